@@ -1,0 +1,1 @@
+"""Twin-based safety and ergonomics evaluation of cobotic workstations."""

@@ -1,0 +1,458 @@
+"""From a `Workstation` to a `Model`: read every file, mount everything, compile one MuJoCo model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from seerob.contacts import add_contacts
+from seerob.distance import Shapes
+from seerob.errors import InputError, Problem, UnknownName
+from seerob.geometry import Solid
+from seerob.human import manikin, posture
+from seerob.model import Body, Frame, Mechanism, Model
+from seerob.model_io.description import Description, Inertial, Joint, Link, Quantity
+from seerob.model_io.loader import load_robot
+from seerob.mounting import Mounting, extreme_points
+from seerob.snapshot import Finding, Origin
+from seerob.things import PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, link_by_hand, load_thing
+from seerob.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
+from seerob.workstation import Human, Mounted, Pose, Robot, Tool, Workstation
+
+PLACEHOLDER_DENSITY = 500.0
+"""Of the box around a moving link that nobody gave a mass [kg/m³]: it lets the twin move, and no
+criterion may use it."""
+
+Progress = Callable[[str], None]
+
+
+def compile_workstation(
+    station: Workstation, *, cache: Path | None = None, progress: Progress = lambda _: None
+) -> Model:
+    """Read every file that the workstation names and compile the twin.
+
+    Args:
+        station: From `seerob.reading.read`.
+        cache: Folder for distance trees and convex pieces that take long to make.
+        progress: Told what is being read.
+
+    Raises:
+        InputError: With every mistake in every file.
+    """
+    return _Compiler(station, cache, progress).run()
+
+
+@dataclass
+class _Chain:
+    """A robot or human on its way to a `Mechanism`."""
+
+    description: Description
+    role: str
+    home: Array
+    home_given: bool
+    tip: Frame | None = None
+
+
+class _Compiler:
+    def __init__(self, station: Workstation, cache: Path | None, progress: Progress) -> None:
+        self.station = station
+        self.cache = cache
+        self.progress = progress
+        self.folder = Path(station.folder)
+        self.mounting = Mounting()
+        self.problems: list[Problem] = []
+        self.chains: dict[str, _Chain] = {}
+        self.carriers: dict[str, str] = {}
+        self.file = next(iter(station.files), "workstation")
+
+    def run(self) -> Model:
+        self._option()
+        for i, robot in enumerate(self.station.robots):
+            self._try(f"robots[{i}]", self._robot, robot)
+        for i, human in enumerate(self.station.humans):
+            self._try(f"humans[{i}]", self._human, human)
+        for i, part in enumerate(self.station.parts):
+            self._try(f"parts[{i}]", self._part, part)
+        if not self.problems:
+            self._mount_all()
+        if self.problems:
+            raise InputError(self.problems)
+        bodies = self._bodies()
+        self._actuators()
+        add_contacts(self.mounting, bodies, self.station.contacts, file=self.file, cache=self.cache)
+        self.progress("compiling")
+        try:
+            mj = self.mounting.spec.compile()
+        except ValueError as error:
+            raise InputError.at(self.file, "", f"MuJoCo refuses the model: {error}") from error
+        return self._model(mj, bodies)
+
+    def _try(self, key: str, build: Callable[[Any], None], table: Any) -> None:
+        try:
+            build(table)
+        except InputError as error:
+            self.problems += [p._replace(key=f"{key} ({p.key})" if p.key else key) for p in error.problems]
+        except UnknownName as error:
+            self.problems.append(Problem(self.file, key, str(error)))
+
+    def _option(self) -> None:
+        option, engine = self.mounting.spec.option, self.station.engine
+        option.timestep = engine.timestep
+        option.gravity = engine.gravity
+        # Damping of the controllers is integrated implicitly: stiff gains stay stable.
+        option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+
+    # -- robots and humans ------------------------------------------------------------------
+
+    def _robot(self, robot: Robot) -> None:
+        self.progress(f"reading {robot.name} ({robot.model})")
+        description = load_robot(
+            robot.model, folder=self.folder, packages=robot.packages, meshes=robot.meshes, name=robot.name
+        )
+        description = self._by_hand(description, robot)
+        n = len(description.joints())
+        home = np.zeros(n)
+        if robot.q is not None:
+            if len(robot.q) != n:
+                raise InputError.at(
+                    self.file, "q", f"{len(robot.q)} values", f"{robot.name} has {n} joints: give {n}"
+                )
+            home = np.array(robot.q, float)
+        self._chain(robot.name, description, "robot", _matrix(robot.base), home, robot.q is not None)
+        if robot.tool is not None:
+            self.chains[robot.name].tip = self._tip_frame(robot)
+
+    def _tip_frame(self, robot: Robot) -> Frame | None:
+        assert robot.tool is not None
+        if any(tool.name == robot.tool for tool in self.station.tools):
+            return None  # set when the tool is mounted
+        name = robot.tool if "/" in robot.tool else f"{robot.name}/{robot.tool}"
+        if not self.mounting.has(name):
+            links = [f"{robot.name}/{link.name}" for link in self.chains[robot.name].description.links]
+            raise UnknownName("link or tool", robot.tool, links + [t.name for t in self.station.tools])
+        return Frame(name, -1, np.eye(4))
+
+    def _by_hand(self, description: Description, robot: Robot) -> Description:
+        """The description with what the workstation file says instead."""
+        names = [joint.name for joint in description.joints()]
+        changes: dict[str, dict[str, Any]] = {name: {} for name in names}
+        for key, values in (
+            ("armature", robot.rotor_inertia),
+            ("effort", robot.torque_limits),
+            ("velocity", robot.velocity_limits),
+        ):
+            if values is None:
+                continue
+            if len(values) != len(names) or min(values) < 0:
+                raise InputError.at(
+                    self.file,
+                    {"armature": "rotor_inertia", "effort": "torque_limits", "velocity": "velocity_limits"}[
+                        key
+                    ],
+                    f"{list(values)} does not fit",
+                    f"give one value of 0 or more for each of {', '.join(names)}",
+                )
+            for name, value in zip(names, values, strict=True):
+                changes[name][key] = Quantity(float(value), Origin.GIVEN, "workstation file")
+        known = {link.name for link in description.links}
+        for name in robot.masses:
+            if name not in known:
+                raise UnknownName(f"link of {robot.name}", name, known)
+        links = []
+        for link in description.links:
+            joints = tuple(replace(j, **changes[j.name]) if changes.get(j.name) else j for j in link.joints)
+            inertial = link.inertial
+            if link.name in robot.masses:
+                inertial = link_by_hand(robot.masses[link.name], link.solids, f"{robot.name}/{link.name}")
+            links.append(replace(link, joints=joints, inertial=inertial))
+        return replace(description, links=tuple(links))
+
+    def _human(self, human: Human) -> None:
+        self.progress(f"making {human.name}")
+        description = manikin.build(
+            name=human.name,
+            stature=human.stature,
+            mass=human.mass,
+            sex=human.sex,
+            lengths=human.lengths,
+            hand=human.hand,
+        )
+        wanted = {**posture.named(human.posture), **human.joints}
+        home = posture.posture(description, wanted, file=f"{human.name}.joints")
+        self._chain(human.name, description, "human", _matrix(human.at), home, True)
+
+    def _chain(
+        self, name: str, description: Description, role: str, world_from_base: Array, home: Array, given: bool
+    ) -> None:
+        self.chains[name] = _Chain(description, role, home, given)
+        self.mounting.findings += description.findings
+        self.mounting.files.update({f"{name}/{file}": data for file, data in description.files.items()})
+        for link in description.links:
+            self._link(name, role, link, world_from_base)
+
+    def _link(self, owner: str, role: str, link: Link, world_from_base: Array) -> None:
+        full = f"{owner}/{link.name}"
+        parent = None if link.parent is None else f"{owner}/{link.parent}"
+        pose = link.parent_from_link if parent is not None else world_from_base @ link.parent_from_link
+        body = self.mounting.body(full, parent, pose)
+        self.carriers[full] = owner
+        for joint in link.joints:
+            self.mounting.joint(body, f"{owner}/{joint.name}", joint)
+        mass = None
+        if link.inertial is not None:
+            self.mounting.inertial(body, link.inertial)
+            mass = Quantity(link.inertial.mass, link.inertial.origin, link.inertial.source)
+        elif link.joints and link.solids:
+            self.mounting.inertial(body, _placeholder(link.solids))
+        elif link.joints:
+            self.mounting.massless(body)
+        if link.solids or link.visual:
+            self.mounting.shape(
+                full, role=role, owner=owner, carrier=owner, solids=link.solids, visual=link.visual, mass=mass
+            )
+
+    # -- things -----------------------------------------------------------------------------
+
+    def _part(self, part: Any) -> None:
+        self._thing(part, "part", None, _matrix(part.at), PART_COLOR)
+
+    def _mount_all(self) -> None:
+        """Mount tools and workpieces; what they are mounted on may come later in the file."""
+        waiting: list[tuple[str, str, Mounted]] = [
+            *((f"tools[{i}]", "tool", t) for i, t in enumerate(self.station.tools)),
+            *((f"workpieces[{i}]", "workpiece", w) for i, w in enumerate(self.station.workpieces)),
+        ]
+        while waiting:
+            ready = [entry for entry in waiting if self.mounting.has(entry[2].on)]
+            if not ready:
+                for key, _, thing in waiting:
+                    known = list(self.carriers)
+                    self.problems.append(
+                        Problem(self.file, f"{key}.on", str(UnknownName("link or tool", thing.on, known)))
+                    )
+                return
+            for entry in ready:
+                waiting.remove(entry)
+                self._try(entry[0], lambda table, role=entry[1]: self._mount(role, table), entry[2])  # type: ignore[misc]
+
+    def _mount(self, role: str, thing: Mounted) -> None:
+        color = TOOL_COLOR if role == "tool" else WORKPIECE_COLOR
+        self._thing(thing, role, thing.on, _matrix(thing.at), color)
+        carrier = self.carriers[thing.on]
+        if isinstance(thing, Tool):
+            chain = self.chains[carrier]
+            robot = next(r for r in self.station.robots if r.name == carrier)
+            if thing.tcp is not None and robot.tool in (None, thing.name):
+                chain.tip = Frame(thing.name, -1, _matrix(thing.tcp))
+
+    def _thing(
+        self,
+        thing: Any,
+        role: str,
+        parent: str | None,
+        parent_from_thing: Array,
+        color: tuple[float, float, float, float],
+    ) -> None:
+        self.progress(f"reading {thing.name}")
+        loaded = load_thing(thing, self.folder, color, needs_mass=parent is not None)
+        self.mounting.findings += loaded.findings
+        self.mounting.files.update(loaded.files)
+        carrier = "" if parent is None else self.carriers[parent]
+        body = self.mounting.body(thing.name, parent, parent_from_thing)
+        if carrier:
+            self.carriers[thing.name] = carrier
+        mass = None
+        if loaded.inertial is not None:
+            self.mounting.inertial(body, loaded.inertial)
+            mass = Quantity(loaded.inertial.mass, loaded.inertial.origin, loaded.inertial.source)
+        for piece in loaded.pieces:
+            name = f"{thing.name}/{piece.name}" if piece.name else thing.name
+            if piece.name:
+                self.mounting.body(name, thing.name, np.eye(4))
+                if carrier:
+                    self.carriers[name] = carrier
+            self.mounting.shape(
+                name,
+                role=role,
+                owner=thing.name,
+                carrier=carrier,
+                solids=piece.solids,
+                visual=piece.visual,
+                mass=mass if piece is loaded.pieces[0] else None,
+            )
+
+    # -- the model --------------------------------------------------------------------------
+
+    def _actuators(self) -> None:
+        """One per degree of freedom, in the same order; the engine sets gains and limits."""
+        for joint in self.mounting.spec.joints:
+            self.mounting.spec.add_actuator(
+                name=joint.name,
+                target=joint.name,
+                trntype=mujoco.mjtTrn.mjTRN_JOINT,
+                gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+                biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            )
+
+    def _bodies(self) -> tuple[Body, ...]:
+        """The bodies, with `mujoco` indices still to come: contacts are added by name first."""
+        bodies = []
+        for index, entry in enumerate(self.mounting.entries):
+            corners, radius = extreme_points(entry.solids)
+            notes = list(dict.fromkeys(solid.note for solid in entry.solids if solid.note))
+            bodies.append(
+                Body(
+                    index=index,
+                    name=entry.name,
+                    role=entry.role,
+                    owner=entry.owner,
+                    carrier=entry.carrier,
+                    mj=-1,
+                    solids=entry.solids,
+                    corners=corners,
+                    radius=radius,
+                    mass=entry.mass,
+                    mesh=entry.mesh,
+                    triangles=entry.triangles,
+                    note="; ".join(notes),
+                )
+            )
+        return tuple(bodies)
+
+    def _model(self, mj: Any, bodies: Sequence[Body]) -> Model:
+        numbered = tuple(replace(body, mj=_body_id(mj, body.name)) for body in bodies)
+        frames = {
+            name: Frame(name, _body_id(mj, name), np.eye(4))
+            for name in (*self.carriers, *(part.name for part in self.station.parts))
+        }
+        self.progress("building distance trees")
+        shapes = Shapes.build([(body.name, body.solids) for body in numbered], cache=self.cache)
+        mechanisms = {name: self._mechanism(mj, name, numbered) for name in self.chains}
+        return Model(
+            workstation=self.station,
+            mj=mj,
+            bodies=numbered,
+            frames=frames,
+            mechanisms=mechanisms,
+            shapes=shapes,
+            meshes=self.mounting.meshes,
+            findings=tuple(self.mounting.findings + self._unknowns(mechanisms)),
+            files={**self.station.files, **self.mounting.files},
+        )
+
+    def _mechanism(self, mj: Any, name: str, bodies: tuple[Body, ...]) -> Mechanism:
+        chain = self.chains[name]
+        every = [joint for link in chain.description.links for joint in link.joints]
+        commanded = [joint for joint in every if joint.mimic is None]
+        coupling, offset = _coupling(every, commanded)
+        ids = [mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_JOINT, f"{name}/{joint.name}") for joint in every]
+        own = {full for full, carrier in self.carriers.items() if carrier == name}
+        mj_bodies = np.array(
+            sorted(i for i in (_body_id(mj, full) for full in own) if mj.body_weldid[i] != 0), np.int64
+        )
+        moving_ids = set(mj_bodies.tolist())
+        tip = chain.tip if chain.tip is not None else Frame(f"{name}/{chain.description.tip}", -1, np.eye(4))
+        tip = replace(tip, mj=_body_id(mj, tip.name))
+        return Mechanism(
+            name=name,
+            role=chain.role,
+            description=chain.description,
+            joints=tuple(commanded),
+            q_address=np.array([mj.jnt_qposadr[i] for i in ids], np.int64),
+            v_address=np.array([mj.jnt_dofadr[i] for i in ids], np.int64),
+            coupling=coupling,
+            offset=offset,
+            home=chain.home,
+            home_given=chain.home_given,
+            tip=tip,
+            bodies=tuple(b.index for b in bodies if b.owner == name),
+            carried=tuple(b.index for b in bodies if b.carrier == name and b.owner != name),
+            moving=tuple(b.index for b in bodies if b.carrier == name and b.mj in moving_ids),
+            mj_bodies=mj_bodies,
+            unknown_masses=self._unknown_masses(name),
+            velocity_limits=tuple(joint.velocity for joint in commanded),
+            effort_limits=tuple(joint.effort for joint in commanded),
+            rotor_inertia_known=all(joint.armature is not None for joint in commanded),
+        )
+
+    def _unknown_masses(self, name: str) -> tuple[str, ...]:
+        unknown = [
+            f"nobody gave the mass of {name}/{link.name}"
+            for link in self.chains[name].description.links
+            if link.joints and link.solids and link.inertial is None
+        ]
+        by_name: dict[str, list[Quantity | None]] = {}
+        for entry in self.mounting.entries:
+            if entry.carrier == name and entry.owner != name:
+                by_name.setdefault(entry.owner, []).append(entry.mass)
+        unknown += [
+            f"nobody gave the mass or the density of {owner}"
+            for owner, masses in by_name.items()
+            if all(mass is None for mass in masses)
+        ]
+        return tuple(unknown)
+
+    def _unknowns(self, mechanisms: dict[str, Mechanism]) -> list[Finding]:
+        findings = []
+        for mechanism in mechanisms.values():
+            if mechanism.role != "robot":
+                continue
+            findings += [
+                Finding(
+                    level="assumed",
+                    subject=mechanism.name,
+                    text=f"{text}: energies and effective masses are UNDECIDED; a placeholder moves the twin",
+                )
+                for text in mechanism.unknown_masses
+            ]
+            if not mechanism.rotor_inertia_known:
+                findings.append(
+                    Finding(
+                        level="assumed",
+                        subject=mechanism.name,
+                        text="rotor inertia not given for every joint: mass matrix and effective mass are "
+                        "link-side only (give rotor_inertia)",
+                    )
+                )
+        return findings
+
+
+def _matrix(pose: Pose) -> Array:
+    """Homogeneous matrix (4, 4) of a pose in the file."""
+    if pose.wxyz is not None:
+        return transform(rotation_from_wxyz(pose.wxyz), pose.position)
+    return transform(rotation_from_rpy(pose.rpy if pose.rpy is not None else (0.0, 0.0, 0.0)), pose.position)
+
+
+def _body_id(mj: Any, name: str) -> int:
+    return int(mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name))
+
+
+def _coupling(every: Sequence[Joint], commanded: Sequence[Joint]) -> tuple[Array, Array]:
+    """All joints as an affine function of the commanded ones; mimics of mimics are followed."""
+    column = {joint.name: i for i, joint in enumerate(commanded)}
+    by_name = {joint.name: joint for joint in every}
+    coupling, offset = np.zeros((len(every), len(commanded))), np.zeros(len(every))
+    for row, joint in enumerate(every):
+        factor, shift, at = 1.0, 0.0, joint
+        while at.mimic is not None:
+            shift += factor * at.mimic.offset
+            factor *= at.mimic.multiplier
+            at = by_name[at.mimic.joint]
+        coupling[row, column[at.name]] = factor
+        offset[row] = shift
+    return coupling, offset
+
+
+def _placeholder(solids: Sequence[Solid]) -> Inertial:
+    points, radius = extreme_points(solids)
+    size = np.ptp(points, axis=0) + 2 * radius + 1e-3
+    mass = float(PLACEHOLDER_DENSITY * size.prod())
+    inertia = np.diag([size[1] ** 2 + size[2] ** 2, size[0] ** 2 + size[2] ** 2, size[0] ** 2 + size[1] ** 2])
+    center = (points.min(axis=0) + points.max(axis=0)) / 2
+    return Inertial(mass, center, inertia * mass / 12, Origin.ASSUMED, "placeholder")

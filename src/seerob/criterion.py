@@ -1,0 +1,77 @@
+"""What a criterion or a rule is: options in, a function of `State` out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from msgspec import Struct
+
+from seerob.snapshot import Basis, Result, Verdict
+
+if TYPE_CHECKING:
+    from seerob.model import Model
+    from seerob.state import State
+
+Evaluate = Callable[["State"], Result]
+"""Called at each tick (or each ``every``); may raise `Undecided`."""
+
+
+class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of every safety criterion and ergonomics rule: one file, one class, one ``kind``.
+
+    The fields are the table of the workstation file. The first line of the class's docstring is
+    what `seerob kinds` and the report print.
+    """
+
+    name: str = ""
+    """What results are called; made from the kind and the subject when not given."""
+    every: float | None = None
+    """Period [s]; each tick when not given."""
+
+    def bind(self, model: Model) -> Evaluate:
+        """Resolve every name once and return the function that judges a state.
+
+        Raises:
+            UnknownName: A robot, body or human that the workstation does not have.
+            InputError: An option that cannot be, such as a negative limit.
+        """
+        raise NotImplementedError
+
+    def basis(self, model: Model) -> Basis:
+        """Formula, source and inputs of what `bind` computes."""
+        raise NotImplementedError
+
+    def subjects(self) -> tuple[str, ...]:
+        """Names from the workstation file that this criterion speaks of."""
+        return ()
+
+
+def judge(value: float, limit: float | None, *, at_most: bool = True) -> Verdict | None:
+    """Verdict of a value against a limit; on the limit is WITHIN, no limit is no verdict.
+
+    A value that is not a number is UNDECIDED, whatever the limit.
+    """
+    if math.isnan(value):
+        return Verdict.UNDECIDED
+    if limit is None:
+        return None
+    within = value <= limit if at_most else value >= limit
+    return Verdict.WITHIN if within else Verdict.EXCEEDED
+
+
+def judge_interval(
+    interval: tuple[float, float], limit: float | None, *, at_most: bool = True
+) -> Verdict | None:
+    """Verdict when the true value lies in ``interval``: UNDECIDED when the limit lies inside it."""
+    low, high = (judge(end, limit, at_most=at_most) for end in interval)
+    return low if low == high else Verdict.UNDECIDED
+
+
+def worst(verdicts: list[Verdict | None]) -> Verdict | None:
+    """The verdict of a whole: EXCEEDED before UNDECIDED before WITHIN before none."""
+    for verdict in (Verdict.EXCEEDED, Verdict.UNDECIDED, Verdict.WITHIN):
+        if verdict in verdicts:
+            return verdict
+    return None

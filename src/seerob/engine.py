@@ -1,0 +1,248 @@
+r"""The engine: pulls the twin toward the samples and steps the physics, one `State` per tick.
+
+Each joint is pulled by an actuator with
+
+.. math:: \tau = k_p (q_{ref} - q) + k_d (\dot q_{ref} - \dot q) + \tau_{ff},\quad
+          k_p = \omega^2 \bar M_{ii},\; k_d = 2 \omega \bar M_{ii}
+
+critically damped at the stated bandwidth ω, where :math:`\bar M_{ii}` is the largest diagonal
+element of the mass matrix over a set of poses, tools and payloads included, and
+:math:`\tau_{ff}` are the torques that the reference motion itself needs (recursive Newton–Euler).
+The gains live in MuJoCo's actuators, whose damping `implicitfast` integrates implicitly; the same
+gains as applied forces diverge at a floating root. Torque limits clamp the whole sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from seerob.errors import SimulationDiverged
+from seerob.inverse_kinematics import solve_pose
+from seerob.model import Mechanism, Model
+from seerob.reference import Reference
+from seerob.samples import JointSample, PoseSample, Quality, Sample, SignalSample
+from seerob.state import Hearing, State
+from seerob.transforms import Array, rotation_from_wxyz
+
+POSES_FOR_GAINS = 16
+POSE_TOLERANCE = 1e-4
+"""Largest error of a solved Cartesian target [m or rad] that still counts as reached."""
+
+
+class Engine:
+    """The twin in motion.
+
+    Attributes:
+        state: The twin at the last tick; the same object throughout.
+        signals: Newest values of machines by source.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        *,
+        driven: dict[str, float] | None = None,
+        controllers: bool = True,
+        contacts: bool = True,
+    ) -> None:
+        """Set the twin up at its home position.
+
+        Args:
+            model: The compiled workstation.
+            driven: Time-out [s] of the source of each robot and human that a source drives.
+            controllers: Whether the twin is pulled at all; off, it moves freely.
+            contacts: Whether the contacts that the file asks for act.
+        """
+        driven = driven or {}
+        self.model = model
+        self.controllers = controllers
+        engine = model.workstation.engine
+        self._mj = model.mj.__copy__()
+        self._mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        if not contacts:
+            self._mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+        if not controllers:
+            # Nothing stiff is left, and Runge–Kutta keeps the energy.
+            self._mj.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+        self._steps = round(engine.tick / engine.timestep)
+        self._dt = engine.timestep
+        self._period = engine.tick
+        self._data = mujoco.MjData(self._mj)
+        self._wanted = mujoco.MjData(self._mj)
+        self._mechanisms = list(model.mechanisms.values())
+        self._references = {m.name: Reference(m.home) for m in self._mechanisms}
+        self._hearings = {
+            m.name: Hearing(given=m.home_given, driven=m.name in driven, timeout=driven.get(m.name, np.inf))
+            for m in self._mechanisms
+        }
+        self._dof = self._mj.jnt_dofadr[self._mj.actuator_trnid[:, 0]]
+        """Degree of freedom of each actuator."""
+        self._kp, self._kd = self._gains()
+        self._limits = self._torque_limits()
+        self._feedforward = np.zeros(self._mj.nv)
+        self._unreachable: dict[str, float] = {}
+        self.signals: dict[str, dict[str, float | bool | str]] = {}
+        self.state = State(model, self._data, self._hearings)
+        self._tick = 0
+        self._place(0.0)
+
+    # -- what comes in ----------------------------------------------------------------------
+
+    def take(self, samples: Sequence[Sample]) -> None:
+        """Hear samples: what they say is where the twin is pulled from now on."""
+        for sample in samples:
+            if isinstance(sample, SignalSample):
+                self.signals[sample.source] = sample.values
+                continue
+            name = sample.target.split("/")[0]
+            mechanism = self.model.mechanism(name)
+            quality = sample.quality
+            if isinstance(sample, JointSample):
+                qd = None if sample.qd is None else np.array(sample.qd)
+                self._references[name].take(sample.t, np.array(sample.q), qd)
+            elif not self._take_pose(mechanism, sample):
+                quality = Quality.DEGRADED
+            hearing = self._hearings[name]
+            hearing.sample_t, hearing.quality, hearing.driven = sample.t, quality, True
+
+    def _take_pose(self, mechanism: Mechanism, sample: PoseSample) -> bool:
+        """Resolve a Cartesian target into joint positions; False when it cannot be reached."""
+        frame = self.model.frame(sample.target)
+        reference = self._references[mechanism.name]
+        q, error = solve_pose(
+            self._mj,
+            self._wanted,
+            mechanism,
+            frame,
+            rotation_from_wxyz(sample.wxyz),
+            np.array(sample.position),
+            start=reference.newest,
+        )
+        reference.take(sample.t, q, None)
+        return error <= POSE_TOLERANCE
+
+    # -- time -------------------------------------------------------------------------------
+
+    def start(self) -> State:
+        """The twin at t = 0, placed on the first samples without being pulled there."""
+        self._place(0.0)
+        return self.state
+
+    def tick(self) -> State:
+        """Advance by one tick and return the twin then.
+
+        Raises:
+            SimulationDiverged: A position that is not finite.
+        """
+        start = self._tick * self._period
+        for step in range(self._steps):
+            if self.controllers:
+                self._pull(start + step * self._dt)
+            mujoco.mj_step(self._mj, self._data)
+        self._tick += 1
+        self._check_finite()
+        t = self._tick * self._period
+        self.state.refresh(t)
+        self._note_errors(t)
+        return self.state
+
+    def _pull(self, t: float) -> None:
+        wanted = self._wanted
+        for mechanism in self._mechanisms:
+            q, v, a = self._references[mechanism.name].at(t)
+            wanted.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
+            wanted.qvel[mechanism.v_address] = mechanism.coupling @ v
+            wanted.qacc[mechanism.v_address] = mechanism.coupling @ a
+        mujoco.mj_kinematics(self._mj, wanted)
+        mujoco.mj_comPos(self._mj, wanted)
+        mujoco.mj_comVel(self._mj, wanted)
+        mujoco.mj_passive(self._mj, wanted)
+        mujoco.mj_rne(self._mj, wanted, 1, self._feedforward)
+        # mj_rne knows neither rotor inertia nor passive forces.
+        torque = self._feedforward + self._mj.dof_armature * wanted.qacc - wanted.qfrc_passive
+        # mj_step integrates positions with the velocity at the end of the step, so its velocities
+        # belong half a step earlier than its positions.
+        velocity = wanted.qvel - 0.5 * self._dt * wanted.qacc
+        self._data.ctrl[:] = (wanted.qpos + (self._kd * velocity + torque) / self._kp)[self._dof]
+
+    def _place(self, t: float) -> None:
+        for mechanism in self._mechanisms:
+            q, v, _ = self._references[mechanism.name].at(t)
+            self._data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
+            self._data.qvel[mechanism.v_address] = mechanism.coupling @ v
+        mujoco.mj_forward(self._mj, self._data)
+        self.state.refresh(t)
+
+    def _note_errors(self, t: float) -> None:
+        force = np.zeros(self._mj.nv)
+        force[self._dof] = np.abs(self._data.actuator_force)
+        for mechanism in self._mechanisms:
+            q, _, _ = self._references[mechanism.name].at(t)
+            wanted = mechanism.coupling @ q + mechanism.offset
+            hearing = self._hearings[mechanism.name]
+            hearing.error = float(np.abs(self._data.qpos[mechanism.q_address] - wanted).max(initial=0.0))
+            own = mechanism.v_address
+            hearing.saturated = bool((force[own] >= 0.999 * self._limits[own]).any())
+
+    def _check_finite(self) -> None:
+        if np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qvel).all():
+            return
+        for mechanism in self._mechanisms:
+            bad = ~np.isfinite(self._data.qpos[mechanism.q_address])
+            if bad.any():
+                names = [j.name for link in mechanism.description.links for j in link.joints]
+                joint = names[int(bad.argmax())]
+                raise SimulationDiverged(
+                    f"{mechanism.name}/{joint} is not finite after {self._tick * self._period:.3f} s; "
+                    "lower engine.bandwidth or check masses and samples"
+                )
+        raise SimulationDiverged(f"a velocity is not finite after {self._tick * self._period:.3f} s")
+
+    # -- set-up -----------------------------------------------------------------------------
+
+    def _gains(self) -> tuple[Array, Array]:
+        """Proportional and derivative gain per degree of freedom; also written into the actuators."""
+        largest = np.zeros(self._mj.nv)
+        matrix = np.zeros((self._mj.nv, self._mj.nv))
+        random = np.random.default_rng(0)
+        data = self._wanted
+        for pose in range(POSES_FOR_GAINS):
+            for m in self._mechanisms:
+                low, high = np.maximum(m.lower, -np.pi), np.minimum(m.upper, np.pi)
+                q = m.home if pose == 0 or m.role == "human" else random.uniform(low, high)
+                data.qpos[m.q_address] = m.coupling @ q + m.offset
+            mujoco.mj_kinematics(self._mj, data)
+            mujoco.mj_comPos(self._mj, data)
+            mujoco.mj_makeM(self._mj, data)
+            mujoco.mj_fullM(self._mj, data, matrix)
+            largest = np.maximum(largest, np.diag(matrix))
+        engine = self.model.workstation.engine
+        omega = np.full(self._mj.nv, 2 * np.pi * engine.bandwidth)
+        for m in self._mechanisms:
+            if m.role == "human":
+                omega[m.v_address] = 2 * np.pi * engine.human_bandwidth
+        kp, kd = omega**2 * largest, 2 * omega * largest
+        if self.controllers:
+            self._mj.actuator_gainprm[:, 0] = kp[self._dof]
+            self._mj.actuator_biasprm[:, 1] = -kp[self._dof]
+            self._mj.actuator_biasprm[:, 2] = -kd[self._dof]
+        else:
+            self._mj.actuator_gainprm[:] = 0.0
+            self._mj.actuator_biasprm[:] = 0.0
+        return kp, kd
+
+    def _torque_limits(self) -> Array:
+        limits = np.full(self._mj.nv, np.inf)
+        for m in self._mechanisms:
+            for column, limit in enumerate(m.effort_limits):
+                if limit is not None and limit.value > 0:
+                    own = m.v_address[m.coupling[:, column] != 0]
+                    limits[own] = limit.value
+        ranges = limits[self._dof]
+        limited = np.isfinite(ranges)
+        self._mj.actuator_forcelimited[:] = limited
+        self._mj.actuator_forcerange[limited] = np.column_stack([-ranges[limited], ranges[limited]])
+        return limits

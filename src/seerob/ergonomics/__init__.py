@@ -1,0 +1,1 @@
+"""Ergonomics rules, one file each; the file name is the ``kind``."""

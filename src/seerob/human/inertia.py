@@ -1,0 +1,125 @@
+r"""Mass properties of every bone from the tables of de Leva 1996.
+
+A table's segment that is one bone here keeps mass, centre and radii of gyration, scaled by the length.
+Where a segment is several bones (trunk top = thorax and two clavicles, head = head and neck, foot = foot
+and toes), the small piece is a uniform body of the bone's length and the large one is what remains, so that
+the bones together have exactly the segment's mass, centre and inertia. Pieces scale with the lengths, as the
+table does: what remains is a possible body for every stature and mass.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from seerob.human.anthropometry import Body, table
+from seerob.human.skeleton import BONES, SIDES, without_side
+from seerob.model_io.description import Inertial
+from seerob.snapshot import Origin
+from seerob.transforms import Array
+
+SOURCE = "de Leva 1996, Table 4 (percent of body mass, radii of gyration), scaled to this person"
+SPLIT = "split of a de Leva 1996 segment (shares and shape are a choice): uniform body of the bone's length"
+REMAINDER = "de Leva 1996 segment less its split pieces, scaled to this person"
+CLAVICLE_RADIUS = 0.2
+"""Of the cylinder that stands for clavicle and flesh, as a share of its length: a choice."""
+
+
+def _shifted(inertia: Array, mass: float, by: Array) -> Array:
+    """Inertia about a point ``by`` [m] away from the centre of mass (Steiner)."""
+    return np.asarray(inertia + mass * (by @ by * np.eye(3) - np.outer(by, by)))
+
+
+def remainder(whole: Inertial, pieces: list[tuple[float, Array, Array]]) -> Inertial:
+    """What is left of a body when pieces (mass [kg], centre [m], inertia [kg·m²]) are taken out of it."""
+    mass = whole.mass - math.fsum(m for m, _, _ in pieces)
+    com = (whole.mass * whole.com - sum((m * c for m, c, _ in pieces), np.zeros(3))) / mass
+    about_whole = whole.inertia - sum((_shifted(i, m, c - whole.com) for m, c, i in pieces), np.zeros((3, 3)))
+    inertia = _shifted(about_whole, -mass, com - whole.com)
+    return Inertial(mass, com, inertia, Origin.ESTIMATED, REMAINDER)
+
+
+def inertials(body: Body) -> dict[str, Inertial]:
+    """Mass properties of every bone in its own frame."""
+    result = {bone: (_piece if without_side(bone) in _PIECES else _segment)(body, bone) for bone in BONES}
+    groups = {"head": ("neck",), "thorax": tuple(f"{s}_clavicle" for s in SIDES)}
+    groups |= {f"{s}_foot": (f"{s}_toes",) for s in SIDES}
+    for bone, pieces in groups.items():
+        taken = []
+        for piece in pieces:
+            shift = -body.offset["head"] if piece == "neck" else body.offset[piece]
+            taken.append((result[piece].mass, result[piece].com + shift, result[piece].inertia))
+        result[bone] = remainder(result[bone], taken)
+    return result
+
+
+_PIECES = ("neck", "clavicle", "toes")
+
+
+def _piece(body: Body, bone: str) -> Inertial:
+    """A piece of a segment as a uniform body: toes a box, neck and clavicle bodies of revolution."""
+    length, mass = body.length, body.bone_mass(bone)
+    if without_side(bone) == "toes":
+        forward, side = length["foot"] - length["heel"] - length["toe_joint"], length["foot_breadth"]
+        com = np.array([forward / 2, -length["toe_joint_height"] / 2, 0.0])
+        square = np.array([forward**2, length["toe_joint_height"] ** 2, side**2]) / 12
+        return Inertial(mass, com, mass * np.diag(square.sum() - square), Origin.ESTIMATED, SPLIT)
+    if bone == "neck":
+        along = body.offset["head"]
+        row = table("de_leva")[body.sex]["alternatives"]["head_2"]
+        turning = row["radii"][2] / 100 * (length["neck"] + length["head"])  # as wide as the head
+    else:
+        along = body.offset[bone.replace("clavicle", "upper_arm")]
+        turning = float(np.linalg.norm(along)) * CLAVICLE_RADIUS / math.sqrt(2)
+    size = float(np.linalg.norm(along))
+    axis = np.outer(along, along) / size**2
+    inertia = mass * (turning**2 * axis + (turning**2 / 2 + size**2 / 12) * (np.eye(3) - axis))
+    return Inertial(mass, along / 2, inertia, Origin.ESTIMATED, SPLIT)
+
+
+def _segment(body: Body, bone: str) -> Inertial:
+    """A whole segment of the table, in the frame of the bone that it is reported at."""
+    people = table("de_leva")[body.sex]
+    rows = people["segments"] | people["alternatives"]
+    plain, length = without_side(bone), body.length
+    mass = body.bone_mass(bone)
+    if plain in ("pelvis", "lumbar", "thorax"):
+        lower, middle, upper = rows["lower_trunk"], rows["middle_trunk"], rows["upper_trunk_2"]
+        scale = length["trunk"] / (lower["length"] + middle["length"] + upper["length"])
+        up_to_xiphion = lower["length"] + middle["length"]
+        row, height, start = {
+            "pelvis": (lower, lower["length"], 0.0),
+            "lumbar": (middle, up_to_xiphion, length["pelvis"]),
+            "thorax": (upper, up_to_xiphion + upper["length"], length["pelvis"] + length["lumbar"]),
+        }[plain]
+        height -= row["com"] / 100 * row["length"]
+        if plain == "thorax":
+            mass += sum(body.bone_mass(f"{s}_clavicle") for s in SIDES)
+        return _inertial(mass, np.array([0, height * scale - start, 0]), row["radii"], row["length"] * scale)
+    if plain == "head":
+        row, both = rows["head_2"], length["neck"] + length["head"]
+        com = length["head"] - row["com"] / 100 * both
+        return _inertial(mass + body.bone_mass("neck"), np.array([0, com, 0]), row["radii"], both)
+    if plain == "foot":
+        row = rows["foot"]
+        com_foot = [
+            row["com"] / 100 * length["foot"] - length["heel"],
+            length["foot_com_height"] - length["ankle_height"],
+            0,
+        ]
+        sagittal, transverse, longitudinal = row["radii"]
+        # The foot's long axis points forward.
+        radii = [longitudinal, transverse, sagittal]
+        mass += body.bone_mass(bone.replace("foot", "toes"))
+        return _inertial(mass, np.array(com_foot), radii, length["foot"])
+    row = rows["hand_2"] if plain == "hand" else rows[plain]
+    return _inertial(mass, np.array([0, -row["com"] / 100 * length[plain], 0]), row["radii"], length[plain])
+
+
+def _inertial(mass: float, com: Array, radii: list[float], length: float) -> Inertial:
+    """Radii of gyration [%] about the sagittal (X), transverse (Z) and longitudinal (Y) axis."""
+    sagittal, transverse, longitudinal = (mass * (r / 100 * length) ** 2 for r in radii)
+    return Inertial(
+        mass, com.astype(float), np.diag([sagittal, longitudinal, transverse]), Origin.ESTIMATED, SOURCE
+    )

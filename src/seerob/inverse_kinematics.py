@@ -1,0 +1,86 @@
+r"""Cartesian targets into joint positions, by damped least squares from where the robot is.
+
+.. math:: \Delta q = J^T (J J^T + \lambda^2 I)^{-1} e
+
+A robot with more or other solutions keeps the branch it is on; redundancy is resolved by staying
+near the start. Real controllers may choose otherwise, so a pose-driven twin is less certain.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from seerob.model import Frame, Mechanism
+from seerob.transforms import Array
+
+ITERATIONS = 40
+DAMPING = 1e-3
+LARGEST_STEP = 0.3
+"""Of one iteration and joint [rad or m]."""
+
+
+def solve_pose(
+    mj: Any,
+    data: Any,
+    mechanism: Mechanism,
+    frame: Frame,
+    rotation: Array,
+    position: Array,
+    *,
+    start: Array,
+) -> tuple[Array, float]:
+    """Joint positions that bring a frame to a pose.
+
+    Args:
+        mj: The `mujoco.MjModel`.
+        data: Scratch `mujoco.MjData`.
+        mechanism: The robot; only its joints move.
+        frame: The frame to place.
+        rotation: World from frame, shape (3, 3).
+        position: In the world [m], shape (3,).
+        start: Joint positions to start from, shape (n,) [rad or m].
+
+    Returns:
+        Joint positions, shape (n,), within their limits, and the larger of the errors in position
+        [m] and orientation [rad] that is left.
+    """
+    q = start.astype(float).copy()
+    jacobian_p, jacobian_r = np.zeros((3, mj.nv)), np.zeros((3, mj.nv))
+    error = np.inf
+    for _ in range(ITERATIONS):
+        data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
+        mujoco.mj_kinematics(mj, data)
+        mujoco.mj_comPos(mj, data)
+        body = data.xmat[frame.mj].reshape(3, 3)
+        at = data.xpos[frame.mj] + body @ frame.body_from_frame[:3, 3]
+        twist = np.concatenate(
+            [position - at, _rotation_vector(rotation @ (body @ frame.body_from_frame[:3, :3]).T)]
+        )
+        error = float(max(np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])))
+        if error < 1e-10:
+            break
+        mujoco.mj_jac(mj, data, jacobian_p, jacobian_r, at, frame.mj)
+        J = np.vstack([jacobian_p, jacobian_r])[:, mechanism.v_address] @ mechanism.coupling
+        # The damping fades with the error, so that convergence is quadratic in the end.
+        damping = min(DAMPING, error**2)
+        step = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), twist)
+        step *= min(1.0, LARGEST_STEP / max(np.abs(step).max(), 1e-12))
+        q = np.clip(q + step, mechanism.lower, mechanism.upper)
+    return q, error
+
+
+def _rotation_vector(rotation: Array) -> Array:
+    """Axis times angle [rad] of a rotation matrix."""
+    sine = 0.5 * np.array(
+        [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
+    )
+    s, c = float(np.linalg.norm(sine)), 0.5 * (float(rotation.trace()) - 1)
+    if s > 1e-9:
+        return np.asarray(sine * (np.arctan2(s, c) / s))
+    if c > 0:
+        return sine
+    axis = np.sqrt(np.maximum((np.diag(rotation) + 1) / 2, 0))
+    return np.asarray(np.pi * axis / max(np.linalg.norm(axis), 1e-12))

@@ -1,0 +1,340 @@
+r"""Squared distances between segments and triangles, with closest points.
+
+Two planar convex shapes are nearest at a pair of points of which at least one lies on the edge of
+its shape (two interior points mean parallel planes, along which the pair slides to an edge).
+So the distance of a segment to a triangle is the least of: its ends to the face, its crossing with
+the face, itself to the three edges; and of two triangles: corners to faces, edges crossing faces,
+edges to edges.
+
+Every candidate is a *feasible* pair of points, so that rounding in a thin triangle can only
+lengthen a candidate, never invent a nearer one; edges are always candidates.
+A value is a function of its two primitives alone: ``cut`` only lets a result above it be replaced
+by infinity. Squared distances below `TOUCH` are returned as 0.
+
+A triangle is a row of 13: corner, edge to the second corner, edge to the third, their cross
+product, and how far its plane can be trusted (`FLAT`, `THIN`, `LINE`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from seerob.transforms import Array
+
+Links = NDArray[np.int32]
+Indices = NDArray[np.int64]
+
+TOUCH = 1e-24
+"""Squared distance below which two primitives touch [m²]."""
+FLAT = 2.0
+"""The normal is accurate: the plane may be used to reject."""
+THIN = 1.0
+"""A sliver: its face is tried, its plane rejects nothing."""
+LINE = 0.0
+"""No face to speak of: its edges are all there is."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def point_segment(
+    px: float,
+    py: float,
+    pz: float,
+    ax: float,
+    ay: float,
+    az: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    dd: float,
+) -> tuple[float, float]:
+    """Squared distance of ``p`` to ``a + t·d``, t in 0…1, and t; ``dd`` is d·d."""
+    rx = px - ax
+    ry = py - ay
+    rz = pz - az
+    t = (rx * dx + ry * dy + rz * dz) / dd if dd > 0.0 else 0.0
+    t = min(max(t, 0.0), 1.0)
+    rx -= t * dx
+    ry -= t * dy
+    rz -= t * dz
+    return rx * rx + ry * ry + rz * rz, t
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def segment_segment(
+    ax: float,
+    ay: float,
+    az: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    bx: float,
+    by: float,
+    bz: float,
+    ex: float,
+    ey: float,
+    ez: float,
+) -> tuple[float, float, float]:
+    """Squared distance of ``a + s·d`` to ``b + t·e``, and s, t; either may be a point.
+
+    Nearly parallel segments are settled by their four ends besides the interior solution, which
+    cancellation makes unreliable there.
+    """
+    rx = ax - bx
+    ry = ay - by
+    rz = az - bz
+    dd = dx * dx + dy * dy + dz * dz
+    ee = ex * ex + ey * ey + ez * ez
+    if dd < 1e-30:
+        d2, t = point_segment(ax, ay, az, bx, by, bz, ex, ey, ez, ee)
+        return d2, 0.0, t
+    if ee < 1e-30:
+        d2, s = point_segment(bx, by, bz, ax, ay, az, dx, dy, dz, dd)
+        return d2, s, 0.0
+    f = ex * rx + ey * ry + ez * rz
+    c = dx * rx + dy * ry + dz * rz
+    b = dx * ex + dy * ey + dz * ez
+    den = dd * ee - b * b
+    s = min(max((b * f - c * ee) / den, 0.0), 1.0) if den > 0.0 else 0.0
+    t = (b * s + f) / ee
+    if t < 0.0:
+        t = 0.0
+        s = min(max(-c / dd, 0.0), 1.0)
+    elif t > 1.0:
+        t = 1.0
+        s = min(max((b - c) / dd, 0.0), 1.0)
+    x = rx + s * dx - t * ex
+    y = ry + s * dy - t * ey
+    z = rz + s * dz - t * ez
+    d2 = x * x + y * y + z * z
+    if den < 1e-8 * dd * ee:
+        for end in range(2):
+            g, w = point_segment(ax + end * dx, ay + end * dy, az + end * dz, bx, by, bz, ex, ey, ez, ee)
+            if g < d2:
+                d2, s, t = g, float(end), w
+            g, w = point_segment(bx + end * ex, by + end * ey, bz + end * ez, ax, ay, az, dx, dy, dz, dd)
+            if g < d2:
+                d2, s, t = g, w, float(end)
+    return d2, s, t
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def over_face(
+    rx: float,
+    ry: float,
+    rz: float,
+    e0x: float,
+    e0y: float,
+    e0z: float,
+    e1x: float,
+    e1y: float,
+    e1z: float,
+    nx: float,
+    ny: float,
+    nz: float,
+    nn: float,
+) -> tuple[float, float]:
+    """Barycentric u, v of the foot of ``r`` (from the first corner) in the plane; u < 0 when not inside."""
+    u = ((ry * e1z - rz * e1y) * nx + (rz * e1x - rx * e1z) * ny + (rx * e1y - ry * e1x) * nz) / nn
+    v = ((e0y * rz - e0z * ry) * nx + (e0z * rx - e0x * rz) * ny + (e0x * ry - e0y * rx) * nz) / nn
+    if u >= 0.0 and v >= 0.0 and u + v <= 1.0:
+        return u, v
+    return -1.0, 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def segment_triangle(
+    ax: float, ay: float, az: float, dx: float, dy: float, dz: float, T: Array, k: int, cut: float
+) -> tuple[float, float, float, float, float]:
+    """Squared distance of ``a + s·d`` to triangle ``T[k]``, s, and the point of the triangle.
+
+    Infinity when it is found to exceed ``cut``.
+    """
+    vx = T[k, 0]
+    vy = T[k, 1]
+    vz = T[k, 2]
+    e0x = T[k, 3]
+    e0y = T[k, 4]
+    e0z = T[k, 5]
+    e1x = T[k, 6]
+    e1y = T[k, 7]
+    e1z = T[k, 8]
+    best = np.inf
+    bs = px = py = pz = 0.0
+    if T[k, 12] > LINE:
+        nx = T[k, 9]
+        ny = T[k, 10]
+        nz = T[k, 11]
+        nn = nx * nx + ny * ny + nz * nz
+        rx = ax - vx
+        ry = ay - vy
+        rz = az - vz
+        h0 = rx * nx + ry * ny + rz * nz
+        h1 = h0 + dx * nx + dy * ny + dz * nz
+        crossing = h0 * h1 < 0.0
+        reject = T[k, 12] == FLAT
+        if reject and not crossing:
+            low = min(abs(h0), abs(h1))
+            if low * low > cut * nn:
+                return best, bs, px, py, pz
+        for c in range(3):
+            if c == 0:
+                s = 0.0
+                h = h0
+            elif c == 1:
+                s = 1.0
+                h = h1
+            elif crossing:
+                s = h0 / (h0 - h1)
+                h = 0.0
+            else:
+                break
+            if reject and h * h > cut * nn:
+                continue
+            qx = rx + s * dx
+            qy = ry + s * dy
+            qz = rz + s * dz
+            u, v = over_face(qx, qy, qz, e0x, e0y, e0z, e1x, e1y, e1z, nx, ny, nz, nn)
+            if u >= 0.0:
+                fx = u * e0x + v * e1x
+                fy = u * e0y + v * e1y
+                fz = u * e0z + v * e1z
+                g = (qx - fx) ** 2 + (qy - fy) ** 2 + (qz - fz) ** 2
+                if g < best:
+                    best = g
+                    bs = s
+                    px = vx + fx
+                    py = vy + fy
+                    pz = vz + fz
+    for c in range(3):
+        if c == 0:
+            ox, oy, oz, gx, gy, gz = vx, vy, vz, e0x, e0y, e0z
+        elif c == 1:
+            ox, oy, oz, gx, gy, gz = vx, vy, vz, e1x, e1y, e1z
+        else:
+            ox, oy, oz = vx + e0x, vy + e0y, vz + e0z
+            gx, gy, gz = e1x - e0x, e1y - e0y, e1z - e0z
+        g, s, t = segment_segment(ax, ay, az, dx, dy, dz, ox, oy, oz, gx, gy, gz)
+        if g < best:
+            best = g
+            bs = s
+            px = ox + t * gx
+            py = oy + t * gy
+            pz = oz + t * gz
+    return (0.0 if best < TOUCH else best), bs, px, py, pz
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _edges_through(A: Array, i: int, B: Array, j: int, cut: float, swapped: bool, W: Array) -> float:
+    """Corners of ``B[j]`` over the face of ``A[i]`` and edges of ``B[j]`` through it.
+
+    Returns the least squared distance, or -1 when the plane of ``A[i]`` shows that it exceeds
+    ``cut``; writes the points on A and B (B and A when ``swapped``) to ``W``.
+    """
+    best = np.inf
+    if A[i, 12] == LINE:
+        return best
+    nx = A[i, 9]
+    ny = A[i, 10]
+    nz = A[i, 11]
+    nn = nx * nx + ny * ny + nz * nz
+    r0 = B[j, 0] - A[i, 0]
+    r1 = B[j, 1] - A[i, 1]
+    r2 = B[j, 2] - A[i, 2]
+    h0 = r0 * nx + r1 * ny + r2 * nz
+    h1 = h0 + B[j, 3] * nx + B[j, 4] * ny + B[j, 5] * nz
+    h2 = h0 + B[j, 6] * nx + B[j, 7] * ny + B[j, 8] * nz
+    one_side = (h0 > 0.0 and h1 > 0.0 and h2 > 0.0) or (h0 < 0.0 and h1 < 0.0 and h2 < 0.0)
+    reject = A[i, 12] == FLAT
+    if reject and one_side:
+        low = min(abs(h0), abs(h1), abs(h2))
+        if low * low > cut * nn:
+            return -1.0
+    for c in range(6):
+        # Weights of B's two edges at the candidate: a corner, or where an edge meets the plane.
+        if c == 0:
+            p, q, h = 0.0, 0.0, h0
+        elif c == 1:
+            p, q, h = 1.0, 0.0, h1
+        elif c == 2:
+            p, q, h = 0.0, 1.0, h2
+        else:
+            if one_side:
+                break
+            h = 0.0
+            if c == 3 and h0 * h1 < 0.0:
+                p, q = h0 / (h0 - h1), 0.0
+            elif c == 4 and h0 * h2 < 0.0:
+                p, q = 0.0, h0 / (h0 - h2)
+            elif c == 5 and h1 * h2 < 0.0:
+                q = h1 / (h1 - h2)
+                p = 1.0 - q
+            else:
+                continue
+        if reject and h * h > cut * nn:
+            continue
+        x = r0 + p * B[j, 3] + q * B[j, 6]
+        y = r1 + p * B[j, 4] + q * B[j, 7]
+        z = r2 + p * B[j, 5] + q * B[j, 8]
+        u, v = over_face(x, y, z, A[i, 3], A[i, 4], A[i, 5], A[i, 6], A[i, 7], A[i, 8], nx, ny, nz, nn)
+        if u >= 0.0:
+            fx = u * A[i, 3] + v * A[i, 6]
+            fy = u * A[i, 4] + v * A[i, 7]
+            fz = u * A[i, 5] + v * A[i, 8]
+            g = (x - fx) ** 2 + (y - fy) ** 2 + (z - fz) ** 2
+            if g < best:
+                best = g
+                on_a = 3 if swapped else 0
+                on_b = 3 - on_a
+                W[on_a] = A[i, 0] + fx
+                W[on_a + 1] = A[i, 1] + fy
+                W[on_a + 2] = A[i, 2] + fz
+                W[on_b] = A[i, 0] + x
+                W[on_b + 1] = A[i, 1] + y
+                W[on_b + 2] = A[i, 2] + z
+    return best
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def triangle_triangle(A: Array, i: int, B: Array, j: int, cut: float, W: Array) -> float:
+    """Squared distance of triangles ``A[i]`` and ``B[j]`` in one frame; their points to ``W[:6]``.
+
+    Infinity when it is found to exceed ``cut``. ``W[6:]`` is scratch.
+    """
+    best = _edges_through(A, i, B, j, cut, False, W)
+    if best < 0.0:
+        return np.inf
+    other = W[6:]
+    g = _edges_through(B, j, A, i, cut, True, other)
+    if g < 0.0:
+        return np.inf
+    if g < best:
+        best = g
+        W[:6] = other
+    for a in range(3):
+        if a == 0:
+            ax, ay, az, dx, dy, dz = A[i, 0], A[i, 1], A[i, 2], A[i, 3], A[i, 4], A[i, 5]
+        elif a == 1:
+            ax, ay, az, dx, dy, dz = A[i, 0], A[i, 1], A[i, 2], A[i, 6], A[i, 7], A[i, 8]
+        else:
+            ax, ay, az = A[i, 0] + A[i, 3], A[i, 1] + A[i, 4], A[i, 2] + A[i, 5]
+            dx, dy, dz = A[i, 6] - A[i, 3], A[i, 7] - A[i, 4], A[i, 8] - A[i, 5]
+        for b in range(3):
+            if b == 0:
+                bx, by, bz, ex, ey, ez = B[j, 0], B[j, 1], B[j, 2], B[j, 3], B[j, 4], B[j, 5]
+            elif b == 1:
+                bx, by, bz, ex, ey, ez = B[j, 0], B[j, 1], B[j, 2], B[j, 6], B[j, 7], B[j, 8]
+            else:
+                bx, by, bz = B[j, 0] + B[j, 3], B[j, 1] + B[j, 4], B[j, 2] + B[j, 5]
+                ex, ey, ez = B[j, 6] - B[j, 3], B[j, 7] - B[j, 4], B[j, 8] - B[j, 5]
+            g, s, t = segment_segment(ax, ay, az, dx, dy, dz, bx, by, bz, ex, ey, ez)
+            if g < best:
+                best = g
+                W[0] = ax + s * dx
+                W[1] = ay + s * dy
+                W[2] = az + s * dz
+                W[3] = bx + t * ex
+                W[4] = by + t * ey
+                W[5] = bz + t * ez
+    return 0.0 if best < TOUCH else best

@@ -1,0 +1,173 @@
+"""The solids of a model as the distance kernel wants them: trees, cores and boxes, built once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.errors import InputError, Problem, UnknownName
+from seerob.geometry import Solid
+from seerob.kernels.tree_file import Tree, tree_of
+from seerob.transforms import Array
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """The solids of all bodies of a model with their trees; immutable, shared by queries and threads."""
+
+    names: tuple[str, ...]
+    """Of the bodies, in the order of all pose arrays."""
+    solids: tuple[tuple[int, ...], ...]
+    """Columns of the arrays below that each body carries."""
+    which: Indices
+    """See `seerob.kernels.nearest`."""
+    local: Array
+    ball: Array
+    corners: Array
+    radius: Array
+    nodes: Array
+    links: NDArray[np.int32]
+    triangles: Array
+    probes: Array
+
+    @classmethod
+    def build(cls, bodies: Sequence[tuple[str, Sequence[Solid]]], *, cache: Path | None = None) -> Shapes:
+        """Shapes of bodies.
+
+        Args:
+            bodies: Name and solids (in the body's frame [m]) of each body; a body may have none.
+            cache: Folder in which trees of meshes are kept between starts, by content.
+
+        Raises:
+            InputError: A mesh without triangles or with indices out of range, or a coordinate that
+                is not finite; names every such solid.
+        """
+        _check(bodies)
+        made: list[_Made] = []
+        owned: list[tuple[int, ...]] = []
+        which: list[list[int]] = []
+        ends = np.zeros(3, int)
+        for body, (_, solids) in enumerate(bodies):
+            owned.append(tuple(range(len(made), len(made) + len(solids))))
+            for solid in solids:
+                core = _make(solid, cache)
+                tree = core.tree
+                size = np.array([0, 0, len(core.probes)])
+                if tree is not None:
+                    size[:2] = len(tree.nodes), len(tree.triangles)
+                spans = np.column_stack([ends, ends + size]).ravel().tolist()
+                ends += size
+                flags = [tree is not None, core.volume, core.closed]
+                which.append([body, *map(int, flags), *spans, core.corner_count])
+                made.append(core)
+        trees = [m.tree for m in made if m.tree is not None]
+        shapes = cls(
+            names=tuple(name for name, _ in bodies),
+            solids=tuple(owned),
+            which=np.array(which, np.int64).reshape(-1, 11),
+            local=_rows([m.local for m in made], (12,)),
+            ball=_rows([m.ball for m in made], (4,)),
+            corners=_rows([m.corners for m in made], (8, 3)),
+            radius=np.array([s.radius for _, solids in bodies for s in solids], float),
+            nodes=np.concatenate([np.zeros((0, 10)), *(t.nodes for t in trees)]),
+            links=np.concatenate([np.zeros((0, 2), np.int32), *(t.links for t in trees)]),
+            triangles=np.concatenate([np.zeros((0, 13)), *(t.triangles for t in trees)]),
+            probes=np.concatenate([np.zeros((0, 3)), *(m.probes for m in made)]),
+        )
+        return shapes
+
+    def index(self, name: str) -> int:
+        """Index of a body.
+
+        Raises:
+            UnknownName: No such body.
+        """
+        try:
+            return self.names.index(name)
+        except ValueError:
+            raise UnknownName("body", name, self.names) from None
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """A solid as the kernel wants it."""
+
+    tree: Tree | None
+    probes: Array
+    volume: bool
+    closed: bool
+    local: Array
+    ball: Array
+    corners: Array
+    corner_count: int
+
+
+def _make(solid: Solid, cache: Path | None) -> _Made:
+    local = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
+    corners = np.zeros((8, 3))
+    if solid.points is not None and len(solid.points) == 2:
+        ends = solid.points.astype(float)
+        corners[:2] = ends
+        ball = np.append(ends.mean(0), np.linalg.norm(ends[1] - ends[0]) / 2)
+        return _Made(None, ends[:1], False, True, local, ball, corners, 2)
+    if solid.mesh is not None:
+        vertices = np.ascontiguousarray(solid.mesh.vertices, float)
+        tree = tree_of(vertices, np.ascontiguousarray(solid.mesh.faces, np.int32), cache=cache)
+    else:
+        assert solid.points is not None
+        local, vertices = _flat_frame(solid.points)
+        tree = tree_of(vertices, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    centre, half = tree.nodes[0, :3], tree.nodes[0, 3:6]
+    corners[:] = centre + half * (np.indices((2, 2, 2)).reshape(3, 8).T * 2 - 1)
+    ball = np.append(centre, np.linalg.norm(vertices - centre, axis=1).max())
+    volume = solid.mesh is not None
+    return _Made(tree, tree.probes, volume, tree.closed or not volume, local, ball, corners, 8)
+
+
+def _flat_frame(points: Array) -> tuple[Array, Array]:
+    """Frame along a rectangle's edges, as body_from_solid (12,), and its four corners there (4, 3)."""
+    corner, u, v = points[0], points[1] - points[0], points[2] - points[0]
+    longest, other = (u, v) if u @ u >= v @ v else (v, u)
+    basis = np.eye(3)
+    if longest @ longest > 0:
+        x = longest / np.linalg.norm(longest)
+        beside = other - (other @ x) * x
+        if not beside @ beside > 0:
+            beside = np.eye(3)[np.abs(x).argmin()]
+            beside = beside - (beside @ x) * x
+        y = beside / np.linalg.norm(beside)
+        basis = np.column_stack([x, y, np.cross(x, y)])
+    four = np.array([np.zeros(3), u, u + v, v]) @ basis
+    return np.concatenate([basis.ravel(), corner]), four
+
+
+def _rows(parts: list[Array], shape: tuple[int, ...]) -> Array:
+    return np.array(parts, float).reshape(-1, *shape)
+
+
+def _check(bodies: Sequence[tuple[str, Sequence[Solid]]]) -> None:
+    problems = []
+    for name, solids in bodies:
+        for k, solid in enumerate(solids):
+            key = solid.name or f"shape {k}"
+            points = solid.points if solid.mesh is None else solid.mesh.vertices
+            if points is not None and not np.isfinite(points).all():
+                row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+                what = f"point {row} is {points[row].tolist()}"
+                problems.append(Problem(name, key, what, "coordinates must be finite numbers"))
+            if solid.mesh is None:
+                continue
+            faces = solid.mesh.faces
+            if len(faces) == 0:
+                problems.append(Problem(name, key, "the mesh has no triangles", "give at least one"))
+            elif int(faces.min()) < 0 or int(faces.max()) >= len(solid.mesh.vertices):
+                what = f"a triangle names vertex {int(faces.max())} of {len(solid.mesh.vertices)}"
+                problems.append(Problem(name, key, what, "export the mesh again"))
+    if problems:
+        raise InputError(problems)

@@ -1,0 +1,227 @@
+r"""A tree of boxes over the triangles of a mesh, and what the inside test needs of each box.
+
+Binned surface-area splits, top down, in pre-order: the left child of inner node i is i + 1.
+A node carries its box, the sum of its triangles' area vectors :math:`\sum \frac12 e_0 \times e_1`
+and the sum of their areas (the dipole of the winding number, see `seerob.kernels.winding`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from seerob.transforms import Array
+
+Links = NDArray[np.int32]
+Indices = NDArray[np.int64]
+
+from seerob.kernels.primitives import FLAT, LINE, THIN
+
+LEAF = 2
+"""Triangles of a leaf, at most."""
+BINS = 16
+DEEP = 40
+"""Level below which nodes are halved by count, so that no mesh makes a tree deeper than 72."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def triangle_rows(vertices: Array, faces: Links) -> Array:
+    """Rows of 13 (see `seerob.kernels.primitives`) of a mesh's faces, shape (m, 13)."""
+    T = np.empty((len(faces), 13))
+    for k in range(len(faces)):
+        a = vertices[faces[k, 0]]
+        for c in range(3):
+            T[k, c] = a[c]
+            T[k, 3 + c] = vertices[faces[k, 1], c] - a[c]
+            T[k, 6 + c] = vertices[faces[k, 2], c] - a[c]
+        for c in range(3):
+            d = (c + 1) % 3
+            e = (c + 2) % 3
+            T[k, 9 + c] = T[k, 3 + d] * T[k, 6 + e] - T[k, 3 + e] * T[k, 6 + d]
+        nn = longest = 0.0
+        uu = vv = ww = 0.0
+        for c in range(3):
+            nn += T[k, 9 + c] ** 2
+            uu += T[k, 3 + c] ** 2
+            vv += T[k, 6 + c] ** 2
+            ww += (T[k, 6 + c] - T[k, 3 + c]) ** 2
+        longest = max(uu, vv, ww)
+        # |n| = longest · height: height/longest decides.
+        if nn > 1e-10 * longest * longest:
+            T[k, 12] = FLAT
+        elif nn > 1e-22 * longest * longest:
+            T[k, 12] = THIN
+        else:
+            T[k, 12] = LINE
+    return T
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _split(order: Indices, start: int, stop: int, centre: Array, low: Array, high: Array, level: int) -> int:
+    """Reorder ``order[start:stop]`` and return where the right half begins."""
+    middle = (start + stop) // 2
+    least = np.full(3, np.inf)
+    most = np.full(3, -np.inf)
+    for q in range(start, stop):
+        for c in range(3):
+            least[c] = min(least[c], centre[order[q], c])
+            most[c] = max(most[c], centre[order[q], c])
+    axis = 0
+    for c in range(1, 3):
+        if most[c] - least[c] > most[axis] - least[axis]:
+            axis = c
+    extent = most[axis] - least[axis]
+    if not extent > 0.0:
+        return middle
+    if level < DEEP and stop - start > 4:
+        best = np.inf
+        best_axis = best_bin = -1
+        for c in range(3):
+            if not most[c] - least[c] > 1e-3 * extent:
+                continue
+            scale = BINS * (1.0 - 1e-12) / (most[c] - least[c])
+            count = np.zeros(BINS, np.int64)
+            box = np.empty((BINS, 6))
+            box[:, :3] = np.inf
+            box[:, 3:] = -np.inf
+            for q in range(start, stop):
+                k = order[q]
+                b = min(max(int((centre[k, c] - least[c]) * scale), 0), BINS - 1)
+                count[b] += 1
+                for d in range(3):
+                    box[b, d] = min(box[b, d], low[k, d])
+                    box[b, 3 + d] = max(box[b, 3 + d], high[k, d])
+            cost = np.zeros(BINS)
+            for side in range(2):
+                grown = np.empty(6)
+                grown[:3] = np.inf
+                grown[3:] = -np.inf
+                n = 0
+                for m in range(BINS - 1):
+                    b = m if side == 0 else BINS - 1 - m
+                    n += count[b]
+                    for d in range(3):
+                        grown[d] = min(grown[d], box[b, d])
+                        grown[3 + d] = max(grown[3 + d], box[b, 3 + d])
+                    # Split s: bins up to s on the left.
+                    s = b if side == 0 else b - 1
+                    if n == 0:
+                        cost[s] = np.inf
+                        continue
+                    x = grown[3] - grown[0]
+                    y = grown[4] - grown[1]
+                    z = grown[5] - grown[2]
+                    cost[s] += n * (x * y + y * z + z * x)
+            for s in range(BINS - 1):
+                if cost[s] < best:
+                    best = cost[s]
+                    best_axis = c
+                    best_bin = s
+        if best_axis >= 0:
+            c = best_axis
+            scale = BINS * (1.0 - 1e-12) / (most[c] - least[c])
+            i = start
+            j = stop - 1
+            while i <= j:
+                if min(max(int((centre[order[i], c] - least[c]) * scale), 0), BINS - 1) <= best_bin:
+                    i += 1
+                else:
+                    order[i], order[j] = order[j], order[i]
+                    j -= 1
+            if start < i < stop:
+                return i
+    part = order[start:stop].copy()
+    order[start:stop] = part[np.argsort(centre[part, axis], kind="mergesort")]
+    return middle
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def build_tree(vertices: Array, faces: Links) -> tuple[Array, Links, Array]:
+    """Tree of a mesh.
+
+    Args:
+        vertices: [m], shape (n, 3), finite.
+        faces: Vertex indices in range, shape (m, 3), m > 0.
+
+    Returns:
+        nodes: Box centre, half size, area vector, area: shape (k, 10).
+        links: First triangle and count of a leaf, or right child and 0, shape (k, 2).
+        triangles: Rows of 13 in the order of the leaves, shape (m, 13).
+    """
+    T = triangle_rows(vertices, faces)
+    m = len(T)
+    low = np.empty((m, 3))
+    high = np.empty((m, 3))
+    for k in range(m):
+        for c in range(3):
+            a = vertices[faces[k, 0], c]
+            b = vertices[faces[k, 1], c]
+            d = vertices[faces[k, 2], c]
+            low[k, c] = min(a, b, d)
+            high[k, c] = max(a, b, d)
+    centre = (low + high) / 2.0
+    order = np.arange(m)
+    nodes = np.zeros((2 * m, 10))
+    links = np.zeros((2 * m, 2), np.int32)
+    # Entries: first, end, parent whose right child this is (or -1), level.
+    stack = np.empty((256, 4), np.int64)
+    stack[0] = 0, m, -1, 0
+    depth = 1
+    made = 0
+    while depth > 0:
+        depth -= 1
+        start, stop, parent, level = stack[depth]
+        i = made
+        made += 1
+        if parent >= 0:
+            links[parent, 0] = i
+        for c in range(3):
+            least = np.inf
+            most = -np.inf
+            for q in range(start, stop):
+                least = min(least, low[order[q], c])
+                most = max(most, high[order[q], c])
+            nodes[i, c] = (least + most) / 2.0
+            # Half sizes are rounded up: a box must contain its triangles in floating point too.
+            nodes[i, 3 + c] = (most - least) / 2.0 * (1.0 + 1e-15) + 4e-16 * max(abs(least), abs(most))
+        for q in range(start, stop):
+            nn = 0.0
+            for c in range(3):
+                n = T[order[q], 9 + c]
+                nodes[i, 6 + c] += n / 2.0
+                nn += n * n
+            nodes[i, 9] += np.sqrt(nn) / 2.0
+        if stop - start <= LEAF:
+            links[i, 0] = start
+            links[i, 1] = stop - start
+            continue
+        middle = _split(order, start, stop, centre, low, high, level)
+        stack[depth] = middle, stop, i, level + 1
+        stack[depth + 1] = start, middle, -1, level + 1
+        depth += 2
+    return nodes[:made].copy(), links[:made].copy(), T[order]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def component_of(faces: Links, n: int) -> Indices:
+    """Root vertex of the connected piece of each of ``n`` vertices, pieces joined by faces, shape (n,)."""
+    root = np.arange(n)
+    for k in range(len(faces)):
+        for c in range(1, 3):
+            a = faces[k, 0]
+            b = faces[k, c]
+            while root[a] != a:
+                root[a] = root[root[a]]
+                a = root[a]
+            while root[b] != b:
+                root[b] = root[root[b]]
+                b = root[b]
+            if a < b:
+                root[b] = a
+            else:
+                root[a] = b
+    for i in range(n):
+        while root[root[i]] != root[i]:
+            root[i] = root[root[i]]
+    return root

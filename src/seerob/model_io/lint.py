@@ -1,0 +1,211 @@
+"""Is it plausible? Every check on what a robot description says, each a small function of plain numbers.
+
+Checks of one value return what may be used of it and a sentence for the reader of a result; checks
+of a whole description return findings. What cannot be used at all is the readers' business.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from seerob.geometry import Solid
+from seerob.model_io.description import Description, Inertial, Joint, Link
+from seerob.model_io.rigid import groups
+from seerob.model_io.xml_values import Reader
+from seerob.snapshot import Origin
+from seerob.transforms import Array
+
+MAX_LIMIT = {"effort": 1e5, "velocity": 1e3}
+"""Beyond these a limit means "none" [N·m or N; rad/s or m/s]."""
+REPAIRABLE = 0.02
+"""Violation of A + B >= C, relative to the largest moment, that rounding in a file explains."""
+TIPS = (
+    "tool0",
+    "tcp",
+    "tool_link",
+    "tool_tip",
+    "attachment_site",
+    "ee_link",
+    "link_ee",
+    "end_effector",
+    "flange",
+)
+"""Endings of names that point out the link a tool is mounted on, the best first."""
+ROTOR = (
+    "rotor inertia unknown, nobody published it: mass matrix and effective mass are those of the links alone"
+)
+
+
+def plausible_limit(which: str, value: float | None) -> tuple[float | None, str]:
+    """A joint limit that can be used, and why not otherwise.
+
+    Args:
+        which: ``effort`` or ``velocity``.
+        value: What the file says; None when it says nothing.
+    """
+    if value is None:
+        return None, ""
+    if value <= 0:
+        return None, f"{which} limit is {value:g}, expected more than 0: unknown"
+    if value >= MAX_LIMIT[which]:
+        return (
+            None,
+            f"{which} limit is {value:g}, expected less than {MAX_LIMIT[which]:g}: a placeholder, unknown",
+        )
+    return value, ""
+
+
+def plausible_inertial(inertial: Inertial, *, moves: bool) -> tuple[Inertial | None, str, str]:
+    """Mass properties that a body can have, with the level and text of a finding (empty when all is well).
+
+    A rigid body's second moment ``Σ = ½ tr(I) 1 - I`` has no negative eigenvalue; that is the triangle
+    inequality A + B >= C of its principal moments. Small violations are mended by clipping Σ.
+
+    Args:
+        inertial: What the file says.
+        moves: Whether a joint moves this link, which then needs a rotational inertia too.
+    """
+    mass, inertia = inertial.mass, inertial.inertia
+    if mass <= 1e-9:
+        if not moves and not inertia.any():
+            return None, "note", f"mass is {mass:g} kg: a frame without mass"
+        return None, "warning", f"mass is {mass:g} kg, expected more than 0: mass and inertia unknown"
+    moments = np.linalg.eigvalsh(inertia)
+    largest = float(np.abs(moments).max())
+    shown = ", ".join(f"{m:.4g}" for m in moments)
+    if largest == 0.0:
+        if moves:
+            return None, "warning", f"mass {mass:g} kg with an inertia of 0: mass and inertia unknown"
+        return inertial, "note", f"mass {mass:g} kg with an inertia of 0: a point mass"
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    values, vectors = np.linalg.eigh(second)
+    violation = -float(values[0]) / largest
+    if violation <= -1e-9:
+        return inertial, "", ""
+    if violation > REPAIRABLE:
+        text = f"principal moments {shown} kg·m² break A + B ≥ C by {violation:.0%}: mass and inertia unknown"
+        return None, "warning", text
+    second = (vectors * np.maximum(values, 1e-6 * largest)) @ vectors.T
+    mended = np.trace(second) * np.eye(3) - second
+    text = f"principal moments {shown} kg·m² break A + B ≥ C by {max(violation, 0):.2%}, as rounding does: mended"
+    return replace(inertial, inertia=0.5 * (mended + mended.T)), "note", text
+
+
+def guessed_tip(links: Sequence[Link]) -> str:
+    """The link a tool is most likely mounted on: a customary name, else the end of the longest chain."""
+    for ending in TIPS:
+        for link in links:
+            if link.name.lower().endswith(ending):
+                return link.name
+    depth: dict[str, tuple[int, int]] = {}
+    for link in links:
+        joints, steps = depth[link.parent] if link.parent else (0, 0)
+        depth[link.name] = (joints + len(link.joints), steps + 1)
+    return max(depth, key=lambda name: depth[name]) if depth else ""
+
+
+def checked(description: Description, reader: Reader) -> Description:
+    """The description with placeholders marked as such, and every finding of the reader and of this file."""
+    description = _placeholder_inertias_marked(description, reader)
+    for level, subject, text in _findings(description):
+        reader.finding(level, subject, text)
+    return replace(description, findings=(*description.findings, *reader.findings))
+
+
+def _findings(description: Description) -> Iterator[tuple[str, str, str]]:
+    joints = description.joints()
+    if not description.tip.lower().endswith(TIPS):
+        yield "note", "", f"tip taken as {description.tip}, the end of the longest chain"
+    for which in ("effort", "velocity"):
+        yield from flat_limits(which, joints)
+        unknown = [joint.name for joint in joints if getattr(joint, which) is None]
+        if unknown:
+            yield "warning", "", f"{which} limit unknown: {', '.join(unknown)}"
+    yield from massless(description)
+    for link in description.links:
+        yield from misplaced_mass(link)
+        if link.inertial is not None and not link.solids and link.inertial.mass > 0.05:
+            yield (
+                "warning",
+                link.name,
+                f"has a mass of {link.inertial.mass:g} kg but no shape: no distance sees it",
+            )
+    if joints and all(joint.armature is None for joint in joints):
+        yield "assumed", "", ROTOR
+
+
+def flat_limits(which: str, joints: Iterable[Joint]) -> Iterator[tuple[str, str, str]]:
+    """One finding when four or more joints of one kind carry the same limit: often a placeholder."""
+    quantities = [(joint, getattr(joint, which)) for joint in joints]
+    for kind in {joint.kind for joint, _ in quantities}:
+        values = [q.value for joint, q in quantities if joint.kind is kind and q is not None]
+        if len(values) >= 4 and all(a == b for a, b in pairwise(values)):
+            text = f"{which} limit is {values[0]:g} for all {len(values)} {kind.value} joints: a placeholder?"
+            yield "warning", "", text
+
+
+def massless(description: Description) -> Iterator[tuple[str, str, str]]:
+    """A finding for each joint that moves nothing with a known mass, before the next joint."""
+    for group in groups(description.links):
+        if group[0].joints and not any(link.inertial for link in group):
+            yield "warning", group[0].name, "moved by a joint, but mass and inertia unknown"
+
+
+def misplaced_mass(link: Link) -> Iterator[tuple[str, str, str]]:
+    """Findings when centre of mass or radius of gyration do not fit the link's shape."""
+    if link.inertial is None or not link.solids:
+        return
+    points = np.concatenate([extreme_points(solid) for solid in link.solids])
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = float(np.linalg.norm(high - low))
+    com = link.inertial.com
+    outside = float(np.linalg.norm(np.maximum(np.maximum(low - com, com - high), 0)))
+    if outside > 0.25 * size:
+        text = f"centre of mass {np.round(com, 4).tolist()} m lies {outside:.3g} m outside the shape's box"
+        yield "warning", link.name, text
+    gyration = float(np.sqrt(np.linalg.eigvalsh(link.inertial.inertia).max() / link.inertial.mass))
+    if gyration > size or 0 < gyration < 0.02 * size:
+        text = f"radius of gyration {gyration:.3g} m does not fit a shape of {size:.3g} m"
+        yield "warning", link.name, text
+
+
+def extreme_points(solid: Solid) -> Array:
+    """Points [m], shape (n, 3), whose bounding box is that of the solid."""
+    if solid.mesh is not None:
+        return solid.mesh.vertices
+    assert solid.points is not None
+    points = solid.points
+    if len(points) == 3:
+        points = np.vstack([points, points[1] + points[2] - points[0]])
+    return np.concatenate([points - solid.radius, points + solid.radius])
+
+
+def _placeholder_inertias_marked(description: Description, reader: Reader) -> Description:
+    """Three or more links of different mass with one and the same ``a·1`` inertia were never measured."""
+    same: dict[float, list[Link]] = {}
+    for link in description.links:
+        if link.inertial is not None:
+            a = float(link.inertial.inertia[0, 0])
+            if np.array_equal(link.inertial.inertia, a * np.eye(3)):
+                same.setdefault(a, []).append(link)
+    marked: dict[str, Link] = {}
+    for a, links in same.items():
+        masses = {link.inertial.mass for link in links if link.inertial}
+        if len(links) < 3 or (len(masses) == 1 and len(links) < 4):
+            continue
+        text = (
+            f"inertia {a:g}·1 kg·m² on {len(links)} links alike is a placeholder: masses and inertias assumed"
+        )
+        reader.finding("warning", "", text)
+        for link in links:
+            assert link.inertial is not None
+            source = f"{link.inertial.source}: placeholder inertia"
+            marked[link.name] = replace(
+                link, inertial=replace(link.inertial, origin=Origin.ASSUMED, source=source)
+            )
+    links_now = tuple(marked.get(link.name, link) for link in description.links)
+    return replace(description, links=links_now)

@@ -1,0 +1,143 @@
+"""Putting links and things into one MuJoCo specification, and keeping the books of what is where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from seerob.geometry import Mesh, Solid
+from seerob.model_io import glb
+from seerob.model_io.description import Inertial, Joint, JointKind, Quantity
+from seerob.snapshot import Finding
+from seerob.transforms import Array, wxyz_from_rotation
+
+TINY = 2e-15
+"""MuJoCo wants more than 1e-15 kg on a body with a joint; this changes no digit of a mass matrix."""
+
+
+@dataclass
+class Entry:
+    """A body in the making; becomes `seerob.model.Body`."""
+
+    name: str
+    role: str
+    owner: str
+    carrier: str
+    solids: tuple[Solid, ...]
+    mass: Quantity | None
+    mesh: str | None
+    triangles: int
+
+
+@dataclass
+class Mounting:
+    """A MuJoCo specification under construction."""
+
+    spec: Any = field(default_factory=mujoco.MjSpec)
+    entries: list[Entry] = field(default_factory=list)
+    meshes: dict[str, bytes] = field(default_factory=dict)
+    findings: list[Finding] = field(default_factory=list)
+    files: dict[str, bytes] = field(default_factory=dict)
+    _bodies: dict[str, Any] = field(default_factory=dict)
+    _displays: dict[bytes, tuple[str, int]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.spec.compiler.degree = False
+        self.spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+        self.spec.compiler.fusestatic = False
+        self.spec.compiler.autolimits = False
+
+    def body(self, name: str, parent: str | None, parent_from_body: Array) -> Any:
+        """Add a body; ``parent`` None is the world."""
+        above = self.spec.worldbody if parent is None else self._bodies[parent]
+        added = above.add_body(
+            name=name, pos=parent_from_body[:3, 3], quat=wxyz_from_rotation(parent_from_body[:3, :3])
+        )
+        self._bodies[name] = added
+        return added
+
+    def has(self, name: str) -> bool:
+        """Whether there is a body of that name."""
+        return name in self._bodies
+
+    def get(self, name: str) -> Any:
+        """The specification's body of that name."""
+        return self._bodies[name]
+
+    def joint(self, body: Any, name: str, joint: Joint) -> None:
+        """Add a joint. Limits are not imposed: the twin shows what was heard, also beyond them."""
+        hinge = joint.kind == JointKind.REVOLUTE
+        body.add_joint(
+            name=name,
+            type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=joint.axis,
+            pos=joint.anchor,
+            armature=joint.armature.value if joint.armature is not None else 0.0,
+            damping=[joint.damping, 0.0, 0.0],
+            frictionloss=joint.friction,
+        )
+
+    def inertial(self, body: Any, inertial: Inertial) -> None:
+        """Give a body its mass properties."""
+        body.explicitinertial = True
+        body.mass = inertial.mass
+        body.ipos = inertial.com
+        i = inertial.inertia
+        body.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
+
+    def massless(self, body: Any) -> None:
+        """Give a body with a joint so little mass that no figure changes."""
+        body.explicitinertial = True
+        body.mass = TINY
+        body.inertia = [TINY] * 3
+
+    def shape(
+        self,
+        name: str,
+        *,
+        role: str,
+        owner: str,
+        carrier: str,
+        solids: Sequence[Solid],
+        visual: Sequence[Mesh],
+        mass: Quantity | None,
+    ) -> None:
+        """Note that a body has a shape: it becomes a node of the scene and an item of distances."""
+        display = list(visual) or [glb.solid_mesh(solid) for solid in solids]
+        content = glb.glb_bytes(display)
+        digest = glb.mesh_hash(content)
+        self.meshes[digest] = content
+        triangles = sum(len(mesh.faces) for mesh in display)
+        self.entries.append(Entry(name, role, owner, carrier, tuple(solids), mass, digest, triangles))
+
+
+def extreme_points(solids: Sequence[Solid]) -> tuple[Array, float]:
+    """Points whose convex hull, dilated by the radius returned with them, contains the solids.
+
+    Returns:
+        Points, shape (k, 3) [m], and radius [m].
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    points: list[Array] = []
+    radius = 0.0
+    for solid in solids:
+        radius = max(radius, solid.radius)
+        if solid.mesh is None:
+            assert solid.points is not None
+            corner = solid.points
+            points.append(
+                corner if len(corner) == 2 else np.vstack([corner, corner[1] + corner[2] - corner[0]])
+            )
+            continue
+        vertices = solid.mesh.vertices[np.unique(solid.mesh.faces)]
+        try:
+            vertices = vertices[ConvexHull(vertices).vertices]
+        except (QhullError, ValueError):
+            pass  # flat or too few points: all of them are as good
+        points.append(vertices)
+    return (np.vstack(points), radius) if points else (np.zeros((0, 3)), 0.0)

@@ -1,0 +1,135 @@
+"""What a run said: every criterion over time, its worst instant and its verdict.
+
+A run is as good as its worst tick: EXCEEDED before UNDECIDED before WITHIN before no verdict, and
+a criterion that was announced and never heard is UNDECIDED.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple
+
+from seerob.errors import UnknownName
+from seerob.series import Series, Spread, Worst, WorstTracker, worst_verdict
+from seerob.snapshot import CriterionInfo, History, Result, Snapshot, Verdict
+
+__all__ = ["JointLog", "ResultLog", "Series", "Spread", "Worst"]
+
+
+class JointLog(NamedTuple):
+    """Largest tracking error of one robot or human."""
+
+    name: str
+    error: float
+    """Largest joint error between the twin and what was heard [rad or m]."""
+    t: float
+    """When [s]."""
+
+
+class ResultLog(Mapping[str, Series]):
+    """The results of a run by the criterion's name, in the order they were announced or first heard.
+
+    Args:
+        criteria: What the run was to judge; one that never reports stays in the log as UNDECIDED.
+    """
+
+    def __init__(self, criteria: Iterable[CriterionInfo] = ()) -> None:
+        self._series: dict[str, Series] = {}
+        self._worst: dict[str, WorstTracker] = {}
+        self._tracking: dict[str, JointLog] = {}
+        self.ticks = 0
+        """Snapshots that were added."""
+        self.start: float | None = None
+        """Run time of the first snapshot [s]."""
+        self.end: float | None = None
+        """Run time of the last snapshot [s]."""
+        for criterion in criteria:
+            self._begin(criterion.name, criterion.unit, criterion.at_most)
+
+    def add(self, snapshot: Snapshot) -> tuple[str, ...]:
+        """Take the results of one tick.
+
+        A criterion with a period repeats its last result between two evaluations; the repetition
+        (the same `Result.t` again) is not counted twice.
+
+        Returns:
+            Names of the criteria whose worst instant so far is in this snapshot.
+        """
+        self.ticks += 1
+        if self.start is None:
+            self.start = snapshot.t
+        self.end = snapshot.t
+        worse = []
+        for result in snapshot.results:
+            series = self._series.get(result.name)
+            if series is None or not series.known:
+                series = self._begin(result.name, result.unit, result.at_most)
+            if series.repeats(result):
+                continue
+            series.append(result, snapshot.t)
+            if self._worst[result.name].take(result, snapshot):
+                worse.append(result.name)
+        for name, error in snapshot.tracking.items():
+            known = self._tracking.get(name)
+            # A nan is not at most anything, so it shows; and nothing replaces it.
+            if known is None or not (error <= known.error or math.isnan(known.error)):
+                self._tracking[name] = JointLog(name, error, snapshot.t)
+        return tuple(worse)
+
+    def _begin(self, name: str, unit: str, at_most: bool) -> Series:
+        tracker = WorstTracker()
+        series = Series(name=name, unit=unit, at_most=at_most, tracker=tracker)
+        self._series[name], self._worst[name] = series, tracker
+        return series
+
+    def __getitem__(self, name: str) -> Series:
+        try:
+            return self._series[name]
+        except KeyError:
+            raise UnknownName("result", name, self._series) from None
+
+    def get(self, name: str, default: Series | None = None) -> Series | None:  # type: ignore[override]
+        """The series of a criterion, or ``default`` when there is none of that name."""
+        return self._series.get(name, default)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._series
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(tuple(self._series))
+
+    def __len__(self) -> int:
+        return len(self._series)
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """Verdict of the whole run; None when no criterion has one."""
+        return worst_verdict(s.verdict for s in tuple(self._series.values()))
+
+    @property
+    def tracking(self) -> tuple[JointLog, ...]:
+        """Largest tracking error per robot and human."""
+        return tuple(self._tracking.values())
+
+    def ranked(self) -> tuple[Series, ...]:
+        """The series, worst verdict first and, within one verdict, in their own order."""
+        order = {Verdict.EXCEEDED: 0, Verdict.UNDECIDED: 1, Verdict.WITHIN: 2, None: 3}
+        return tuple(sorted(self._series.values(), key=lambda s: order[s.verdict]))
+
+    def history(self, max_points: int = 2000) -> History:
+        """Every series thinned for a plot; no extremum and no exceedance is lost."""
+        return History(traces=tuple(s.thin(max_points) for s in tuple(self._series.values())))
+
+
+def log_of(snapshots: Iterable[Snapshot], criteria: Iterable[CriterionInfo] = ()) -> ResultLog:
+    """The log of snapshots that are already there, such as those of a recording."""
+    log = ResultLog(criteria)
+    for snapshot in snapshots:
+        log.add(snapshot)
+    return log
+
+
+def result_named(snapshot: Snapshot, name: str) -> Result | None:
+    """The result of one criterion in a snapshot; None when it is not in it."""
+    return next((r for r in snapshot.results if r.name == name), None)

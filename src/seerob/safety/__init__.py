@@ -1,0 +1,1 @@
+"""Safety criteria, one file each; the file name is the ``kind``."""

@@ -1,0 +1,144 @@
+"""A run that is happening: snapshots come from the run loop's thread, the newest goes to the pages."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from types import TracebackType
+from typing import Self
+
+from seerob.samples import Sample
+from seerob.server.feed import Audience
+from seerob.server.past import Past
+from seerob.server.serving import Server
+from seerob.snapshot import Command, History, Scene, Snapshot, Transport
+
+WAITING = 8192
+"""Snapshots that wait for the server's thread; more than that are missing in the history only."""
+
+
+class Live:
+    """Takes snapshots from any one thread without ever making it wait.
+
+    A live view cannot be paused, sought or slowed down: the world does not wait. A page may hold
+    its own picture still. Whoever asks is told the truth, `Transport.live`.
+
+    Args:
+        rate: Frames sent per second at most [1/s].
+    """
+
+    mode = "live"
+    duration = None
+
+    def __init__(self, *, rate: float = 60.0) -> None:
+        self._pause = 1.0 / rate
+        self._inbox: deque[Snapshot] = deque(maxlen=WAITING)
+        self._past = Past()
+        self._newest = 0.0
+        self._finished = False
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._arrived: asyncio.Event | None = None
+        self._told = False
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Hand over what is now; returns at once."""
+        self._inbox.append(snapshot)
+        self._notify()
+
+    def finish(self) -> None:
+        """Say that no more will come, so that no page takes the last picture for the present."""
+        self._finished = True
+        self._notify()
+
+    def _notify(self) -> None:
+        # Once until the server's thread has looked: waking it costs more than a deque's append.
+        if self._told or self._loop is None or self._arrived is None:
+            return
+        self._told = True
+        try:
+            self._loop.call_soon_threadsafe(self._arrived.set)
+        except RuntimeError:
+            self._loop = None  # the server was stopped; the run goes on without it
+
+    def history(self) -> History:
+        """What happened so far."""
+        return self._past.history()
+
+    def transport(self) -> Transport:
+        """Always live; not playing once the run has ended."""
+        return Transport(playing=not self._finished, t=self._newest, live=True)
+
+    def command(self, command: Command) -> None:
+        """Nothing that a page asks for can be done to the present."""
+
+    async def run(self, audience: Audience) -> None:
+        """Show the newest, at most ``rate`` times a second, until cancelled."""
+        self._arrived = asyncio.Event()
+        self._loop = asyncio.get_running_loop()
+        said_finished = False
+        while True:
+            # In this order: what is put in after the flag is down raises the flag again.
+            self._arrived.clear()
+            self._told = False
+            newest = None
+            for _ in range(len(self._inbox)):
+                newest = self._inbox.popleft()
+                self._past.add(newest)
+            if newest is not None:
+                self._newest = newest.t
+                audience.show(newest)
+                self._past.tidy()
+            if self._finished and not said_finished:
+                audience.tell(self.transport())
+                said_finished = True
+            await asyncio.sleep(self._pause)
+            await self._arrived.wait()
+
+
+class LiveView:
+    """The live view as a sink: an open `seerob.sink.Writer` that pages in a browser look at.
+
+    Args:
+        scene: What does not change during the run.
+        meshes: Binary glTF per mesh hash of the scene's nodes.
+        host: Address to listen on; anything but this machine's own needs a token.
+        port: Port; 0 is any free one, a taken one moves to the next free.
+        token: What a visitor must know.
+
+    Raises:
+        InputError: As `Server.start`.
+    """
+
+    def __init__(
+        self,
+        *,
+        scene: Scene,
+        meshes: dict[str, bytes],
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        token: str | None = None,
+    ) -> None:
+        self._live = Live()
+        self.server = Server(scene=scene, meshes=meshes, host=host, port=port, token=token, feed=self._live)
+        self.url = self.server.start()
+        """What to open in a browser."""
+
+    def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
+        """Show one tick; never waits for a page."""
+        self._live.publish(snapshot)
+
+    def finish(self) -> None:
+        """The run is over; pages may go on looking at what happened until `close`."""
+        self._live.finish()
+
+    def close(self) -> None:
+        """Stop the server."""
+        self.server.stop()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,44 @@
+"""What a sink is: something that snapshots, and the samples behind them, are written to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol, Self
+
+from msgspec import Struct
+
+from seerob.samples import Sample
+from seerob.snapshot import Scene, Snapshot
+
+
+class Writer(Protocol):
+    """An open sink. A slow one must drop frames of its own, never block the loop."""
+
+    def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
+        """Take one tick: what goes out, and what came in to make it."""
+
+    def close(self) -> None:
+        """Finish files; nothing half-written stays behind."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+
+class Sink(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of every sink: one file, one class, one ``kind``. The fields are its table in the file."""
+
+    def open(self, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes], folder: Path) -> Writer:
+        """Open for one run.
+
+        Args:
+            scene: What does not change during the run.
+            meshes: Binary glTF per mesh hash of the scene's nodes.
+            files: The workstation file and every file it names (relative name → content), so that
+                a recording can be recomputed anywhere.
+            folder: Where to write.
+        """
+        raise NotImplementedError

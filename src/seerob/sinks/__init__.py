@@ -1,0 +1,1 @@
+"""Sinks, one file each; the file name is the ``kind``."""

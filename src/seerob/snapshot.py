@@ -1,0 +1,336 @@
+"""What goes out: plain frozen data that a recorder, a browser and a report can read.
+
+``web/src/wire.ts`` is generated from this file by `seerob.wire`; docstrings go along.
+World frame: right-handed, z up, metres. Quaternions: unit, w first.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from msgspec import Struct
+
+Vec3 = tuple[float, float, float]
+Vec4 = tuple[float, float, float, float]
+
+PROTOCOL = "seerob.v1.msgpack"
+"""WebSocket sub-protocol; the server refuses any other."""
+
+
+class Verdict(StrEnum):
+    """What a limit says of a value. An evaluation, never a certificate."""
+
+    WITHIN = "within"
+    EXCEEDED = "exceeded"
+    UNDECIDED = "undecided"
+
+
+class Origin(StrEnum):
+    """Where a number comes from, best first."""
+
+    MEASURED = "measured"
+    """Heard from the real thing."""
+    STATED = "stated"
+    """Published by the maker or by a norm; the source is named."""
+    GIVEN = "given"
+    """Written by the user in the workstation file."""
+    COMPUTED = "computed"
+    """Follows from the others by the formula."""
+    ESTIMATED = "estimated"
+    """By a stated method with a stated error, asked for by the user."""
+    ASSUMED = "assumed"
+    """Nobody gave it; a verdict that needs it is UNDECIDED."""
+    MISSING = "missing"
+
+
+class Input(Struct, frozen=True, kw_only=True):
+    """One number that a result was made from."""
+
+    name: str
+    value: float | str | None = None
+    unit: str = ""
+    origin: Origin
+    source: str = ""
+    """Document, file or device; for norms with edition, clause and confidence."""
+
+
+class Basis(Struct, frozen=True, kw_only=True):
+    """Why a result is what it is; enough to defend it line by line."""
+
+    formula: str
+    source: str
+    """Clause and edition of the norm, or equation of the paper."""
+    inputs: tuple[Input, ...] = ()
+    not_modelled: tuple[str, ...] = ()
+    """What this number leaves out."""
+
+
+class Finding(Struct, frozen=True, kw_only=True):
+    """Something noticed while a model was built that whoever reads a result must know."""
+
+    level: str
+    """``note``, ``assumed`` or ``warning``."""
+    subject: str
+    """Full name of the thing it is about."""
+    text: str
+
+
+# -- markers: a closed set; a new criterion draws with these ------------------------------------
+
+
+class Arrow(Struct, frozen=True, kw_only=True, tag="arrow"):
+    """A vector at a point."""
+
+    origin: Vec3
+    vector: Vec3
+    """From tail to tip [m as drawn]."""
+    label: str = ""
+    verdict: Verdict | None = None
+
+
+class Segment(Struct, frozen=True, kw_only=True, tag="segment"):
+    """A line between two points, such as a shortest distance."""
+
+    start: Vec3
+    end: Vec3
+    label: str = ""
+    verdict: Verdict | None = None
+
+
+class Sphere(Struct, frozen=True, kw_only=True, tag="sphere"):
+    """A translucent ball."""
+
+    center: Vec3
+    radius: float
+    label: str = ""
+    verdict: Verdict | None = None
+
+
+class Ellipsoid(Struct, frozen=True, kw_only=True, tag="ellipsoid"):
+    """A translucent ellipsoid."""
+
+    center: Vec3
+    wxyz: Vec4
+    """Orientation of the half axes in the world."""
+    radii: Vec3
+    """Half axes [m as drawn]."""
+    label: str = ""
+    verdict: Verdict | None = None
+
+
+class Box(Struct, frozen=True, kw_only=True, tag="box"):
+    """A translucent box."""
+
+    center: Vec3
+    wxyz: Vec4
+    size: Vec3
+    """Full edge lengths [m]."""
+    label: str = ""
+    verdict: Verdict | None = None
+
+
+class Hull(Struct, frozen=True, kw_only=True, tag="hull"):
+    """A translucent closed surface, convex or not."""
+
+    vertices: tuple[Vec3, ...]
+    faces: tuple[tuple[int, int, int], ...]
+    label: str = ""
+    verdict: Verdict | None = None
+
+
+class Label(Struct, frozen=True, kw_only=True, tag="label"):
+    """Text at a point."""
+
+    position: Vec3
+    text: str
+    verdict: Verdict | None = None
+
+
+class Highlight(Struct, frozen=True, kw_only=True, tag="highlight"):
+    """A whole body shown in the colour of a verdict."""
+
+    body: str
+    """Full name of the node."""
+    verdict: Verdict | None = None
+
+
+Marker = Arrow | Segment | Sphere | Ellipsoid | Box | Hull | Label | Highlight
+
+
+# -- results ------------------------------------------------------------------------------------
+
+
+class Result(Struct, frozen=True, kw_only=True):
+    """What one criterion says at one instant.
+
+    A result without a limit has no verdict: it informs. UNDECIDED always carries a reason.
+    """
+
+    name: str
+    value: float | None = None
+    """The figure, in ``unit``; None when it could not be had."""
+    unit: str = ""
+    limit: float | None = None
+    """Admissible value, in ``unit``."""
+    at_most: bool = True
+    """Whether the limit bounds from above (a speed) or from below (a distance)."""
+    verdict: Verdict | None = None
+    reason: str = ""
+    """Why UNDECIDED, or what governs: ``forearm_link ↔ right hand``."""
+    interval: tuple[float, float] | None = None
+    """Where the true value lies, given the tolerances of the inputs."""
+    parts: tuple[Result, ...] = ()
+    """The same per link or body area; the worst one gives the verdict."""
+    markers: tuple[Marker, ...] = ()
+    basis: Basis | None = None
+    """None on parts, which share their parent's, and on the wire, where it is sent once."""
+    t: float | None = None
+    """Instant it speaks of [s] when that is not the snapshot's (a criterion with a period)."""
+
+
+class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot"):
+    """The twin and its results at one tick."""
+
+    seq: int
+    t: float
+    """Run time [s]."""
+    poses: bytes
+    """Little-endian float32, seven per node of `Scene.nodes`: x, y, z [m], w, x, y, z."""
+    joints: dict[str, tuple[float, ...]] = {}
+    """Joint positions of the twin per robot and human [rad or m]."""
+    tracking: dict[str, float] = {}
+    """Largest joint error between the twin and what was heard, per robot and human [rad or m]."""
+    results: tuple[Result, ...] = ()
+
+
+# -- what does not change during a run ----------------------------------------------------------
+
+
+class Node(Struct, frozen=True, kw_only=True):
+    """One body of the scene; its index is its slot in `Snapshot.poses`."""
+
+    name: str
+    """Unique full name, such as ``ur10/forearm_link`` or ``line/fixture/pin_2``."""
+    role: str
+    """``robot``, ``tool``, ``workpiece``, ``part`` or ``human``."""
+    owner: str
+    """The robot, tool, part or human of the workstation file it belongs to."""
+    mesh: str | None = None
+    """Hash of its display mesh (binary glTF, metres, z up, in the body's frame), at ``/mesh/<hash>.glb``."""
+    triangles: int = 0
+    moves: bool = True
+    mass: float | None = None
+    """[kg]; None when nobody gave it."""
+    mass_origin: Origin = Origin.MISSING
+    note: str = ""
+    """What to know of its geometry: ``envelope, not the maker's mesh``."""
+
+
+class CriterionInfo(Struct, frozen=True, kw_only=True):
+    """A criterion of this run."""
+
+    name: str
+    kind: str
+    group: str
+    """``safety`` or ``ergonomics``."""
+    title: str
+    """First line of the criterion's documentation."""
+    subjects: tuple[str, ...] = ()
+    """Full names it speaks of."""
+    unit: str = ""
+    limit: float | None = None
+    at_most: bool = True
+    basis: Basis | None = None
+
+
+class JointInfo(Struct, frozen=True, kw_only=True):
+    """One joint of a robot or human."""
+
+    name: str
+    unit: str
+    """``rad`` or ``m``."""
+    lower: float | None = None
+    upper: float | None = None
+
+
+class MechanismInfo(Struct, frozen=True, kw_only=True):
+    """A robot or a human, as the page lists it."""
+
+    name: str
+    role: str
+    """``robot`` or ``human``."""
+    joints: tuple[JointInfo, ...]
+
+
+class Scene(Struct, frozen=True, kw_only=True, tag="scene"):
+    """Everything about a run that does not change while it runs; sent once."""
+
+    title: str
+    edition: str
+    """Edition of the norm that limits are taken from, as the workstation file says."""
+    version: str
+    """Version of seerob that wrote this."""
+    workstation_hash: str
+    """SHA-256 of the workstation file and of every file it names."""
+    period: float
+    """Tick period [s]."""
+    nodes: tuple[Node, ...]
+    mechanisms: tuple[MechanismInfo, ...] = ()
+    criteria: tuple[CriterionInfo, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+
+# -- the page's protocol ------------------------------------------------------------------------
+
+
+class Hello(Struct, frozen=True, kw_only=True, tag="hello"):
+    """First message of the server."""
+
+    server: str
+    mode: str
+    """``live`` or ``replay``."""
+    duration: float | None = None
+    """Length of the recording [s]; None when live."""
+    schema: str = ""
+    """Hash of the message types; a page built for another one must be built anew."""
+
+
+class Trace(Struct, frozen=True, kw_only=True):
+    """One criterion over a stretch of time, for plots and the timeline's lanes."""
+
+    name: str
+    t: bytes
+    """Little-endian float64 run times [s]."""
+    values: bytes
+    """Little-endian float32, NaN where there was no value."""
+    limits: bytes
+    """Little-endian float32, NaN where there was none."""
+    verdicts: bytes
+    """One byte each: 0 within, 1 exceeded, 2 undecided, 255 none."""
+
+
+class History(Struct, frozen=True, kw_only=True, tag="history"):
+    """What happened so far (live) or all of it (replay), thinned without losing an extremum."""
+
+    traces: tuple[Trace, ...]
+
+
+class Transport(Struct, frozen=True, kw_only=True, tag="transport"):
+    """State of the player; sent on every change."""
+
+    playing: bool
+    t: float
+    speed: float = 1.0
+    live: bool = False
+    loop: bool = False
+    """Whether the player starts again at the end."""
+
+
+class Command(Struct, frozen=True, kw_only=True, tag="command"):
+    """What a page asks of the server."""
+
+    action: str
+    """``play``, ``pause``, ``seek``, ``speed``, ``step``, ``loop`` or ``ack``."""
+    value: float | None = None
+    """``seek``: run time [s]; ``speed``: factor; ``step``: recorded snapshots forward or back;
+    ``loop``: 1 or 0; ``ack``: `Snapshot.seq` that was received."""

@@ -1,0 +1,111 @@
+"""What a source is: options in, samples out. Sources know no physics.
+
+A *recorded* source (a trajectory file, a recording) knows its future; the run loop pumps it in
+run time, live and as fast as possible alike. The pump stays one sample ahead, so that references
+are interpolated between two samples and nothing lags.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from msgspec import Struct
+
+from seerob.samples import Sample
+from seerob.snapshot import Finding
+
+
+class Target(Struct, frozen=True, kw_only=True):
+    """What a source needs to know of the robot or human it drives."""
+
+    name: str
+    joints: tuple[str, ...]
+    """Joint names in order."""
+    units: tuple[str, ...]
+    """``rad`` or ``m`` per joint."""
+    lower: tuple[float, ...]
+    """Position limits [rad or m]; -inf where there is none."""
+    upper: tuple[float, ...]
+    velocity: tuple[float | None, ...]
+    """Speed limits [rad/s or m/s]; None where nobody stated one."""
+
+
+class Opened(Struct, frozen=True, kw_only=True):
+    """A source that has read what it can read at start."""
+
+    samples: Iterable[Sample]
+    """In time order, ``t`` from 0; iterating again starts again."""
+    duration: float
+    """From the first to the last sample [s]."""
+    findings: tuple[Finding, ...] = ()
+    """The mapping that was used, limits that were passed, losses in the file."""
+
+
+class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of every source: one file, one class, one ``kind``. The fields are its table in the file."""
+
+    name: str = ""
+    """Made from the kind and the target when not given."""
+    timeout: float = 0.2
+    """Age at which what it said no longer counts [s]: dependent verdicts turn UNDECIDED."""
+    loop: bool = False
+    """Start again at the end; the jump back is bridged by holding for ``loop_pause``."""
+    loop_pause: float = 1.0
+    """[s]"""
+
+    def target(self) -> str:
+        """Name of the robot or human it drives; empty for signals."""
+        return ""
+
+    def open(self, folder: Path, target: Target | None) -> Opened:
+        """Read or connect, and check against the target's limits.
+
+        Args:
+            folder: Folder of the workstation file; relative paths start there.
+            target: What it drives; None when `target` is empty.
+
+        Raises:
+            InputError: The file is missing or wrong; names file, place, value and remedy.
+        """
+        raise NotImplementedError
+
+
+class Pump:
+    """Feeds the samples of one recorded source to the loop as run time passes."""
+
+    def __init__(self, opened: Opened, *, loop: bool = False, pause: float = 1.0) -> None:
+        self._opened = opened
+        self._loop, self._pause = loop, pause
+        self._offset = 0.0
+        self._seq = 0
+        self._iterator: Iterator[Sample] = iter(opened.samples)
+        self._next: Sample | None = None
+        self._advance()
+
+    def _advance(self) -> None:
+        sample = next(self._iterator, None)
+        if sample is None and self._loop and self._opened.duration > 0:
+            self._offset += self._opened.duration + self._pause
+            self._iterator = iter(self._opened.samples)
+            sample = next(self._iterator, None)
+        if sample is not None and self._offset:
+            self._seq += 1
+        self._next = sample
+
+    @property
+    def finished(self) -> bool:
+        """Whether there is nothing left to come."""
+        return self._next is None
+
+    def until(self, t: float) -> Iterator[Sample]:
+        """Samples up to ``t`` [s] and the first one after it."""
+        from msgspec.structs import replace
+
+        while self._next is not None:
+            due = self._next.t + self._offset
+            sample = self._next
+            self._advance()
+            yield replace(sample, t=due) if due != sample.t else sample
+            if due > t:
+                return

@@ -1,0 +1,231 @@
+"""The twin at this tick, and what follows from it. Valid until the next tick.
+
+What two criteria share has its one home here and is computed once per tick. Accessors raise
+`Undecided` when the robot or human they speak of was not heard lately, does not follow what was
+heard, or has a mass that nobody gave: a stale or guessed number can never be green.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from seerob.distance import Closest, Closests
+from seerob.errors import Undecided
+from seerob.model import Frame, Gap, Mechanism, Model
+from seerob.samples import Quality
+from seerob.transforms import Array
+
+
+@dataclass
+class Hearing:
+    """What is known of where a robot or human really is."""
+
+    given: bool
+    """It stands where the workstation file puts it; no source drives it."""
+    driven: bool
+    """A source drives it."""
+    timeout: float = np.inf
+    """[s]"""
+    sample_t: float | None = None
+    """Instant of the newest sample [s]; None before the first."""
+    quality: Quality = Quality.GOOD
+    error: float = 0.0
+    """Largest joint error between twin and reference [rad or m]."""
+    saturated: bool = False
+    """A joint's torque limit was reached: the twin cannot do what was heard."""
+
+
+class State:
+    """A view of the engine's `mujoco.MjData`; never keep one beyond its tick."""
+
+    def __init__(self, model: Model, data: Any, hearings: dict[str, Hearing]) -> None:
+        self.model = model
+        self.data = data
+        self.t = 0.0
+        """Run time [s]."""
+        self.hearings = hearings
+        self._mj_ids = np.array([body.mj for body in model.bodies], np.int64)
+        n = len(model.bodies)
+        self.rotations = np.zeros((n, 3, 3))
+        """World from body, in the order of `Model.bodies`."""
+        self.positions = np.zeros((n, 3))
+        """World position of the bodies' origins [m]."""
+        self.quaternions = np.zeros((n, 4))
+        self._tracking_limit = model.workstation.engine.tracking_limit
+        self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
+        self._cache: dict[Any, Any] = {}
+        self._jacp, self._jacr = np.zeros((3, model.mj.nv)), np.zeros((3, model.mj.nv))
+        self._velocity = np.zeros(6)
+
+    def refresh(self, t: float) -> None:
+        """Take the engine's new positions and velocities; called once per tick by the engine."""
+        mj, data = self.model.mj, self.data
+        # mj_step leaves what follows from positions one step behind.
+        mujoco.mj_kinematics(mj, data)
+        mujoco.mj_comPos(mj, data)
+        mujoco.mj_comVel(mj, data)
+        self.t = t
+        self.rotations[:] = data.xmat[self._mj_ids].reshape(-1, 3, 3)
+        self.positions[:] = data.xpos[self._mj_ids]
+        self.quaternions[:] = data.xquat[self._mj_ids]
+        self._cache.clear()
+
+    def poses(self) -> bytes:
+        """Little-endian float32, seven per body: position [m], quaternion w first."""
+        return np.hstack([self.positions, self.quaternions]).astype("<f4").tobytes()
+
+    # -- what may be relied on --------------------------------------------------------------
+
+    def require(self, *names: str) -> None:
+        """Raise `Undecided` unless each robot or human is where the twin shows it."""
+        for name in names:
+            reason = self.doubt(name)
+            if reason:
+                raise Undecided(reason)
+
+    def doubt(self, name: str) -> str:
+        """Why the twin of a robot or human may not be where the real one is; empty when it may be relied on."""
+        hearing = self.hearings[name]
+        if not hearing.driven:
+            return "" if hearing.given else f"{name}: no source drives it and the file gives no position (q)"
+        if hearing.sample_t is None:
+            return f"{name}: nothing heard yet"
+        age = self.t - hearing.sample_t
+        if age > hearing.timeout:
+            return f"{name}: not heard for {age:.2f} s (time-out {hearing.timeout:g} s)"
+        if hearing.quality is not Quality.GOOD:
+            return f"{name}: its source says {hearing.quality.value}"
+        if hearing.error > self._tracking_limit:
+            why = " (a torque limit is reached)" if hearing.saturated else ""
+            return (
+                f"{name}: the twin is off by {hearing.error:.3g} rad or m, "
+                f"more than {self._tracking_limit:g}{why}"
+            )
+        return ""
+
+    # -- joints -----------------------------------------------------------------------------
+
+    def q(self, mechanism: Mechanism) -> Array:
+        """Joint positions of the twin [rad or m], shape (n,)."""
+        self.require(mechanism.name)
+        return self.joint_positions(mechanism)
+
+    def joint_positions(self, mechanism: Mechanism) -> Array:
+        """The same without asking whether it was heard: for the picture, never for a verdict."""
+        own = mechanism.coupling.argmax(axis=0)
+        return np.asarray(self.data.qpos[mechanism.q_address[own]])
+
+    def qd(self, mechanism: Mechanism) -> Array:
+        """Joint velocities of the twin [rad/s or m/s], shape (n,)."""
+        self.require(mechanism.name)
+        own = mechanism.coupling.argmax(axis=0)
+        return np.asarray(self.data.qvel[mechanism.v_address[own]])
+
+    # -- dynamics ---------------------------------------------------------------------------
+
+    def mass_matrix(self, mechanism: Mechanism) -> Array:
+        """Joint-space mass matrix M(q) with tools and workpieces [kg·m², kg·m or kg], shape (n, n).
+
+        Raises:
+            Undecided: A mass that nobody gave.
+        """
+        self.require(mechanism.name)
+        if mechanism.unknown_masses:
+            raise Undecided("; ".join(mechanism.unknown_masses))
+        key = ("M", mechanism.name)
+        if key not in self._cache:
+            if "M" not in self._cache:
+                mujoco.mj_makeM(self.model.mj, self.data)
+                mujoco.mj_fullM(self.model.mj, self.data, self._full_mass_matrix)
+                self._cache["M"] = self._full_mass_matrix
+            block = self._full_mass_matrix[np.ix_(mechanism.v_address, mechanism.v_address)]
+            self._cache[key] = mechanism.coupling.T @ block @ mechanism.coupling
+        return np.asarray(self._cache[key])
+
+    # -- kinematics -------------------------------------------------------------------------
+
+    def pose(self, frame: Frame) -> tuple[Array, Array]:
+        """World rotation (3, 3) and position (3,) [m] of a frame."""
+        rotation = self.data.xmat[frame.mj].reshape(3, 3)
+        position = self.data.xpos[frame.mj] + rotation @ frame.body_from_frame[:3, 3]
+        return rotation @ frame.body_from_frame[:3, :3], position
+
+    def jacobian(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> Array:
+        """Jacobian of a point of a frame, linear rows first, world axes, shape (6, n).
+
+        Args:
+            frame: The frame.
+            mechanism: Whose joints the columns are.
+            offset: The point in the frame [m], shape (3,); its origin when not given.
+        """
+        self.require(mechanism.name)
+        key = ("J", frame.name, mechanism.name, None if offset is None else offset.tobytes())
+        if key not in self._cache:
+            rotation, position = self.pose(frame)
+            if offset is not None:
+                position = position + rotation @ offset
+            mujoco.mj_jac(self.model.mj, self.data, self._jacp, self._jacr, position, frame.mj)
+            every = np.vstack([self._jacp, self._jacr])[:, mechanism.v_address]
+            self._cache[key] = every @ mechanism.coupling
+        return np.asarray(self._cache[key])
+
+    def body_velocity(self, index: int) -> tuple[Array, Array]:
+        """Linear velocity at its origin [m/s] and angular velocity [rad/s] of a body, world axes."""
+        body = self.model.bodies[index]
+        if body.carrier:
+            self.require(body.carrier)
+        key = ("v", index)
+        if key not in self._cache:
+            mujoco.mj_objectVelocity(
+                self.model.mj, self.data, mujoco.mjtObj.mjOBJ_XBODY, body.mj, self._velocity, 0
+            )
+            # mj_objectVelocity puts rotation first.
+            self._cache[key] = self._velocity[3:].copy(), self._velocity[:3].copy()
+        linear, angular = self._cache[key]
+        return linear, angular
+
+    def fastest_point(self, index: int) -> tuple[float, Array, Array]:
+        """Bound on the speed of any point of a body, and the point where it is largest.
+
+        The speed of a rigid body is a convex function of the point, so over a convex hull it is
+        largest at a corner; a dilation by r adds at most ``|ω| r``.
+
+        Returns:
+            Speed [m/s], the corner in the world [m] (3,), its velocity [m/s] (3,).
+        """
+        key = ("fastest", index)
+        if key not in self._cache:
+            linear, angular = self.body_velocity(index)
+            body = self.model.bodies[index]
+            arms = body.corners @ self.rotations[index].T
+            velocities = linear + np.cross(angular, arms)
+            squares = np.einsum("ij,ij->i", velocities, velocities)
+            k = int(squares.argmax())
+            speed = float(np.sqrt(squares[k]) + np.linalg.norm(angular) * body.radius)
+            self._cache[key] = speed, self.positions[index] + arms[k], velocities[k]
+        speed, point, velocity = self._cache[key]
+        return speed, point, velocity
+
+    # -- distances --------------------------------------------------------------------------
+
+    def closest(self, gap: Gap) -> Closest:
+        """Where two sets are nearest."""
+        self.require(*gap.carriers)
+        key = ("closest", id(gap))
+        if key not in self._cache:
+            self._cache[key] = gap.query.minimum(self.rotations, self.positions)
+        found: Closest = self._cache[key]
+        return found
+
+    def closest_per_body(self, gap: Gap) -> Closests:
+        """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``."""
+        self.require(*gap.carriers)
+        key = ("closest per body", id(gap))
+        if key not in self._cache:
+            self._cache[key] = gap.query.per_body(self.rotations, self.positions)
+        found: Closests = self._cache[key]
+        return found

@@ -1,0 +1,1 @@
+"""Motion in tables: workbooks and delimited text, whatever their headers call things."""

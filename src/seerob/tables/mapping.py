@@ -1,0 +1,143 @@
+"""Which column of a table is what, in which unit: the ``[sources.mapping]`` of a workstation file."""
+
+from __future__ import annotations
+
+import json
+import re
+from enum import StrEnum
+from math import pi
+
+from msgspec import Struct, structs
+
+Column = str | int
+"""A header as it stands in the file, or a column number from 1."""
+
+
+class TimeUnit(StrEnum):
+    """Unit of a time column."""
+
+    S = "s"
+    MS = "ms"
+
+
+class PositionUnit(StrEnum):
+    """Unit of joint positions, angles or lengths."""
+
+    DEG = "deg"
+    RAD = "rad"
+    MM = "mm"
+    M = "m"
+
+
+class RateUnit(StrEnum):
+    """Unit of joint velocities."""
+
+    DEG_S = "deg/s"
+    RAD_S = "rad/s"
+    MM_S = "mm/s"
+    M_S = "m/s"
+
+
+class AngleUnit(StrEnum):
+    """Unit of angles."""
+
+    DEG = "deg"
+    RAD = "rad"
+
+
+class LengthUnit(StrEnum):
+    """Unit of lengths."""
+
+    MM = "mm"
+    M = "m"
+
+
+SI: dict[str, tuple[str, float]] = {
+    "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "deg": ("rad", pi / 180),
+    "rad": ("rad", 1.0),
+    "mm": ("m", 1e-3),
+    "m": ("m", 1.0),
+    "deg/s": ("rad/s", pi / 180),
+    "rad/s": ("rad/s", 1.0),
+    "mm/s": ("m/s", 1e-3),
+    "m/s": ("m/s", 1.0),
+    "Nm": ("N·m", 1.0),
+}
+"""Unit → SI unit and factor."""
+
+
+class Mapping(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where things stand in a table. What is not given is guessed, and asked when in doubt."""
+
+    sheet: str | None = None
+    """Sheet of a workbook."""
+    header_row: int | None = None
+    """Row with the names of the columns, from 1."""
+    group_row: int | None = None
+    """Row above it whose cells stand for several columns (``Position``, ``Velocity``); they become
+    the first word of the names below."""
+    unit_row: int | None = None
+    """Row below the names that holds their units."""
+    delimiter: str | None = None
+    """Of a text file: ``","``, ``";"``, a tab, ``"|"``; ``" "`` is any run of blanks."""
+    decimal_comma: bool | None = None
+    """Whether ``1,5`` is one and a half."""
+    robot_column: Column | None = None
+    """Column that names the robot, when several share the table."""
+    robot: str | None = None
+    """The name to take from it."""
+    time: Column | None = None
+    time_unit: TimeUnit | None = None
+    joints: str | tuple[Column, ...] | None = None
+    """Columns of the joint positions in joint order; or a regular expression for whole headers
+    whose first group is the joint's number."""
+    joint_unit: PositionUnit | tuple[PositionUnit, ...] | None = None
+    """One unit for all joints, or one per joint."""
+    velocities: str | tuple[Column, ...] | None = None
+    """As ``joints``; ``[]`` leaves them out, and velocities are derived from the positions."""
+    velocity_unit: RateUnit | tuple[RateUnit, ...] | None = None
+    torques: str | tuple[Column, ...] | None = None
+    """As ``joints`` [N·m or N]; ``[]`` leaves them out."""
+    tcp_position: tuple[Column, ...] | None = None
+    """Columns x, y, z of the tool; ``[]`` leaves them out."""
+    tcp_position_unit: LengthUnit | None = None
+    tcp_orientation: tuple[Column, ...] | None = None
+    """Columns of the tool's orientation, in the order of the convention; ``[]`` leaves them out."""
+    tcp_convention: str | None = None
+    """``"ZYX"``: turned axes in the order of the columns; ``"xyz"``: fixed axes; ``"rpy"``;
+    ``"rotation_vector"``; ``"wxyz"`` or ``"xyzw"``."""
+    tcp_orientation_unit: AngleUnit | None = None
+
+    def toml(self, remarks: dict[str, str] | None = None) -> str:
+        """The table as it stands in a workstation file.
+
+        Args:
+            remarks: A comment per key, written above it.
+        """
+        lines = ["[sources.mapping]"]
+        for name in self.__struct_fields__:
+            value = getattr(self, name)
+            if value is None:
+                continue
+            if remarks and name in remarks:
+                lines.append(f"# {remarks[name]}")
+            lines.append(f"{name} = {_toml(value)}")
+        return "\n".join(lines) + "\n"
+
+    def over(self, other: Mapping) -> Mapping:
+        """This mapping, and where it says nothing the other."""
+        given = {k: v for k, v in structs.asdict(self).items() if v is not None}
+        return structs.replace(other, **given)
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    text = json.dumps(str(value), ensure_ascii=False)
+    return re.sub(r"[\x7f-\x9f\ud800-\udfff]", lambda m: f"\\u{ord(m[0]):04x}", text)

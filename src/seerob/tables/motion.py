@@ -1,0 +1,168 @@
+"""A table and its mapping → a trajectory in SI units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from seerob.errors import InputError, Problem, suggestion
+from seerob.source import Target
+from seerob.tables.grid import Numbers, place, read_numbers
+from seerob.tables.guess import Guess, guess
+from seerob.tables.layout import Layout
+from seerob.tables.mapping import SI, Mapping
+from seerob.tables.orientation import wxyz_from
+from seerob.trajectory import Trajectory
+from seerob.transforms import Array
+
+KEYS = ("time", "joints", "velocities", "torques", "tcp_position", "tcp_orientation")
+
+
+def read_motion(
+    path: Path, given: Mapping | None = None, *, name: str | None = None, target: Target | None = None
+) -> tuple[Trajectory, Guess, tuple[str, ...]]:
+    """Read a table of motion.
+
+    Args:
+        path: A workbook or delimited text.
+        given: What the user says of its columns.
+        name: The file as messages name it.
+        target: The robot it is to drive; its joints say which are lengths.
+
+    Returns:
+        The motion, the mapping that was used, and remarks on what was left out or mended.
+
+    Raises:
+        InputError: Something must be confirmed first, or the file is wrong.
+    """
+    found = guess(path, given, name=name, target=target)
+    if not found.certain:
+        raise found.error()
+    layout, mapping = found.layout, found.mapping
+    indices = _indices(layout, mapping)
+    factors = _factors(found.file, mapping, indices, target)
+    columns = {
+        # Two keys may name the same column; numbers keep the names apart.
+        f"{layout.label(i)}" if n == 0 else f"{layout.label(i)} ({key} {n})": i
+        for key, group in indices.items()
+        for i in group
+        for n in [_occurrence(indices, key, i)]
+    }
+    select = None
+    if mapping.robot_column is not None:
+        select = (_single(layout, "robot_column", mapping.robot_column), mapping.robot)
+    numbers = read_numbers(
+        layout.grid,
+        layout.first_row,
+        columns,
+        decimal_comma=bool(mapping.decimal_comma),
+        select=select,
+    )
+    _check_selection(found.file, mapping, numbers)
+    blocks = _blocks(numbers, indices, factors)
+    notes = list(found.notes)
+    if numbers.skipped:
+        notes.append(f"{numbers.skipped} blank rows between rows with values were skipped")
+    wxyz = None
+    if "tcp_orientation" in blocks and mapping.tcp_convention is not None:
+        try:
+            wxyz = wxyz_from(mapping.tcp_convention, blocks["tcp_orientation"])
+        except ValueError as error:
+            raise InputError.at(
+                found.file, place(layout.grid), str(error), "leave the columns out"
+            ) from error
+    trajectory = Trajectory(
+        file=found.file,
+        t=blocks["time"][:, 0],
+        q=blocks["joints"],
+        qd=blocks.get("velocities"),
+        tau=blocks.get("torques"),
+        tcp_position=blocks.get("tcp_position"),
+        tcp_wxyz=wxyz,
+        rows=numbers.rows,
+        sheet=layout.grid.sheet,
+    )
+    return trajectory, found, tuple(notes)
+
+
+def _indices(layout: Layout, mapping: Mapping) -> dict[str, tuple[int, ...]]:
+    indices: dict[str, tuple[int, ...]] = {}
+    for key in KEYS:
+        columns = getattr(mapping, key)
+        if key == "time" and columns is not None:
+            indices[key] = (_single(layout, key, columns),)
+        elif columns:
+            found = layout.find_all(key, columns)
+            if isinstance(found, list):
+                raise InputError(found)
+            indices[key] = found
+    return indices
+
+
+def _single(layout: Layout, key: str, column: str | int) -> int:
+    index = layout.find(key, column)
+    if isinstance(index, Problem):
+        raise InputError(index)
+    return index
+
+
+def _occurrence(indices: dict[str, tuple[int, ...]], key: str, index: int) -> int:
+    before = KEYS[: KEYS.index(key)]
+    return sum(indices.get(other, ()).count(index) for other in before)
+
+
+def _factors(
+    file: str, mapping: Mapping, indices: dict[str, tuple[int, ...]], target: Target | None
+) -> dict[str, Array]:
+    """Factor to SI per column of each key; InputError where a unit does not fit the robot's joint."""
+    dof = len(indices["joints"])
+    wanted = target.units if target is not None and len(target.units) == dof else None
+    units = {
+        "time": (mapping.time_unit,),
+        "joints": mapping.joint_unit,
+        "velocities": mapping.velocity_unit,
+        "tcp_position": mapping.tcp_position_unit,
+        "tcp_orientation": mapping.tcp_orientation_unit,
+    }
+    factors, problems = {}, []
+    for key, group in indices.items():
+        unit = units.get(key)
+        each = unit if isinstance(unit, tuple) else (unit,) * len(group)
+        if len(each) != len(group):
+            what = f"{len(each)} units for {len(group)} columns"
+            problems.append(Problem(file, f"mapping.{key}", what, "give one unit, or one per column"))
+            continue
+        # A quaternion and a torque have no unit to convert.
+        factors[key] = np.array([1.0 if u is None else SI[u][1] for u in each])
+        if wanted is None or key not in ("joints", "velocities"):
+            continue
+        for j, u in enumerate(each):
+            si = SI[u][0].split("/")[0] if u is not None else wanted[j]
+            if si != wanted[j] and target is not None:
+                what = f"column {j + 1} is in {u}, but joint {target.joints[j]!r} is in {wanted[j]}"
+                problems.append(Problem(file, f"mapping.{key}", what, "correct the unit or the columns"))
+    if problems:
+        raise InputError(problems)
+    return factors
+
+
+def _check_selection(file: str, mapping: Mapping, numbers: Numbers) -> None:
+    if mapping.robot_column is None:
+        return
+    if mapping.robot is not None and mapping.robot not in numbers.selections:
+        what = f"no row of robot {mapping.robot!r}"
+        raise InputError.at(file, "mapping.robot", what, suggestion(mapping.robot, numbers.selections))
+    if mapping.robot is None and len(numbers.selections) > 1:
+        names = ", ".join(map(repr, numbers.selections[:12]))
+        raise InputError.at(file, "mapping.robot", f"the rows are of several robots: {names}", "name one")
+
+
+def _blocks(
+    numbers: Numbers, indices: dict[str, tuple[int, ...]], factors: dict[str, Array]
+) -> dict[str, Array]:
+    blocks, start = {}, 0
+    for key, group in indices.items():
+        blocks[key] = numbers.values[:, start : start + len(group)] * factors[key]
+        start += len(group)
+    return blocks

@@ -1,0 +1,210 @@
+"""A joint trajectory read from a file: plain arrays in SI units, checked once, then sampled.
+
+Nothing is resampled: every sample is a row of the file. Velocities that the file does not give are
+derived by second-order central differences, and the result says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.errors import InputError, Problem
+from seerob.samples import JointSample, Quality
+from seerob.snapshot import Finding
+from seerob.transforms import Array
+
+MAX_SAMPLES = 5_000_000
+"""More rows than this are refused: 80 minutes at 1 kHz."""
+
+
+class MotionOrigin(StrEnum):
+    """What a recorded motion is a motion of; anything but the real controller is preliminary."""
+
+    CONTROLLER = "controller"
+    """Logged from the real robot's controller."""
+    VENDOR_EMULATOR = "vendor_emulator"
+    """The maker's own controller software without the robot (URSim, a virtual controller)."""
+    SIMULATOR = "simulator"
+    """A generic simulator or offline programming tool with its own motion planner."""
+    PLANNED = "planned"
+    """A path that nobody has executed, not even in a simulator."""
+    RECORDING = "recording"
+    """One of our own recordings; what fed it is written there."""
+
+
+def origin_finding(origin: MotionOrigin, subject: str, file: str) -> Finding:
+    """What whoever reads a result must know of where the motion comes from."""
+    if origin is MotionOrigin.CONTROLLER:
+        return Finding(level="note", subject=subject, text=f"motion logged from the controller ({file})")
+    if origin is MotionOrigin.RECORDING:
+        return Finding(level="note", subject=subject, text=f"motion replayed from a recording ({file})")
+    what = {
+        MotionOrigin.VENDOR_EMULATOR: "the maker's emulator",
+        MotionOrigin.SIMULATOR: "a generic simulator",
+        MotionOrigin.PLANNED: "a plan that was not executed",
+    }[origin]
+    text = f"motion comes from {what} ({file}): preliminary until it is confirmed on the controller"
+    return Finding(level="assumed", subject=subject, text=text)
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Joint values over time, one row per sample of the file.
+
+    Raises:
+        InputError: Values that are not finite, time that does not strictly increase, shapes that
+            do not fit, fewer than two samples; every kind of mistake once, with its first place.
+    """
+
+    file: str
+    """The file, as the user named it; for messages."""
+    t: Array
+    """Instants on the file's own clock [s], shape (n,), strictly increasing."""
+    q: Array
+    """Joint positions [rad or m], shape (n, dof)."""
+    qd: Array | None = None
+    """Joint velocities as the file gives them [rad/s or m/s], shape (n, dof)."""
+    tau: Array | None = None
+    """Measured joint torques [N·m or N], shape (n, dof)."""
+    tcp_position: Array | None = None
+    """Tool centre point in whatever frame the file uses [m], shape (n, 3)."""
+    tcp_wxyz: Array | None = None
+    """Orientation of the tool in whatever frame the file uses, unit quaternions, shape (n, 4)."""
+    invalid: NDArray[np.bool_] | None = None
+    """Rows of which the file itself says that they are not the robot's state, shape (n,)."""
+    rows: NDArray[np.int64] | None = None
+    """Row numbers in the file, from 1, shape (n,); for messages."""
+    sheet: str = ""
+    """Sheet of a workbook; for messages."""
+
+    def __post_init__(self) -> None:
+        problems = list(self._shape_problems()) or list(self._value_problems())
+        if problems:
+            raise InputError(problems)
+
+    @property
+    def dof(self) -> int:
+        """Number of joints."""
+        return int(self.q.shape[1])
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last sample [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    def instant(self, index: int) -> float:
+        """Run time of a sample [s], from 0."""
+        return float(self.t[index] - self.t[0])
+
+    def place(self, index: int, column: str = "") -> str:
+        """Where a sample stands in the file: ``sheet 'Joints' row 17 column 'J3'``."""
+        row = f"row {self.rows[index]}" if self.rows is not None else f"sample {index}"
+        sheet = f"sheet {self.sheet!r} " if self.sheet else ""
+        return sheet + row + (f" column {column!r}" if column else "")
+
+    def _shape_problems(self) -> Iterator[Problem]:
+        n = len(self.t)
+        if self.t.ndim != 1 or self.q.ndim != 2 or self.q.shape[1] == 0:
+            yield Problem(self.file, "", f"time {self.t.shape} and joints {self.q.shape} are not a table")
+            return
+        if n < 2:
+            what = f"{n} sample{'s' * (n != 1)}; a trajectory has at least 2"
+            yield Problem(self.file, f"sheet {self.sheet!r}" if self.sheet else "", what, "export more rows")
+        if n > MAX_SAMPLES:
+            yield Problem(self.file, "", f"{n} samples, more than {MAX_SAMPLES}", "split the file")
+        wanted = {"q": self.dof, "qd": self.dof, "tau": self.dof, "tcp_position": 3, "tcp_wxyz": 4}
+        for name, width in wanted.items():
+            array = getattr(self, name)
+            if array is not None and array.shape != (n, width):
+                yield Problem(self.file, name, f"shape {array.shape} where {(n, width)} is needed")
+
+    def _value_problems(self) -> Iterator[Problem]:
+        finite_time = np.isfinite(self.t)
+        if not finite_time.all():
+            i = int(np.argmin(finite_time))
+            yield Problem(self.file, self.place(i), f"time is {self.t[i]}", "give every row a time")
+        else:
+            step = np.diff(self.t)
+            wrong = np.flatnonzero(step <= 0)
+            if wrong.size:
+                i = int(wrong[0]) + 1
+                kind = "repeats" if step[i - 1] == 0 else "goes back"
+                what = f"time {kind}: {self.t[i]:.9g} s after {self.t[i - 1]:.9g} s ({wrong.size} such rows)"
+                yield Problem(
+                    self.file, self.place(i), what, "remove the rows, or export one motion per file"
+                )
+        for name in ("q", "qd", "tau", "tcp_position", "tcp_wxyz"):
+            array = getattr(self, name)
+            if array is None:
+                continue
+            bad = ~np.isfinite(array)
+            if bad.any():
+                i, j = (int(k) for k in np.argwhere(bad)[0])
+                what = f"{name}[{j}] is {array[i, j]} ({int(bad.sum())} such values)"
+                yield Problem(self.file, self.place(i), what, "every value must be a finite number")
+
+
+@dataclass(frozen=True, eq=False)
+class Derived:
+    """Velocities from positions."""
+
+    qd: Array
+    """[rad/s or m/s], shape (n, dof)."""
+    error: float | None
+    """Largest estimated error [rad/s or m/s]; None when there are too few samples to tell."""
+
+
+def derive_velocities(t: Array, q: Array) -> Derived:
+    r"""Second-order central differences, one-sided at the ends, for any spacing.
+
+    The error is Richardson's estimate :math:`|\dot q_h - \dot q_{2h}| / 3` where every other sample
+    is left out; noise in the positions raises it, as it should.
+
+    Args:
+        t: Instants [s], shape (n,), strictly increasing, n >= 2.
+        q: Positions [rad or m], shape (n, dof).
+    """
+    if len(t) > 2:
+        qd = np.asarray(np.gradient(q, t, axis=0, edge_order=2))
+    else:
+        qd = np.asarray(np.gradient(q, t, axis=0))
+    if len(t) < 7:
+        return Derived(qd, None)
+    coarse = np.gradient(q[::2], t[::2], axis=0, edge_order=2)
+    # The ends are one-sided there; the estimate holds inside.
+    return Derived(qd, float(np.abs(coarse - qd[::2])[1:-1].max()) / 3)
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectorySamples:
+    """The rows of a trajectory as samples, ``t`` from 0; can be iterated again and again."""
+
+    trajectory: Trajectory
+    source: str
+    target: str
+    qd: Array | None
+    """Velocities to hand on: the file's own or derived [rad/s or m/s], shape (n, dof)."""
+
+    def __len__(self) -> int:
+        return len(self.trajectory.t)
+
+    def __iter__(self) -> Iterator[JointSample]:
+        motion = self.trajectory
+        start = float(motion.t[0])
+        for i, t in enumerate(motion.t.tolist()):
+            yield JointSample(
+                source=self.source,
+                target=self.target,
+                seq=i,
+                t=t - start,
+                t_device=t,
+                quality=Quality.GOOD if motion.invalid is None or not motion.invalid[i] else Quality.INVALID,
+                q=tuple(motion.q[i].tolist()),
+                qd=None if self.qd is None else tuple(self.qd[i].tolist()),
+                tau=None if motion.tau is None else tuple(motion.tau[i].tolist()),
+            )

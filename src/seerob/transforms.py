@@ -1,0 +1,110 @@
+"""Rigid transforms. They read right to left: ``world_from_tool = world_from_base @ base_from_tool``.
+
+Positions are in metres, angles in radians, quaternions are unit and ordered w, x, y, z.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def rotation_from_wxyz(wxyz: ArrayLike) -> Array:
+    """Rotation matrix of a quaternion.
+
+    Args:
+        wxyz: Quaternion, w first, shape (..., 4); need not be normalised, must not be zero.
+
+    Returns:
+        Rotation matrix, shape (..., 3, 3).
+    """
+    quaternion = np.asarray(wxyz, float)
+    w, x, y, z = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def wxyz_from_rotation(rotation: ArrayLike) -> Array:
+    """Unit quaternion with w >= 0 of a rotation matrix.
+
+    Args:
+        rotation: Rotation matrix, shape (3, 3).
+
+    Returns:
+        Quaternion w, x, y, z, shape (4,).
+    """
+    m = np.asarray(rotation, float)
+    # Shepperd's method: divide by the largest of the four, so that nothing cancels.
+    squares = np.array([m.trace(), m[0, 0], m[1, 1], m[2, 2]])
+    largest = int(squares.argmax())
+    q = np.zeros(4)
+    if largest == 0:
+        q[:] = 1 + m.trace(), m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
+    else:
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q[0] = m[k, j] - m[j, k]
+        q[1 + i] = 1 + m[i, i] - m[j, j] - m[k, k]
+        q[1 + j] = m[j, i] + m[i, j]
+        q[1 + k] = m[k, i] + m[i, k]
+    q /= np.linalg.norm(q)
+    return -q if q[0] < 0 else q
+
+
+def rotation_from_rpy(rpy: ArrayLike) -> Array:
+    """Rotation matrix of fixed-axis roll, pitch, yaw as URDF has them: ``Rz(yaw) Ry(pitch) Rx(roll)``.
+
+    Args:
+        rpy: Roll, pitch, yaw [rad], shape (3,).
+
+    Returns:
+        Rotation matrix, shape (3, 3).
+    """
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def rotation_from_axis_angle(axis: ArrayLike, angle: float) -> Array:
+    """Rotation by ``angle`` [rad] about ``axis`` (any length but zero), shape (3, 3)."""
+    x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
+
+
+def transform(rotation: ArrayLike | None = None, position: ArrayLike | None = None) -> Array:
+    """Homogeneous matrix of a rotation (3, 3) and a position [m] (3,), shape (4, 4)."""
+    matrix = np.eye(4)
+    if rotation is not None:
+        matrix[:3, :3] = rotation
+    if position is not None:
+        matrix[:3, 3] = position
+    return matrix
+
+
+def inverse(a_from_b: ArrayLike) -> Array:
+    """``b_from_a`` of a rigid ``a_from_b``, shape (..., 4, 4)."""
+    matrix = np.asarray(a_from_b, float)
+    result = np.zeros_like(matrix)
+    rotation = np.swapaxes(matrix[..., :3, :3], -1, -2)
+    result[..., :3, :3] = rotation
+    result[..., :3, 3] = -np.einsum("...ij,...j->...i", rotation, matrix[..., :3, 3])
+    result[..., 3, 3] = 1.0
+    return result
+
+
+def apply(a_from_b: ArrayLike, points_in_b: ArrayLike) -> Array:
+    """Points in ``a`` [m], shape (n, 3), of points in ``b`` [m], shape (n, 3)."""
+    matrix = np.asarray(a_from_b, float)
+    return np.asarray(points_in_b, float) @ matrix[:3, :3].T + matrix[:3, 3]

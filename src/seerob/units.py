@@ -1,0 +1,40 @@
+"""Units at the door: ``rpy_deg = [0, 0, 90]`` in a file is ``rpy`` in radians inside."""
+
+from __future__ import annotations
+
+import math
+
+SUFFIXES: dict[str, tuple[str, float]] = {
+    "mm": ("m", 1e-3),
+    "cm": ("m", 1e-2),
+    "inch": ("m", 0.0254),
+    "deg": ("rad", math.pi / 180),
+    "deg_s": ("rad/s", math.pi / 180),
+    "mm_s": ("m/s", 1e-3),
+    "ms": ("s", 1e-3),
+    "g": ("kg", 1e-3),
+    "mJ": ("J", 1e-3),
+    "g_cm3": ("kg/m³", 1e3),
+}
+"""Suffix of a key → SI unit and factor."""
+
+LENGTHS: dict[str, float] = {
+    "m": 1.0,
+    "dm": 0.1,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "inch": 0.0254,
+    "ft": 0.3048,
+}
+"""Units a mesh file may be in → metres."""
+
+
+def split(key: str) -> tuple[str, str, float] | None:
+    """``('rpy', 'rad', π/180)`` of ``'rpy_deg'``; None when the key carries no known suffix."""
+    for suffix in sorted(SUFFIXES, key=len, reverse=True):
+        stem = key.removesuffix("_" + suffix)
+        if stem and stem != key:
+            unit, factor = SUFFIXES[suffix]
+            return stem, unit, factor
+    return None

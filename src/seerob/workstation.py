@@ -1,0 +1,345 @@
+"""The workstation file: what the engineer writes, typed, frozen, checked all at once.
+
+`read` turns ``workstation.toml`` into a `Workstation`; every mistake is reported in one
+`InputError`. Quantities are SI; a key that ends in ``_deg``, ``_mm`` … is converted at the door.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct
+
+from seerob.errors import InputError, Problem, suggestion
+
+MAX_FILE_SIZE = 4 << 20
+"""A workstation file larger than this [byte] is not one."""
+
+FILE_NAME = "workstation.toml"
+
+
+def _unit(unit: str, **limits: Any) -> Any:
+    return Meta(extra={"unit": unit}, extra_json_schema={"x-unit": unit}, **limits)
+
+
+Metre = Annotated[float, _unit("m")]
+Length = Annotated[float, _unit("m", gt=0)]
+Mass = Annotated[float, _unit("kg", gt=0)]
+Density = Annotated[float, _unit("kg/m³", gt=0)]
+Inertia = Annotated[float, _unit("kg·m²")]
+Seconds = Annotated[float, _unit("s", gt=0)]
+Radian = Annotated[float, _unit("rad")]
+Hertz = Annotated[float, _unit("Hz", gt=0)]
+Metres3 = Annotated[tuple[float, float, float], _unit("m")]
+Radians3 = Annotated[tuple[float, float, float], _unit("rad")]
+Radians = Annotated[tuple[float, ...], _unit("rad")]
+Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=80)]
+PathName = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.\-]+(/[A-Za-z0-9_.\-]+)*$", max_length=200)]
+
+
+class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of every table."""
+
+
+class Pose(_Table, frozen=True, kw_only=True):
+    """Where something is: a position and one way of giving an orientation."""
+
+    position: Metres3 = (0.0, 0.0, 0.0)
+    rpy: Radians3 | None = None
+    """Roll, pitch, yaw about the fixed x, y, z axes [rad]; write ``rpy_deg`` for degrees."""
+    wxyz: tuple[float, float, float, float] | None = None
+    """Unit quaternion, w first."""
+
+    def __post_init__(self) -> None:
+        if self.rpy is not None and self.wxyz is not None:
+            raise ValueError("rpy and wxyz are both given: keep one")
+        if self.wxyz is not None and abs(sum(x * x for x in self.wxyz) - 1.0) > 1e-3:
+            raise ValueError(f"wxyz = {list(self.wxyz)} is not a unit quaternion")
+
+
+class Engine(_Table, frozen=True, kw_only=True):
+    """How the twin is moved."""
+
+    timestep: Annotated[float, _unit("s", ge=0.001, le=0.002)] = 0.002
+    """Physics step [s]: 500 to 1 000 Hz."""
+    tick: Annotated[float, _unit("s", gt=0, le=0.01)] = 0.01
+    """Period of results [s]: 100 Hz or more, a whole number of steps."""
+    bandwidth: Annotated[float, _unit("Hz", ge=1, le=60)] = 20.0
+    """Natural frequency of the critically damped controllers that pull robots [Hz]."""
+    human_bandwidth: Annotated[float, _unit("Hz", ge=1, le=40)] = 10.0
+    """The same for people [Hz]."""
+    gravity: Metres3 = (0.0, 0.0, -9.81)
+    """[m/s²]"""
+    tracking_limit: Annotated[float, _unit("rad", gt=0)] = 0.01
+    """Joint error [rad or m] beyond which the twin does not follow what was heard: verdicts that
+    depend on it turn UNDECIDED."""
+
+    def __post_init__(self) -> None:
+        steps = self.tick / self.timestep
+        if abs(steps - round(steps)) > 1e-9 or round(steps) < 1:
+            raise ValueError(f"tick = {self.tick} s is not a whole number of timesteps of {self.timestep} s")
+
+
+class Robot(_Table, frozen=True, kw_only=True):
+    """A robot arm or any other chain of joints."""
+
+    name: Name
+    model: str
+    """``library:ur10``, ``package:…/ur10_robot.urdf``, or a path to URDF, xacro or MJCF."""
+    base: Pose = Pose()
+    """Pose of its root link in the world."""
+    meshes: str | None = None
+    """URDF or folder with the maker's meshes, to use instead of the library's envelope."""
+    packages: dict[str, str] = {}
+    """Folders of ROS packages that ``package://`` may name."""
+    tool: str | None = None
+    """Link that is its point of interest; its last mounted tool's ``tcp`` when not given."""
+    q: Radians | None = None
+    """Joint positions [rad or m] where it stands when no source drives it."""
+    rotor_inertia: Annotated[tuple[float, ...], _unit("kg·m²")] | None = None
+    """Rotor inertia seen at each joint [kg·m²]; unknown when not given."""
+    torque_limits: Annotated[tuple[float, ...], _unit("N·m")] | None = None
+    """Largest torque per joint [N·m], instead of the description's."""
+    velocity_limits: Annotated[tuple[float, ...], _unit("rad/s")] | None = None
+    """Largest speed per joint [rad/s], instead of the description's."""
+    masses: dict[str, Body] = {}
+    """Mass properties by hand, per link name."""
+
+
+class Body(_Table, frozen=True, kw_only=True):
+    """Physical properties given by hand."""
+
+    mass: Mass
+    com: Metres3 | None = None
+    """Centre of mass in the link's frame [m]; from the shape at uniform density when not given."""
+    inertia: Annotated[tuple[float, float, float, float, float, float], _unit("kg·m²")] | None = None
+    """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]; from the shape when not given."""
+    source: str = "workstation file"
+
+
+class Shape(_Table, frozen=True, kw_only=True):
+    """A simple shape instead of a mesh file, centred at the origin of its frame."""
+
+    box: Annotated[tuple[float, float, float], _unit("m")] | None = None
+    """Edge lengths [m]."""
+    sphere: Length | None = None
+    """Radius [m]."""
+    cylinder: Annotated[tuple[float, float], _unit("m")] | None = None
+    """Radius and height along z [m]."""
+
+    def __post_init__(self) -> None:
+        given = [x for x in (self.box, self.sphere, self.cylinder) if x is not None]
+        if len(given) != 1:
+            raise ValueError("give exactly one of box, sphere, cylinder")
+        sizes = (given[0],) if isinstance(given[0], float) else given[0]
+        if min(sizes) <= 0:
+            raise ValueError(f"sizes must be larger than 0 m, not {list(sizes)}")
+
+
+class Thing(_Table, frozen=True, kw_only=True):
+    """What a tool, a workpiece and a part have in common: a shape and where it is."""
+
+    name: PathName
+    mesh: str | None = None
+    """STL, OBJ, PLY, glTF, COLLADA or 3MF file."""
+    shape: Shape | None = None
+    units: str | None = None
+    """Unit of the mesh file (``mm``, ``m``, ``inch`` …) when the format does not say."""
+    up: Literal["x", "y", "z"] | None = None
+    """Axis that points up in the mesh file, when the format does not say."""
+    at: Pose = Pose()
+    """Pose in the world, or in the frame it is mounted on."""
+    mass: Mass | None = None
+    com: Metres3 | None = None
+    """Centre of mass in its own frame [m]."""
+    inertia: Annotated[tuple[float, float, float, float, float, float], _unit("kg·m²")] | None = None
+    """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]."""
+    density: Density | None = None
+    """Uniform density [kg/m³] to compute the mass from the shape."""
+    color: tuple[float, float, float] | None = None
+    """Red, green, blue in 0…1."""
+
+    def __post_init__(self) -> None:
+        if (self.mesh is None) == (self.shape is None):
+            raise ValueError("give either mesh or shape")
+        if self.mass is not None and self.density is not None:
+            raise ValueError("mass and density are both given: keep one")
+        if self.inertia is not None and (self.mass is None or self.com is None):
+            raise ValueError("inertia needs mass and com beside it")
+        if self.com is not None and self.mass is None:
+            raise ValueError("com needs mass beside it")
+
+
+class Mounted(Thing, frozen=True, kw_only=True):
+    """A thing that moves with a robot."""
+
+    on: str
+    """Full name of the link that carries it, such as ``ur10/tool0``, or of another tool."""
+
+
+class Tool(Mounted, frozen=True, kw_only=True):
+    """Something mounted on a robot, real or virtual: it changes the twin's masses and torques."""
+
+    tcp: Pose | None = None
+    """Its working point in its own frame; the robot's point of interest from then on."""
+
+
+class Workpiece(Mounted, frozen=True, kw_only=True):
+    """A payload: something a tool carries."""
+
+
+class Part(Thing, frozen=True, kw_only=True):
+    """Something of the environment that stands still."""
+
+
+class Human(_Table, frozen=True, kw_only=True):
+    """A person."""
+
+    name: Name
+    stature: Annotated[float, _unit("m", ge=1.2, le=2.3)]
+    """[m]"""
+    mass: Annotated[float, _unit("kg", ge=30, le=250)]
+    """[kg]"""
+    sex: Literal["male", "female"]
+    hand: Literal["right", "left"] = "right"
+    """Dominant hand."""
+    lengths: Literal["drillis", "deleva"] = "drillis"
+    """Data set that segment lengths are taken from."""
+    at: Pose = Pose()
+    """Where the person stands: the point on the floor between the feet."""
+    posture: str = "standing"
+    """Named posture when no source moves the person."""
+    joints: dict[str, Radian] = {}
+    """Joint angles on top of the posture [rad]; ``joints_deg`` for degrees."""
+
+
+class Contact(_Table, frozen=True, kw_only=True):
+    """Two sets that may touch in the physics. Nothing else does."""
+
+    between: tuple[str, str]
+
+
+class Workstation(_Table, frozen=True, kw_only=True):
+    """A workstation file."""
+
+    title: str = "Untitled workstation"
+    edition: Literal["ISO 10218-2:2025", "ISO/TS 15066:2016"] = "ISO/TS 15066:2016"
+    """Edition of the norm that limits are taken from."""
+    description: str = ""
+    engine: Engine = Engine()
+    robots: tuple[Robot, ...] = ()
+    tools: tuple[Tool, ...] = ()
+    workpieces: tuple[Workpiece, ...] = ()
+    parts: tuple[Part, ...] = ()
+    humans: tuple[Human, ...] = ()
+    contacts: tuple[Contact, ...] = ()
+    sources: tuple[Any, ...] = ()
+    """`Source`s, each of the type that its ``kind`` names."""
+    safety: tuple[Any, ...] = ()
+    """`Criterion`s."""
+    ergonomics: tuple[Any, ...] = ()
+    """Rules, which are `Criterion`s too."""
+    sinks: tuple[Any, ...] = ()
+    """`Sink`s."""
+
+    folder: str = ""
+    """Folder of the file; not written in it."""
+    files: dict[str, bytes] = {}
+    """The file itself, and after `compile` every file it names; not written in it."""
+
+
+PLUGINS = ("sources", "safety", "ergonomics", "sinks")
+"""Tables whose type is told by their ``kind``."""
+
+
+def locate(path: Path | str) -> Path:
+    """The workstation file of a path that is one, or a folder that contains one.
+
+    Raises:
+        InputError: There is none.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / FILE_NAME
+    if not path.is_file():
+        raise InputError.at(
+            path, "", "no such file", f"give a folder with a {FILE_NAME}, or make one with `seerob new`"
+        )
+    return path
+
+
+def read_toml(path: Path) -> tuple[dict[str, Any], bytes]:
+    """Content of a TOML file, parsed and raw.
+
+    Raises:
+        InputError: Too large, not UTF-8, or not TOML; names line and column.
+    """
+    if path.stat().st_size > MAX_FILE_SIZE:
+        raise InputError.at(path, "", f"larger than {MAX_FILE_SIZE} bytes", "is this a workstation file?")
+    raw = path.read_bytes()
+    try:
+        return tomllib.loads(raw.decode("utf-8-sig").replace("\r\n", "\n")), raw
+    except UnicodeDecodeError as error:
+        raise InputError.at(path, f"byte {error.start}", "not UTF-8", "save it as UTF-8 text") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError.at(path, "", f"not TOML: {error}", "see https://toml.io for the syntax") from error
+
+
+def content_hash(files: dict[str, bytes]) -> str:
+    """SHA-256 over the names and contents of files, independent of their order."""
+    digest = hashlib.sha256()
+    for name in sorted(files):
+        digest.update(f"{name}\0{len(files[name])}\0".encode())
+        digest.update(files[name])
+    return digest.hexdigest()
+
+
+def check_names(station: Workstation, file: str) -> list[Problem]:
+    """Mistakes that span tables: a name twice, a mount that does not exist or goes in a circle."""
+    problems: list[Problem] = []
+    seen: dict[str, str] = {}
+    for table in ("robots", "tools", "workpieces", "parts", "humans"):
+        for i, entry in enumerate(getattr(station, table)):
+            key = f"{table}[{i}].name"
+            if entry.name in seen:
+                problems.append(
+                    Problem(
+                        file, key, f"the name {entry.name!r} is taken by {seen[entry.name]}", "choose another"
+                    )
+                )
+            seen.setdefault(entry.name, key)
+    robots = {robot.name for robot in station.robots}
+    mounts = {thing.name: thing.on for thing in (*station.tools, *station.workpieces)}
+    mounted: list[tuple[str, Mounted]] = [(f"tools[{i}].on", t) for i, t in enumerate(station.tools)]
+    mounted += [(f"workpieces[{i}].on", w) for i, w in enumerate(station.workpieces)]
+    for key, thing in mounted:
+        at, steps = thing.on, 0
+        while at in mounts and steps <= len(mounts):
+            at, steps = mounts[at], steps + 1
+        if steps > len(mounts):
+            problems.append(
+                Problem(file, key, f"{thing.name!r} is mounted on itself in a circle", "break it")
+            )
+        elif at.split("/")[0] not in robots:
+            known = [*(f"{robot}/<link>" for robot in robots), *mounts]
+            problems.append(
+                Problem(file, key, f"nothing named {thing.on!r} to mount on", suggestion(at, known))
+            )
+    return problems
+
+
+def source_target_problem(name: str, known: set[str], file: str, key: str) -> Problem | None:
+    """The mistake of a source that drives what does not exist."""
+    if name and name not in known:
+        return Problem(file, key, f"no robot or human named {name!r}", suggestion(name, known))
+    return None
+
+
+def default_name(kind: str, subjects: tuple[str, ...]) -> str:
+    """``minimum distance ur10 – operator`` of a kind and the names it speaks of."""
+    words = re.sub(r"[_.]+", " ", kind).strip()
+    return f"{words} {' – '.join(subjects)}".strip()

@@ -1,0 +1,357 @@
+"""What is read back is what was written, whatever happened to the file."""
+
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+from threading import Event
+
+import made_run
+import msgspec
+import numpy as np
+import pytest
+from mcap.exceptions import EndOfFile
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.stream_reader import StreamReader
+from mcap_protobuf.decoder import DecoderFactory
+
+import seerob
+from seerob.errors import InputError, SeerobError
+from seerob.recording import Recording
+from seerob.recording_format import BASIS, SAMPLES, SCENE, SNAPSHOT
+from seerob.sinks import recorder as recorder_module
+from seerob.sinks.recorder import Recorder
+from seerob.snapshot import Scene, Snapshot
+from seerob.transforms import rotation_from_axis_angle, rotation_from_wxyz
+
+N = 150
+
+
+def record(folder, n=N, *, pause=0.0, scene=None, meshes=made_run.MESHES, files=made_run.FILES):
+    with Recorder(lossless=True).open(scene or made_run.scene(), meshes, files, folder) as writer:
+        for k in range(n):
+            writer.write(made_run.snapshot(k), made_run.samples(k))
+            time.sleep(pause)
+    return folder / "run.mcap"
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return record(tmp_path_factory.mktemp("recording"))
+
+
+def test_everything_comes_back_bit_for_bit(path):
+    recording = Recording.open(path)
+    assert recording.complete
+    assert recording.findings == ()
+    assert recording.scene == made_run.scene()
+    assert recording.meshes == made_run.MESHES
+    assert recording.files == made_run.FILES
+    pack = msgspec.msgpack.encode
+
+    def plain(k):
+        return msgspec.msgpack.decode(pack(made_run.snapshot(k)), type=Snapshot)
+
+    snapshots = list(recording.snapshots())
+    assert [pack(s) for s in snapshots] == [pack(plain(k)) for k in range(N)]
+    ticks = list(recording.ticks())
+    assert [(tick.seq, tick.t) for tick in ticks] == [(s.seq, s.t) for s in snapshots]
+    assert [tick.samples for tick in ticks] == [made_run.samples(k) for k in range(N)]
+    assert (recording.start, recording.end) == (0.0, snapshots[-1].t)
+
+
+def test_seek_agrees_with_search_in_all_of_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(recorder_module, "FLUSH_PERIOD", 0.0)  # a chunk per few ticks
+    recording = Recording.open(record(tmp_path, pause=1e-3))
+    every = list(recording.snapshots())
+    assert every == [made_run.snapshot(k) for k in range(N)]
+    rng = np.random.default_rng(1)
+    for t in [0.0, -1.0, 99.0, *(s.t for s in every[::7]), *rng.uniform(0, N / 100, 50)]:
+        before = [s for s in every if s.t <= t]
+        assert recording.snapshot_at(t) == (before[-1] if before else every[0])
+        end = t + rng.uniform(0, 0.3)
+        assert list(recording.snapshots(t, end)) == [s for s in every if t <= s.t <= end]
+
+
+def test_basis_is_stored_when_it_changes_and_not_at_every_tick(path):
+    with path.open("rb") as file:
+        changes = list(make_reader(file, validate_crcs=True).iter_messages(topics=[BASIS]))
+    assert len(changes) == 3  # separation and speed from the start, the third from tick 10
+
+
+def test_cut_anywhere_it_opens_shorter_or_says_why(path, tmp_path):
+    whole = path.read_bytes()
+    expected = [made_run.snapshot(k) for k in range(N)]
+    cut = tmp_path / "cut.mcap"
+    lengths = []
+    for size in [*range(0, 120, 3), *range(120, len(whole), len(whole) // 150)]:
+        cut.write_bytes(whole[:size])
+        try:
+            recording = Recording.open(cut)
+        except InputError:
+            lengths.append(-1)
+            continue
+        snapshots = list(recording.snapshots())
+        assert snapshots == expected[: len(snapshots)]
+        lengths.append(len(snapshots))
+    assert lengths == sorted(lengths)
+    assert lengths[-1] == N
+
+
+def test_a_flipped_byte_anywhere_never_invents_anything(path, tmp_path):
+    whole = path.read_bytes()
+    expected = {s.seq: s for s in (made_run.snapshot(k) for k in range(N))}
+    bad = tmp_path / "bad.mcap"
+    rng = np.random.default_rng(2)
+    refused = 0
+    for position in rng.integers(0, len(whole), 150):
+        data = bytearray(whole)
+        data[position] ^= int(rng.integers(1, 256))
+        bad.write_bytes(data)
+        try:
+            recording = Recording.open(bad)
+            for s in recording.snapshots():
+                assert s == expected[s.seq]
+            assert all(made_run.MESHES.get(k, v) == v for k, v in recording.meshes.items())
+            recording.snapshot_at(0.7)
+            list(recording.ticks())
+            assert recording.scene == made_run.scene()
+        except InputError:
+            refused += 1
+    assert refused < 150  # most of the file is data, of which the rest survives
+
+
+def test_cut_off_recording_says_so_and_how_far_it_goes(path, tmp_path):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(path.read_bytes()[:-40000] if path.stat().st_size > 80000 else path.read_bytes()[:-200])
+    recording = Recording.open(cut)
+    assert not recording.complete
+    assert "cut off" in recording.findings[0].text
+    assert f"{recording.end:.3f} s" in recording.findings[0].text
+
+
+KILLED = """
+import sys, time
+from pathlib import Path
+import made_run
+from seerob.sinks.recorder import Recorder
+writer = Recorder().open(made_run.scene(), made_run.MESHES, made_run.FILES, Path(sys.argv[1]))
+start = time.monotonic()
+k = 0
+while True:
+    time.sleep(max(0.0, start + k * 0.01 - time.monotonic()))
+    writer.write(made_run.snapshot(k), made_run.samples(k))
+    print(k, flush=True)
+    k += 1
+"""
+
+
+def test_kill_9_loses_less_than_a_second(tmp_path):
+    source = Path(seerob.__file__).parents[1]
+    process = subprocess.Popen(
+        [sys.executable, "-c", KILLED, str(tmp_path)],
+        stdout=subprocess.PIPE,
+        env={"PYTHONPATH": f"{source}:{Path(made_run.__file__).parent}"},
+    )
+    for line in process.stdout:
+        if int(line) == 220:
+            process.kill()
+            break
+    last = max([220, *map(int, process.stdout.read().split())])
+    process.stdout.close()
+    assert process.wait() == -9
+    path = tmp_path / "run.mcap"
+    recording = Recording.open(path)
+    snapshots = list(recording.snapshots())
+    assert not recording.complete
+    assert last * 0.01 - recording.end < 1.0
+    assert snapshots == [made_run.snapshot(k) for k in range(len(snapshots))]
+    with path.open("rb") as file:  # a foreign reader gets as far, then finds the end missing
+        messages = NonSeekingReader(file, validate_crcs=True).iter_messages(log_time_order=False)
+        topics = []
+        with pytest.raises((EndOfFile, struct.error)):
+            topics.extend(channel.topic for _, channel, _ in messages)
+    seen = topics.count(SNAPSHOT)
+    assert seen == len(snapshots)
+
+
+def test_a_foreign_reader_understands_every_channel(path):
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        summary = reader.get_summary()
+        topics = {c.topic: c for c in summary.channels.values()}
+        assert set(topics) == {SCENE, SAMPLES, SNAPSHOT, BASIS, "/scene", "/markers", "/tf", "/results"}
+        assert summary.statistics.attachment_count == len(made_run.MESHES) + len(made_run.FILES)
+        scenes = [m.decoded_message for m in reader.iter_decoded_messages(topics=["/scene"])]
+        transforms = [m.decoded_message for m in reader.iter_decoded_messages(topics=["/tf"])]
+        markers = [m.decoded_message for m in reader.iter_decoded_messages(topics=["/markers"])]
+        results = [msgspec.json.decode(m.data) for _, _, m in reader.iter_messages(topics=["/results"])]
+        first = next(m for _, _, m in reader.iter_messages(topics=[SCENE]))
+        # A second implementation of MessagePack reads ours without knowing our types.
+        assert msgspec.convert(msgspec.msgpack.decode(first.data), Scene) == made_run.scene()
+        attachments = {a.name: a.data for a in reader.iter_attachments()}
+    nodes = made_run.scene().nodes
+    assert [e.frame_id for e in scenes[0].entities] == [n.name for n in nodes if n.mesh]
+    assert scenes[0].entities[0].models[0].data == made_run.MESHES["c" * 64]
+    assert {t.child_frame_id for t in transforms[0].transforms} == {n.name for n in nodes}
+    assert attachments["file/workstation.toml"] == made_run.FILES["workstation.toml"]
+    duration = (N - 1) * 0.01
+    assert duration * 20 <= len(transforms) <= duration * 20 + 2
+    assert len(markers) == len(results) == len(transforms)
+    segment = markers[0].entities[0].lines[0].points
+    assert [segment[0].x, segment[0].z] == [0.5, 1.3]
+    assert results[0]["results"][0] == {
+        "name": "separation",
+        "value": made_run.snapshot(0).results[0].value,
+        "limit": made_run.snapshot(0).results[0].limit,
+        "unit": "m",
+        "verdict": "within",
+        "reason": "ur10/forearm_link ↔ operator/head",
+    }
+
+
+def test_models_stand_upright_in_a_viewer_that_turns_gltf(path):
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        message = next(iter(reader.iter_decoded_messages(topics=["/scene"]))).decoded_message
+    q = message.entities[0].models[0].pose.orientation
+    viewer = rotation_from_axis_angle([1, 0, 0], np.pi / 2)
+    np.testing.assert_allclose(rotation_from_wxyz([q.w, q.x, q.y, q.z]) @ viewer, np.eye(3), atol=1e-15)
+
+
+def test_checksums_are_in_the_file(path):
+    with path.open("rb") as file:
+        chunks = [r for r in StreamReader(file, emit_chunks=True).records if type(r).__name__ == "Chunk"]
+    assert all(chunk.uncompressed_crc for chunk in chunks)
+
+
+def test_a_slow_disk_drops_snapshots_before_samples_and_says_so(tmp_path, monkeypatch):
+    from seerob.sinks._mcap_tape import McapTape
+
+    gate = Event()
+    tick = McapTape.tick
+    monkeypatch.setattr(McapTape, "tick", lambda *a: (gate.wait(), tick(*a))[1])
+    writer = Recorder(queue=5).open(made_run.scene(), {}, {}, tmp_path)
+    for k in range(60):
+        writer.write(made_run.snapshot(k), made_run.samples(k))
+    gate.set()
+    writer.close()
+    recording = Recording.open(tmp_path / "run.mcap")
+    assert [t.samples for t in recording.ticks()] == [made_run.samples(k) for k in range(60)]
+    assert 0 < len(list(recording.snapshots())) == 60 - writer.dropped < 60
+    assert recording.findings[0].text.startswith(f"{writer.dropped} snapshots were dropped")
+    assert writer.findings()[0].level == "warning"
+
+
+def test_lossless_waits_instead_of_dropping(tmp_path, monkeypatch):
+    from seerob.sinks._mcap_tape import McapTape
+
+    tick = McapTape.tick
+    monkeypatch.setattr(McapTape, "tick", lambda *a: (time.sleep(1e-3), tick(*a))[1])
+    with Recorder(queue=2, lossless=True).open(made_run.scene(), {}, {}, tmp_path) as writer:
+        for k in range(60):
+            writer.write(made_run.snapshot(k), ())
+    assert len(list(Recording.open(tmp_path / "run.mcap").snapshots())) == 60
+
+
+def test_a_disk_that_refuses_stops_the_recording_not_the_run(tmp_path, monkeypatch):
+    from seerob.sinks._mcap_tape import McapTape
+
+    def refuse(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(McapTape, "tick", refuse)
+    writer = Recorder().open(made_run.scene(), {}, {}, tmp_path)
+    for k in range(20):
+        writer.write(made_run.snapshot(k), ())
+    with pytest.raises(SeerobError, match="No space left"):
+        writer.close()
+    assert writer.lost == 20
+    assert "No space left" in writer.findings()[-1].text
+    assert Recording.open(tmp_path / "run.mcap").scene == made_run.scene()
+
+
+def test_time_that_stands_still_or_turns_back_is_left_out(tmp_path):
+    with Recorder(lossless=True).open(made_run.scene(), {}, {}, tmp_path) as writer:
+        for k in (0, 1, 1, 0, 2):
+            writer.write(made_run.snapshot(k), ())
+    recording = Recording.open(tmp_path / "run.mcap")
+    assert [s.seq for s in recording.snapshots()] == [0, 1, 2]
+    assert "2 ticks were left out" in recording.findings[0].text
+
+
+def test_numbers_of_numpy_are_recorded_as_numbers(tmp_path):
+    odd = msgspec.structs.replace(
+        made_run.snapshot(0),
+        tracking={"ur10": np.float32(0.5)},
+        joints={"ur10": (np.float64(0.1), np.int64(2))},
+    )
+    with Recorder(lossless=True).open(made_run.scene(), {}, {}, tmp_path) as writer:
+        writer.write(odd, ())
+    (back,) = Recording.open(tmp_path / "run.mcap").snapshots()
+    assert (back.tracking, back.joints) == ({"ur10": 0.5}, {"ur10": (0.1, 2.0)})
+
+
+def test_an_existing_recording_is_never_overwritten(path):
+    before = path.read_bytes()
+    with pytest.raises(InputError, match="exists already"):
+        record(path.parent)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["../run.mcap", "run.txt", "", "a/b.mcap"])
+def test_only_a_file_name_is_accepted(tmp_path, name):
+    with pytest.raises(InputError, match=r"recorder\.file"):
+        Recorder(file=name).open(made_run.scene(), {}, {}, tmp_path)
+
+
+def test_wrong_files_are_refused_with_their_name(tmp_path):
+    from mcap.writer import Writer
+
+    foreign = tmp_path / "foreign.mcap"
+    with foreign.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        writer.add_message(writer.register_channel("/x", "json", 0), 0, b"{}", 0)
+        writer.finish()
+    text = tmp_path / "text.mcap"
+    text.write_text("hello")
+    for wrong, what in (
+        (foreign, "not one of seerob"),
+        (text, "not an MCAP"),
+        (tmp_path / "none", "No such file"),
+    ):
+        with pytest.raises(InputError, match=what) as caught:
+            Recording.open(wrong)
+        assert caught.value.problems[0].file == str(wrong)
+
+
+def test_poses_that_do_not_fit_the_scene_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("seerob.sinks._mcap_tape.VIEW_PERIOD", float("inf"))
+    with Recorder(lossless=True).open(made_run.scene(), {}, {}, tmp_path) as writer:
+        writer.write(made_run.snapshot(0), ())
+        writer.write(msgspec.structs.replace(made_run.snapshot(1), poses=b"\0" * 28), ())
+    with pytest.raises(InputError, match="28 bytes of poses for 6 nodes"):
+        list(Recording.open(tmp_path / "run.mcap").snapshots())
+
+
+def test_names_that_lead_out_of_the_folder_are_not_extracted(tmp_path):
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    path = record(tmp_path, 1, files={"a/ok.txt": b"1", "../evil.txt": b"2"})
+    with pytest.raises(InputError, match="leads out"):
+        Recording.open(path).extract(inner)
+    assert list(inner.iterdir()) == []
+
+
+def test_files_are_extracted_where_they_were(path, tmp_path):
+    Recording.open(path).extract(tmp_path)
+    assert {n: (tmp_path / n).read_bytes() for n in made_run.FILES} == made_run.FILES
+
+
+def test_a_run_without_ticks_is_a_recording_too(tmp_path):
+    recording = Recording.open(record(tmp_path, 0))
+    assert (recording.complete, recording.duration, list(recording.snapshots())) == (True, 0.0, [])
+    with pytest.raises(InputError, match="no snapshot"):
+        recording.snapshot_at(0)

@@ -1,0 +1,181 @@
+"""A run is as good as its worst tick."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seerob.errors import Undecided, UnknownName
+from seerob.results import ResultLog, log_of, result_named
+from seerob.series import CODES, MAX_REASONS, severity, worst_verdict
+from seerob.snapshot import CriterionInfo, Result, Snapshot, Verdict
+
+W, E, U = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+
+
+def tick(k, *results, tracking=None):
+    return Snapshot(seq=k, t=k * 0.01, poses=b"", results=results, tracking=tracking or {})
+
+
+def result(value=1.0, verdict=W, *, name="speed", limit=2.0, at_most=True, **more):
+    return Result(name=name, value=value, unit="m/s", limit=limit, at_most=at_most, verdict=verdict, **more)
+
+
+verdicts = st.sampled_from([W, E, U, None])
+results = st.builds(
+    result,
+    st.none() | st.floats(-10, 10),
+    verdicts,
+    limit=st.none() | st.floats(-5, 5),
+    at_most=st.booleans(),
+    reason=st.sampled_from(["", "a", "b"]),
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(results, min_size=1, max_size=60))
+def test_arrays_hold_what_was_added_and_the_worst_is_the_smallest_severity(rows):
+    log = log_of(tick(k, r) for k, r in enumerate(rows))
+    series = log["speed"]
+    nan = math.nan
+    np.testing.assert_array_equal(series.t, [k * 0.01 for k in range(len(rows))])
+    np.testing.assert_array_equal(series.values, [nan if r.value is None else r.value for r in rows])
+    np.testing.assert_array_equal(series.limits, [nan if r.limit is None else r.limit for r in rows])
+    assert series.verdicts.tolist() == [CODES[r.verdict] for r in rows]
+    assert series.reasons == tuple(r.reason for r in rows)
+    first = min(range(len(rows)), key=lambda k: (severity(rows[k]), k))
+    worst = series.worst()
+    assert (worst.seq, worst.t) == (first, first * 0.01)
+    assert (worst.value, worst.verdict, worst.reason) == (
+        rows[first].value,
+        rows[first].verdict,
+        rows[first].reason,
+    )
+    assert series.verdict == worst_verdict(r.verdict for r in rows) == worst.verdict
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.floats(-10, 10), verdicts), min_size=1, max_size=400), st.integers(7, 60))
+def test_thinning_loses_no_extremum_and_no_exceedance(rows, most):
+    series = log_of(tick(k, result(v, verdict)) for k, (v, verdict) in enumerate(rows))["speed"]
+    trace = series.thin(most)
+    t, values = np.frombuffer(trace.t, "<f8"), np.frombuffer(trace.values, "<f4")
+    codes = np.frombuffer(trace.verdicts, np.uint8)
+    assert len(t) == len(values) == len(codes) == len(trace.limits) // 4 <= most
+    assert (np.diff(t) > 0).all()
+    assert set(t) <= set(series.t)
+    assert values.max() == np.float32(series.max())
+    assert values.min() == np.float32(series.min())
+    assert (E in dict(series.shares())) == (1 in codes)
+    assert (t[0], t[-1]) == (series.t[0], series.t[-1])
+
+
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [([W, E, U], E), ([W, U, None], U), ([None, W], W), ([None], None), ([], U)],
+)
+def test_a_run_is_as_good_as_its_worst_tick(rows, expected):
+    log = ResultLog([CriterionInfo(name="speed", kind="k", group="safety", title="")])
+    for k, verdict in enumerate(rows):
+        log.add(tick(k, result(1.0, verdict)))
+    assert log["speed"].verdict == log.verdict == expected
+
+
+def test_what_was_announced_and_never_heard_is_undecided():
+    silent = CriterionInfo(name="silent", kind="k", group="safety", title="", unit="J", limit=1.0)
+    log = ResultLog([silent])
+    log.add(tick(0, result()))
+    assert (log.verdict, log["silent"].verdict, log["speed"].verdict) == (U, U, W)
+    assert log["silent"].unit == "J"
+    with pytest.raises(Undecided, match="never heard"):
+        log["silent"].worst()
+
+
+def test_an_exceedance_of_unknown_size_is_the_worst_and_a_lower_limit_looks_down():
+    log = log_of([tick(0, result(9.0, E)), tick(1, result(None, E)), tick(2, result(99.0, E))])
+    assert log["speed"].worst().seq == 1
+    down = [tick(k, result(v, E, at_most=False)) for k, v in enumerate((1.5, 0.5, 1.0))]
+    assert log_of(down)["speed"].worst().value == 0.5
+    free = [tick(k, result(v, None, limit=None)) for k, v in enumerate((1.5, 3.5, 1.0))]
+    assert log_of(free)["speed"].worst().value == 3.5
+
+
+def test_the_worst_names_the_part_that_governs():
+    parts = (result(1.9, W, name="hand"), result(5.0, E, name="skull"), result(3.0, E, name="face"))
+    log = log_of([tick(0, result(5.0, E, parts=parts, reason="skull ↔ gripper"))])
+    assert log["speed"].worst().part == "skull"
+    assert log["speed"].parts["face"].worst().value == 3.0
+    assert log["speed"].parts["hand"].verdict == W
+
+
+def test_exceedance_comes_as_intervals_and_shares():
+    log = log_of(tick(k, result(1.0, v)) for k, v in enumerate([E, E, W, U, E, W, W, E]))
+    assert log["speed"].intervals() == ((0.0, 0.01), (0.04, 0.04), (0.07, 0.07))
+    assert log["speed"].intervals(U) == ((0.03, 0.03),)
+    assert log["speed"].shares() == {E: 0.5, U: 0.125, W: 0.375}
+
+
+def test_a_mean_comes_with_its_extrema_and_nothing_is_made_up():
+    log = log_of(tick(k, result(v)) for k, v in enumerate((1.0, None, 4.0)))
+    assert log["speed"].spread() == (1.0, 2.5, 4.0)
+    assert not hasattr(log["speed"], "mean")
+    with pytest.raises(Undecided, match="no value"):
+        log_of([tick(0, result(None, U))])["speed"].max()
+
+
+def test_a_result_shown_again_counts_once():
+    log = ResultLog()
+    for k in range(10):
+        log.add(tick(k, result(float(k // 5), t=(k // 5) * 0.05)))
+    assert log["speed"].values.tolist() == [0.0, 1.0]
+    assert log.ticks == 10
+
+
+def test_add_tells_whose_worst_instant_this_is():
+    log = ResultLog()
+    rows = [(1.0, W), (0.5, W), (1.5, W), (None, U), (1.9, W), (2.5, E)]
+    told = [bool(log.add(tick(k, result(v, verdict)))) for k, (v, verdict) in enumerate(rows)]
+    assert told == [True, False, True, True, False, True]
+
+
+def test_a_reason_that_changes_at_every_tick_does_not_fill_the_memory():
+    log = log_of(tick(k, result(None, U, reason=f"age {k}")) for k in range(MAX_REASONS + 10))
+    reasons = log["speed"].reasons
+    assert len(set(reasons)) == MAX_REASONS
+    assert (reasons[5], reasons[-1], log["speed"].worst().reason) == ("age 5", "…", "age 0")
+
+
+def test_tracking_keeps_the_largest_error_and_shows_a_nan():
+    log = ResultLog()
+    for k, error in enumerate((1e-4, 3e-4, 2e-4)):
+        log.add(tick(k, tracking={"ur10": error, "iiwa": math.nan if k == 1 else 0.0}))
+    ur10, iiwa = log.tracking
+    assert (ur10.error, ur10.t) == (3e-4, 0.01)
+    assert math.isnan(iiwa.error)
+
+
+def test_arrays_are_read_only_copies():
+    log = ResultLog()
+    first = result()
+    for k in range(50):
+        log.add(tick(k, first))
+    before = log["speed"].values
+    log.add(tick(50, first))
+    assert (len(before), len(log["speed"])) == (50, 51)
+    with pytest.raises(ValueError, match="read-only"):
+        log["speed"].values[0] = 0.0
+
+
+def test_an_unknown_name_gets_the_known_ones():
+    log = log_of([tick(0, result())])
+    with pytest.raises(UnknownName, match="did you mean 'speed'"):
+        log["sped"]
+    assert "speed" in log
+    assert list(log) == ["speed"]
+    assert log.get("sped") is None
+    assert result_named(tick(0, result()), "speed") == result()
+    assert result_named(tick(0), "speed") is None
+    assert [s.name for s in log.ranked()] == ["speed"]
+    assert log.history(10).traces[0].name == "speed"

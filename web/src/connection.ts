@@ -1,0 +1,159 @@
+// The page's end of the worker: what it says becomes signals, traces and poses.
+
+import type { Frame, FromWorker, ToWorker } from "./messages";
+import {
+  beginScene,
+  frame,
+  hello,
+  isLive,
+  link,
+  lookingAt,
+  now,
+  reach,
+  stale,
+  traces,
+  tracesRevision,
+  transport,
+} from "./page_state";
+import { PoseReader } from "./poses";
+import { traceFromWire } from "./traces";
+import { type History, type Scene, SCHEMA } from "./wire";
+
+/** Numbers change at most this often: faster cannot be read. */
+const NUMBERS_EVERY_MS = 110;
+/** A live run that says nothing for so long is not trusted any more. */
+const SILENCE_MS = 1000;
+/** Points per trace of a live run; a recording comes thinned already. */
+const LIVE_POINTS = 40_000;
+
+/** Where the display loop gets poses from. */
+export interface PoseFeed {
+  /** The newest block, once; valid until the next call. */
+  read(): Float32Array | null;
+}
+
+export interface ConnectionEvents {
+  scene(scene: Scene, poses: PoseFeed): void;
+  /** Every shown frame, at up to the display's rate: markers follow the poses, numbers need not. */
+  frame(frame: Frame): void;
+}
+
+export class Connection {
+  private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+  private posted: PostedPoses | null = null;
+  private heardAt = 0;
+  private numbersAt = 0;
+  private pending: Frame | null = null;
+
+  constructor(private readonly events: ConnectionEvents) {
+    this.worker.onmessage = (event: MessageEvent<FromWorker>) => this.receive(event.data);
+    const url = new URL(`/ws${location.search}`, location.href);
+    url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    this.send({ kind: "connect", url: url.href, shared: globalThis.crossOriginIsolated === true });
+    setInterval(() => this.watch(), 200);
+  }
+
+  send(message: ToWorker): void {
+    this.worker.postMessage(message);
+  }
+
+  /** To be called once per display frame: passes on numbers that are due and asks for the next. */
+  tick(time: number): void {
+    if (this.pending && time - this.numbersAt >= NUMBERS_EVERY_MS) {
+      this.numbersAt = time;
+      frame.value = this.pending;
+      this.pending = null;
+    }
+  }
+
+  private receive(message: FromWorker): void {
+    switch (message.kind) {
+      case "link":
+        if (link.value.state !== "refused") link.value = { state: message.state, reason: message.reason };
+        if (message.state !== "open") stale.value = true;
+        return;
+      case "hello":
+        hello.value = message.hello;
+        if (message.hello.schema !== SCHEMA) {
+          link.value = { state: "refused", reason: "page and server are of different versions; reload, or rebuild the page" };
+        }
+        reach.value = { start: 0, end: message.hello.duration ?? 0 };
+        return;
+      case "scene":
+        this.begin(message.scene, message.shared);
+        return;
+      case "history":
+        this.history(message.history);
+        return;
+      case "transport":
+        transport.value = message.transport;
+        return;
+      case "points":
+        for (const points of message.points) traces.get(points.name)?.append(points);
+        reach.value = { start: Number.isNaN(message.oldest) ? message.newest : message.oldest, end: message.newest };
+        tracesRevision.value += 1;
+        return;
+      case "poses":
+        this.posted?.put(message.buffer);
+        return;
+      case "frame":
+        this.show(message.frame);
+        return;
+    }
+  }
+
+  private begin(scene: Scene, shared: SharedArrayBuffer | null): void {
+    this.pending = null;
+    beginScene(scene);
+    this.posted = shared ? null : new PostedPoses((buffer) => this.send({ kind: "recycle", buffer }));
+    this.events.scene(scene, shared ? new PoseReader(shared) : this.posted!);
+  }
+
+  private history(history: History): void {
+    let start = Number.POSITIVE_INFINITY;
+    for (const wire of history.traces) {
+      const trace = traceFromWire(wire, isLive.value ? LIVE_POINTS : Number.POSITIVE_INFINITY);
+      traces.set(wire.name, trace);
+      if (trace.length > 0) start = Math.min(start, trace.t[0]!);
+    }
+    if (!isLive.value && Number.isFinite(start)) reach.value = { start: Math.min(start, reach.value.end), end: reach.value.end };
+    tracesRevision.value += 1;
+  }
+
+  private show(next: Frame): void {
+    this.heardAt = performance.now();
+    this.pending = next;
+    now.value = next.t;
+    stale.value = link.value.state !== "open";
+    this.events.frame(next);
+    requestAnimationFrame(() => this.send({ kind: "want" }));
+  }
+
+  // Live numbers that stopped coming must not stay on the screen as if they were true.
+  private watch(): void {
+    if (link.value.state !== "open") stale.value = true;
+    else if (isLive.value && lookingAt.value === null) stale.value = performance.now() - this.heardAt > SILENCE_MS;
+    else stale.value = frame.value === null && this.pending === null;
+  }
+}
+
+/** Poses that came by message, where memory cannot be shared. */
+class PostedPoses implements PoseFeed {
+  private newest: Float32Array | null = null;
+  private shown: Float32Array | null = null;
+
+  constructor(private readonly recycle: (buffer: ArrayBuffer) => void) {}
+
+  put(buffer: ArrayBuffer): void {
+    if (this.newest) this.recycle(this.newest.buffer as ArrayBuffer);
+    this.newest = new Float32Array(buffer);
+  }
+
+  read(): Float32Array | null {
+    if (!this.newest) return null;
+    if (this.shown) this.recycle(this.shown.buffer as ArrayBuffer);
+    this.shown = this.newest;
+    this.newest = null;
+    return this.shown;
+  }
+}

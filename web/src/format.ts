@@ -1,0 +1,56 @@
+// Numbers for people: enough digits to compare with the limit, a true minus, units beside.
+
+const NO_BREAK = "\u00a0";
+
+/** Decimals that give three significant digits at this magnitude. */
+function decimalsFor(magnitude: number): number {
+  if (!(magnitude > 0)) return 2;
+  return Math.min(4, Math.max(0, 2 - Math.floor(Math.log10(magnitude))));
+}
+
+/** A number; `like` fixes the decimals so that a changing value does not jump. */
+export function formatNumber(value: number | null, like: number | null = null): string {
+  if (value === null || Number.isNaN(value)) return "–";
+  if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
+  const size = Math.abs(value);
+  if (size !== 0 && (size < 5e-4 || size >= 1e6)) return value.toExponential(2).replaceAll("-", "−");
+  const text = value.toFixed(decimalsFor(Math.abs(like ?? value)));
+  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
+}
+
+export function formatQuantity(value: number | null, unit: string, like: number | null = null): string {
+  const text = formatNumber(value, like);
+  return value === null || unit === "" ? text : `${text}${NO_BREAK}${unit}`;
+}
+
+/** A share as whole percent with its sign. */
+export function formatPercent(share: number | null): string {
+  if (share === null) return "–";
+  const percent = Math.round(share * 100);
+  if (Math.abs(percent) > 999) return percent > 0 ? ">999 %" : "<−999 %";
+  return `${percent}${NO_BREAK}%`.replace("-", "−");
+}
+
+/** Run time as minutes and seconds. */
+export function formatTime(t: number): string {
+  if (!Number.isFinite(t)) return "–";
+  const sign = t < 0 ? "−" : "";
+  const centis = Math.round(Math.abs(t) * 100);
+  const minutes = Math.floor(centis / 6000);
+  const seconds = ((centis % 6000) / 100).toFixed(2).padStart(5, "0");
+  return `${sign}${minutes}:${seconds}`;
+}
+
+/** A joint position: angles in degrees, as robots' own panels show them. */
+export function formatJoint(value: number, unit: string): string {
+  return unit === "rad" ? `${formatFixed((value * 180) / Math.PI, 1)}°` : `${formatFixed(value, 4)}${NO_BREAK}${unit}`;
+}
+
+function formatFixed(value: number, decimals: number): string {
+  return value.toFixed(decimals).replace("-", "−");
+}
+
+/** The part of a full name below its owner: `ur10/forearm_link` → `forearm_link`. */
+export function shortName(name: string, owner: string): string {
+  return name.startsWith(`${owner}/`) ? name.slice(owner.length + 1) : name;
+}

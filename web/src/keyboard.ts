@@ -1,0 +1,56 @@
+// The keys of the page; they do nothing while one writes or uses a control that needs them itself.
+
+import type { Actions } from "./panels/app_context";
+import { rows, select, toggleMuted } from "./page_state";
+
+const BACK = -1;
+const AHEAD = 1;
+
+export function listenToKeys(actions: Actions): void {
+  addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || needsKeys(event.target, event.key)) return;
+    const act = actionOf(event.key, event.shiftKey, actions);
+    if (!act) return;
+    event.preventDefault();
+    act();
+  });
+}
+
+function actionOf(key: string, shift: boolean, actions: Actions): (() => void) | null {
+  const { time } = actions;
+  switch (key) {
+    case " ":
+      return () => time.toggle();
+    case "ArrowLeft":
+      return () => (shift ? time.seekBy(BACK) : time.step(BACK));
+    case "ArrowRight":
+      return () => (shift ? time.seekBy(AHEAD) : time.step(AHEAD));
+    case "[":
+      return () => time.violation(false);
+    case "]":
+      return () => time.violation(true);
+    case "f":
+    case "F":
+      return () => actions.frameSelection();
+    case "l":
+    case "L":
+      return () => time.follow();
+    case "Escape":
+      return () => select(null);
+    default:
+      return overlay(key);
+  }
+}
+
+// 1 to 9: the markers of a criterion, in the order of the workstation file.
+function overlay(key: string): (() => void) | null {
+  const row = /^[1-9]$/.test(key) ? rows.value[Number(key) - 1] : undefined;
+  return row ? () => toggleMuted(row.info.name) : null;
+}
+
+function needsKeys(target: EventTarget | null, key: string): boolean {
+  if (!(target instanceof HTMLElement)) return false;
+  if (target.matches("input:not([type=checkbox]), select, textarea")) return true;
+  if (key === " ") return target.matches("button, summary, input, a");
+  return key.startsWith("Arrow") && target.matches("[role=tree] *, [role=tablist] *");
+}

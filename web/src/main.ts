@@ -1,0 +1,61 @@
+// Where the page begins: connection, room, panels, keys.
+
+import "uplot/dist/uPlot.min.css";
+import "./theme.css";
+import { h, render } from "preact";
+import { Connection } from "./connection";
+import { listenToKeys } from "./keyboard";
+import { now, selectedNodes } from "./page_state";
+import { App } from "./panels/App";
+import { type Actions, ActionsContext } from "./panels/app_context";
+import { Viewer } from "./scene/viewer";
+import { TimeControl } from "./time_control";
+
+declare global {
+  interface Window {
+    /** For tests and for the curious: where things are drawn, and when. */
+    seerob?: {
+      /** Run time of what is shown [s]. */
+      readonly t: number;
+      /** Position and quaternion (x, y, z, w) of a body as three.js has it, y up; null for an unknown name. */
+      pose(name: string): { position: number[]; quaternion: number[] } | null;
+      /** Where a point of the world (z up) [m] is on the screen [px]. */
+      project(point: [number, number, number]): [number, number];
+    };
+  }
+}
+
+const page = document.getElementById("page")!;
+
+function begin(element: HTMLElement): void {
+  const viewer = new Viewer(element);
+  const connection = new Connection({
+    scene: (scene, poses) => void viewer.begin(scene, poses),
+    frame: (frame) => viewer.show(frame),
+  });
+  actions.time.connect((message) => connection.send(message));
+  actions.look = (preset) => viewer.viewpoint.go(preset);
+  actions.frameSelection = () => {
+    const names = selectedNodes.value;
+    viewer.viewpoint.frame(names.size > 0 ? names : null);
+  };
+  viewer.stage.run((time) => {
+    connection.tick(time);
+    viewer.tick();
+  });
+  window.seerob = {
+    get t() {
+      return now.value;
+    },
+    pose: (name) => viewer.poseOf(name),
+    project: (point) => viewer.project(point),
+  };
+}
+
+const actions: Actions = {
+  time: new TimeControl(),
+  look: () => {},
+  frameSelection: () => {},
+};
+listenToKeys(actions);
+render(h(ActionsContext.Provider, { value: actions, children: h(App, { room: begin }) }), page);

@@ -1,0 +1,86 @@
+// Text in the room: a plate with an icon of the verdict, always upright, always readable, never in the way
+// of a click. It is painted on a canvas, so whatever the text says stays text.
+
+import { CanvasTexture, LinearFilter, Sprite, SpriteMaterial, SRGBColorSpace, Vector3 } from "three";
+import { NEUTRAL_TEXT, STATE_ICONS, VERDICT_TEXT } from "../verdicts";
+import type { Verdict } from "../wire";
+import type { View } from "./drawn";
+
+const FONT_PX = 13;
+const PAD_PX = 7;
+const HEIGHT_PX = 24;
+const SHARPNESS = 2;
+const LONGEST = 64;
+const FONT = `600 ${FONT_PX * SHARPNESS}px system-ui, "Segoe UI", "Noto Sans", sans-serif`;
+
+const at = new Vector3();
+
+export class Caption {
+  readonly object: Sprite;
+  private readonly canvas = document.createElement("canvas");
+  private readonly material: SpriteMaterial;
+  private texture: CanvasTexture | null = null;
+  private shown = "";
+
+  constructor() {
+    this.material = new SpriteMaterial({ depthTest: false, transparent: true, toneMapped: false, fog: false });
+    this.object = new Sprite(this.material);
+    this.object.renderOrder = 10;
+    this.object.raycast = () => {};
+    this.object.center.set(0.5, -0.35);
+  }
+
+  update(text: string, verdict: Verdict | null): void {
+    const short = text.length > LONGEST ? `${text.slice(0, LONGEST - 1)}…` : text;
+    const key = `${verdict} ${short}`;
+    if (key === this.shown) return;
+    this.shown = key;
+    this.paint(verdict ? `${STATE_ICONS[verdict]}  ${short}` : short, verdict);
+  }
+
+  face(view: View): void {
+    const { camera, pixel } = view;
+    const size = pixel * Math.max(this.object.getWorldPosition(at).distanceTo(camera.position), 0.05);
+    this.object.scale.set((this.canvas.width / SHARPNESS) * size, (this.canvas.height / SHARPNESS) * size, 1);
+  }
+
+  dispose(): void {
+    this.texture?.dispose();
+    this.material.dispose();
+  }
+
+  private paint(text: string, verdict: Verdict | null): void {
+    const brush = this.canvas.getContext("2d")!;
+    brush.font = FONT;
+    const width = Math.ceil(brush.measureText(text).width) + 2 * PAD_PX * SHARPNESS;
+    const height = HEIGHT_PX * SHARPNESS;
+    // A texture cannot change its size once it is on the graphics card.
+    if (width !== this.canvas.width || height !== this.canvas.height || !this.texture) {
+      this.canvas.width = width;
+      this.canvas.height = height;
+      this.texture?.dispose();
+      this.texture = new CanvasTexture(this.canvas);
+      this.texture.colorSpace = SRGBColorSpace;
+      this.texture.minFilter = LinearFilter;
+      this.texture.generateMipmaps = false;
+      this.material.map = this.texture;
+      this.material.needsUpdate = true;
+    }
+    const color = verdict ? VERDICT_TEXT[verdict] : NEUTRAL_TEXT;
+    brush.clearRect(0, 0, width, height);
+    brush.beginPath();
+    brush.roundRect(2, 2, width - 4, height - 4, 10);
+    brush.fillStyle = "rgba(10, 14, 20, 0.88)";
+    brush.fill();
+    brush.lineWidth = 2.5;
+    brush.strokeStyle = color;
+    if (verdict === "undecided") brush.setLineDash([10, 7]);
+    brush.stroke();
+    brush.setLineDash([]);
+    brush.font = FONT;
+    brush.fillStyle = color;
+    brush.textBaseline = "middle";
+    brush.fillText(text, PAD_PX * SHARPNESS, height / 2 + 1);
+    this.texture.needsUpdate = true;
+  }
+}

@@ -1,0 +1,22 @@
+// What every kind of marker is once it is on the screen.
+
+import type { Object3D, PerspectiveCamera, Vector3 } from "three";
+
+/** How the screen sees the world, for what keeps its size in pixels. */
+export interface View {
+  camera: PerspectiveCamera;
+  /** World size of a pixel at one metre from the eye [m]. */
+  pixel: number;
+}
+
+export interface Drawn<M> {
+  /** In world coordinates: z up, metres. */
+  readonly object: Object3D;
+  /** Where its caption goes, in world coordinates. */
+  readonly anchor: Vector3;
+  /** Draw this marker instead of the one before it. */
+  update(marker: M): void;
+  /** Keep widths and letters constant in pixels; called before each picture. */
+  face?(view: View): void;
+  dispose(): void;
+}

@@ -1,0 +1,30 @@
+// Text at a point.
+
+import { Group, Vector3 } from "three";
+import type { Label } from "../wire";
+import { Caption } from "./caption";
+import type { Drawn, View } from "./drawn";
+
+export class LabelDrawn implements Drawn<Label> {
+  readonly object = new Group();
+  readonly anchor = new Vector3();
+  private readonly caption = new Caption();
+
+  constructor() {
+    this.object.add(this.caption.object);
+  }
+
+  update(marker: Label): void {
+    this.object.position.fromArray(marker.position);
+    this.anchor.copy(this.object.position);
+    this.caption.update(marker.text, marker.verdict);
+  }
+
+  face(view: View): void {
+    this.caption.face(view);
+  }
+
+  dispose(): void {
+    this.caption.dispose();
+  }
+}

@@ -1,0 +1,123 @@
+// All markers of a frame: what is drawn is kept and changed in place, so that 30 frames a second cost
+// no garbage to speak of.
+
+import { Group } from "three";
+import { stateOf, STATE_ORDER } from "../verdicts";
+import type { Marker, Result, Verdict } from "../wire";
+import { Caption } from "./caption";
+import type { Drawn, View } from "./drawn";
+import { makeDrawn } from "./index";
+
+interface Slot {
+  type: Marker["type"];
+  drawn: Drawn<Marker>;
+  caption: Caption | null;
+}
+
+/** Labels of how many results are written into the room: more would hide what they are about. */
+const CAPTIONED_RESULTS = 3;
+
+export class MarkerLayer {
+  readonly root = new Group();
+  /** Bodies that highlights paint. */
+  readonly painted = new Map<string, Verdict | null>();
+  private readonly slots = new Map<string, Slot[]>();
+
+  /**
+   * Draw the markers of these results.
+   *
+   * @param muted Criteria whose markers are not drawn.
+   * @param selected Criterion whose labels are always written, beside the worst three.
+   * @param captions Whether labels are written at all.
+   */
+  update(results: readonly Result[], muted: ReadonlySet<string>, selected: string | null, captions: boolean): void {
+    this.painted.clear();
+    const captioned = captions ? worst(results, muted) : new Set<string>();
+    if (captions && selected) captioned.add(selected);
+    for (const name of this.slots.keys()) {
+      if (!results.some((r) => r.name === name)) this.drop(name, 0);
+    }
+    for (const result of results) {
+      const markers = muted.has(result.name) ? [] : result.markers;
+      this.draw(result.name, markers, captioned.has(result.name));
+    }
+  }
+
+  /** Called before each picture: what has a size in pixels keeps it. */
+  face(view: View): void {
+    for (const slots of this.slots.values()) {
+      for (const { drawn, caption } of slots) {
+        drawn.face?.(view);
+        caption?.face(view);
+      }
+    }
+  }
+
+  private draw(name: string, markers: readonly Marker[], captioned: boolean): void {
+    const slots = this.slots.get(name) ?? [];
+    this.slots.set(name, slots);
+    let used = 0;
+    for (const marker of markers) {
+      const slot = this.slotFor(slots, used, marker);
+      if (!slot) continue;
+      slot.drawn.update(marker);
+      this.write(slot, marker, captioned);
+      if (marker.type === "highlight") paintWorst(this.painted, marker.body, marker.verdict);
+      used += 1;
+    }
+    this.drop(name, used);
+  }
+
+  private slotFor(slots: Slot[], index: number, marker: Marker): Slot | null {
+    const there = slots[index];
+    if (there?.type === marker.type) return there;
+    const drawn = makeDrawn(marker);
+    if (!drawn) return null;
+    if (there) this.free(there);
+    const slot: Slot = { type: marker.type, drawn, caption: null };
+    slots[index] = slot;
+    this.root.add(drawn.object);
+    return slot;
+  }
+
+  private write(slot: Slot, marker: Marker, captioned: boolean): void {
+    const text = captioned && "label" in marker && marker.type !== "highlight" ? marker.label : "";
+    if (text === "") {
+      if (slot.caption) slot.caption.object.visible = false;
+      return;
+    }
+    if (!slot.caption) {
+      slot.caption = new Caption();
+      this.root.add(slot.caption.object);
+    }
+    slot.caption.object.visible = true;
+    slot.caption.object.position.copy(slot.drawn.anchor);
+    slot.caption.update(text, marker.verdict);
+  }
+
+  private drop(name: string, from: number): void {
+    const slots = this.slots.get(name);
+    if (!slots) return;
+    for (const slot of slots.splice(from)) this.free(slot);
+  }
+
+  private free(slot: Slot): void {
+    slot.drawn.object.removeFromParent();
+    slot.drawn.dispose();
+    slot.caption?.object.removeFromParent();
+    slot.caption?.dispose();
+  }
+}
+
+function worst(results: readonly Result[], muted: ReadonlySet<string>): Set<string> {
+  const rank = (r: Result): number => STATE_ORDER.indexOf(stateOf(r));
+  const shown = results.filter((r) => !muted.has(r.name) && r.markers.length > 0);
+  return new Set(shown.sort((a, b) => rank(a) - rank(b)).slice(0, CAPTIONED_RESULTS).map((r) => r.name));
+}
+
+const RANK: (Verdict | null)[] = [null, "within", "undecided", "exceeded"];
+
+function paintWorst(painted: Map<string, Verdict | null>, body: string, verdict: Verdict | null): void {
+  const before = painted.get(body);
+  if (before === undefined || RANK.indexOf(verdict) > RANK.indexOf(before)) painted.set(body, verdict);
+}

@@ -1,0 +1,46 @@
+// What the worker and the page tell each other. The worker owns the socket; the page owns the screen.
+
+import type { Hello, History, Result, Scene, Transport } from "./wire";
+
+/** What a page asks of the server; `ack` is the worker's own affair. */
+export type Action = "play" | "pause" | "seek" | "speed" | "step" | "loop";
+
+export type LinkState = "connecting" | "open" | "lost" | "refused";
+
+/** One point of one criterion per received snapshot, for plots and lanes while live. */
+export interface TracePoints {
+  name: string;
+  t: Float64Array;
+  values: Float32Array;
+  limits: Float32Array;
+  /** 0 within, 1 exceeded, 2 undecided, 255 none. */
+  verdicts: Uint8Array;
+}
+
+/** A snapshot without its poses: those travel through shared memory. */
+export interface Frame {
+  seq: number;
+  t: number;
+  joints: { [name: string]: number[] };
+  tracking: { [name: string]: number };
+  results: Result[];
+}
+
+export type FromWorker =
+  | { kind: "link"; state: LinkState; reason: string; retryInMs: number | null }
+  | { kind: "hello"; hello: Hello }
+  | { kind: "scene"; scene: Scene; shared: SharedArrayBuffer | null }
+  | { kind: "history"; history: History }
+  | { kind: "transport"; transport: Transport }
+  | { kind: "frame"; frame: Frame }
+  | { kind: "points"; points: TracePoints[]; newest: number; oldest: number }
+  | { kind: "poses"; buffer: ArrayBuffer; t: number; seq: number };
+
+export type ToWorker =
+  | { kind: "connect"; url: string; shared: boolean }
+  /** The page has drawn the last frame and can take another. */
+  | { kind: "want" }
+  | { kind: "recycle"; buffer: ArrayBuffer }
+  | { kind: "command"; action: Action; value: number | null }
+  /** While live: show the kept snapshot of this run time, or follow the newest (null). */
+  | { kind: "look"; t: number | null };

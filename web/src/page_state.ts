@@ -1,0 +1,136 @@
+// What the page knows, as signals: one selection, one time cursor, one set of results for every panel.
+
+import { batch, computed, signal } from "@preact/signals";
+import type { Frame, LinkState } from "./messages";
+import { Trace } from "./traces";
+import { type State, stateOf, worstState } from "./verdicts";
+import type { CriterionInfo, Hello, Node, Result, Scene, Transport } from "./wire";
+
+export interface Selection {
+  /** `node` and `criterion` name one thing; `owner` a whole robot, human, tool or part. */
+  kind: "node" | "owner" | "criterion";
+  name: string;
+}
+
+/** A row of the criteria table: what the criterion is and what it says now. */
+export interface Row {
+  info: CriterionInfo;
+  result: Result | null;
+  state: State;
+}
+
+export interface Link {
+  state: LinkState;
+  reason: string;
+}
+
+export const link = signal<Link>({ state: "connecting", reason: "" });
+export const hello = signal<Hello | null>(null);
+export const scene = signal<Scene | null>(null);
+export const transport = signal<Transport>({
+  type: "transport",
+  playing: false,
+  t: 0,
+  speed: 1,
+  live: false,
+  loop: false,
+});
+
+/** Shown results and joints; replaced at most ten times a second. */
+export const frame = signal<Frame | null>(null);
+/** The time cursor: run time of what is shown [s]. */
+export const now = signal(Number.NaN);
+/** Whether numbers on screen are older than they should be: no connection, or nothing heard. */
+export const stale = signal(true);
+/** While live, the run time being looked at; null when following. */
+export const lookingAt = signal<number | null>(null);
+/** Run times that can be shown [s]. */
+export const reach = signal<{ start: number; end: number }>({ start: 0, end: 0 });
+
+export const selection = signal<Selection | null>(null);
+/** Nodes that are not drawn. */
+export const hidden = signal<ReadonlySet<string>>(new Set());
+/** Criteria whose markers are not drawn. */
+export const mutedCriteria = signal<ReadonlySet<string>>(new Set());
+
+/** Traces are changed in place; the revision says so. */
+export const traces = new Map<string, Trace>();
+export const tracesRevision = signal(0);
+
+export const isLive = computed(() => hello.value?.mode === "live");
+
+export const rows = computed<Row[]>(() => {
+  const infos = scene.value?.criteria ?? [];
+  const results = new Map(frame.value?.results.map((r) => [r.name, r]));
+  return infos.map((info) => {
+    const result = results.get(info.name) ?? null;
+    // A limit that nothing was said about must not look like one that is kept.
+    const state = result ? stateOf(result) : "missing";
+    return { info, result, state };
+  });
+});
+
+/** The worst of all; `missing` until something was heard. */
+export const overall = computed<State>(() => {
+  if (!frame.value) return "missing";
+  return worstState(rows.value.map((row) => row.state));
+});
+
+/** Nodes of the selection, by full name. */
+export const selectedNodes = computed<ReadonlySet<string>>(() => {
+  const chosen = selection.value;
+  const nodes = scene.value?.nodes ?? [];
+  if (!chosen) return new Set();
+  if (chosen.kind === "node") return new Set([chosen.name]);
+  const names = chosen.kind === "owner" ? [chosen.name] : subjectsOf(chosen.name);
+  return new Set(nodes.filter((n) => names.some((name) => belongs(n, name))).map((n) => n.name));
+});
+
+export function subjectsOf(criterion: string): readonly string[] {
+  return scene.value?.criteria.find((c) => c.name === criterion)?.subjects ?? [];
+}
+
+function belongs(node: Node, name: string): boolean {
+  return node.name === name || node.owner === name || node.name.startsWith(`${name}/`);
+}
+
+export function select(next: Selection | null): void {
+  selection.value = next;
+}
+
+export function toggleHidden(names: readonly string[]): void {
+  hidden.value = toggled(hidden.value, names);
+}
+
+export function toggleMuted(criterion: string): void {
+  mutedCriteria.value = toggled(mutedCriteria.value, [criterion]);
+}
+
+// All of them are put in unless all are in already.
+function toggled(set: ReadonlySet<string>, names: readonly string[]): ReadonlySet<string> {
+  const next = new Set(set);
+  const remove = names.every((name) => next.has(name));
+  for (const name of names) {
+    if (remove) next.delete(name);
+    else next.add(name);
+  }
+  return next;
+}
+
+/** A new scene: what belonged to another one is forgotten, the rest is kept over a reconnection. */
+export function beginScene(next: Scene): void {
+  batch(() => {
+    if (scene.value?.workstation_hash !== next.workstation_hash) {
+      selection.value = null;
+      hidden.value = new Set();
+      mutedCriteria.value = new Set();
+    }
+    scene.value = next;
+    frame.value = null;
+    now.value = Number.NaN;
+    lookingAt.value = null;
+    traces.clear();
+    for (const { name } of next.criteria) traces.set(name, new Trace(name));
+    tracesRevision.value += 1;
+  });
+}

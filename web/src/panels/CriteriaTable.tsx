@@ -1,0 +1,171 @@
+// The verdicts: a real table, worst first, every number with its unit and its basis.
+
+import { useSignal } from "@preact/signals";
+import { Fragment } from "preact";
+import { formatNumber, formatPercent, formatQuantity, formatTime } from "../format";
+import { mutedCriteria, type Row, scene, select, selection, stale, toggleMuted } from "../page_state";
+import { orderedRows } from "../row_order";
+import { margin } from "../verdicts";
+import type { Result } from "../wire";
+import { BasisView } from "./BasisView";
+import { Icon } from "./Icon";
+import { StateBadge } from "./StateBadge";
+
+const COLUMNS = 4;
+
+export function CriteriaTable() {
+  const opened = useSignal<string | null>(null);
+  const toggle = (name: string): void => {
+    const opening = opened.value !== name;
+    opened.value = opening ? name : null;
+    select(opening ? { kind: "criterion", name } : null);
+  };
+  return (
+    <section class="criteria scroll" aria-label="Criteria">
+      <table class={stale.value ? "stale" : ""}>
+        <thead>
+          <tr>
+            <th scope="col">Criterion</th>
+            <th scope="col" class="number">
+              Value
+            </th>
+            <th scope="col" class="number">
+              Limit
+            </th>
+            <th scope="col" class="state">
+              State
+            </th>
+          </tr>
+        </thead>
+        <tbody>
+          {orderedRows.value.map((row) => (
+            <Fragment key={row.info.name}>
+              <CriterionRow row={row} open={opened.value === row.info.name} onToggle={() => toggle(row.info.name)} />
+              {opened.value === row.info.name && (
+                <tr class="details">
+                  <td colSpan={COLUMNS}>
+                    <Details row={row} />
+                  </td>
+                </tr>
+              )}
+            </Fragment>
+          ))}
+        </tbody>
+      </table>
+      {scene.value?.criteria.length === 0 && (
+        <p class="empty">This workstation file has no criteria: nothing is judged.</p>
+      )}
+    </section>
+  );
+}
+
+function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onToggle: () => void }) {
+  const { info, result, state } = row;
+  const chosen = selection.value?.kind === "criterion" && selection.value.name === info.name;
+  const muted = mutedCriteria.value.has(info.name);
+  const limit = result ? result.limit : info.limit;
+  const unit = result?.unit ?? info.unit;
+  const reason = result?.reason ?? (state === "missing" ? "nothing was said about it in this snapshot" : "");
+  const shown = stale.value && state !== "missing" ? "off" : state;
+  return (
+    <tr class={`row row-${shown} ${chosen ? "selected" : ""}`} data-criterion={info.name} title={hint(row)}>
+      <th scope="row">
+        <button type="button" class={`twist ${open ? "open" : ""}`} aria-expanded={open} onClick={onToggle}>
+          <Icon name="chevron" />
+          <span class="criterion-name">{info.name}</span>
+        </button>
+        <button
+          type="button"
+          class={`eye ${muted ? "off" : ""}`}
+          aria-label={`${muted ? "Show" : "Hide"} markers of ${info.name}`}
+          onClick={() => toggleMuted(info.name)}
+        >
+          <Icon name={muted ? "eye-off" : "eye"} />
+        </button>
+        {reason !== "" && <span class="reason">{reason}</span>}
+      </th>
+      <td class="number">
+        <span class="value">{formatNumber(result?.value ?? null, limit)}</span> <span class="unit">{unit}</span>
+        {result && <Usage result={result} />}
+      </td>
+      <td class="number limit">
+        {limit === null ? (
+          "–"
+        ) : (
+          <>
+            <span class="bound" title={info.at_most ? "at most" : "at least"}>
+              {info.at_most ? "≤" : "≥"}
+            </span>{" "}
+            {formatNumber(limit)} <span class="unit">{unit}</span>
+          </>
+        )}
+        {result && limit !== null && (
+          <span class="margin" title="Distance to the limit, as a share of the limit">
+            {formatPercent(margin(result))}
+          </span>
+        )}
+      </td>
+      <td class="state">
+        <StateBadge state={state} />
+        {result?.t !== null && result?.t !== undefined && <span class="instant">at {formatTime(result.t)}</span>}
+      </td>
+    </tr>
+  );
+}
+
+/** How much of the limit is used; the tick is the limit. */
+function Usage({ result }: { result: Result }) {
+  const { value, limit, at_most } = result;
+  if (value === null || limit === null || !(limit > 0)) return null;
+  const full = at_most ? 1.25 : 2;
+  const share = (x: number): string => `${(Math.min(Math.max(x / limit, 0), full) / full) * 100}%`;
+  return (
+    <span class="usage" aria-hidden="true">
+      <i style={{ width: share(value) }} />
+      <b style={{ left: share(limit) }} />
+    </span>
+  );
+}
+
+function hint({ info }: Row): string {
+  const { basis } = info;
+  return basis ? `${info.title}\n${basis.formula}\n${basis.source}` : info.title;
+}
+
+function Details({ row }: { row: Row }) {
+  const { info, result } = row;
+  return (
+    <div class="details-body">
+      <p class="lead">{info.title}</p>
+      {result?.interval && (
+        <p>
+          True value between {formatQuantity(result.interval[0], result.unit)} and{" "}
+          {formatQuantity(result.interval[1], result.unit)}, given the tolerances of the inputs.
+        </p>
+      )}
+      {result && result.parts.length > 0 && <Parts parts={result.parts} />}
+      {info.basis ? <BasisView basis={info.basis} /> : <p class="unknown">No basis was stated.</p>}
+    </div>
+  );
+}
+
+function Parts({ parts }: { parts: readonly Result[] }) {
+  return (
+    <table class="parts">
+      <caption>Parts</caption>
+      <tbody>
+        {parts.map((part) => (
+          <tr key={part.name}>
+            <th scope="row">
+              {part.name}
+              {part.reason !== "" && <span class="reason">{part.reason}</span>}
+            </th>
+            <td class="number">{formatQuantity(part.value, part.unit, part.limit)}</td>
+            <td class="number">{part.limit === null ? "–" : formatQuantity(part.limit, part.unit)}</td>
+            <td>{part.verdict && <StateBadge state={part.verdict} />}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}

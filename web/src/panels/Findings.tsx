@@ -1,0 +1,79 @@
+// What whoever reads a result must know about the model it was made with.
+
+import { link, scene, select } from "../page_state";
+import { unseen } from "../scene/viewer";
+import type { Finding } from "../wire";
+
+const LOOKS: Record<string, { icon: string; word: string; rank: number }> = {
+  warning: { icon: "!", word: "warning", rank: 0 },
+  assumed: { icon: "≈", word: "assumed", rank: 1 },
+  note: { icon: "i", word: "note", rank: 2 },
+};
+
+export function allFindings(): Finding[] {
+  const missing = unseen.value.map((subject) => ({
+    level: "warning",
+    subject,
+    text: "its mesh could not be fetched: it is evaluated but not drawn",
+  }));
+  const found = [...(scene.value?.findings ?? []), ...missing];
+  return found.sort((a, b) => rank(a) - rank(b));
+}
+
+export function Findings() {
+  const findings = allFindings();
+  return (
+    <section class="findings scroll" aria-label="Findings">
+      <p class="lead">
+        What was noticed, repaired or assumed while the model was built. Each of these bears on the results.
+      </p>
+      {findings.length === 0 ? <p class="empty">Nothing was found.</p> : <FindingList findings={findings} />}
+      {scene.value && (
+        <dl class="fingerprint">
+          <dt>Workstation</dt>
+          <dd title={scene.value.workstation_hash}>{scene.value.workstation_hash.slice(0, 16)}</dd>
+          <dt>seerob</dt>
+          <dd>{scene.value.version}</dd>
+          <dt>Connection</dt>
+          <dd>{link.value.reason || link.value.state}</dd>
+        </dl>
+      )}
+    </section>
+  );
+}
+
+export function FindingList({ findings }: { findings: readonly Finding[] }) {
+  return (
+    <ul class="finding-list">
+      {findings.map((finding, i) => {
+        const look = LOOKS[finding.level] ?? LOOKS.note!;
+        return (
+          <li key={i} class={`finding finding-${look.word}`}>
+            <span class="finding-level">
+              <span aria-hidden="true">{look.icon}</span> {look.word}
+            </span>
+            <button type="button" class="link" onClick={() => choose(finding.subject)}>
+              {finding.subject}
+            </button>
+            <span>{finding.text}</span>
+          </li>
+        );
+      })}
+    </ul>
+  );
+}
+
+function rank(finding: Finding): number {
+  return (LOOKS[finding.level] ?? LOOKS.note!).rank;
+}
+
+function choose(subject: string): void {
+  const run = scene.value;
+  if (run?.nodes.some((node) => node.name === subject && node.owner !== subject)) {
+    select({ kind: "node", name: subject });
+  } else if (run?.nodes.some((node) => node.owner === subject)) {
+    select({ kind: "owner", name: subject });
+  } else if (run?.criteria.some((criterion) => criterion.name === subject)) {
+    select({ kind: "criterion", name: subject });
+  }
+}

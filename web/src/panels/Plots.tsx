@@ -1,0 +1,127 @@
+// A few criteria over time, side by side, under one time cursor.
+
+import { effect, signal } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { formatQuantity } from "../format";
+import { isLive, lookingAt, now, reach, rows, scene, select, selection, stale, traces, tracesRevision } from "../page_state";
+import { Chart, type ChartView } from "../plots/chart";
+import { useActions } from "./app_context";
+import { StateBadge } from "./StateBadge";
+
+/** Plots are drawn anew at most this often. */
+const REDRAW_MS = 60;
+
+/** Widths of the time window [s]; null for the whole recording. */
+const WINDOWS: readonly [number | null, string][] = [
+  [10, "10 s"],
+  [30, "30 s"],
+  [120, "2 min"],
+  [null, "All"],
+];
+
+const chosenWindow = signal<number | null | undefined>(undefined);
+
+function windowWidth(): number | null {
+  const chosen = chosenWindow.value;
+  return chosen === undefined ? (isLive.value ? 30 : null) : chosen;
+}
+
+export function Plots({ count }: { count: number }) {
+  const names = plotted(count);
+  return (
+    <section class="plots" aria-label="Plots">
+      <fieldset class="windows">
+        <legend class="visually-hidden">Time window</legend>
+        {WINDOWS.map(([seconds, title]) => (
+          <button
+            key={title}
+            type="button"
+            aria-pressed={windowWidth() === seconds}
+            class={windowWidth() === seconds ? "on" : ""}
+            onClick={() => {
+              chosenWindow.value = seconds;
+            }}
+          >
+            {title}
+          </button>
+        ))}
+      </fieldset>
+      <div class="charts">
+        {names.map((name) => (
+          <Plot key={name} name={name} />
+        ))}
+      </div>
+    </section>
+  );
+}
+
+// Those with a limit first, in the file's order; the selected one is always among them.
+function plotted(count: number): string[] {
+  const all = scene.value?.criteria ?? [];
+  const ranked = [...all.filter((c) => c.limit !== null), ...all.filter((c) => c.limit === null)].map((c) => c.name);
+  const names = ranked.slice(0, count);
+  const chosen = selection.value?.kind === "criterion" ? selection.value.name : null;
+  if (chosen && ranked.includes(chosen) && !names.includes(chosen)) names[names.length - 1] = chosen;
+  return names;
+}
+
+function Plot({ name }: { name: string }) {
+  const { time } = useActions();
+  const place = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    const chart = new Chart(place.current!, (t) => time.seek(t));
+    let timer: ReturnType<typeof setTimeout> | null = null;
+    const draw = (): void => {
+      timer = null;
+      const trace = traces.get(name);
+      if (trace) chart.show(trace, viewNow());
+    };
+    const stop = effect(() => {
+      void [tracesRevision.value, now.value, chosenWindow.value, reach.value];
+      timer ??= setTimeout(draw, REDRAW_MS);
+    });
+    return () => {
+      stop();
+      if (timer !== null) clearTimeout(timer);
+      chart.dispose();
+    };
+  }, [name, time]);
+  const row = rows.value.find((r) => r.info.name === name);
+  const chosen = selection.value?.kind === "criterion" && selection.value.name === name;
+  return (
+    <figure class={`plot ${chosen ? "selected" : ""}`}>
+      <figcaption class={stale.value ? "stale" : ""}>
+        <button type="button" class="plot-name" onClick={() => select({ kind: "criterion", name })}>
+          {name}
+        </button>
+        <span class="plot-value">
+          {formatQuantity(row?.result?.value ?? null, row?.info.unit ?? "", row?.result?.limit ?? null)}
+        </span>
+        {row && <StateBadge state={row.state} />}
+      </figcaption>
+      <div class="plot-area" ref={place} />
+    </figure>
+  );
+}
+
+// Live: the newest at the right edge. Looking back or replaying: the cursor in the middle, inside what there is.
+function viewNow(): ChartView {
+  const width = windowWidth();
+  const at = now.peek();
+  const { start, end } = reach.peek();
+  if (isLive.peek()) {
+    const span = width ?? Math.max(end - firstTime(), 10);
+    if (lookingAt.peek() === null) return { start: end - span, end, now: at };
+    const middle = Math.min(Math.max(at + span / 2, firstTime() + span), Math.max(end, firstTime() + span));
+    return { start: middle - span, end: middle, now: at };
+  }
+  if (width === null || width >= end - start) return { start, end: Math.max(end, start + 1e-3), now: at };
+  const left = Math.min(Math.max(at - width / 2, start), end - width);
+  return { start: left, end: left + width, now: at };
+}
+
+function firstTime(): number {
+  let first = Number.POSITIVE_INFINITY;
+  for (const trace of traces.values()) if (trace.length > 0) first = Math.min(first, trace.t[0]!);
+  return Number.isFinite(first) ? first : 0;
+}

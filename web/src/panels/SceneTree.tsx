@@ -1,0 +1,153 @@
+// What is there: robots and their links, humans, tools, workpieces, parts.
+
+import { useComputed, useSignal } from "@preact/signals";
+import { shortName } from "../format";
+import { hidden, scene, select, selectedNodes, selection, toggleHidden } from "../page_state";
+import type { Node } from "../wire";
+import { Icon } from "./Icon";
+
+const ROLES: readonly [role: string, title: string][] = [
+  ["robot", "Robots"],
+  ["human", "Humans"],
+  ["tool", "Tools"],
+  ["workpiece", "Workpieces"],
+  ["part", "Parts"],
+];
+
+interface Owner {
+  name: string;
+  role: string;
+  nodes: Node[];
+}
+
+export function SceneTree() {
+  const search = useSignal("");
+  const owners = useComputed(() => ownersOf(scene.value?.nodes ?? [], search.value.trim().toLowerCase()));
+  const roles = ROLES.map(([role, title]) => ({ title, owners: owners.value.filter((o) => o.role === role) }));
+  const known = new Set(ROLES.map(([role]) => role));
+  roles.push({ title: "Other", owners: owners.value.filter((o) => !known.has(o.role)) });
+  return (
+    <section class="tree" aria-label="Scene">
+      <label class="search">
+        <Icon name="search" />
+        <input
+          type="search"
+          placeholder="Filter by name"
+          aria-label="Filter the scene by name"
+          value={search.value}
+          onInput={(event) => {
+            search.value = event.currentTarget.value;
+          }}
+        />
+      </label>
+      <div class="scroll">
+        {roles
+          .filter((role) => role.owners.length > 0)
+          .map((role) => (
+            <div key={role.title} class="role">
+              <h3>{role.title}</h3>
+              <ul>
+                {role.owners.map((owner) => (
+                  <OwnerItem key={owner.name} owner={owner} open={search.value !== ""} />
+                ))}
+              </ul>
+            </div>
+          ))}
+        {owners.value.length === 0 && <p class="empty">Nothing of that name.</p>}
+      </div>
+    </section>
+  );
+}
+
+function OwnerItem({ owner, open }: { owner: Owner; open: boolean }) {
+  const expanded = useSignal(false);
+  const alone = owner.nodes.length === 1;
+  const shown = !alone && (expanded.value || open);
+  const chosen = selection.value;
+  const active = chosen?.name === owner.name && chosen.kind !== "criterion";
+  const names = owner.nodes.map((node) => node.name);
+  const touched = names.some((name) => selectedNodes.value.has(name));
+  return (
+    <li>
+      <div class={`item ${active ? "selected" : touched ? "touched" : ""}`}>
+        {alone ? (
+          <span class="twist" />
+        ) : (
+          <button
+            type="button"
+            class={`twist ${shown ? "open" : ""}`}
+            aria-expanded={shown}
+            aria-label={`${shown ? "Fold" : "Unfold"} ${owner.name}`}
+            onClick={() => {
+              expanded.value = !expanded.value;
+            }}
+          >
+            <Icon name="chevron" />
+          </button>
+        )}
+        <button
+          type="button"
+          class="name"
+          aria-pressed={active}
+          onClick={() => select({ kind: alone ? "node" : "owner", name: alone ? names[0]! : owner.name })}
+        >
+          {owner.name}
+        </button>
+        <EyeButton names={names} label={owner.name} />
+      </div>
+      {shown && (
+        <ul>
+          {owner.nodes.map((node) => (
+            <NodeItem key={node.name} node={node} />
+          ))}
+        </ul>
+      )}
+    </li>
+  );
+}
+
+function NodeItem({ node }: { node: Node }) {
+  const active = selection.value?.kind === "node" && selection.value.name === node.name;
+  const touched = selectedNodes.value.has(node.name);
+  return (
+    <li>
+      <div class={`item leaf ${active ? "selected" : touched ? "touched" : ""}`}>
+        <button
+          type="button"
+          class="name"
+          title={node.name}
+          aria-pressed={active}
+          onClick={() => select({ kind: "node", name: node.name })}
+        >
+          {shortName(node.name, node.owner)}
+        </button>
+        <EyeButton names={[node.name]} label={node.name} />
+      </div>
+    </li>
+  );
+}
+
+function EyeButton({ names, label }: { names: string[]; label: string }) {
+  const off = names.every((name) => hidden.value.has(name));
+  return (
+    <button
+      type="button"
+      class={`eye ${off ? "off" : ""}`}
+      aria-label={`${off ? "Show" : "Hide"} ${label}`}
+      onClick={() => toggleHidden(names)}
+    >
+      <Icon name={off ? "eye-off" : "eye"} />
+    </button>
+  );
+}
+
+function ownersOf(nodes: readonly Node[], search: string): Owner[] {
+  const owners = new Map<string, Owner>();
+  for (const node of nodes) {
+    if (search !== "" && !node.name.toLowerCase().includes(search)) continue;
+    const owner = owners.get(node.owner) ?? { name: node.owner, role: node.role, nodes: [] };
+    owner.nodes.push(node);
+    owners.set(node.owner, owner);
+  }
+  return [...owners.values()];
+}

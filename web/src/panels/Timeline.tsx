@@ -1,0 +1,100 @@
+// Time as a strip: a lane per criterion with a limit, coloured where it is exceeded or undecided.
+
+import { effect } from "@preact/signals";
+import { useEffect, useRef } from "preact/hooks";
+import { formatTime } from "../format";
+import { isLive, now, reach, scene, select, selection, stale, traces, tracesRevision } from "../page_state";
+import { drawLanes, LANE_PX, type TimeRange, timeAt } from "../plots/lanes";
+import { useActions } from "./app_context";
+
+/** A live run's strip shows at least so much [s], so that it does not race at the start. */
+const LIVE_LEAST_S = 60;
+
+export function Timeline() {
+  const { time } = useActions();
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const judged = scene.value?.criteria.filter((c) => c.limit !== null || hasVerdicts(c.name)) ?? [];
+  void tracesRevision.value;
+  const names = judged.map((c) => c.name);
+  const key = names.join("\n");
+
+  useEffect(() => {
+    const target = canvas.current;
+    if (!target) return;
+    const draw = (): void => drawLanes(target, key === "" ? [] : key.split("\n"), stripRange(), now.peek(), stale.peek());
+    const resized = new ResizeObserver(draw);
+    resized.observe(target);
+    let waiting = 0;
+    const stop = effect(() => {
+      void [tracesRevision.value, now.value, reach.value, stale.value];
+      waiting ||= requestAnimationFrame(() => {
+        waiting = 0;
+        draw();
+      });
+    });
+    return () => {
+      stop();
+      resized.disconnect();
+      cancelAnimationFrame(waiting);
+    };
+  }, [key]);
+
+  const seekTo = (event: PointerEvent): void => {
+    const box = canvas.current!.getBoundingClientRect();
+    time.seek(timeAt(stripRange(), (event.clientX - box.left) / box.width));
+  };
+  const { start, end } = stripRange();
+  return (
+    <div class="timeline">
+      <div class="lanes scroll">
+        <ul class="lane-names">
+          {names.map((name) => (
+            <li key={name} style={{ height: `${LANE_PX}px` }}>
+              <button
+                type="button"
+                class={selection.value?.name === name ? "selected" : ""}
+                onClick={() => select({ kind: "criterion", name })}
+              >
+                {name}
+              </button>
+            </li>
+          ))}
+        </ul>
+        <canvas
+          ref={canvas}
+          class="strip"
+          style={{ height: `${Math.max(1, names.length) * LANE_PX}px` }}
+          tabIndex={0}
+          role="slider"
+          aria-label="Time cursor"
+          aria-valuemin={start}
+          aria-valuemax={end}
+          aria-valuenow={Number.isFinite(now.value) ? now.value : start}
+          aria-valuetext={formatTime(now.value)}
+          onPointerDown={(event) => {
+            event.currentTarget.setPointerCapture(event.pointerId);
+            seekTo(event);
+          }}
+          onPointerMove={(event) => {
+            if (event.buttons & 1) seekTo(event);
+          }}
+        />
+      </div>
+      <div class="strip-ends" aria-hidden="true">
+        <span>{formatTime(start)}</span>
+        <span>{formatTime(end)}</span>
+      </div>
+    </div>
+  );
+}
+
+function stripRange(): TimeRange {
+  const { start, end } = reach.value;
+  if (!isLive.value) return { start, end: Math.max(end, start + 1e-3) };
+  return { start: Math.min(start, end - LIVE_LEAST_S), end };
+}
+
+function hasVerdicts(name: string): boolean {
+  const trace = traces.get(name);
+  return trace !== undefined && trace.spans.length > 0;
+}

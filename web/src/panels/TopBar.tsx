@@ -1,0 +1,86 @@
+// What is shown, from where, and the worst that is said about it.
+
+import { formatQuantity } from "../format";
+import { frame, hello, isLive, link, lookingAt, overall, rows, scene, stale } from "../page_state";
+import { STATE_ICONS, type State } from "../verdicts";
+
+export function TopBar() {
+  const run = scene.value;
+  return (
+    <header class="topbar">
+      <div class="brand">
+        <img src="/icon.svg" alt="" width="22" height="22" />
+        <span>seerob</span>
+      </div>
+      <div class="study">
+        <h1 title={run?.title}>{run?.title ?? "…"}</h1>
+        {run && <span class="edition">{run.edition || "no edition stated"}</span>}
+      </div>
+      <SourceState />
+      <StatusPill />
+    </header>
+  );
+}
+
+function SourceState() {
+  const { state, reason } = link.value;
+  const lost = state !== "open";
+  const words = {
+    connecting: "connecting…",
+    lost: "disconnected – trying again",
+    refused: "refused",
+    open: isLive.value ? (stale.value ? "live – nothing heard" : "live") : "replay",
+  }[state];
+  const look = lost || stale.value ? "off" : isLive.value ? "live" : "replay";
+  return (
+    <div class={`source source-${look}`} title={lost ? reason : (hello.value?.server ?? "")} role="status">
+      <span class="dot" aria-hidden="true" />
+      {words}
+      {lost && reason !== "" && <span class="source-reason">{reason}</span>}
+    </div>
+  );
+}
+
+const HEADLINES: Record<State, string> = {
+  exceeded: "LIMIT EXCEEDED",
+  undecided: "UNDECIDED",
+  missing: "UNDECIDED",
+  close: "WITHIN LIMITS, CLOSE",
+  within: "WITHIN LIMITS",
+  none: "NO LIMITS SET",
+};
+
+/** The worst verdict, and the criterion that gives it. Grey as soon as it may be out of date. */
+function StatusPill() {
+  const state = overall.value;
+  if (stale.value || !frame.value) {
+    return (
+      <output class="pill state-off" aria-live="polite">
+        <span class="badge-icon" aria-hidden="true">
+          –
+        </span>
+        <strong>NO CURRENT DATA</strong>
+      </output>
+    );
+  }
+  const there = rows.value.filter((row) => row.state === state);
+  const worst = there[0];
+  const others = there.length - 1;
+  const detail = worst && state !== "within" && state !== "none" ? ` ${worst.info.name}` : "";
+  return (
+    <output class={`pill state-${state}`} aria-live="polite">
+      <span class="badge-icon" aria-hidden="true">
+        {STATE_ICONS[state]}
+      </span>
+      <strong>{HEADLINES[state]}</strong>
+      {detail && <span class="pill-detail">{detail}</span>}
+      {worst?.result && detail && worst.result.value !== null && (
+        <span class="pill-value" aria-hidden="true">
+          {formatQuantity(worst.result.value, worst.result.unit, worst.result.limit)}
+        </span>
+      )}
+      {detail && others > 0 && <span class="pill-more">+{others}</span>}
+      {lookingAt.value !== null && <span class="pill-more">looking back</span>}
+    </output>
+  );
+}

@@ -1,0 +1,22 @@
+// What the panels may ask for beyond the signals: time and viewpoint.
+
+import { createContext } from "preact";
+import { useContext } from "preact/hooks";
+import type { Preset } from "../scene/viewpoint";
+import type { TimeControl } from "../time_control";
+
+export interface Actions {
+  time: TimeControl;
+  /** Go to a viewpoint. */
+  look(preset: Preset): void;
+  /** Fill the view with the selection, or with everything. */
+  frameSelection(): void;
+}
+
+export const ActionsContext = createContext<Actions | null>(null);
+
+export function useActions(): Actions {
+  const actions = useContext(ActionsContext);
+  if (!actions) throw new Error("panel outside of the page");
+  return actions;
+}

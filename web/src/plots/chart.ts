@@ -1,0 +1,128 @@
+// One criterion over time: its value, its limit, and where the limit is exceeded or nothing can be said.
+
+import uPlot from "uplot";
+import { formatNumber, formatTime } from "../format";
+import type { Trace } from "../traces";
+import { hatchPattern } from "./hatch";
+import { windowOf } from "./window";
+
+const GRID = "#222c39";
+const TEXT = "#9aa8ba";
+const SYNC = "time";
+
+export interface ChartView {
+  start: number;
+  end: number;
+  now: number;
+}
+
+export class Chart {
+  private readonly plot: uPlot;
+  private view: ChartView = { start: 0, end: 1, now: Number.NaN };
+  private trace: Trace | null = null;
+  private readonly resized: ResizeObserver;
+
+  /** @param seek Called with the run time that was clicked [s]. */
+  constructor(
+    private readonly element: HTMLElement,
+    seek: (t: number) => void,
+  ) {
+    this.plot = new uPlot(this.options(), [[], [], []], element);
+    this.plot.over.addEventListener("click", () => {
+      const { left } = this.plot.cursor;
+      if (left !== undefined && left >= 0) seek(this.plot.posToVal(left, "x"));
+    });
+    this.resized = new ResizeObserver(() => this.fit());
+    this.resized.observe(element);
+  }
+
+  show(trace: Trace, view: ChartView): void {
+    this.view = view;
+    this.trace = trace;
+    const data = windowOf(trace, view.start, view.end, Math.max(100, this.element.clientWidth));
+    this.plot.setData(data, false);
+    this.plot.batch(() => {
+      this.plot.setScale("x", { min: view.start, max: view.end });
+      this.plot.setScale("y", valueRange(data[1], data[2]));
+    });
+  }
+
+  dispose(): void {
+    this.resized.disconnect();
+    this.plot.destroy();
+  }
+
+  private fit(): void {
+    const { clientWidth: width, clientHeight: height } = this.element;
+    if (width > 0 && height > 0) this.plot.setSize({ width, height });
+  }
+
+  private options(): uPlot.Options {
+    const axis = { stroke: TEXT, grid: { stroke: GRID, width: 1 }, ticks: { show: false }, font: "11px system-ui" };
+    return {
+      width: Math.max(this.element.clientWidth, 50),
+      height: Math.max(this.element.clientHeight, 50),
+      pxAlign: 0,
+      legend: { show: false },
+      cursor: { sync: { key: SYNC }, drag: { x: false, y: false }, points: { size: 6 }, y: false },
+      scales: { x: { time: false, auto: false }, y: { auto: false } },
+      axes: [
+        { ...axis, size: 22, gap: 2, values: (_, ticks) => ticks.map(shortTime) },
+        { ...axis, size: 48, gap: 4, space: 26, values: (_, ticks) => ticks.map((y) => formatNumber(y, Math.max(...ticks.map(Math.abs)))) },
+      ],
+      series: [
+        {},
+        { stroke: "#dbe3ee", width: 1.5, points: { show: false } },
+        { stroke: "#ff8fa6", width: 1.5, dash: [6, 4], points: { show: false } },
+      ],
+      hooks: { drawClear: [(plot) => this.shade(plot)], draw: [(plot) => this.cursor(plot)] },
+    };
+  }
+
+  private shade(plot: uPlot): void {
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    for (const span of this.trace?.spans ?? []) {
+      if (span.end < this.view.start || span.start > this.view.end) continue;
+      const left = plot.valToPos(span.start, "x", true);
+      const right = plot.valToPos(span.end, "x", true);
+      ctx.globalAlpha = span.verdict === "exceeded" ? 0.38 : 0.3;
+      ctx.fillStyle = span.verdict === "exceeded" ? "#c11540" : hatchPattern(ctx);
+      ctx.fillRect(left, bbox.top, Math.max(right - left, 1), bbox.height);
+    }
+    ctx.restore();
+  }
+
+  private cursor(plot: uPlot): void {
+    const { now, start, end } = this.view;
+    if (!(now >= start && now <= end)) return;
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.fillStyle = "#ffffff";
+    ctx.fillRect(Math.round(plot.valToPos(now, "x", true)) - 1, bbox.top, 2, bbox.height);
+    ctx.restore();
+  }
+}
+
+function shortTime(t: number): string {
+  return t >= 60 || t <= -60 ? formatTime(t).replace(/\.?0+$/, "") : `${Number(t.toFixed(3))}`.replace("-", "−");
+}
+
+// Room for every value and for the limit, with a little air.
+function valueRange(...columns: (number | null)[][]): { min: number; max: number } {
+  let min = Number.POSITIVE_INFINITY;
+  let max = Number.NEGATIVE_INFINITY;
+  for (const column of columns) {
+    for (const x of column) {
+      if (x === null) continue;
+      min = Math.min(min, x);
+      max = Math.max(max, x);
+    }
+  }
+  if (min > max) return { min: 0, max: 1 };
+  const air = 0.08 * (max - min) || 0.5 * Math.abs(max) || 0.5;
+  return { min: min >= 0 ? Math.max(0, min - air) : min - air, max: max + air };
+}

@@ -1,0 +1,77 @@
+// The newest pose block between two threads without waiting: a triple buffer in shared memory.
+//
+// Header, int32: [0] published slot, [1] slot being read, [2] generation (counts writes), [3] sequence
+// number of the published snapshot. Then one float64 run time per slot, then three slots of float32.
+// The writer takes the slot that is neither published nor being read. The reader announces the slot it
+// is about to read and looks again: if another was published meanwhile it moves on, so the writer can
+// never be inside the slot that is read.
+
+const PUBLISHED = 0;
+const READING = 1;
+const GENERATION = 2;
+const SEQUENCE = 3;
+const TIMES_AT = 32;
+const SLOTS_AT = 128;
+const SLOT_COUNT = 3;
+
+/** Floats per node: x, y, z [m], w, x, y, z. */
+export const FLOATS_PER_NODE = 7;
+
+/** Bytes that a triple buffer of so many floats takes. */
+export function poseBufferBytes(floats: number): number {
+  return SLOTS_AT + SLOT_COUNT * floats * 4;
+}
+
+class PoseSlots {
+  protected readonly header: Int32Array;
+  protected readonly times: Float64Array;
+  protected readonly slots: Float32Array[];
+
+  constructor(buffer: SharedArrayBuffer | ArrayBuffer) {
+    const floats = (buffer.byteLength - SLOTS_AT) / (SLOT_COUNT * 4);
+    this.header = new Int32Array(buffer, 0, 8);
+    this.times = new Float64Array(buffer, TIMES_AT, SLOT_COUNT);
+    this.slots = [0, 1, 2].map((k) => new Float32Array(buffer, SLOTS_AT + k * floats * 4, floats));
+  }
+}
+
+/** The worker's end. */
+export class PoseWriter extends PoseSlots {
+  private readonly bytes = this.slots.map((s) => new Uint8Array(s.buffer, s.byteOffset, s.byteLength));
+
+  /** Publish a block; replaces one that nobody read. A block of the wrong length is refused. */
+  write(block: Uint8Array, t: number, seq: number): boolean {
+    if (block.byteLength !== this.bytes[0]!.byteLength) return false;
+    const published = Atomics.load(this.header, PUBLISHED);
+    const reading = Atomics.load(this.header, READING);
+    let slot = 0;
+    while (slot === published || slot === reading) slot += 1;
+    this.bytes[slot]!.set(block); // msgpack's bytes are not aligned to four: copied as bytes
+    this.times[slot] = t;
+    Atomics.store(this.header, SEQUENCE, seq | 0);
+    Atomics.store(this.header, PUBLISHED, slot);
+    Atomics.add(this.header, GENERATION, 1);
+    return true;
+  }
+}
+
+/** The page's end. */
+export class PoseReader extends PoseSlots {
+  /** Run time of the block that `read` returned last [s]. */
+  t = Number.NaN;
+  private seen = 0;
+
+  /** The newest block, valid until the next call; null when there is nothing newer. */
+  read(): Float32Array | null {
+    const generation = Atomics.load(this.header, GENERATION);
+    if (generation === this.seen) return null;
+    this.seen = generation;
+    let slot: number;
+    do {
+      slot = Atomics.load(this.header, PUBLISHED);
+      Atomics.store(this.header, READING, slot);
+    } while (Atomics.load(this.header, PUBLISHED) !== slot);
+    this.t = this.times[slot]!;
+    return this.slots[slot]!;
+  }
+}

@@ -1,0 +1,125 @@
+// The bodies of the twin: one group per node, posed by the newest block, dressed by its mesh.
+
+import { Box3, Group, type Material, Mesh, type Object3D, Quaternion, Vector3 } from "three";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { FLOATS_PER_NODE } from "../poses";
+import type { Node, Scene, Verdict } from "../wire";
+import { bodyMaterial } from "./materials";
+
+const ONE = new Vector3(1, 1, 1);
+
+export class Body {
+  readonly group = new Group();
+  /** Box around its mesh, in its own frame; empty until the mesh came. */
+  readonly extent = new Box3();
+  private dressed: { mesh: Mesh; own: Material | Material[] }[] = [];
+  private painted: Verdict | null | undefined = undefined;
+
+  constructor(readonly node: Node) {
+    this.group.name = node.name;
+    this.group.matrixAutoUpdate = false;
+    this.group.userData.node = node.name;
+  }
+
+  /** Put on a mesh that is given in the body's frame. */
+  dress(model: Object3D): void {
+    model.traverse((part) => {
+      if (!(part instanceof Mesh)) return;
+      part.castShadow = true;
+      part.receiveShadow = true;
+      this.dressed.push({ mesh: part, own: part.material });
+    });
+    this.extent.setFromObject(model);
+    this.group.add(model);
+    this.repaint();
+  }
+
+  /** Show it in the colour of a verdict; `undefined` for its own. */
+  paint(verdict: Verdict | null | undefined): void {
+    if (verdict === this.painted) return;
+    this.painted = verdict;
+    this.repaint();
+  }
+
+  private repaint(): void {
+    for (const { mesh, own } of this.dressed) {
+      mesh.material = this.painted === undefined ? own : bodyMaterial(this.painted);
+    }
+  }
+}
+
+export class Bodies {
+  readonly root = new Group();
+  readonly byName = new Map<string, Body>();
+  private list: Body[] = [];
+  private generation = 0;
+  private readonly position = new Vector3();
+  private readonly orientation = new Quaternion();
+
+  /**
+   * Make the bodies of a scene and fetch their meshes.
+   *
+   * @returns Full names of the nodes whose mesh could not be had.
+   */
+  async load(scene: Scene): Promise<string[]> {
+    this.generation += 1;
+    const generation = this.generation;
+    this.root.clear();
+    this.byName.clear();
+    this.list = scene.nodes.map((node) => new Body(node));
+    for (const body of this.list) {
+      this.byName.set(body.node.name, body);
+      this.root.add(body.group);
+    }
+    const failed: string[] = [];
+    const models = new Map<string, Promise<Object3D>>();
+    await Promise.all(
+      this.list.map(async (body) => {
+        const hash = body.node.mesh;
+        if (!hash) return;
+        let model = models.get(hash);
+        if (!model) {
+          model = fetchModel(hash);
+          models.set(hash, model);
+        }
+        try {
+          const shape = (await model).clone();
+          if (generation === this.generation) body.dress(shape);
+        } catch {
+          failed.push(body.node.name);
+        }
+      }),
+    );
+    return failed;
+  }
+
+  /** Put every body where the block says: x, y, z [m], w, x, y, z in the world. */
+  pose(block: Float32Array): void {
+    for (let i = 0, k = 0; i < this.list.length; i += 1, k += FLOATS_PER_NODE) {
+      const { group } = this.list[i]!;
+      this.position.set(block[k]!, block[k + 1]!, block[k + 2]!);
+      this.orientation.set(block[k + 4]!, block[k + 5]!, block[k + 6]!, block[k + 3]!);
+      group.matrix.compose(this.position, this.orientation, ONE);
+      group.matrixWorldNeedsUpdate = true;
+    }
+  }
+
+  hide(names: ReadonlySet<string>): void {
+    for (const body of this.list) body.group.visible = !names.has(body.node.name);
+  }
+
+  /** Colour the bodies that verdicts are about, and only those. */
+  paint(verdicts: ReadonlyMap<string, Verdict | null>): void {
+    for (const body of this.list) {
+      const name = body.node.name;
+      body.paint(verdicts.has(name) ? (verdicts.get(name) ?? null) : undefined);
+    }
+  }
+}
+
+async function fetchModel(hash: string): Promise<Object3D> {
+  const response = await fetch(`/mesh/${encodeURIComponent(hash)}.glb`);
+  if (!response.ok) throw new Error(`mesh ${hash}: ${response.status}`);
+  const model = await new GLTFLoader().parseAsync(await response.arrayBuffer(), "");
+  return model.scene;
+}

@@ -1,0 +1,80 @@
+// Materials that carry a meaning: their colours are what the legend says, whatever the light.
+
+import { Color, DoubleSide, type Material, MeshBasicMaterial, MeshStandardMaterial } from "three";
+import { NEUTRAL_COLOR, VERDICT_COLORS } from "../verdicts";
+import type { Verdict } from "../wire";
+
+type Tone = Verdict | "none";
+
+function colorOf(tone: Tone): number {
+  return tone === "none" ? NEUTRAL_COLOR : VERDICT_COLORS[tone];
+}
+
+// UNDECIDED is hatched on the screen, so that it differs in more than colour.
+function hatch(material: Material): void {
+  material.onBeforeCompile = (shader) => {
+    shader.fragmentShader = shader.fragmentShader.replace(
+      "#include <opaque_fragment>",
+      `#include <opaque_fragment>
+       if (mod(gl_FragCoord.x - gl_FragCoord.y, 12.0) < 5.0) gl_FragColor.a *= 0.25;`,
+    );
+  };
+  material.customProgramCacheKey = () => "hatched";
+}
+
+type Kind = "line" | "ghost" | "fill" | "edge";
+
+const LOOK: Record<Kind, { opacity: number; depthTest: boolean; depthWrite: boolean }> = {
+  line: { opacity: 1, depthTest: true, depthWrite: true },
+  ghost: { opacity: 0.35, depthTest: false, depthWrite: false },
+  fill: { opacity: 0.24, depthTest: true, depthWrite: false },
+  edge: { opacity: 0.9, depthTest: true, depthWrite: false },
+};
+
+const made = new Map<string, Material>();
+
+function once(key: string, make: () => Material): Material {
+  let material = made.get(key);
+  if (!material) {
+    material = make();
+    made.set(key, material);
+  }
+  return material;
+}
+
+/** The shared material of markers of one verdict. */
+export function markerMaterial(kind: Kind, verdict: Verdict | null): Material {
+  const tone: Tone = verdict ?? "none";
+  return once(`${kind} ${tone}`, () => {
+    const hatched = tone === "undecided" && kind !== "edge";
+    const material = new MeshBasicMaterial({
+      color: colorOf(tone),
+      side: DoubleSide,
+      toneMapped: false,
+      transparent: LOOK[kind].opacity < 1 || hatched,
+      ...LOOK[kind],
+    });
+    if (hatched) hatch(material);
+    return material;
+  });
+}
+
+/** The shared material of a body that a verdict is about. */
+export function bodyMaterial(verdict: Verdict | null): Material {
+  const tone: Tone = verdict ?? "none";
+  return once(`body ${tone}`, () => {
+    const color = new Color(colorOf(tone));
+    const material = new MeshStandardMaterial({
+      color,
+      emissive: color,
+      emissiveIntensity: 0.45,
+      roughness: 0.6,
+      metalness: 0,
+      side: DoubleSide,
+      toneMapped: false,
+      transparent: tone === "undecided",
+    });
+    if (tone === "undecided") hatch(material);
+    return material;
+  });
+}

@@ -1,0 +1,33 @@
+// A click (not a drag) on a body selects it.
+
+import { type Object3D, Raycaster, Vector2 } from "three";
+import type { Bodies } from "./bodies";
+import type { Stage } from "./stage";
+
+/** A pointer that moved less than this between press and release clicked [px]. */
+const STILL_PX = 4;
+
+export function pickOnClick(stage: Stage, bodies: Bodies, picked: (name: string | null) => void): void {
+  const canvas = stage.renderer.domElement;
+  const ray = new Raycaster();
+  const at = new Vector2();
+  const pressed = new Vector2();
+  canvas.addEventListener("pointerdown", (event) => pressed.set(event.clientX, event.clientY));
+  canvas.addEventListener("pointerup", (event) => {
+    if (event.button !== 0 || pressed.distanceTo(at.set(event.clientX, event.clientY)) > STILL_PX) return;
+    const box = canvas.getBoundingClientRect();
+    at.set(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
+    ray.setFromCamera(at, stage.camera);
+    const hits = ray.intersectObject(bodies.root, true);
+    picked(hits.map((hit) => nodeOf(hit.object)).find((name) => name !== null) ?? null);
+  });
+}
+
+// Hidden bodies are hit by rays all the same.
+function nodeOf(object: Object3D | null): string | null {
+  for (let at = object; at; at = at.parent) {
+    if (!at.visible) return null;
+    if (typeof at.userData.node === "string") return at.userData.node;
+  }
+  return null;
+}

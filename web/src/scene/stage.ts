@@ -1,0 +1,101 @@
+// The room: renderer, light, floor, and the one place where the world's z-up becomes the screen's y-up.
+
+import {
+  Color,
+  DirectionalLight,
+  Fog,
+  Group,
+  HemisphereLight,
+  Mesh,
+  NeutralToneMapping,
+  PCFShadowMap,
+  PerspectiveCamera,
+  PlaneGeometry,
+  Scene,
+  ShadowMaterial,
+  WebGLRenderer,
+} from "three";
+import { makeGrid } from "./grid";
+
+const BACKGROUND = 0x10151c;
+
+export class Stage {
+  readonly renderer: WebGLRenderer;
+  readonly scene = new Scene();
+  readonly camera = new PerspectiveCamera(42, 1, 0.03, 120);
+  /** What a person's eyes and hands hang on; moved and scaled when the person is. */
+  readonly rig = new Group();
+  /** Everything that is given in world coordinates: z up, metres. */
+  readonly world = new Group();
+  readonly grid = makeGrid();
+  private dirty = true;
+
+  constructor(readonly element: HTMLElement) {
+    this.renderer = new WebGLRenderer({ antialias: true });
+    this.renderer.setPixelRatio(Math.min(globalThis.devicePixelRatio, 2));
+    this.renderer.toneMapping = NeutralToneMapping;
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = PCFShadowMap;
+    this.renderer.shadowMap.autoUpdate = false;
+    element.append(this.renderer.domElement);
+    this.scene.background = new Color(BACKGROUND);
+    this.scene.fog = new Fog(BACKGROUND, 14, 40);
+    this.world.rotation.x = -Math.PI / 2;
+    this.rig.add(this.camera);
+    this.scene.add(this.world, this.rig, ...lights(), floor(), this.grid);
+    new ResizeObserver(() => this.resize()).observe(element);
+    this.resize();
+  }
+
+  /** Ask for a new picture; without being asked none is drawn. */
+  invalidate(): void {
+    this.dirty = true;
+  }
+
+  /** The bodies moved: their shadows are out of date. */
+  moved(): void {
+    this.renderer.shadowMap.needsUpdate = true;
+    this.dirty = true;
+  }
+
+  /** Call `each` once per display frame, before drawing. */
+  run(each: (time: number) => void): void {
+    this.renderer.setAnimationLoop((time: number) => {
+      each(time);
+      if (!this.dirty && !this.renderer.xr.isPresenting) return;
+      this.dirty = false;
+      this.renderer.render(this.scene, this.camera);
+    });
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.element;
+    if (width === 0 || height === 0) return;
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.renderer.setSize(width, height);
+    // Drawn at once: a cleared canvas would flash.
+    this.renderer.render(this.scene, this.camera);
+  }
+}
+
+function lights(): (HemisphereLight | DirectionalLight)[] {
+  const sky = new HemisphereLight(0xe8f0ff, 0x39414f, 1.7);
+  const key = new DirectionalLight(0xfff4e6, 2.1);
+  key.position.set(2.6, 5, 3.2);
+  key.castShadow = true;
+  key.shadow.mapSize.set(1024, 1024);
+  key.shadow.normalBias = 0.02;
+  Object.assign(key.shadow.camera, { left: -3.5, right: 3.5, top: 3.5, bottom: -3.5, near: 0.5, far: 12 });
+  const fill = new DirectionalLight(0xbfd4ff, 0.7);
+  fill.position.set(-4, 2.5, -2);
+  return [sky, key, fill];
+}
+
+function floor(): Mesh {
+  const shade = new Mesh(new PlaneGeometry(16, 16), new ShadowMaterial({ opacity: 0.38 }));
+  shade.rotation.x = -Math.PI / 2;
+  shade.position.y = -0.001;
+  shade.receiveShadow = true;
+  return shade;
+}

@@ -1,0 +1,136 @@
+// The middle of the page: bodies, markers and viewpoint, told by signals what to show.
+
+import { effect, signal } from "@preact/signals";
+import { Quaternion, Vector3 } from "three";
+import type { PoseFeed } from "../connection";
+import { MarkerLayer } from "../markers/layer";
+import type { View } from "../markers/drawn";
+import type { Frame } from "../messages";
+import { hidden, mutedCriteria, select, selectedNodes, selection, stale } from "../page_state";
+import type { Scene } from "../wire";
+import { Bodies } from "./bodies";
+import { Outline } from "./outline";
+import { pickOnClick } from "./picking";
+import { Stage } from "./stage";
+import { Viewpoint } from "./viewpoint";
+
+export const showCaptions = signal(true);
+export const showGrid = signal(true);
+/** Nodes whose mesh could not be fetched: they are there, but not to be seen. */
+export const unseen = signal<readonly string[]>([]);
+
+export class Viewer {
+  readonly stage: Stage;
+  readonly bodies = new Bodies();
+  readonly markers = new MarkerLayer();
+  readonly viewpoint: Viewpoint;
+  private readonly outline = new Outline(this.bodies);
+  private readonly view: View;
+  private feed: PoseFeed | null = null;
+  private frame: Frame | null = null;
+  private posed = false;
+  private framed = false;
+  private dressed = false;
+
+  constructor(element: HTMLElement) {
+    this.stage = new Stage(element);
+    this.stage.world.add(this.bodies.root, this.markers.root);
+    this.viewpoint = new Viewpoint(this.stage, this.bodies);
+    this.view = { camera: this.stage.camera, pixel: 0 };
+    pickOnClick(this.stage, this.bodies, (name) => select(name === null ? null : { kind: "node", name }));
+    this.follow();
+    new ResizeObserver(() => this.stage.invalidate()).observe(element);
+  }
+
+  /** Show another scene; the viewpoint stays when one has been there before. */
+  async begin(scene: Scene, feed: PoseFeed): Promise<void> {
+    this.feed = feed;
+    this.frame = null;
+    this.dressed = false;
+    this.markers.update([], new Set(), null, false);
+    unseen.value = await this.bodies.load(scene);
+    if (feed !== this.feed) return;
+    this.bodies.hide(hidden.peek());
+    this.outline.show(selectedNodes.peek());
+    this.dressed = true;
+    this.stage.moved();
+  }
+
+  show(frame: Frame): void {
+    this.frame = frame;
+    this.draw();
+  }
+
+  /** Once per display frame, before drawing. */
+  tick(): void {
+    const block = this.feed?.read();
+    if (block) {
+      this.bodies.pose(block);
+      this.posed = true;
+      this.stage.moved();
+    }
+    if (!this.framed && this.posed && this.dressed) {
+      this.framed = true;
+      this.viewpoint.go("corner");
+    }
+    this.viewpoint.update();
+    const { camera, element } = this.stage;
+    this.view.pixel = (2 * Math.tan((camera.fov * Math.PI) / 360)) / Math.max(element.clientHeight, 1);
+    this.markers.face(this.view);
+  }
+
+  /** Pose of a body in three.js's own world, y up. */
+  poseOf(name: string): { position: number[]; quaternion: number[] } | null {
+    const group = this.bodies.byName.get(name)?.group;
+    if (!group) return null;
+    group.updateWorldMatrix(true, false);
+    const position = group.getWorldPosition(new Vector3()).toArray();
+    return { position, quaternion: group.getWorldQuaternion(new Quaternion()).toArray() };
+  }
+
+  /** Where a point of the world (z up) is on the screen [px]. */
+  project(point: [number, number, number]): [number, number] {
+    const { camera, world, element } = this.stage;
+    camera.updateMatrixWorld();
+    const at = world.localToWorld(new Vector3(...point)).project(camera);
+    const box = element.getBoundingClientRect();
+    return [box.left + ((at.x + 1) / 2) * box.width, box.top + ((1 - at.y) / 2) * box.height];
+  }
+
+  private draw(): void {
+    const chosen = selection.peek();
+    this.markers.update(
+      this.frame?.results ?? [],
+      mutedCriteria.peek(),
+      chosen?.kind === "criterion" ? chosen.name : null,
+      showCaptions.peek(),
+    );
+    this.bodies.paint(this.markers.painted);
+    this.stage.invalidate();
+  }
+
+  private follow(): void {
+    effect(() => {
+      this.outline.show(selectedNodes.value);
+      this.stage.invalidate();
+    });
+    effect(() => {
+      this.bodies.hide(hidden.value);
+      this.stage.moved();
+    });
+    effect(() => {
+      this.stage.grid.visible = showGrid.value;
+      this.stage.invalidate();
+    });
+    effect(() => {
+      // Read to be told of changes.
+      void [mutedCriteria.value, selection.value, showCaptions.value];
+      this.draw();
+    });
+    effect(() => {
+      this.markers.root.visible = !stale.value;
+      this.bodies.paint(stale.value ? new Map() : this.markers.painted);
+      this.stage.invalidate();
+    });
+  }
+}

@@ -1,0 +1,140 @@
+// Beside the page: the socket, decoding, the pose buffer, and what was heard lately. The screen never
+// waits for the network, and the network never waits for the screen.
+
+import { Decoder } from "@msgpack/msgpack";
+import type { Frame, FromWorker, ToWorker } from "./messages";
+import { PointCollector } from "./points";
+import { FLOATS_PER_NODE, PoseWriter, poseBufferBytes } from "./poses";
+import { Recent } from "./recent";
+import { Socket } from "./socket";
+import type { Scene, ServerMessage, Snapshot } from "./wire";
+
+const RECENT_BYTES = 64 * 1024 * 1024;
+const RECENT_SPACING_S = 0.04;
+const POINTS_EVERY_MS = 80;
+
+let socket: Socket | null = null;
+let mayShare = false;
+let live = false;
+let writer: PoseWriter | null = null;
+let poseBytes = 0;
+let lookingAt: number | null = null;
+let pageWants = true;
+let waiting: Frame | null = null;
+let newest = Number.NaN;
+const spare: ArrayBuffer[] = [];
+const collector = new PointCollector();
+const recent = new Recent(RECENT_BYTES, RECENT_SPACING_S);
+const decoder = new Decoder();
+
+const post = (message: FromWorker, transfer: Transferable[] = []): void => {
+  self.postMessage(message, { transfer });
+};
+
+function received(message: ServerMessage, raw: Uint8Array): void {
+  switch (message.type) {
+    case "snapshot":
+      heard(message, raw);
+      return;
+    case "scene":
+      begin(message);
+      return;
+    case "hello":
+      live = message.mode === "live";
+      post({ kind: "hello", hello: message });
+      return;
+    case "history":
+      post({ kind: "history", history: message });
+      return;
+    case "transport":
+      post({ kind: "transport", transport: message });
+      return;
+  }
+}
+
+function begin(scene: Scene): void {
+  const floats = scene.nodes.length * FLOATS_PER_NODE;
+  poseBytes = floats * 4;
+  const shared = mayShare ? new SharedArrayBuffer(poseBufferBytes(floats)) : null;
+  writer = shared ? new PoseWriter(shared) : null;
+  lookingAt = null;
+  waiting = null;
+  newest = Number.NaN;
+  recent.clear();
+  collector.clear();
+  post({ kind: "scene", scene, shared });
+}
+
+function heard(snapshot: Snapshot, raw: Uint8Array): void {
+  socket?.send({ type: "command", action: "ack", value: snapshot.seq });
+  if (snapshot.poses.byteLength !== poseBytes) return; // belongs to another scene
+  newest = snapshot.t;
+  if (live) {
+    collector.add(snapshot);
+    recent.keep(snapshot.t, raw, false);
+  }
+  if (lookingAt === null) show(snapshot);
+}
+
+function show(snapshot: Snapshot): void {
+  if (writer) {
+    writer.write(snapshot.poses, snapshot.t, snapshot.seq);
+  } else {
+    let buffer = spare.pop();
+    if (!buffer || buffer.byteLength !== poseBytes) buffer = new ArrayBuffer(poseBytes);
+    new Uint8Array(buffer).set(snapshot.poses);
+    post({ kind: "poses", buffer, t: snapshot.t, seq: snapshot.seq }, [buffer]);
+  }
+  const { seq, t, joints, tracking, results } = snapshot;
+  waiting = { seq, t, joints, tracking, results };
+  deliver();
+}
+
+// Latest wins: a frame is replaced until the page has drawn the one before it.
+function deliver(): void {
+  if (!pageWants || !waiting) return;
+  pageWants = false;
+  const frame = waiting;
+  waiting = null;
+  post({ kind: "frame", frame });
+}
+
+function look(t: number | null): void {
+  lookingAt = t;
+  if (t === null) return;
+  const raw = recent.at(t);
+  if (raw) show(decoder.decode(raw) as Snapshot);
+}
+
+setInterval(() => {
+  if (!live) return;
+  const points = collector.take();
+  const transfer = points.flatMap((p) => [p.t.buffer, p.values.buffer, p.limits.buffer, p.verdicts.buffer]);
+  if (points.length > 0) post({ kind: "points", points, newest, oldest: recent.oldest }, transfer);
+}, POINTS_EVERY_MS);
+
+self.onmessage = (event: MessageEvent<ToWorker>) => {
+  const message = event.data;
+  switch (message.kind) {
+    case "connect":
+      mayShare = message.shared;
+      socket = new Socket(message.url, {
+        message: received,
+        state: (state, reason, retryInMs) => post({ kind: "link", state, reason, retryInMs }),
+      });
+      return;
+    case "want":
+      pageWants = true;
+      deliver();
+      return;
+    case "recycle":
+      spare.push(message.buffer);
+      return;
+    case "command":
+      socket?.send({ type: "command", action: message.action, value: message.value });
+      return;
+    case "look":
+      look(message.t);
+      return;
+  }
+};

@@ -17,14 +17,14 @@ from pathlib import Path
 from typing import Any
 
 import coal
-import defusedxml.ElementTree as ElementTree
 import fcl
 import manifold3d
 import numpy as np
 import pinocchio as pin
 import trimesh
+from defusedxml import ElementTree
 
-from seerob.distance import Query, Shapes
+from seerob.distance import Per, Query, Reach, Shapes
 from seerob.geometry import Mesh, Solid, capsule
 from seerob.transforms import Array, rotation_from_rpy
 
@@ -64,30 +64,38 @@ def robot_motion(names: list[str], ticks: int) -> tuple[Array, Array]:
     R, x = np.zeros((ticks, len(names), 3, 3)), np.zeros((ticks, len(names), 3))
     for k in range(ticks):
         t = k * PERIOD
-        pin.forwardKinematics(model, data, home + reach * np.sin(np.array([1.9, 1.4, 1.6, 2.0, 1.7, 2.1]) * t))
+        pin.forwardKinematics(
+            model, data, home + reach * np.sin(np.array([1.9, 1.4, 1.6, 2.0, 1.7, 2.1]) * t)
+        )
         pin.updateFramePlacements(model, data)
         R[k] = [data.oMf[f].rotation for f in frames]
         x[k] = [data.oMf[f].translation + BASE for f in frames]
     return R, x
 
 
-# Length along its own z [m], radius [m], middle from the pelvis [m], axis, how far an arm swings it [m].
-PARTS = [
-    (0.10, 0.13, (0, 0, 0), (0, 0, 1), 0), (0.12, 0.12, (0, 0, 0.16), (0, 0, 1), 0),
-    (0.18, 0.13, (0, 0, 0.34), (0, 0, 1), 0), (0.07, 0.05, (0, 0, 0.52), (0, 0, 1), 0),
-    (0.10, 0.09, (0, 0, 0.64), (0, 0, 1), 0), (0.26, 0.10, (0, 0, 0.40), (0, 1, 0), 0),
+# Length along its own z [m], radius [m], middle from the pelvis [m], axis, how far it swings [m].
+TRUNK = [
+    (0.10, 0.13, (0, 0, 0), (0, 0, 1), 0),
+    (0.12, 0.12, (0, 0, 0.16), (0, 0, 1), 0),
+    (0.18, 0.13, (0, 0, 0.34), (0, 0, 1), 0),
+    (0.07, 0.05, (0, 0, 0.52), (0, 0, 1), 0),
+    (0.10, 0.09, (0, 0, 0.64), (0, 0, 1), 0),
+    (0.26, 0.10, (0, 0, 0.40), (0, 1, 0), 0),
     (0.26, 0.10, (0, 0, 0.02), (0, 1, 0), 0),
-] + [
-    (length, radius, (forward, side * y, z), axis, swing)
-    for side in (1, -1)
-    for length, radius, forward, y, z, axis, swing in (
-        (0.16, 0.045, 0, 0.10, 0.45, (0, 1, 0), 0), (0.29, 0.047, -0.10, 0.20, 0.33, (-1, 0, -1), 0.02),
-        (0.23, 0.038, -0.30, 0.20, 0.22, (-1, 0, 0.2), 0.06), (0.16, 0.035, -0.50, 0.19, 0.26, (-1, 0, 0.1), 0.1),
-        (0.07, 0.028, -0.50, 0.19, 0.26, (0, 1, 0), 0.1), (0.36, 0.078, 0, 0.09, -0.25, (0, 0, 1), 0),
-        (0.38, 0.055, 0, 0.09, -0.66, (0, 0, 1), 0), (0.14, 0.038, -0.07, 0.09, -0.88, (1, 0, 0), 0),
-        (0.07, 0.03, -0.18, 0.09, -0.89, (1, 0, 0), 0),
-    )
-]  # fmt: skip
+]
+LEFT = [
+    (0.16, 0.045, (0, 0.10, 0.45), (0, 1, 0), 0),
+    (0.29, 0.047, (-0.10, 0.20, 0.33), (-1, 0, -1), 0.02),
+    (0.23, 0.038, (-0.30, 0.20, 0.22), (-1, 0, 0.2), 0.06),
+    (0.16, 0.035, (-0.50, 0.19, 0.26), (-1, 0, 0.1), 0.1),
+    (0.07, 0.028, (-0.50, 0.19, 0.26), (0, 1, 0), 0.1),
+    (0.36, 0.078, (0, 0.09, -0.25), (0, 0, 1), 0),
+    (0.38, 0.055, (0, 0.09, -0.66), (0, 0, 1), 0),
+    (0.14, 0.038, (-0.07, 0.09, -0.88), (1, 0, 0), 0),
+    (0.07, 0.03, (-0.18, 0.09, -0.89), (1, 0, 0), 0),
+]
+RIGHT = [(length, radius, (x, -y, z), axis, swing) for length, radius, (x, y, z), axis, swing in LEFT]
+PARTS = [*TRUNK, *LEFT, *RIGHT]
 
 
 def person_motion(ticks: int) -> tuple[Array, Array]:
@@ -96,7 +104,7 @@ def person_motion(ticks: int) -> tuple[Array, Array]:
     for k in range(ticks):
         t = k * PERIOD
         lean = rotation_from_rpy([0.0, -0.25 * np.sin(0.9 * t), 0.1 * np.sin(0.5 * t)])
-        pelvis = np.array([1.15 + 0.15 * np.sin(1.1 * t), 0.1 + 0.1 * np.sin(0.7 * t), 0.93])
+        pelvis = np.array([1.45 + 0.15 * np.sin(1.1 * t), 0.1 + 0.1 * np.sin(0.7 * t), 0.93])
         for i, (_, _, middle, axis, swing) in enumerate(PARTS):
             z = np.array(axis, float) / np.linalg.norm(axis)
             y = np.cross(z, [1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.cross(z, [0.0, 1.0, 0.0])
@@ -128,7 +136,13 @@ class CoalPeer:
         self.request = coal.DistanceRequest(True)
         self.request.rel_err = self.request.abs_err = 0
 
-    def per_second(self, R: Array, x: Array, placed: list[Any], lower: Array) -> Array:
+    def to_segments(self, R: Array, x: Array, placed: list[Any], a: Array, b: Array) -> Array:
+        return self.per_second(placed, self.bounds_to_segments(R, x, a, b))
+
+    def to_balls(self, R: Array, x: Array, placed: list[Any]) -> Array:
+        return self.per_second(placed, self.bounds_to_balls(R, x))
+
+    def per_second(self, placed: list[Any], lower: Array) -> Array:
         n = len(self.first)
         order = np.argsort(lower, axis=0)
         least = np.empty(len(self.second))
@@ -138,9 +152,7 @@ class CoalPeer:
             for j in order[:, i]:
                 if lower[j, i] >= bound:
                     break
-                coal.distance(
-                    self.first[j], placed[j], self.second[i], placed[n + i], self.request, result
-                )
+                coal.distance(self.first[j], placed[j], self.second[i], placed[n + i], self.request, result)
                 bound = result.min_distance - self.radii[i]
             least[i] = bound
         return least
@@ -175,9 +187,9 @@ def report(title: str, times: dict[str, list[float]], peer: str, worst: float) -
     print(f"  largest difference           {worst:.1e} m", flush=True)
 
 
-def clock(times: dict[str, list[float]], name: str, ask: Any) -> Any:
+def clock(times: dict[str, list[float]], name: str, ask: Any, *given: Any) -> Any:
     begin = time.perf_counter()
-    answer = ask()
+    answer = ask(*given)
     times.setdefault(name, []).append(time.perf_counter() - begin)
     return answer
 
@@ -202,25 +214,42 @@ def person(kind: str, ticks: int) -> tuple[float, float]:
         [coal_tree(np.array([-e, e, e]), [(0, 1, 2)]) for e in ends],
         radii,
     )
-    R, x = (np.concatenate(both, axis=1) for both in zip(robot_motion([l for l, _ in links], ticks), person_motion(ticks), strict=True))  # fmt: skip
+    robot, human = robot_motion([name for name, _ in links], ticks), person_motion(ticks)
+    R, x = (np.concatenate(both, axis=1) for both in zip(robot, human, strict=True))
     times: dict[str, list[float]] = {}
-    worst = 0.0
+    worst, nearest, farthest = 0.0, np.inf, -np.inf
     for k in range(ticks):
         placed = [coal.Transform3s(R[k, i], x[k, i]) for i in range(len(bodies))]
         tips = np.einsum("iab,ib->ia", R[k, n:], ends)
         a, b = x[k, n:] - tips, x[k, n:] + tips
-        theirs = clock(times, "coal, 25 parts", lambda: peer.per_second(R[k], x[k], placed, peer.bounds_to_segments(R[k], x[k], a, b)))  # fmt: skip  # noqa: B023
-        ours = clock(times, "seerob, 25 parts", lambda: parts.per_body(R[k], x[k]))  # noqa: B023
-        pairs = clock(times, f"seerob, {n * len(PARTS)} pairs", lambda: all_pairs.per_pair(R[k], x[k]))  # noqa: B023
-        one = clock(times, "seerob, least of all", lambda: least.minimum(R[k], x[k]))  # noqa: B023
-        apart = theirs + radii > 0  # Coal's zero says that cores intersect.
-        worst = max(worst, np.abs(ours.distance - theirs)[apart].max())
+        theirs = clock(
+            times,
+            "coal, 25 parts",
+            peer.to_segments,
+            R[k],
+            x[k],
+            placed,
+            a,
+            b,
+        )
+        ours = clock(times, "seerob, 25 parts", parts.per_body, R[k], x[k])
+        pairs = clock(times, f"seerob, {n * len(PARTS)} pairs", all_pairs.per_pair, R[k], x[k])
+        one = clock(times, "seerob, least of all", least.minimum, R[k], x[k])
+        exact = ours.reach == Reach.EXACT  # Coal knows no depth and no inside.
+        worst = max(worst, np.abs(ours.distance - theirs)[exact].max())
+        assert (ours.distance <= theirs + 1e-9).all()
+        nearest, farthest = min(nearest, ours.distance.min()), max(farthest, ours.distance.min())
         assert (pairs.distance.reshape(n, -1).min(0) == ours.distance).all()
         assert one.distance == ours.distance.min()
-    clock(times, "seerob, 25 parts, batch/tick", lambda: parts.batch(R, x, per="body"))
+    clock(times, "seerob, 25 parts, batch/tick", parts.batch, R, x, Per.BODY)
     times["seerob, 25 parts, batch/tick"][0] /= ticks
     count = sum(len(mesh.faces) for _, mesh in links)
-    report(f"person × UR10 {kind} ({count} triangles, built in {built:.2f} s)", times, "coal, 25 parts", worst)
+    report(
+        f"person at {nearest:.2f} … {farthest:.2f} m × UR10 {kind} ({count} triangles, built in {built:.2f} s)",
+        times,
+        "coal, 25 parts",
+        worst,
+    )
     return float(np.median(times["coal, 25 parts"]) / np.median(times["seerob, 25 parts"])), worst
 
 
@@ -271,30 +300,48 @@ def environment(ticks: int) -> tuple[float, float]:
     times: dict[str, list[float]] = {}
     worst = 0.0
 
-    def bare(lower: Array) -> Array:
+    def bare(R: Array, x: Array) -> Array:
+        lower = peer.bounds_to_balls(R, x)
         least = np.full(n, np.inf)
         for i in range(n):
             for j in np.argsort(lower[:, i]):
                 if lower[j, i] >= least[i]:
                     break
-                least[i] = min(least[i], fcl.distance(theirs_fcl[j], theirs_fcl[m + i], fcl.DistanceRequest(True), fcl.DistanceResult()))  # fmt: skip
+                least[i] = min(
+                    least[i],
+                    fcl.distance(
+                        theirs_fcl[j], theirs_fcl[m + i], fcl.DistanceRequest(True), fcl.DistanceResult()
+                    ),
+                )
         return least
 
     for k in range(ticks):
         placed = [coal.Transform3s(R[k, i], x[k, i]) for i in range(m + n)]
         for i in range(m + n):
             theirs_fcl[i].setTransform(fcl.Transform(R[k, i], x[k, i]))
-        theirs = clock(times, "coal, 7 links", lambda: peer.per_second(R[k], x[k], placed, peer.bounds_to_balls(R[k], x[k])))  # fmt: skip  # noqa: B023
+        theirs = clock(
+            times,
+            "coal, 7 links",
+            peer.to_balls,
+            R[k],
+            x[k],
+            placed,
+        )
         if k < 20:
-            clock(times, "fcl, 7 links", lambda: bare(peer.bounds_to_balls(R[k], x[k])))  # noqa: B023
-        ours = clock(times, "seerob, 7 links", lambda: per_link.per_body(R[k], x[k]))  # noqa: B023
-        clock(times, "seerob, 7 links within 0.1 m", lambda: capped.per_body(R[k], x[k]))  # noqa: B023
-        clock(times, "seerob, least of all", lambda: one.minimum(R[k], x[k]))  # noqa: B023
+            clock(times, "fcl, 7 links", bare, R[k], x[k])
+        ours = clock(times, "seerob, 7 links", per_link.per_body, R[k], x[k])
+        clock(times, "seerob, 7 links within 0.1 m", capped.per_body, R[k], x[k])
+        clock(times, "seerob, least of all", one.minimum, R[k], x[k])
         apart = theirs > 1e-9
         worst = max(worst, np.abs(ours.distance - theirs)[apart].max())
         assert (ours.distance[~apart] <= 0).all()
     count = sum(len(f) for _, f in parts), sum(len(mesh.faces) for _, mesh in links)
-    report(f"UR10 collision ({count[1]} triangles) × 10 parts ({count[0]} triangles)", times, "coal, 7 links", worst)
+    report(
+        f"UR10 collision ({count[1]} triangles) × 10 parts ({count[0]} triangles)",
+        times,
+        "coal, 7 links",
+        worst,
+    )
     return float(np.median(times["coal, 7 links"]) / np.median(times["seerob, 7 links"])), worst
 
 

@@ -20,9 +20,9 @@ from seerob.model_io.description import Description, Inertial, Joint, Link, Quan
 from seerob.model_io.loader import load_robot
 from seerob.mounting import Mounting, extreme_points
 from seerob.snapshot import Finding, Origin
-from seerob.things import PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, link_by_hand, load_thing
+from seerob.things import AREA_COLOR, PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, link_by_hand, load_thing
 from seerob.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
-from seerob.workstation import Human, Mounted, Pose, Robot, Tool, Workstation
+from seerob.workstation import Area, Human, Mounted, Pose, Robot, Tool, Workstation
 
 PLACEHOLDER_DENSITY = 500.0
 """Of the box around a moving link that nobody gave a mass [kg/m³]: it lets the twin move, and no
@@ -80,6 +80,9 @@ class _Compiler:
             self._try(f"parts[{i}]", self._part, part)
         if not self.problems:
             self._mount_all()
+        if not self.problems:
+            for i, area in enumerate(self.station.areas):
+                self._try(f"areas[{i}]", self._area, area)
         if self.problems:
             raise InputError(self.problems)
         bodies = self._bodies()
@@ -221,6 +224,11 @@ class _Compiler:
     def _part(self, part: Any) -> None:
         self._thing(part, "part", None, _matrix(part.at), PART_COLOR)
 
+    def _area(self, area: Area) -> None:
+        if area.on is not None and not self.mounting.has(area.on):
+            raise UnknownName("link, tool or bone", area.on, self.carriers)
+        self._thing(area, "area", area.on, _matrix(area.at), AREA_COLOR)
+
     def _mount_all(self) -> None:
         """Mount tools and workpieces; what they are mounted on may come later in the file."""
         waiting: list[tuple[str, str, Mounted]] = [
@@ -259,7 +267,7 @@ class _Compiler:
         color: tuple[float, float, float, float],
     ) -> None:
         self.progress(f"reading {thing.name}")
-        loaded = load_thing(thing, self.folder, color, needs_mass=parent is not None)
+        loaded = load_thing(thing, self.folder, color, needs_mass=role in ("tool", "workpiece"))
         self.mounting.findings += loaded.findings
         self.mounting.files.update(loaded.files)
         carrier = "" if parent is None else self.carriers[parent]
@@ -356,6 +364,7 @@ class _Compiler:
             sorted(i for i in (_body_id(mj, full) for full in own) if mj.body_weldid[i] != 0), np.int64
         )
         moving_ids = set(mj_bodies.tolist())
+        own_bodies = [b for b in bodies if b.carrier == name and b.role != "area"]
         tip = chain.tip if chain.tip is not None else Frame(f"{name}/{chain.description.tip}", -1, np.eye(4))
         tip = replace(tip, mj=_body_id(mj, tip.name))
         return Mechanism(
@@ -371,8 +380,8 @@ class _Compiler:
             home_given=chain.home_given,
             tip=tip,
             bodies=tuple(b.index for b in bodies if b.owner == name),
-            carried=tuple(b.index for b in bodies if b.carrier == name and b.owner != name),
-            moving=tuple(b.index for b in bodies if b.carrier == name and b.mj in moving_ids),
+            carried=tuple(b.index for b in own_bodies if b.owner != name),
+            moving=tuple(b.index for b in own_bodies if b.mj in moving_ids),
             mj_bodies=mj_bodies,
             unknown_masses=self._unknown_masses(name),
             velocity_limits=tuple(joint.velocity for joint in commanded),
@@ -388,7 +397,7 @@ class _Compiler:
         ]
         by_name: dict[str, list[Quantity | None]] = {}
         for entry in self.mounting.entries:
-            if entry.carrier == name and entry.owner != name:
+            if entry.carrier == name and entry.role in ("tool", "workpiece"):
                 by_name.setdefault(entry.owner, []).append(entry.mass)
         unknown += [
             f"nobody gave the mass or the density of {owner}"

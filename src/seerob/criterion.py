@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from msgspec import Struct
 
@@ -24,6 +24,11 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     The fields are the table of the workstation file. The first line of the class's docstring is
     what `seerob kinds` and the report print.
     """
+
+    unit: ClassVar[str] = ""
+    """Unit of its results."""
+    at_most: ClassVar[bool] = True
+    """Whether its limit bounds from above."""
 
     name: str = ""
     """What results are called; made from the kind and the subject when not given."""

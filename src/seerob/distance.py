@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seerob.errors import InputError, Problem, SimulationDiverged
 from seerob.kernels import nearest as kernel
+from seerob.kernels.pairs import MESH
 from seerob.kernels.shapes import Indices, Shapes
 from seerob.transforms import Array
 
@@ -119,7 +120,7 @@ class Query:
         _check_sets(shapes, self.a, self.b, cap)
         self.cap = float(cap)
         rows, bodies, groups = [], [], []
-        mesh = shapes.which[:, kernel.MESH]
+        mesh = shapes.which[:, MESH]
         for ia, body_a in enumerate(self.a):
             for ib, body_b in enumerate(self.b):
                 for i in shapes.solids[body_a]:

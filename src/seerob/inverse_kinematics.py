@@ -67,7 +67,7 @@ def solve_pose(
         # The damping fades with the error, so that convergence is quadratic in the end.
         damping = min(DAMPING, error**2)
         step = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), twist)
-        step *= min(1.0, LARGEST_STEP / max(np.abs(step).max(), 1e-12))
+        step *= min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), 1e-12))
         q = np.clip(q + step, mechanism.lower, mechanism.upper)
     return q, error
 
@@ -83,4 +83,4 @@ def _rotation_vector(rotation: Array) -> Array:
     if c > 0:
         return sine
     axis = np.sqrt(np.maximum((np.diag(rotation) + 1) / 2, 0))
-    return np.asarray(np.pi * axis / max(np.linalg.norm(axis), 1e-12))
+    return np.asarray(np.pi * axis / max(float(np.linalg.norm(axis)), 1e-12))

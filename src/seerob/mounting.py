@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -135,9 +136,8 @@ def extreme_points(solids: Sequence[Solid]) -> tuple[Array, float]:
             )
             continue
         vertices = solid.mesh.vertices[np.unique(solid.mesh.faces)]
-        try:
+        # Flat or too few points: all of them are as good.
+        with contextlib.suppress(QhullError, ValueError):
             vertices = vertices[ConvexHull(vertices).vertices]
-        except (QhullError, ValueError):
-            pass  # flat or too few points: all of them are as good
         points.append(vertices)
     return (np.vstack(points), radius) if points else (np.zeros((0, 3)), 0.0)

@@ -7,12 +7,15 @@ are interpolated between two samples and nothing lags.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from msgspec import Struct
+from msgspec.structs import replace
 
-from seerob.samples import Sample
+from seerob.model_io.description import Description
+from seerob.samples import JointSample, Quality, Sample
 from seerob.snapshot import Finding
 
 
@@ -29,6 +32,8 @@ class Target(Struct, frozen=True, kw_only=True):
     upper: tuple[float, ...]
     velocity: tuple[float | None, ...]
     """Speed limits [rad/s or m/s]; None where nobody stated one."""
+    description: Description | None = None
+    """Its links and joints, for sources that need lengths (where a person's feet are)."""
 
 
 class Opened(Struct, frozen=True, kw_only=True):
@@ -50,7 +55,8 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     timeout: float = 0.2
     """Age at which what it said no longer counts [s]: dependent verdicts turn UNDECIDED."""
     loop: bool = False
-    """Start again at the end; the jump back is bridged by holding for ``loop_pause``."""
+    """Start again at the end. If the ends differ, the way back takes ``loop_pause`` and is UNDECIDED:
+    nobody drove it."""
     loop_pause: float = 1.0
     """[s]"""
 
@@ -71,6 +77,10 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         raise NotImplementedError
 
 
+SAME_PLACE = 1e-3
+"""A loop whose ends differ by no more than this [rad or m] is closed."""
+
+
 class Pump:
     """Feeds the samples of one recorded source to the loop as run time passes."""
 
@@ -78,20 +88,24 @@ class Pump:
         self._opened = opened
         self._loop, self._pause = loop, pause
         self._offset = 0.0
-        self._seq = 0
         self._iterator: Iterator[Sample] = iter(opened.samples)
-        self._next: Sample | None = None
-        self._advance()
+        self._last: Sample | None = None
+        self._reached = -math.inf
+        self._next = self._fetch()
 
-    def _advance(self) -> None:
+    def _fetch(self) -> Sample | None:
         sample = next(self._iterator, None)
         if sample is None and self._loop and self._opened.duration > 0:
             self._offset += self._opened.duration + self._pause
             self._iterator = iter(self._opened.samples)
             sample = next(self._iterator, None)
-        if sample is not None and self._offset:
-            self._seq += 1
-        self._next = sample
+            if sample is not None and _apart(self._last, sample):
+                # Nobody drove this way back: it may be looked at, not judged.
+                sample = replace(sample, quality=Quality.DEGRADED)
+        self._last = sample
+        if sample is None or not self._offset:
+            return sample
+        return replace(sample, t=sample.t + self._offset)
 
     @property
     def finished(self) -> bool:
@@ -99,13 +113,14 @@ class Pump:
         return self._next is None
 
     def until(self, t: float) -> Iterator[Sample]:
-        """Samples up to ``t`` [s] and the first one after it."""
-        from msgspec.structs import replace
+        """Samples up to ``t`` [s] and the first one after it, each once."""
+        while self._next is not None and self._reached <= t:
+            sample, self._next = self._next, self._fetch()
+            self._reached = sample.t
+            yield sample
 
-        while self._next is not None:
-            due = self._next.t + self._offset
-            sample = self._next
-            self._advance()
-            yield replace(sample, t=due) if due != sample.t else sample
-            if due > t:
-                return
+
+def _apart(last: Sample | None, first: Sample) -> bool:
+    if not isinstance(last, JointSample) or not isinstance(first, JointSample):
+        return True
+    return max((abs(a - b) for a, b in zip(last.q, first.q, strict=True)), default=0.0) > SAME_PLACE

@@ -88,7 +88,7 @@ class State:
                 raise Undecided(reason)
 
     def doubt(self, name: str) -> str:
-        """Why the twin of a robot or human may not be where the real one is; empty when it may be relied on."""
+        """Why a twin may not be where the real one is; empty when it may be relied on."""
         hearing = self.hearings[name]
         if not hearing.driven:
             return "" if hearing.given else f"{name}: no source drives it and the file gives no position (q)"

@@ -20,6 +20,7 @@ Color = tuple[float, float, float, float]
 TOOL_COLOR: Color = (0.33, 0.38, 0.45, 1.0)
 WORKPIECE_COLOR: Color = (0.80, 0.62, 0.36, 1.0)
 PART_COLOR: Color = (0.55, 0.58, 0.62, 1.0)
+AREA_COLOR: Color = (0.99, 0.92, 0.57, 0.25)
 
 CYLINDER_SIDES = 96
 

@@ -11,6 +11,7 @@ from enum import StrEnum
 from math import pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.errors import InputError, Problem
 from seerob.snapshot import Finding
@@ -64,7 +65,7 @@ def limit_check(
         InputError: Another number of joints, a wrapped angle, or a position beyond a limit.
     """
     joint_count_check(trajectory, target)
-    slopes = np.diff(trajectory.q, axis=0) / np.diff(trajectory.t)[:, None]
+    slopes = _slopes(trajectory)
     problems, findings = [], []
     for j, joint in enumerate(target.joints):
         unit = target.units[j]
@@ -98,10 +99,24 @@ def limit_check(
     return tuple(findings)
 
 
+def _judged(trajectory: Trajectory) -> NDArray[np.bool_]:
+    """Rows that the file does not itself call invalid, shape (n,)."""
+    if trajectory.invalid is None:
+        return np.ones(len(trajectory.t), bool)
+    return ~trajectory.invalid
+
+
+def _slopes(trajectory: Trajectory) -> Array:
+    """Mean velocity of each interval [rad/s or m/s], shape (n - 1, dof); 0 beside an invalid row."""
+    slopes = np.diff(trajectory.q, axis=0) / np.diff(trajectory.t)[:, None]
+    judged = _judged(trajectory)
+    return np.asarray(np.where((judged[1:] & judged[:-1])[:, None], slopes, 0.0))
+
+
 def _position(trajectory: Trajectory, target: Target, j: int) -> tuple[str, str] | None:
     """Place and text of the worst position beyond a limit of joint ``j``."""
     q = trajectory.q[:, j]
-    over = np.maximum(q - target.upper[j], target.lower[j] - q)
+    over = np.where(_judged(trajectory), np.maximum(q - target.upper[j], target.lower[j] - q), -np.inf)
     worst = int(np.argmax(over))
     if not over[worst] > TOLERANCE:
         return None
@@ -124,9 +139,10 @@ def _speed(trajectory: Trajectory, target: Target, slopes: Array, j: int) -> lis
     k = int(np.argmax(np.abs(slopes[:, j])))
     fastest, at = abs(float(slopes[k, j])), trajectory.instant(k)
     if trajectory.qd is not None:
-        i = int(np.argmax(np.abs(trajectory.qd[:, j])))
-        if abs(float(trajectory.qd[i, j])) > fastest:
-            fastest, at = abs(float(trajectory.qd[i, j])), trajectory.instant(i)
+        given = np.where(_judged(trajectory), np.abs(trajectory.qd[:, j]), 0.0)
+        i = int(np.argmax(given))
+        if given[i] > fastest:
+            fastest, at = float(given[i]), trajectory.instant(i)
     if fastest <= limit * (1 + TOLERANCE):
         return []
     per_s = target.units[j] + "/s"
@@ -163,16 +179,18 @@ def velocity_check(trajectory: Trajectory, target: Target) -> tuple[Finding, ...
         InputError: The columns differ by a factor, a sign or altogether; a velocity column that is
             too small would flatter every result.
     """
-    if trajectory.qd is None:
+    judged = _judged(trajectory)
+    if trajectory.qd is None or judged.sum() < 2:
         return ()
-    h = np.diff(trajectory.t)[:, None]
-    slopes = np.diff(trajectory.q, axis=0) / h
-    means = (trajectory.qd[1:] + trajectory.qd[:-1]) / 2
+    slopes = _slopes(trajectory)
+    pairs = judged[1:] & judged[:-1]
+    h = np.where(pairs, np.diff(trajectory.t), 0.0)
+    means = np.where(pairs[:, None], trajectory.qd[1:] + trajectory.qd[:-1], 0.0) / 2
     problems, findings = [], []
     for j, joint in enumerate(target.joints):
-        q, unit = trajectory.q[:, j], target.units[j]
-        s, v, w = slopes[:, j], means[:, j], h[:, 0] ** 2
-        if np.ptp(q) < MOVES[unit] and np.sum(np.abs(v) * h[:, 0]) < 10 * MOVES[unit]:
+        q, unit = trajectory.q[judged, j], target.units[j]
+        s, v, w = slopes[:, j], means[:, j], h**2
+        if np.ptp(q) < MOVES[unit] and np.sum(np.abs(v) * h) < 10 * MOVES[unit]:
             continue
         power_s, power_v, cross = (float(np.sum(w * a * b)) for a, b in ((s, s), (v, v), (s, v)))
         reason = _disagreement(power_s, power_v, cross)
@@ -196,9 +214,9 @@ def velocity_check(trajectory: Trajectory, target: Target) -> tuple[Finding, ...
 
 def _disagreement(power_s: float, power_v: float, cross: float) -> str:
     """What is wrong between slopes and velocities; empty when they agree."""
-    if power_v <= 1e-6 * power_s:
+    if power_v <= 1e-9 * power_s:
         return "is zero while the joint moves"
-    if power_s <= 1e-6 * power_v:
+    if power_s <= 1e-9 * power_v:
         return "is not zero while the joint stands still"
     ratio = cross / power_v
     correlation = cross / np.sqrt(power_s * power_v)

@@ -107,4 +107,4 @@ def inverse(a_from_b: ArrayLike) -> Array:
 def apply(a_from_b: ArrayLike, points_in_b: ArrayLike) -> Array:
     """Points in ``a`` [m], shape (n, 3), of points in ``b`` [m], shape (n, 3)."""
     matrix = np.asarray(a_from_b, float)
-    return np.asarray(points_in_b, float) @ matrix[:3, :3].T + matrix[:3, 3]
+    return np.asarray(np.asarray(points_in_b, float) @ matrix[:3, :3].T + matrix[:3, 3])

@@ -196,6 +196,18 @@ class Part(Thing, frozen=True, kw_only=True):
     """Something of the environment that stands still."""
 
 
+class Area(Thing, frozen=True, kw_only=True):
+    """A safety area: a shape that is watched, not touched."""
+
+    on: str | None = None
+    """Full name of the link, tool or bone that carries it; stands still when not given."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.mass is not None or self.density is not None:
+            raise ValueError("an area has no mass")
+
+
 class Human(_Table, frozen=True, kw_only=True):
     """A person."""
 
@@ -235,6 +247,7 @@ class Workstation(_Table, frozen=True, kw_only=True):
     tools: tuple[Tool, ...] = ()
     workpieces: tuple[Workpiece, ...] = ()
     parts: tuple[Part, ...] = ()
+    areas: tuple[Area, ...] = ()
     humans: tuple[Human, ...] = ()
     contacts: tuple[Contact, ...] = ()
     sources: tuple[Any, ...] = ()
@@ -302,7 +315,7 @@ def check_names(station: Workstation, file: str) -> list[Problem]:
     """Mistakes that span tables: a name twice, a mount that does not exist or goes in a circle."""
     problems: list[Problem] = []
     seen: dict[str, str] = {}
-    for table in ("robots", "tools", "workpieces", "parts", "humans"):
+    for table in ("robots", "tools", "workpieces", "parts", "areas", "humans"):
         for i, entry in enumerate(getattr(station, table)):
             key = f"{table}[{i}].name"
             if entry.name in seen:

@@ -79,9 +79,11 @@ class Visitor:
         wire.Hello | wire.Scene | wire.History | wire.Transport | wire.Snapshot
     )
 
-    def __init__(self, server, *, acknowledge=True, **options):
+    def __init__(self, server, *, acknowledge=True, path="/ws", **options):
         options.setdefault("subprotocols", [wire.PROTOCOL])
-        self._open = connect(f"ws://127.0.0.1:{server.port}/ws", compression=None, max_size=2**26, **options)
+        self._open = connect(
+            f"ws://127.0.0.1:{server.port}{path}", compression=None, max_size=2**26, **options
+        )
         self.socket = self._open.__enter__()
         self.acknowledge = acknowledge
 

@@ -268,7 +268,7 @@ def test_acknowledging_after_a_jump_back_keeps_the_window_open():
     frames = [snapshot(k) for k in range(100)]
     with replay(frames) as server, Visitor(server, acknowledge=False) as page:
         page.of(Snapshot)
-        for _ in range(3 * WINDOW):
+        for _ in range(WINDOW // 2 + 2):
             for k in (90, 10):
                 page.ask("seek", frames[k].t)
                 assert page.of(Snapshot).seq == k

@@ -17,7 +17,7 @@ import {
 } from "./page_state";
 import { PoseReader } from "./poses";
 import { traceFromWire } from "./traces";
-import { type History, type Scene, SCHEMA } from "./wire";
+import { type History, SCHEMA, type Scene } from "./wire";
 
 /** Numbers change at most this often: faster cannot be read. */
 const NUMBERS_EVERY_MS = 110;
@@ -75,7 +75,10 @@ export class Connection {
       case "hello":
         hello.value = message.hello;
         if (message.hello.schema !== SCHEMA) {
-          link.value = { state: "refused", reason: "page and server are of different versions; reload, or rebuild the page" };
+          link.value = {
+            state: "refused",
+            reason: "page and server are of different versions; reload, or rebuild the page",
+          };
         }
         reach.value = { start: 0, end: message.hello.duration ?? 0 };
         return;
@@ -90,7 +93,10 @@ export class Connection {
         return;
       case "points":
         for (const points of message.points) traces.get(points.name)?.append(points);
-        reach.value = { start: Number.isNaN(message.oldest) ? message.newest : message.oldest, end: message.newest };
+        reach.value = {
+          start: Number.isNaN(message.oldest) ? message.newest : message.oldest,
+          end: message.newest,
+        };
         tracesRevision.value += 1;
         return;
       case "poses":
@@ -116,7 +122,8 @@ export class Connection {
       traces.set(wire.name, trace);
       if (trace.length > 0) start = Math.min(start, trace.t[0]!);
     }
-    if (!isLive.value && Number.isFinite(start)) reach.value = { start: Math.min(start, reach.value.end), end: reach.value.end };
+    if (!isLive.value && Number.isFinite(start))
+      reach.value = { start: Math.min(start, reach.value.end), end: reach.value.end };
     tracesRevision.value += 1;
   }
 
@@ -132,7 +139,8 @@ export class Connection {
   // Live numbers that stopped coming must not stay on the screen as if they were true.
   private watch(): void {
     if (link.value.state !== "open") stale.value = true;
-    else if (isLive.value && lookingAt.value === null) stale.value = performance.now() - this.heardAt > SILENCE_MS;
+    else if (isLive.value && lookingAt.value === null)
+      stale.value = performance.now() - this.heardAt > SILENCE_MS;
     else stale.value = frame.value === null && this.pending === null;
   }
 }

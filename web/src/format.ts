@@ -43,7 +43,9 @@ export function formatTime(t: number): string {
 
 /** A joint position: angles in degrees, as robots' own panels show them. */
 export function formatJoint(value: number, unit: string): string {
-  return unit === "rad" ? `${formatFixed((value * 180) / Math.PI, 1)}°` : `${formatFixed(value, 4)}${NO_BREAK}${unit}`;
+  return unit === "rad"
+    ? `${formatFixed((value * 180) / Math.PI, 1)}°`
+    : `${formatFixed(value, 4)}${NO_BREAK}${unit}`;
 }
 
 function formatFixed(value: number, decimals: number): string {

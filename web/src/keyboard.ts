@@ -1,13 +1,13 @@
 // The keys of the page; they do nothing while one writes or uses a control that needs them itself.
 
-import type { Actions } from "./panels/app_context";
 import { rows, select, toggleMuted } from "./page_state";
+import type { Actions } from "./panels/app_context";
 
 const BACK = -1;
 const AHEAD = 1;
 
 export function listenToKeys(actions: Actions): void {
-  addEventListener("keydown", (event) => {
+  window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || needsKeys(event.target, event.key)) return;
     const act = actionOf(event.key, event.shiftKey, actions);
     if (!act) return;

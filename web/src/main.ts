@@ -1,7 +1,7 @@
 // Where the page begins: connection, room, panels, keys.
 
 import "uplot/dist/uPlot.min.css";
-import "./theme.css";
+import "./look/index.css";
 import { h, render } from "preact";
 import { Connection } from "./connection";
 import { listenToKeys } from "./keyboard";

@@ -4,7 +4,10 @@ import type { TracePoints } from "./messages";
 import type { Result, Snapshot, Verdict } from "./wire";
 
 /** The byte that stands for a verdict in traces. */
-export const VERDICT_CODES = { within: 0, exceeded: 1, undecided: 2 } as const satisfies Record<Verdict, number>;
+export const VERDICT_CODES = { within: 0, exceeded: 1, undecided: 2 } as const satisfies Record<
+  Verdict,
+  number
+>;
 export const NO_VERDICT = 255;
 
 interface Gathered {

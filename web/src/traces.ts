@@ -1,7 +1,7 @@
 // One criterion over time: what the plots draw and the timeline's lanes colour.
 
 import type { TracePoints } from "./messages";
-import { VERDICT_CODES } from "./points";
+import { NO_VERDICT, VERDICT_CODES } from "./points";
 import type { Trace as WireTrace } from "./wire";
 
 /** A stretch of time in which a limit was exceeded or nothing could be said. */
@@ -26,6 +26,8 @@ export class Trace {
   verdicts: Uint8Array;
   length = 0;
   spans: Span[] = [];
+  /** Whether there ever was a verdict: what only informs needs no lane. */
+  judged = false;
 
   /** @param capacity Points kept before the older ones are thinned. */
   constructor(
@@ -67,6 +69,7 @@ export class Trace {
     this.limits[i] = limit;
     this.verdicts[i] = verdict;
     this.length += 1;
+    this.judged ||= verdict !== NO_VERDICT;
     this.extendSpans(i);
   }
 
@@ -151,4 +154,3 @@ export function neighbourViolation(traces: Iterable<Trace>, t: number, forward: 
   }
   return best;
 }
-

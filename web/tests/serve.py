@@ -1,8 +1,9 @@
 """Serves a made-up workstation through the real server, for the page's tests.
 
 ``python serve.py [--mode live|replay] [--port N] [--seconds S]`` prints one line of JSON with the
-address, then obeys lines on standard input (``freeze``, ``go``, ``finish``, ``stop``, ``start``) and
-ends with it. Each answers with a line of JSON. Everything is a function of run time: `snapshot`.
+address, then obeys lines on standard input (``freeze``, ``go``, ``finish``, ``stop``, ``start``,
+``snapshot T``) and ends with it. Each answers with a line of JSON. Everything is a function of run time:
+`snapshot`.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import threading
 import time
 from collections.abc import Iterator
 
+import msgspec
 import numpy as np
 
 from seerob.model_io.glb import glb_bytes, mesh_hash
@@ -46,6 +48,7 @@ from seerob.snapshot import (
 )
 
 PERIOD = 0.01
+TCP_LIMIT = 0.7
 HOSTILE = "<img src=x onerror=window.hacked=1>"
 
 # name, parent, axis of the joint ("" when fixed), place in the parent [m], where the link ends [m], radius
@@ -62,11 +65,11 @@ BODY = [
     ("pelvis", (0, -0.09, 0.95), (0, 0.09, 0.95), 0.11),
     ("torso", (0, 0, 1.08), (0, 0, 1.36), 0.14),
     ("head", (0, 0, 1.6), (0, 0, 1.68), 0.09),
-    ("right upper arm", (0, -0.21, 1.4), (0.05, -0.24, 1.13), 0.045),
-    ("right forearm", (0.05, -0.24, 1.13), (0.28, -0.18, 1.12), 0.038),
-    ("right hand", (0.3, -0.17, 1.12), (0.38, -0.15, 1.12), 0.035),
+    ("right upper arm", (0, -0.21, 1.4), (-0.05, -0.24, 1.13), 0.045),
+    ("right forearm", (-0.05, -0.24, 1.13), (-0.28, -0.18, 1.12), 0.038),
+    ("right hand", (-0.3, -0.17, 1.12), (-0.38, -0.15, 1.12), 0.035),
     ("left upper arm", (0, 0.21, 1.4), (0, 0.25, 1.12), 0.045),
-    ("left forearm", (0, 0.25, 1.12), (0.02, 0.26, 0.88), 0.038),
+    ("left forearm", (0, 0.25, 1.12), (-0.02, 0.26, 0.88), 0.038),
     ("right leg", (0, -0.1, 0.86), (0, -0.1, 0.08), 0.075),
     ("left leg", (0, 0.1, 0.86), (0, 0.1, 0.08), 0.075),
 ]
@@ -94,7 +97,7 @@ SEPARATION = Basis(
 def joints(t: float) -> tuple[float, ...]:
     """Joint positions at run time ``t`` [rad]."""
     w = 2 * math.pi * t / 8.0
-    return (0.9 * math.sin(w), -0.7 + 0.2 * math.cos(w), 1.3 + 0.3 * math.sin(2 * w), -0.6, -1.57, w % 6.28)
+    return (0.9 * math.sin(w), 0.6 + 0.2 * math.cos(w), 1.1 + 0.3 * math.sin(2 * w), 1.4, -1.57, w % 6.28)
 
 
 def _turn(axis: str, angle: float) -> np.ndarray:
@@ -165,7 +168,7 @@ def workstation() -> tuple[Scene, dict[str, bytes]]:
         nodes.append(Node(name=name, role="part", owner=owner, mesh=mesh, triangles=12, moves=False))
     criteria = (
         _criterion("separation", "separation", "m", at_most=False, basis=SEPARATION),
-        _criterion("tcp speed", "velocity", "m/s", limit=1.0),
+        _criterion("tcp speed", "velocity", "m/s", limit=TCP_LIMIT),
         _criterion("arm energy", "kinetic_energy", "J", limit=20.0),
         _criterion("effective mass", "effective_mass", "kg", limit=5.0),
         _criterion("manipulability", "manipulability", ""),
@@ -236,7 +239,7 @@ def snapshot(seq: int, t: float) -> Snapshot:
     tcp, hand = arm[-1][0], person + np.array([-0.38, -0.15, 1.12])
     v = (arm_poses(t + 1e-4)[-1][0] - arm_poses(t - 1e-4)[-1][0]) / 2e-4
     distance, speed = float(np.linalg.norm(tcp - hand)), float(np.linalg.norm(v))
-    near, quick = 0.5 + 0.2 * speed, _judge(speed, 1.0, at_most=True)
+    near, quick = 0.5 + 0.2 * speed, _judge(speed, TCP_LIMIT, at_most=True)
     apart = _judge(distance, near, at_most=False)
     energy = 12.0 * speed**2
     results = (
@@ -259,7 +262,7 @@ def snapshot(seq: int, t: float) -> Snapshot:
             name="tcp speed",
             value=speed,
             unit="m/s",
-            limit=1.0,
+            limit=TCP_LIMIT,
             verdict=quick,
             markers=(Arrow(origin=_vec(tcp), vector=_vec(v * 0.4), label="v", verdict=quick),),
         ),
@@ -353,6 +356,13 @@ def _publish(live: Live, frozen: threading.Event, over: threading.Event) -> None
         over.wait(max(0.0, begun + k * PERIOD - time.monotonic()))
 
 
+def _told(scene: Scene, t: float) -> dict[str, object]:
+    told = snapshot(round(t / PERIOD), round(t / PERIOD) * PERIOD)
+    block = np.frombuffer(told.poses, "<f4").reshape(-1, 7).tolist()
+    names = [node.name for node in scene.nodes]
+    return {"t": told.t, "poses": dict(zip(names, block, strict=True)), "results": msgspec.to_builtins(told.results)}
+
+
 def main() -> None:
     """Serve until standard input ends."""
     parser = argparse.ArgumentParser()
@@ -376,6 +386,9 @@ def main() -> None:
     if recording is None:
         publisher.start()
     for line in sys.stdin:
+        if line.startswith("snapshot "):
+            _say(**_told(scene, float(line.split()[1])))
+            continue
         match line.strip():
             case "freeze":
                 frozen.set()

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from seerob import units
 from seerob.errors import InputError, Problem, UnknownName
@@ -21,6 +21,8 @@ from seerob.transforms import Array
 
 HEIGHT = JOINTS.index("pelvis_z")
 SOLES = ("right_foot", "left_foot", "right_toes", "left_toes")
+LARGEST = 1e6
+"""No angle or length is as large, in any unit."""
 ROUNDING = 1e-9
 """A value this far beyond a limit [rad or m] is at it: 20° written as radians."""
 
@@ -34,6 +36,7 @@ def posture(
     description: Description,
     wanted: str | Mapping[str, float],
     *,
+    joints: Mapping[str, float] | None = None,
     position: tuple[float, float] = (0.0, 0.0),
     heading: float = 0.0,
     floor: bool = True,
@@ -45,6 +48,7 @@ def posture(
         description: The person.
         wanted: Name of a posture in the library, or joint values by name [rad, m; deg where the key ends in
             ``_deg``]; joints that are not named are at 0.
+        joints: Values that replace those of ``wanted``, by name as there.
         position: Of the pelvis over the floor, in the root's frame: x forward, y left [m].
         heading: Turn to the left about the vertical [rad].
         floor: Move the pelvis up or down until the lowest sole is on the floor, z = 0 of the root.
@@ -58,6 +62,7 @@ def posture(
         InputError: A value is not finite, given twice or beyond its limit; all such values are named.
     """
     q = joint_values(description, named(wanted) if isinstance(wanted, str) else wanted, file=file)
+    q = joint_values(description, joints or {}, base=q, file=file)
     q[JOINTS.index("pelvis_x")] += position[0]
     q[JOINTS.index("pelvis_y")] += position[1]
     q[JOINTS.index("pelvis_turn_left")] += heading
@@ -76,13 +81,21 @@ def named(name: str) -> dict[str, float]:
     return dict(library[name])
 
 
-def joint_values(description: Description, wanted: Mapping[str, Any], *, file: str = "posture") -> Array:
+def joint_values(
+    description: Description, wanted: Mapping[str, Any], *, base: Array | None = None, file: str = "posture"
+) -> Array:
     """Joint values by name as an array, checked against the limits; see `posture`.
+
+    Args:
+        description: The person.
+        wanted: Joint values by name.
+        base: Values of the joints that are not named, shape (53,); 0 when not given.
+        file: What the values were read from, for messages.
 
     Returns:
         Joint values [rad, m], shape (53,).
     """
-    q = np.zeros(len(AXES))
+    q = np.zeros(len(AXES)) if base is None else np.array(base, float)
     given: dict[int, str] = {}
     problems: list[Problem] = []
     joints = description.joints()
@@ -118,8 +131,8 @@ def _read(
             Problem(file, key, f"is in {unit}, {stem} is in {expected}", f"give it in {expected}")
         )
         return (), 0.0
-    if isinstance(raw, bool) or not isinstance(raw, int | float) or not np.isfinite(raw):
-        problems.append(Problem(file, key, f"{raw!r} is not a finite number", f"give a number in {expected}"))
+    if isinstance(raw, bool) or not isinstance(raw, int | float) or not abs(raw) < LARGEST:
+        problems.append(Problem(file, key, f"{raw!r} is not a number to use", f"give one in {expected}"))
         return (), 0.0
     return places, float(raw) * factor
 
@@ -133,22 +146,39 @@ def _beyond(place: int, sign: float, value: float, low: float, high: float) -> t
     return f"{shown:.1f}° is beyond its limit", f"give {first:g}…{last:g}°"
 
 
-def lowest_sole(description: Description, q: ArrayLike) -> Array:
-    """Height of the lowest point of the feet over the floor [m], shape (...), of joint values (..., 53).
+def sole_corners(
+    description: Description, rotations: Array, positions: Array
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Where the soles may touch the floor.
 
     A sole is a rectangle dilated by r: its lowest point is r below its lowest corner.
+
+    Args:
+        description: The person.
+        rotations: From `bone_poses`, shape (..., 21, 3, 3).
+        positions: From `bone_poses` [m], shape (..., 21, 3).
+
+    Returns:
+        Lowest points of the balls at the corners and the centres of these balls in the root's frame [m],
+        each (..., m, 3), and the index of the bone that each belongs to, (m,).
     """
-    rotations, positions = bone_poses(description, q)
-    heights = []
+    centers, radii, owners = [], [], []
     for index, link in enumerate(description.links[1:]):
-        if link.name not in SOLES:
-            continue
-        for solid in link.solids:
+        for solid in link.solids if link.name in SOLES else ():
             assert solid.points is not None
             corners = np.vstack([solid.points, solid.points[1] + solid.points[-1] - solid.points[0]])
-            up = rotations[..., index, 2, :] @ corners.T + positions[..., index, 2, None]
-            heights.append(up.min(axis=-1) - solid.radius)
-    return np.asarray(np.min(heights, axis=0))
+            turned = np.einsum("...ij,kj->...ki", rotations[..., index, :, :], corners)
+            centers.append(turned + positions[..., index, None, :])
+            radii += [solid.radius] * len(corners)
+            owners += [index] * len(corners)
+    center = np.concatenate(centers, axis=-2)
+    return center - np.array(radii)[:, None] * np.array([0.0, 0.0, 1.0]), center, np.array(owners, np.intp)
+
+
+def lowest_sole(description: Description, q: ArrayLike) -> Array:
+    """Height of the lowest point of the feet over the floor [m], shape (...), of joint values (..., 53)."""
+    lowest, _, _ = sole_corners(description, *bone_poses(description, q))
+    return np.asarray(lowest[..., 2].min(axis=-1))
 
 
 def on_floor(description: Description, q: ArrayLike) -> Array:

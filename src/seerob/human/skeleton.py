@@ -58,30 +58,27 @@ class Axis(NamedTuple):
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
-PARENTS: dict[str, str] = {
-    "pelvis": ROOT,
-    "lumbar": "pelvis",
-    "thorax": "lumbar",
-    "neck": "thorax",
-    "head": "neck",
-}
-"""Bone → parent, in the order of the description's links."""
-for _bone, _parent in (
-    ("clavicle", "thorax"),
-    ("upper_arm", "clavicle"),
-    ("forearm", "upper_arm"),
-    ("hand", "forearm"),
-    ("thigh", "pelvis"),
-    ("shank", "thigh"),
-    ("foot", "shank"),
-    ("toes", "foot"),
-):
-    for _side in SIDES:
-        _paired = _parent if _parent in ("thorax", "pelvis") else f"{_side}_{_parent}"
-        PARENTS[f"{_side}_{_bone}"] = _paired
+_SPINE_BONES = ("pelvis", "lumbar", "thorax", "neck", "head")
+_LIMB_BONES = (
+    ("thorax", ("clavicle", "upper_arm", "forearm", "hand")),
+    ("pelvis", ("thigh", "shank", "foot", "toes")),
+)
+
+
+def _parents() -> dict[str, str]:
+    parents = dict(zip(_SPINE_BONES, (ROOT, *_SPINE_BONES), strict=False))
+    for start, bones in _LIMB_BONES:
+        for side in SIDES:
+            names = [f"{side}_{bone}" for bone in bones]
+            parents |= dict(zip(names, (start, *names), strict=False))
+    return parents
+
+
+PARENTS: dict[str, str] = _parents()
+"""Bone → parent, depth first: physics engines keep this order of bodies and joints."""
 
 BONES: tuple[str, ...] = tuple(PARENTS)
-"""The 21 bones, each after its parent."""
+"""The 21 bones in the order of the description's links, each after its parent."""
 
 
 def without_side(bone: str) -> str:
@@ -151,12 +148,15 @@ def _axes() -> tuple[Axis, ...]:
     for bone in ("lumbar", "thorax", "neck", "head"):
         senses = _SPINE if bone != "head" else (_SPINE[0], _SPINE[2])
         axes += [Axis(f"{bone}_{plus}", f"{bone}_{minus}", bone, bone, a) for a, plus, minus in senses]
-    for bone, group, limb_senses in _LIMBS:
-        for side in SIDES:
-            for axis, plus, minus in limb_senses:
-                first, second = (plus, minus) if side == "right" or axis == Z else (minus, plus)
-                prefix = f"{side}_{group}"
-                axes.append(Axis(f"{prefix}_{first}", f"{prefix}_{second}", f"{side}_{bone}", group, axis))
+    limbs = {bone: (group, senses) for bone, group, senses in _LIMBS}
+    for name in BONES:
+        bone = without_side(name)
+        if bone == name:
+            continue
+        side, (group, limb_senses) = name.removesuffix(f"_{bone}"), limbs[bone]
+        for axis, plus, minus in limb_senses:
+            first, second = (plus, minus) if side == "right" or axis == Z else (minus, plus)
+            axes.append(Axis(f"{side}_{group}_{first}", f"{side}_{group}_{second}", name, group, axis))
     return tuple(axes)
 
 

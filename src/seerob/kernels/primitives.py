@@ -19,12 +19,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from seerob.transforms import Array
-
-Links = NDArray[np.int32]
-Indices = NDArray[np.int64]
 
 TOUCH = 1e-24
 """Squared distance below which two primitives touch [m²]."""

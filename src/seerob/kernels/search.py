@@ -12,50 +12,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.kernels.boxes import box_box, segment_box
+from seerob.kernels.primitives import segment_triangle, triangle_triangle
 from seerob.transforms import Array
 
 Links = NDArray[np.int32]
-Indices = NDArray[np.int64]
-
-from seerob.kernels.primitives import segment_triangle, triangle_triangle
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def cut_of(best: float) -> float:
     """Squared distance above which nothing can win or tie with ``best`` [m²]."""
     return best * (1.0 + 1e-9) + 1e-18
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def segment_box(
-    nodes: Array, i: int, ax: float, ay: float, az: float, dx: float, dy: float, dz: float, dd: float
-) -> float:
-    """Lower bound of the squared distance of ``a + s·d`` to box i: box axes and centre direction."""
-    cx = nodes[i, 0]
-    cy = nodes[i, 1]
-    cz = nodes[i, 2]
-    hx = nodes[i, 3]
-    hy = nodes[i, 4]
-    hz = nodes[i, 5]
-    mx = max(abs(ax + 0.5 * dx - cx) - 0.5 * abs(dx) - hx, 0.0)
-    my = max(abs(ay + 0.5 * dy - cy) - 0.5 * abs(dy) - hy, 0.0)
-    mz = max(abs(az + 0.5 * dz - cz) - 0.5 * abs(dz) - hz, 0.0)
-    low = mx * mx + my * my + mz * mz
-    rx = cx - ax
-    ry = cy - ay
-    rz = cz - az
-    t = (rx * dx + ry * dy + rz * dz) / dd if dd > 0.0 else 0.0
-    t = min(max(t, 0.0), 1.0)
-    # All of the segment lies beyond its point nearest to the centre, seen from the centre.
-    rx -= t * dx
-    ry -= t * dy
-    rz -= t * dz
-    q = rx * rx + ry * ry + rz * rz
-    reach = hx * abs(rx) + hy * abs(ry) + hz * abs(rz)
-    if q > reach:
-        gap = q - reach
-        low = max(low, gap * gap / q)
-    return low
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -102,7 +69,7 @@ def mesh_segment(
             cut = min(cut, cut_of(best))
             winner = first
             W[0], W[1], W[2], W[3], W[4], W[5] = px, py, pz, ax + s * dx, ay + s * dy, az + s * dz
-    low = segment_box(nodes, 0, ax, ay, az, dx, dy, dz, dd)
+    low = segment_box(nodes, 0, ax, ay, az, dx, dy, dz, dd, cut)
     stack[0] = 0
     bounds[0] = low
     depth = 1
@@ -124,8 +91,8 @@ def mesh_segment(
         else:
             left = i + 1
             right = links[i, 0]
-            a = segment_box(nodes, left, ax, ay, az, dx, dy, dz, dd)
-            b = segment_box(nodes, right, ax, ay, az, dx, dy, dz, dd)
+            a = segment_box(nodes, left, ax, ay, az, dx, dy, dz, dd, cut)
+            b = segment_box(nodes, right, ax, ay, az, dx, dy, dz, dd, cut)
             if a < b:
                 left, right, a, b = right, left, b, a
             if a <= cut:
@@ -137,47 +104,6 @@ def mesh_segment(
                 bounds[depth] = b
                 depth += 1
     return best, winner
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def box_box(A: Array, i: int, B: Array, j: int, R: Array, F: Array, t: Array) -> float:
-    """Lower bound of the squared distance of boxes ``A[i]`` and ``B[j]``.
-
-    Args:
-        A: Nodes.
-        i: Box of A.
-        B: Nodes.
-        j: Box of B.
-        R: Rotation a_from_b, shape (9,).
-        F: Its absolute values, shape (9,).
-        t: Position a_from_b [m], shape (3,).
-    """
-    hx = B[j, 3]
-    hy = B[j, 4]
-    hz = B[j, 5]
-    gx = A[i, 3]
-    gy = A[i, 4]
-    gz = A[i, 5]
-    cx = R[0] * B[j, 0] + R[1] * B[j, 1] + R[2] * B[j, 2] + t[0] - A[i, 0]
-    cy = R[3] * B[j, 0] + R[4] * B[j, 1] + R[5] * B[j, 2] + t[1] - A[i, 1]
-    cz = R[6] * B[j, 0] + R[7] * B[j, 1] + R[8] * B[j, 2] + t[2] - A[i, 2]
-    mx = max(abs(cx) - gx - (F[0] * hx + F[1] * hy + F[2] * hz), 0.0)
-    my = max(abs(cy) - gy - (F[3] * hx + F[4] * hy + F[5] * hz), 0.0)
-    mz = max(abs(cz) - gz - (F[6] * hx + F[7] * hy + F[8] * hz), 0.0)
-    low = mx * mx + my * my + mz * mz
-    ux = abs(R[0] * cx + R[3] * cy + R[6] * cz)
-    uy = abs(R[1] * cx + R[4] * cy + R[7] * cz)
-    uz = abs(R[2] * cx + R[5] * cy + R[8] * cz)
-    mx = max(ux - hx - (F[0] * gx + F[3] * gy + F[6] * gz), 0.0)
-    my = max(uy - hy - (F[1] * gx + F[4] * gy + F[7] * gz), 0.0)
-    mz = max(uz - hz - (F[2] * gx + F[5] * gy + F[8] * gz), 0.0)
-    low = max(low, mx * mx + my * my + mz * mz)
-    q = cx * cx + cy * cy + cz * cz
-    reach = gx * abs(cx) + gy * abs(cy) + gz * abs(cz) + hx * ux + hy * uy + hz * uz
-    if q > reach:
-        gap = q - reach
-        low = max(low, gap * gap / q)
-    return low
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -232,7 +158,6 @@ def mesh_mesh(
         Stops at the first intersection, which depends on ``limit`` and ``first``: ask again
         without them for *the* first one.
     """
-    F = np.abs(R)
     row = np.empty((1, 13))
     points = np.empty(12)
     best = np.inf
@@ -249,14 +174,14 @@ def mesh_mesh(
             W[:6] = points[:6]
     pairs[0, 0] = 0
     pairs[0, 1] = 0
-    bounds[0] = box_box(A, 0, B, 0, R, F, t)
+    bounds[0] = box_box(A, 0, B, 0, R, t, cut)
     depth = 1
     while depth > 0 and best > 0.0:
         depth -= 1
         if bounds[depth] > cut:
             continue
-        i = pairs[depth, 0]
-        j = pairs[depth, 1]
+        i = int(pairs[depth, 0])
+        j = int(pairs[depth, 1])
         if LA[i, 1] > 0 and LB[j, 1] > 0:
             for b in range(LB[j, 0], LB[j, 0] + LB[j, 1]):
                 _row_in(TB, b, R, t, row)
@@ -269,15 +194,13 @@ def mesh_mesh(
                         kb = b
                         W[:6] = points[:6]
             continue
-        descend_a = LB[j, 1] > 0 or (
-            LA[i, 1] == 0 and A[i, 3] + A[i, 4] + A[i, 5] > B[j, 3] + B[j, 4] + B[j, 5]
-        )
+        descend_a = LB[j, 1] > 0 or (LA[i, 1] == 0 and A[i, 19] > B[j, 19])
         if descend_a:
-            i1, j1, i2, j2 = i + 1, j, np.int64(LA[i, 0]), j
+            i1, j1, i2, j2 = i + 1, j, int(LA[i, 0]), j
         else:
-            i1, j1, i2, j2 = i, j + 1, i, np.int64(LB[j, 0])
-        low1 = box_box(A, i1, B, j1, R, F, t)
-        low2 = box_box(A, i2, B, j2, R, F, t)
+            i1, j1, i2, j2 = i, j + 1, i, int(LB[j, 0])
+        low1 = box_box(A, i1, B, j1, R, t, cut)
+        low2 = box_box(A, i2, B, j2, R, t, cut)
         if low1 < low2:
             i1, j1, i2, j2, low1, low2 = i2, j2, i1, j1, low2, low1
         if low1 <= cut:

@@ -26,7 +26,7 @@ class Shapes:
     solids: tuple[tuple[int, ...], ...]
     """Columns of the arrays below that each body carries."""
     which: Indices
-    """See `seerob.kernels.nearest`."""
+    """See `seerob.kernels.pairs`."""
     local: Array
     ball: Array
     corners: Array
@@ -75,7 +75,7 @@ class Shapes:
             ball=_rows([m.ball for m in made], (4,)),
             corners=_rows([m.corners for m in made], (8, 3)),
             radius=np.array([s.radius for _, solids in bodies for s in solids], float),
-            nodes=np.concatenate([np.zeros((0, 10)), *(t.nodes for t in trees)]),
+            nodes=np.concatenate([np.zeros((0, 20)), *(t.nodes for t in trees)]),
             links=np.concatenate([np.zeros((0, 2), np.int32), *(t.links for t in trees)]),
             triangles=np.concatenate([np.zeros((0, 13)), *(t.triangles for t in trees)]),
             probes=np.concatenate([np.zeros((0, 3)), *(m.probes for m in made)]),

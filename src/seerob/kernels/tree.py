@@ -1,8 +1,9 @@
 r"""A tree of boxes over the triangles of a mesh, and what the inside test needs of each box.
 
 Binned surface-area splits, top down, in pre-order: the left child of inner node i is i + 1.
-A node carries its box, the sum of its triangles' area vectors :math:`\sum \frac12 e_0 \times e_1`
-and the sum of their areas (the dipole of the winding number, see `seerob.kernels.winding`).
+A node is a row of 20: centre and half size of a box (see `seerob.kernels.boxes`; the root's is upright),
+the sum of its triangles' area vectors :math:`\sum \frac12 e_0 \times e_1` and of their areas (the dipole of
+`seerob.kernels.winding`), the box's axes as rows, and the radius of the ball around it.
 """
 
 from __future__ import annotations
@@ -11,12 +12,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.kernels.boxes import fit_box
+from seerob.kernels.primitives import FLAT, LINE, THIN
 from seerob.transforms import Array
 
 Links = NDArray[np.int32]
 Indices = NDArray[np.int64]
-
-from seerob.kernels.primitives import FLAT, LINE, THIN
 
 LEAF = 2
 """Triangles of a leaf, at most."""
@@ -145,7 +146,7 @@ def build_tree(vertices: Array, faces: Links) -> tuple[Array, Links, Array]:
         faces: Vertex indices in range, shape (m, 3), m > 0.
 
     Returns:
-        nodes: Box centre, half size, area vector, area: shape (k, 10).
+        nodes: Box centre, half size, area vector, area, axes of the box (rows), radius: shape (k, 20).
         links: First triangle and count of a leaf, or right child and 0, shape (k, 2).
         triangles: Rows of 13 in the order of the leaves, shape (m, 13).
     """
@@ -162,7 +163,7 @@ def build_tree(vertices: Array, faces: Links) -> tuple[Array, Links, Array]:
             high[k, c] = max(a, b, d)
     centre = (low + high) / 2.0
     order = np.arange(m)
-    nodes = np.zeros((2 * m, 10))
+    nodes = np.zeros((2 * m, 20))
     links = np.zeros((2 * m, 2), np.int32)
     # Entries: first, end, parent whose right child this is (or -1), level.
     stack = np.empty((256, 4), np.int64)
@@ -176,15 +177,7 @@ def build_tree(vertices: Array, faces: Links) -> tuple[Array, Links, Array]:
         made += 1
         if parent >= 0:
             links[parent, 0] = i
-        for c in range(3):
-            least = np.inf
-            most = -np.inf
-            for q in range(start, stop):
-                least = min(least, low[order[q], c])
-                most = max(most, high[order[q], c])
-            nodes[i, c] = (least + most) / 2.0
-            # Half sizes are rounded up: a box must contain its triangles in floating point too.
-            nodes[i, 3 + c] = (most - least) / 2.0 * (1.0 + 1e-15) + 4e-16 * max(abs(least), abs(most))
+        fit_box(T, order, start, stop, nodes[i], i == 0)
         for q in range(start, stop):
             nn = 0.0
             for c in range(3):
@@ -204,7 +197,7 @@ def build_tree(vertices: Array, faces: Links) -> tuple[Array, Links, Array]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def component_of(faces: Links, n: int) -> Indices:
+def component_of(faces: Indices, n: int) -> Indices:
     """Root vertex of the connected piece of each of ``n`` vertices, pieces joined by faces, shape (n,)."""
     root = np.arange(n)
     for k in range(len(faces)):

@@ -24,7 +24,7 @@ class Tree:
     """What distance queries need of one mesh, in its own frame."""
 
     nodes: NDArray[np.float64]
-    """See `seerob.kernels.tree.build_tree`, shape (k, 10)."""
+    """See `seerob.kernels.tree.build_tree`, shape (k, 20)."""
     links: NDArray[np.int32]
     triangles: NDArray[np.float64]
     probes: NDArray[np.float64]

@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from seerob.transforms import Array
 
 Links = NDArray[np.int32]
-Indices = NDArray[np.int64]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -80,7 +79,7 @@ def winding_number(
         ry = nodes[i, 1] - y
         rz = nodes[i, 2] - z
         d = math.sqrt(rx * rx + ry * ry + rz * rz)
-        R = math.sqrt(nodes[i, 3] ** 2 + nodes[i, 4] ** 2 + nodes[i, 5] ** 2)
+        R = nodes[i, 19]
         if d > far * R:
             total += (rx * nodes[i, 6] + ry * nodes[i, 7] + rz * nodes[i, 8]) / (d * d * d)
             error += 2.0 * nodes[i, 9] * R / (d - R) ** 3

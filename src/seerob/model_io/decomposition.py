@@ -19,8 +19,9 @@ import numpy as np
 
 from seerob.errors import InputError
 from seerob.geometry import Mesh
-from seerob.model_io.detail import display_mesh, manifold, tidied
+from seerob.model_io.detail import display_mesh, manifold
 from seerob.model_io.moments import signed_volume
+from seerob.model_io.tidy import tidied
 
 _CONVEX = 1e-6
 _VERSION = 1
@@ -145,7 +146,7 @@ def _key(mesh: Mesh, threshold: float, max_parts: int | None, max_triangles: int
 def _write(file: Path, found: ConvexParts) -> None:
     """All or nothing: a run that is stopped here leaves no half file behind."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    arrays = {f"v{i}": p.vertices for i, p in enumerate(found.parts)}
+    arrays: dict[str, Any] = {f"v{i}": p.vertices for i, p in enumerate(found.parts)}
     arrays |= {f"f{i}": p.faces for i, p in enumerate(found.parts)}
     handle, temporary = tempfile.mkstemp(dir=file.parent, suffix=".part")
     with os.fdopen(handle, "wb") as stream:
@@ -156,7 +157,7 @@ def _write(file: Path, found: ConvexParts) -> None:
 def _read(file: Path, color: tuple[float, float, float, float]) -> ConvexParts | None:
     """None when there is no such file, or when it is broken: then it is made again."""
     try:
-        with np.load(file, allow_pickle=False) as data:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
             count = sum(name.startswith("v") and name[1:].isdigit() for name in data.files)
             parts = tuple(Mesh(data[f"v{i}"], data[f"f{i}"], color) for i in range(count))
             excess, missing = data["volumes"].tolist()

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.geometry import Mesh
+from seerob.model_io.mesh_bodies import bodies, joined_unmerged
+from seerob.model_io.tidy import tidied
 from seerob.transforms import Array
 
 LOSSLESS = 1e-6
@@ -22,42 +25,6 @@ class DerivedMesh(Mesh):
     """Largest distance from either surface to the other [m]: an upper bound."""
     method: str = ""
     """``as it is``, ``cleaned``, ``simplified`` or ``clustered``."""
-
-
-def tidied(mesh: Mesh) -> tuple[Mesh, str]:
-    """Equal vertices merged, triangles without area and repeated triangles dropped; the surface stays.
-
-    Returns:
-        The mesh, without vertices that no triangle uses, and what was done in words, empty when nothing was.
-    """
-    # + 0.0 makes -0.0 and 0.0 one; comparing bytes is much faster than comparing rows.
-    vertices = np.ascontiguousarray(mesh.vertices, float) + 0.0
-    keys = vertices.view(np.dtype((np.void, vertices.dtype.itemsize * 3))).ravel()
-    _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
-    # Keep the file's order of vertices: what was written together is read together.
-    order = np.argsort(first)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    faces = rank[inverse.ravel()][mesh.faces]
-    vertices = vertices[first[order]]
-    said = []
-    flat = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
-    corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat |= ~cross.any(axis=1)
-    if flat.any():
-        said.append(f"{int(flat.sum())} triangles without area dropped")
-        faces = faces[~flat]
-    start = faces.argmin(axis=1)
-    turned = np.take_along_axis(faces, (start[:, None] + np.arange(3)) % 3, axis=1)
-    _, kept = np.unique(turned, axis=0, return_index=True)
-    if len(kept) < len(faces):
-        said.append(f"{len(faces) - len(kept)} repeated triangles dropped")
-        faces = faces[np.sort(kept)]
-    used = np.zeros(len(vertices), bool)
-    used[faces.ravel()] = True
-    index = np.cumsum(used) - 1
-    return Mesh(vertices[used], index[faces].astype(np.int32), mesh.color), ", ".join(said)
 
 
 def manifold(mesh: Mesh) -> Any | None:
@@ -75,54 +42,97 @@ def manifold(mesh: Mesh) -> Any | None:
     return None if solid.status() != manifold3d.Error.NoError or solid.is_empty() else solid
 
 
-def _from_manifold(solid: Any, color: tuple[float, float, float, float]) -> Mesh:
+def from_manifold(solid: Any, color: tuple[float, float, float, float] = Mesh.color) -> Mesh:
+    """The surface of a `manifold3d.Manifold`."""
     out = solid.to_mesh64()
-    vertices = np.array(out.vert_properties[:, :3], float)
-    return tidied(Mesh(vertices, np.array(out.tri_verts, np.int32), color))[0]
+    return Mesh(np.array(out.vert_properties[:, :3], float), np.array(out.tri_verts, np.int32), color)
 
 
 def physics_mesh(mesh: Mesh) -> DerivedMesh:
     """The mesh for distances: the same surface within 2e-6 m, with as few triangles as that allows.
 
-    Closed meshes are simplified with a tolerance of `LOSSLESS`, others are only cleaned.
+    Closed bodies are simplified with a tolerance of `LOSSLESS`; what is open is only cleaned.
     """
     clean, said = tidied(mesh)
-    solid = manifold(clean)
-    if solid is not None:
-        simple = _from_manifold(solid.simplify(LOSSLESS), mesh.color)
-        if 0 < len(simple.faces) < len(clean.faces):
-            return DerivedMesh(simple.vertices, simple.faces, mesh.color, 2 * LOSSLESS, "simplified")
+    simple = _simplified(clean, LOSSLESS)
+    if simple is None and len(clean.faces):
+        parts = [(part, _simplified(part, LOSSLESS)) for part in bodies(clean)]
+        if any(lighter is not None for _, lighter in parts):
+            simple = joined_unmerged([part if lighter is None else lighter for part, lighter in parts])
+    if simple is not None:
+        return DerivedMesh(simple.vertices, simple.faces, mesh.color, 2 * LOSSLESS, "simplified")
     return DerivedMesh(clean.vertices, clean.faces, mesh.color, 0.0, "cleaned" if said else "as it is")
 
 
+def _simplified(mesh: Mesh, tolerance: float) -> Mesh | None:
+    """A lighter mesh within the tolerance [m]; None when the mesh is open, or nothing can be left out."""
+    solid = manifold(mesh)
+    if solid is None:
+        return None
+    simple = tidied(from_manifold(solid.simplify(tolerance), mesh.color))[0]
+    return simple if 0 < len(simple.faces) < len(mesh.faces) else None
+
+
 def display_mesh(mesh: Mesh, *, max_triangles: int = 20_000) -> DerivedMesh:
-    """A mesh for the screen with at most ``max_triangles`` triangles (more only where nothing helps)."""
+    """A mesh for the screen.
+
+    Args:
+        mesh: Any mesh [m].
+        max_triangles: Most triangles; at least 100.
+
+    Returns:
+        A mesh with at most that many triangles and a bound on its deviation: simplified when it is
+        closed and 2 % of its size are enough for that, else with near vertices pulled together.
+    """
+    if max_triangles < 100:
+        raise ValueError(f"max_triangles is {max_triangles}: at least 100 are needed to show a shape")
     best = physics_mesh(mesh)
     if len(best.faces) <= max_triangles:
         return best
     size = float(np.linalg.norm(np.ptp(best.vertices, axis=0)))
-    solid = manifold(best)
+    closed = manifold(best) is not None
     tolerance = 1e-4 * size
-    while solid is not None and tolerance < 0.02 * size:
-        simple = _from_manifold(solid.simplify(tolerance), mesh.color)
-        if 0 < len(simple.faces) <= max_triangles:
-            deviation = tolerance + best.deviation
+    while closed and tolerance < 0.02 * size:
+        simple = _simplified(best, tolerance)
+        if simple is not None and len(simple.faces) <= max_triangles:
+            deviation = 2 * tolerance + best.deviation
             return DerivedMesh(simple.vertices, simple.faces, mesh.color, deviation, "simplified")
         tolerance *= 2
-    cell = size / 400
+    cell = size / 1000
     while True:
-        simple = _clustered(best, cell)
+        simple, deviation = _clustered(best, cell)
         if len(simple.faces) <= max_triangles:
-            deviation = cell * 3**0.5 + best.deviation
+            deviation += best.deviation
             return DerivedMesh(simple.vertices, simple.faces, mesh.color, deviation, "clustered")
-        cell *= 1.25
+        cell *= 1.2
 
 
-def _clustered(mesh: Mesh, cell: float) -> Mesh:
-    """Vertices of each cubic cell replaced by their mean: no vertex moves more than the cell's diagonal."""
+def _clustered(mesh: Mesh, cell: float) -> tuple[Mesh, float]:
+    """Vertices of each cubic cell replaced by their mean, and a bound on the distance either way [m]."""
     low: Array = mesh.vertices.min(axis=0)
-    keys = np.floor((mesh.vertices - low) / cell).astype(np.int64)
-    _, inverse, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    x, y, z = np.floor((mesh.vertices - low) / cell).astype(np.int64).T
+    _, inverse, count = np.unique((x << 40) + (y << 20) + z, return_inverse=True, return_counts=True)
     inverse = inverse.ravel()
     mean = np.stack([np.bincount(inverse, mesh.vertices[:, i]) / count for i in range(3)], axis=1)
-    return tidied(Mesh(mean, inverse[mesh.faces].astype(np.int32), mesh.color))[0]
+    moved = float(np.linalg.norm(mesh.vertices - mean[inverse], axis=1).max())
+    faces = inverse[mesh.faces]
+    light = tidied(Mesh(mean, faces.astype(np.int32), mesh.color))[0]
+    return light, moved + (_lost(mean, faces) if len(light.faces) else 0.0)
+
+
+def _lost(vertices: Array, faces: NDArray[np.int64]) -> float:
+    """How far triangles that shrank to an edge or a point may be from those that remain [m]."""
+    from scipy.spatial import cKDTree
+
+    count = len(vertices)
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 3, 2), axis=2)
+    keys = edges[..., 0] * count + edges[..., 1]
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    flat = ~np.cross(b - a, c - a).any(axis=1)
+    lost = np.unique(keys[flat][~np.isin(keys[flat], keys[~flat])])
+    if not len(lost):
+        return 0.0
+    ends = vertices[np.column_stack([lost // count, lost % count])]
+    remaining = cKDTree(vertices[np.unique(faces[~flat])])
+    away = remaining.query(ends.reshape(-1, 3))[0].reshape(-1, 2).max(axis=1)
+    return float((away + np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1) / 2).max())

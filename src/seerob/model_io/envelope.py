@@ -52,9 +52,9 @@ def _rounded_in_box(lower: Array, upper: Array, color: shapes.Color) -> Mesh:
     """An elliptical cylinder with rounded rims along the longest edge of a box, touching its sides."""
     size = upper - lower
     axis = int(size.argmax())
-    rotation = np.roll(np.eye(3), axis - 2, axis=1)
+    rotation = np.roll(np.eye(3), 2 - axis, axis=1)
     half = 0.5 * size
-    a, b = rotation[:, 0] @ half, rotation[:, 1] @ half
+    a, b = float(rotation[:, 0] @ half), float(rotation[:, 1] @ half)
     start, end = 0.5 * (lower + upper), 0.5 * (lower + upper)
     start[axis], end[axis] = lower[axis], upper[axis]
     profile = shapes.rounded_profile(1.0, float(size[axis]), 0.2 * min(a, b))

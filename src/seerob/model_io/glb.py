@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.geometry import Mesh, Solid
-from seerob.transforms import Array
+from seerob.geometry import Mesh
+from seerob.model_io.shading import CREASE, shaded
+from seerob.model_io.tessellation import solid_mesh
 
-CREASE = np.pi / 6
-"""Edges sharper than this [rad] are shown sharp."""
-_ROUND = 20
-"""Segments of a full circle of a tessellated solid; a multiple of four."""
+__all__ = ["glb_bytes", "mesh_hash", "solid_mesh"]
+
 _FLOAT, _USHORT, _UINT = 5126, 5123, 5125
 _ARRAY, _ELEMENTS = 34962, 34963
 
@@ -133,140 +132,3 @@ def _container(tree: dict[str, Any], binary: bytes) -> bytes:
     if binary:
         body += struct.pack("<I4s", len(binary), b"BIN\0") + binary
     return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
-
-
-def shaded(mesh: Mesh, crease: float = CREASE) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Vertices split along creases, with the angle-weighted normal of the smooth patch around each.
-
-    Returns:
-        Vertices (k, 3) [m], unit normals (k, 3) and faces (m, 3) that index them.
-    """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    faces = mesh.faces.astype(np.int64)
-    count = len(faces)
-    corners = mesh.vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
-
-    # Corner c of face f has number 3 f + c. Two corners at one vertex belong together when their
-    # faces share an edge there that bends less than the crease.
-    at = np.arange(3 * count).reshape(-1, 3)
-    begin, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
-    corner_begin, corner_end = at.ravel(), at[:, [1, 2, 0]].ravel()
-    low, high = np.minimum(begin, end), np.maximum(begin, end)
-    corner_low = np.where(begin < end, corner_begin, corner_end)
-    corner_high = np.where(begin < end, corner_end, corner_begin)
-    order = np.lexsort((high, low))
-    same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
-    first, second = order[:-1][same], order[1:][same]
-    smooth = np.einsum("ij,ij->i", normal[first // 3], normal[second // 3]) > np.cos(crease)
-    first, second = first[smooth], second[smooth]
-    rows = np.concatenate([corner_low[first], corner_high[first]])
-    columns = np.concatenate([corner_low[second], corner_high[second]])
-    graph = coo_matrix((np.ones(len(rows), bool), (rows, columns)), shape=(3 * count, 3 * count))
-    _, group = connected_components(graph, directed=False)
-    # Number the groups by their first corner, so that the order is the mesh's own.
-    _, first_corner, group = np.unique(group, return_index=True, return_inverse=True)
-    order = np.argsort(first_corner)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    group = rank[group.ravel()]
-    vertices = mesh.vertices[faces.ravel()[first_corner[order]]]
-
-    edges = corners[:, [1, 2, 0]] - corners
-    edges /= np.maximum(np.linalg.norm(edges, axis=2, keepdims=True), 1e-300)
-    cosine = -np.einsum("fci,fci->fc", edges, edges[:, [2, 0, 1]])
-    weighted = (np.arccos(np.clip(cosine, -1, 1))[:, :, None] * normal[:, None, :]).reshape(-1, 3)
-    summed = np.stack([np.bincount(group, weighted[:, i], len(order)) for i in range(3)], axis=1)
-    size = np.linalg.norm(summed, axis=1, keepdims=True)
-    normals = np.where(size > 1e-12, summed / np.maximum(size, 1e-300), [0.0, 0.0, 1.0])
-    return vertices, normals, group.reshape(-1, 3)
-
-
-def solid_mesh(solid: Solid, *, color: tuple[float, float, float, float] | None = None) -> Mesh:
-    """A solid's surface for the screen; every vertex of a rounded one lies on the true surface.
-
-    Args:
-        solid: Any solid. A mesh with an envelope is shown with its vertices moved out by the radius.
-        color: Red, green, blue, alpha in 0…1; the mesh's own, or the default, when None.
-
-    Returns:
-        About 400 triangles for a capsule; 12 for a flat rectangle without radius.
-    """
-    if solid.mesh is not None:
-        mesh = solid.mesh
-        vertices = mesh.vertices + solid.radius * _vertex_normals(mesh) if solid.radius else mesh.vertices
-        return Mesh(vertices, mesh.faces, color or mesh.color)
-    assert solid.points is not None
-    tessellated = _capsule if len(solid.points) == 2 else _rounded_rectangle
-    vertices, faces = tessellated(solid.points, solid.radius)
-    return Mesh(vertices, faces.astype(np.int32), color or Mesh.color)
-
-
-def _vertex_normals(mesh: Mesh) -> Array:
-    corners = mesh.vertices[mesh.faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    summed = np.stack(
-        [np.bincount(mesh.faces.ravel(), np.repeat(normal[:, i], 3), len(mesh.vertices)) for i in range(3)],
-        axis=1,
-    )
-    return np.asarray(summed / np.maximum(np.linalg.norm(summed, axis=1, keepdims=True), 1e-300))
-
-
-def _frame(axis: Array) -> Array:
-    """Rotation (3, 3) whose third column is the axis' direction; the identity for no axis."""
-    length = float(np.linalg.norm(axis))
-    if length < 1e-12:
-        return np.eye(3)
-    z = axis / length
-    x = np.cross(np.eye(3)[int(np.abs(z).argmin())], z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
-
-
-def _rings(rings: list[Array], bottom: Array, top: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Rings of equally many points, from the bottom up, joined by quads and closed by two fans."""
-    n = len(rings[0])
-    vertices = np.vstack([bottom[None], *rings, top[None]])
-    here = np.arange(n)
-    there = (here + 1) % n
-    faces = [np.column_stack([np.zeros(n, int), 1 + there, 1 + here])]
-    for k in range(len(rings) - 1):
-        a, b = 1 + k * n, 1 + (k + 1) * n
-        faces.append(np.column_stack([a + here, a + there, b + there]))
-        faces.append(np.column_stack([a + here, b + there, b + here]))
-    last = 1 + (len(rings) - 1) * n
-    faces.append(np.column_stack([last + here, last + there, np.full(n, len(vertices) - 1)]))
-    return vertices, np.vstack(faces)
-
-
-def _capsule(points: Array, radius: float) -> tuple[Array, NDArray[np.int64]]:
-    start, end = points
-    frame = _frame(end - start)
-    angle = 2 * np.pi * np.arange(_ROUND) / _ROUND
-    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_ROUND)]) @ frame.T
-    latitudes = np.linspace(0, np.pi / 2, _ROUND // 4 + 1)[:-1]
-    axis = frame[:, 2]
-    lower = [start + radius * (np.cos(b) * circle - np.sin(b) * axis) for b in latitudes[::-1]]
-    upper = [end + radius * (np.cos(b) * circle + np.sin(b) * axis) for b in latitudes]
-    if np.linalg.norm(end - start) < 1e-12:
-        upper = upper[1:]
-    return _rings(lower + upper, start - radius * axis, end + radius * axis)
-
-
-def _rounded_rectangle(points: Array, radius: float) -> tuple[Array, NDArray[np.int64]]:
-    corner, u, v = points[0], points[1] - points[0], points[2] - points[0]
-    frame = np.column_stack([u / np.linalg.norm(u), v / np.linalg.norm(v), np.zeros(3)])
-    frame[:, 2] = np.cross(frame[:, 0], frame[:, 1])
-    quarter = _ROUND // 4
-    angles = np.concatenate([np.linspace(q, q + 1, quarter + 1) * np.pi / 2 for q in range(4)])
-    circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))]) @ frame.T
-    at = np.repeat([corner + u + v, corner + v, corner, corner + u], quarter + 1, axis=0)
-    axis = frame[:, 2]
-    latitudes = np.linspace(-np.pi / 2, np.pi / 2, _ROUND // 2 + 1)
-    rings = [at + radius * (np.cos(b) * circle + np.sin(b) * axis) for b in latitudes]
-    middle = corner + (u + v) / 2
-    return _rings(rings, middle - radius * axis, middle + radius * axis)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import replace
 from importlib import resources
 from typing import Any
 
@@ -16,7 +15,7 @@ import numpy as np
 
 from seerob import transforms, units
 from seerob.errors import UnknownName
-from seerob.model_io import envelope
+from seerob.model_io import envelope, lint
 from seerob.model_io.description import Description, Inertial, Joint, JointKind, Link, Quantity
 from seerob.snapshot import Finding, Origin
 
@@ -125,18 +124,5 @@ def _findings(name: str, table: Table, links: tuple[Link, ...]) -> list[Finding]
             Finding(level="warning", subject=name, text=envelope.NOTE + ": " + table["geometry"]["source"])
         )
     if any(joint.armature is None for link in links for joint in link.joints):
-        text = "rotor inertia unknown, nobody published it: mass matrix and effective mass are those of the links"
-        found.append(Finding(level="assumed", subject=name, text=text))
+        found.append(Finding(level="assumed", subject=name, text=lint.ROTOR))
     return found
-
-
-def renamed(description: Description, name: str) -> Description:
-    """The same robot under another name; findings follow."""
-    old = description.name
-
-    def moved(finding: Finding) -> Finding:
-        head, slash, rest = finding.subject.partition("/")
-        subject = name + slash + rest if head == old else finding.subject
-        return Finding(level=finding.level, subject=subject, text=finding.text)
-
-    return replace(description, name=name, findings=tuple(map(moved, description.findings)))

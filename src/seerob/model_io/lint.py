@@ -72,7 +72,7 @@ def plausible_inertial(inertial: Inertial, *, moves: bool) -> tuple[Inertial | N
     mass, inertia = inertial.mass, inertial.inertia
     if mass <= 1e-9:
         if not moves and not inertia.any():
-            return None, "note", f"mass is {mass:g} kg: a frame without mass"
+            return None, "", ""
         return None, "warning", f"mass is {mass:g} kg, expected more than 0: mass and inertia unknown"
     moments = np.linalg.eigvalsh(inertia)
     largest = float(np.abs(moments).max())
@@ -144,8 +144,8 @@ def flat_limits(which: str, joints: Iterable[Joint]) -> Iterator[tuple[str, str,
     for kind in {joint.kind for joint, _ in quantities}:
         values = [q.value for joint, q in quantities if joint.kind is kind and q is not None]
         if len(values) >= 4 and all(a == b for a, b in pairwise(values)):
-            text = f"{which} limit is {values[0]:g} for all {len(values)} {kind.value} joints: a placeholder?"
-            yield "warning", "", text
+            text = f"{which} limit is {values[0]:g} for all {len(values)} {kind.value} joints alike: check the source"
+            yield ("warning" if which == "effort" else "note"), "", text
 
 
 def massless(description: Description) -> Iterator[tuple[str, str, str]]:

@@ -43,6 +43,10 @@ def load_robot(
         description = library.load(model.removeprefix("library:"), name=name)
     else:
         description = _from_file(model, folder, packages or {}, arguments or {}, name)
+        # Numba is imported only where a file brings shapes of its own.
+        from seerob.model_io.protrusion import with_protrusions
+
+        description = with_protrusions(description)
     if meshes is None:
         return description
     maker = load_robot(meshes, folder=folder, packages=packages, name=name)

@@ -14,8 +14,8 @@ import numpy as np
 from seerob.errors import InputError
 from seerob.geometry import Mesh
 from seerob.model_io.description import Inertial
-from seerob.model_io.detail import manifold
-from seerob.model_io.mesh_bodies import bodies, flipped, is_closed, joined, outward
+from seerob.model_io.detail import from_manifold, manifold
+from seerob.model_io.mesh_bodies import bodies, flipped, is_closed, joined, joined_unmerged, outward
 from seerob.model_io.mesh_mending import Mended, mended, one_sided
 from seerob.model_io.moments import (
     Moments,
@@ -41,7 +41,7 @@ __all__ = [
 
 WORST = 0.5
 """Largest relative error of a volume that a mass may be computed from."""
-PATCHED = 0.3
+PATCHED = 0.2
 """Largest share of the surface that may have been missing before mending stops being credible."""
 
 
@@ -50,6 +50,8 @@ class _Estimate(NamedTuple):
     method: str
     error: float
     notes: tuple[str, ...] = ()
+    provided: str = ""
+    """What the error bound rests on."""
 
 
 def from_shape(
@@ -102,8 +104,8 @@ def from_shape(
     findings = [Finding(level="note", subject=subject, text=text) for text in notes]
     if error > 0 or estimate.method != _EXACT:
         figure = f"mass {inertial.mass:.4g} kg" if mass is None else "centre of mass and inertia"
-        bound = f"±{100 * error:.2g} %" if error > 1e-6 else "exact if what was missing is flat"
-        text = f"{figure} from {estimate.method}, volume {bound}"
+        bound = f"±{100 * error:.{0 if error > 0.1 else 2}f} %" if error > 1e-4 else "exact within 0.01 %"
+        text = f"{figure} from {estimate.method}, volume {bound}{estimate.provided}"
         findings.append(Finding(level="warning" if error > 0.01 else "note", subject=subject, text=text))
     return inertial, tuple(findings)
 
@@ -186,7 +188,8 @@ def _of_mended(patched: Mended) -> _Estimate:
     estimate = _of_bodies(patched.mesh, method, ())
     volume = estimate.moments.volume
     error = estimate.error + patched.slack / volume if volume > 0 else np.inf
-    return estimate._replace(error=float(error))
+    provided = ", if the holes' true surface lies in the hull of their rims" if patched.filled else ""
+    return estimate._replace(error=float(error), provided=provided)
 
 
 def _of_bodies(mesh: Mesh, method: str, notes: tuple[str, ...]) -> _Estimate:
@@ -199,7 +202,7 @@ def _of_bodies(mesh: Mesh, method: str, notes: tuple[str, ...]) -> _Estimate:
     total = sum(volumes)
     if not solid or not total > 0:
         return _Estimate(_NOTHING, method, np.inf, notes)
-    whole = of_closed_mesh(joined_closed(parts))
+    whole = of_closed_mesh(joined_unmerged(parts))
     if not _boxes_meet(solid):
         return _Estimate(whole, method, 0.0, notes)
     union = _union(parts, volumes)
@@ -211,13 +214,6 @@ def _of_bodies(mesh: Mesh, method: str, notes: tuple[str, ...]) -> _Estimate:
         notes += (f"its {len(parts)} bodies overlap; the {whole.volume - once.volume:.3g} m³ count once",)
         return _Estimate(once, method, 0.0, notes)
     return _Estimate(whole, method, 0.0, notes)
-
-
-def joined_closed(parts: Sequence[Mesh]) -> Mesh:
-    """Bodies in one mesh without merging anything, so that equal triangles of two bodies both stay."""
-    offsets = np.cumsum([0, *(len(p.vertices) for p in parts)])
-    faces = np.vstack([p.faces + o for p, o in zip(parts, offsets, strict=False)])
-    return Mesh(np.vstack([p.vertices for p in parts]), faces.astype(np.int32))
 
 
 def _boxes_meet(parts: Sequence[Mesh]) -> bool:
@@ -247,5 +243,4 @@ def _union(parts: Sequence[Mesh], volumes: Sequence[float]) -> Mesh | None:
         whole -= manifold3d.Manifold.batch_boolean(cavities, manifold3d.OpType.Add)
     if whole.status() != manifold3d.Error.NoError or whole.is_empty():
         return None
-    out = whole.to_mesh64()
-    return Mesh(np.array(out.vert_properties[:, :3], float), np.array(out.tri_verts, np.int32))
+    return from_manifold(whole)

@@ -11,9 +11,9 @@ import numpy as np
 
 from seerob.errors import InputError, suggestion
 from seerob.geometry import Mesh
-from seerob.model_io.detail import tidied
 from seerob.model_io.mesh_formats import collada, gltf, obj, off, ply, stl, threemf
 from seerob.model_io.mesh_formats.source import MeshSource, RawFile, RawMesh
+from seerob.model_io.tidy import tidied
 from seerob.snapshot import Finding
 from seerob.transforms import Array
 from seerob.units import LENGTHS

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from seerob.geometry import Mesh
-from seerob.model_io.detail import tidied
 from seerob.model_io.moments import signed_volume
+from seerob.model_io.tidy import tidied
 from seerob.transforms import Array
 
 Indices = NDArray[np.int64]
 
 
-def joined(meshes: tuple[Mesh, ...]) -> tuple[Mesh, str]:
+def joined(meshes: Sequence[Mesh]) -> tuple[Mesh, str]:
     """All of them as one mesh, with equal vertices merged: a body split by colour closes again.
 
     Returns:
         The mesh, and what was dropped in words.
     """
+    return tidied(joined_unmerged(meshes))
+
+
+def joined_unmerged(meshes: Sequence[Mesh]) -> Mesh:
+    """All of them as one mesh, vertex by vertex and triangle by triangle, in the first one's colour."""
     offsets = np.cumsum([0, *(len(m.vertices) for m in meshes)])
-    vertices = np.vstack([m.vertices for m in meshes])
     faces = np.vstack([m.faces + o for m, o in zip(meshes, offsets, strict=False)])
-    return tidied(Mesh(vertices, faces.astype(np.int32)))
+    return Mesh(np.vstack([m.vertices for m in meshes]), faces.astype(np.int32), meshes[0].color)
 
 
 def edge_balance(faces: NDArray[np.integer]) -> tuple[Indices, Indices, Indices]:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.geometry import Mesh
-from seerob.model_io.detail import tidied
 from seerob.model_io.mesh_bodies import edge_balance, is_closed
+from seerob.model_io.tidy import tidied
 from seerob.transforms import Array
 
 MAX_HOLES = 500

@@ -46,6 +46,7 @@ def _resolved(reader: Reader, joint: Joint, joints: dict[str, Joint]) -> Joint:
             mimic.multiplier * further.offset + mimic.offset,
         )
     if len(seen) > 2:
-        text = f"mimic chain {' → '.join(seen)} collapsed: q = {mimic.multiplier:g} q[{mimic.joint}] + {mimic.offset:g}"
+        law = f"q = {mimic.multiplier:g} q[{mimic.joint}] + {mimic.offset:g}"
+        text = f"mimic chain {' → '.join(seen)} collapsed: {law}"
         reader.finding("note", joint.name, text)
     return replace(joint, mimic=mimic)

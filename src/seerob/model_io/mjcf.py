@@ -15,10 +15,11 @@ from seerob.model_io.description import Description, Inertial, Joint, JointKind,
 from seerob.model_io.mimic import flattened
 from seerob.model_io.mjcf_files import checked_files
 from seerob.model_io.mjcf_geometry import shapes_of_body
+from seerob.model_io.pose import displacement
 from seerob.model_io.resolve import Resolver
 from seerob.model_io.xml_values import Reader
 from seerob.snapshot import Origin
-from seerob.transforms import Array, rotation_from_axis_angle, rotation_from_wxyz, transform
+from seerob.transforms import Array, rotation_from_wxyz, transform
 
 DEFAULT_DENSITY = 1000.0
 """What MuJoCo takes where a file gives neither mass nor density [kg/m³]."""
@@ -128,7 +129,7 @@ def _joint(reader: Reader, model: Any, joint: int) -> Joint | None:
     }
     if kind not in kinds:
         what = str(kind.name).removeprefix("mjJNT_").lower()
-        remedy = "joints have one degree of freedom: chain hinges and slides, or place the robot with base"
+        remedy = "a joint has one degree of freedom: chain several, or place the robot with base"
         reader.problem(f"joint[{name}].type", f"is {what!r}", remedy)
         return None
     dof = int(model.jnt_dofadr[joint])
@@ -188,14 +189,6 @@ def _at_zero(
         reader.problem(key, "several joints of one body with a ref", "make them 0 or give each joint a body")
         return parent_from_link
     return parent_from_link @ displacement(joints[0], -references[0])
-
-
-def displacement(joint: Joint, q: float) -> Array:
-    """``link_at_0_from_link_at_q`` of a joint, shape (4, 4)."""
-    if joint.kind is JointKind.PRISMATIC:
-        return transform(position=joint.axis * q)
-    rotation = rotation_from_axis_angle(joint.axis, q)
-    return transform(rotation, joint.anchor - rotation @ joint.anchor)
 
 
 def _inertial(reader: Reader, spec: Any, model: Any, body: int, name: str, *, moves: bool) -> Inertial | None:

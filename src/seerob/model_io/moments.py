@@ -78,10 +78,7 @@ def of_capsule(start: Array, end: Array, radius: float) -> Moments:
         ValueError: the radius is not positive.
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
-    axis = end - start
-    # Any direction across the axis serves for the edge of length 0.
-    across = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
-    return _of_rectangle((start + end) / 2, axis, 0.0 * across, across, radius)
+    return of_dilated_rectangle(start, end - start, np.zeros(3), radius)
 
 
 def of_dilated_rectangle(corner: Array, u: Array, v: Array, radius: float) -> Moments:
@@ -91,26 +88,32 @@ def of_dilated_rectangle(corner: Array, u: Array, v: Array, radius: float) -> Mo
         ValueError: the radius is not positive.
     """
     corner, u, v = (np.asarray(x, float) for x in (corner, u, v))
-    return _of_rectangle(corner + (u + v) / 2, u, v, v, radius)
-
-
-def _of_rectangle(center: Array, u: Array, v: Array, across: Array, r: float) -> Moments:
+    r = float(radius)
     if not r > 0:
         raise ValueError(f"a solid of radius {r} m has no volume of its own")
     a, b = float(np.linalg.norm(u)), float(np.linalg.norm(v))
     volume = 2 * a * b * r + pi * r**2 * (a + b) + 4 / 3 * pi * r**3
     xx, yy = _along(a, b, r), _along(b, a, r)
     zz = 2 / 3 * a * b * r**3 + pi * r**4 / 4 * (a + b) + 4 * pi * r**5 / 15
-    x = u / a if a > 0 else np.array([1.0, 0.0, 0.0])
-    if a == 0 and b > 0:
-        x = np.cross(v, np.eye(3)[int(np.abs(v).argmin())])
-        x /= np.linalg.norm(x)
-    y = across - (across @ x) * x
-    length = float(np.linalg.norm(y))
-    y = y / length if length > 0 else np.array([0.0, 1.0, 0.0])
-    frame = np.column_stack([x, y, np.cross(x, y)])
+    frame = _axes(u, v)
     inertia = frame @ np.diag([yy + zz, xx + zz, xx + yy]) @ frame.T
-    return Moments(volume, center, (inertia + inertia.T) / 2)
+    return Moments(volume, corner + (u + v) / 2, (inertia + inertia.T) / 2)
+
+
+def _axes(u: Array, v: Array) -> Array:
+    """Rotation (3, 3) whose first columns point along ``u`` and ``v``, or across where one is zero."""
+    if not u.any():
+        u = _across(v) if v.any() else np.array([1.0, 0.0, 0.0])
+    if not v.any():
+        v = _across(u)
+    x = u / np.linalg.norm(u)
+    y = v - (v @ x) * x
+    y /= np.linalg.norm(y)
+    return np.column_stack([x, y, np.cross(x, y)])
+
+
+def _across(axis: Array) -> Array:
+    return np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
 
 
 def _along(a: float, b: float, r: float) -> float:

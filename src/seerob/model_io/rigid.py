@@ -8,7 +8,7 @@ from seerob.model_io.description import Link
 
 
 def groups(links: Sequence[Link]) -> tuple[tuple[Link, ...], ...]:
-    """Links that no joint moves relative to each other; the first of each group is the one its joint moves."""
+    """Links that no joint moves relative to each other; the first of each is the one its joint moves."""
     head: dict[str, str] = {}
     found: dict[str, list[Link]] = {}
     for link in links:

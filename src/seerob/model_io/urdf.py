@@ -158,7 +158,7 @@ def _joint(reader: Reader, name: str, element: Element) -> tuple[Joint, ...]:
             reader.finding("note", name, "a fixed joint that mimics another: mimic ignored")
         return ()
     if kind in {"floating", "planar"}:
-        remedy = "joints have one degree of freedom: chain prismatic and revolute ones, or place the robot with base"
+        remedy = "a joint has one degree of freedom: chain several, or place the robot with base"
         reader.problem(f"{key}.type", f"is {kind!r}", remedy)
         return ()
     if kind not in KINDS:

@@ -24,7 +24,7 @@ from seerob.model_io.xml_values import parse_xml
 MAX_EXPRESSION = 2000
 """Longest expression evaluated [characters]."""
 FORBIDDEN = {"python", "format", "format_map", "gi_frame", "gi_code", "mro"}
-"""Names an expression may not use: they lead out of plain values (``python`` is where xacro keeps ``type``)."""
+"""Names an expression may not use: they lead out of plain values; xacro keeps ``type`` in ``python``."""
 
 _ONE_AT_A_TIME = threading.Lock()
 

@@ -102,6 +102,8 @@ class Client:
                 self._wake.clear()
                 while (payload := self._next()) is not None:
                     await self._socket.send({"type": "websocket.send", "bytes": payload})
+                    # A turn of the loop, in which it may learn that the page is gone.
+                    await asyncio.sleep(0)
                 await self._wake.wait()
         except (WebSocketDisconnect, RuntimeError):
             # RuntimeError is what Starlette raises when the connection was closed meanwhile.

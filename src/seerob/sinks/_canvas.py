@@ -58,9 +58,9 @@ class Canvas:
         self._outline()
 
     def shadow(self, vertices: Array, faces: NDArray[np.int32], floor: float) -> None:
-        """Darken the floor (height [m]) below the bodies; call before `bodies`."""
+        """Darken the floor at a height [m] below the bodies, lit almost from above; call before `bodies`."""
         height = np.maximum(vertices[:, 2] - floor, 0.0)
-        flat = vertices - height[:, None] * (_LIGHT / _LIGHT[2])
+        flat = vertices - height[:, None] * np.array([0.15, -0.2, 1.0])
         screen, inverse = self.fine.project(flat)
         depth, owner = np.zeros_like(self.depth), np.full(self.owner.shape, -1, np.int32)
         ids = np.zeros(len(faces), np.int32)
@@ -145,11 +145,18 @@ class Canvas:
         screen, inverse = self.fine.project(point)
         if inverse[0] <= 0:
             return
-        ys, xs = np.mgrid[0 : self.fine.height, 0 : self.fine.width] + 0.5
+        reach = (radius + 3) * OVERSAMPLING
+        edge = np.array([self.fine.width, self.fine.height])
+        low = np.clip(np.floor(screen[0] - reach), 0, edge).astype(int)
+        high = np.clip(np.ceil(screen[0] + reach), 0, edge).astype(int)
+        if (high <= low).any():
+            return
+        ys, xs = np.mgrid[low[1] : high[1], low[0] : high[0]] + 0.5
+        window = (slice(low[1], high[1]), slice(low[0], high[0]))
         off = np.hypot(xs - screen[0, 0], ys - screen[0, 1])
         for size, paint in ((radius + 1.5, (1.0, 1.0, 1.0)), (radius, color)):
             cover = np.clip(size * OVERSAMPLING + 0.5 - off, 0, 1)[..., None]
-            self.rgb += cover * (np.array(paint) - self.rgb)
+            self.rgb[window] += cover * (np.array(paint) - self.rgb[window])
 
     def pixels(self) -> NDArray[np.uint8]:
         """The picture so far, shape (height, width, 3)."""

@@ -8,7 +8,7 @@ from seerob.errors import InputError
 from seerob.snapshot import Finding
 from seerob.source import Target
 from seerob.sources._mapped_table import MappedTable
-from seerob.tables.open import WORKBOOKS
+from seerob.tables.candidates import WORKBOOKS
 from seerob.trajectory import Trajectory
 
 

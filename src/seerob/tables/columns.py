@@ -41,7 +41,8 @@ def guess_columns(layout: Layout, given: Mapping, target: Target | None) -> Colu
     _single(layout, given, found, "time", Role.TIME)
     _single(layout, given, found, "robot_column", Role.ROBOT)
     _robots(layout, given, found, target)
-    _joints(layout, given, found, "joints", Role.JOINT)
+    if not _joints_by_name(layout, given, found, target):
+        _joints(layout, given, found, "joints", Role.JOINT)
     count = len(found.indices.get("joints", ()))
     _joints(layout, given, found, "velocities", Role.VELOCITY, count)
     _joints(layout, given, found, "torques", Role.TORQUE, count)
@@ -91,6 +92,18 @@ def _robots(layout: Layout, given: Mapping, found: Columns, target: Target | Non
     if len(names) > 1 and not own:
         shown = ", ".join(map(repr, list(names)[:12]))
         found.questions["robot"] = f"the rows are of {len(names)} robots: {shown}"
+
+
+def _joints_by_name(layout: Layout, given: Mapping, found: Columns, target: Target | None) -> bool:
+    """Whether the headers are the names of the robot's own joints, as ROS writes them."""
+    if target is None or given.joints is not None:
+        return False
+    indices = layout.find_all("joints", target.joints)
+    if isinstance(indices, list):
+        return False
+    found.indices["joints"] = indices
+    found.mapping["joints"] = tuple(layout.reference(i) for i in indices)
+    return True
 
 
 def _joints(

@@ -153,5 +153,6 @@ def read_numbers(
             numbers.append(count)
     if problems:
         raise InputError(problems)
-    values_array = np.array(flat, float).reshape(-1, len(indices))
-    return Numbers(np.array(numbers, np.int64), values_array, skipped, tuple(seen))
+    # Views of the arrays: a long file is not held twice.
+    table = np.frombuffer(flat, np.float64).reshape(-1, len(indices))
+    return Numbers(np.frombuffer(numbers, np.int64), table, skipped, tuple(seen))

@@ -13,10 +13,10 @@ from msgspec import convert, structs
 
 from seerob.errors import InputError, Problem
 from seerob.source import Target
+from seerob.tables.candidates import candidates
 from seerob.tables.columns import guess_columns
 from seerob.tables.layout import Layout, find_layout
 from seerob.tables.mapping import Mapping
-from seerob.tables.open import candidates
 from seerob.tables.units_guess import guess_units
 
 
@@ -72,7 +72,7 @@ def guess(
     fitting = [
         (layout, base)
         for grid, base in candidates(path, name, given)
-        if (layout := find_layout(grid, given)) is not None
+        if (layout := find_layout(grid, given, target.joints if target is not None else ())) is not None
     ]
     if not fitting:
         raise InputError.at(name, "header", "no row names a time and joints", _remedy(path, name, given))

@@ -39,6 +39,11 @@ class Header(NamedTuple):
 _SPELLINGS = {
     "s": "s sec secs second seconds sekunde sekunden seconde secondes",
     "ms": "ms msec millisecond milliseconds millisekunde millisekunden milliseconde millisecondes",
+    "us": "us µs μs usec",
+    "min": "min minute minutes",
+    # A degree in German, 0.9 of one in English: known as a word, never as a unit.
+    "grad": "grad gon",
+    "grad/s": "grad/s",
     "deg": "deg degs degree degrees ° degré degrés degre degres",
     "rad": "rad rads radian radians radiant",
     "mm": "mm millimeter millimetre",
@@ -53,7 +58,6 @@ _SPELLINGS = {
     "m/s2": "m/s2 m/s^2",
     "Nm": "nm n.m n*m n·m n⋅m",
 }
-# "Grad" is a degree in German and 0.9 of one in English: it declares nothing.
 UNITS = {spelling: unit for unit, all_of_it in _SPELLINGS.items() for spelling in all_of_it.split()}
 """Spelling, in lower case → unit."""
 

@@ -102,11 +102,12 @@ class Layout:
         return tuple(found[k] for k in sorted(found))
 
 
-def find_layout(grid: Grid, given: Mapping) -> Layout | None:
+def find_layout(grid: Grid, given: Mapping, joints: tuple[str, ...] = ()) -> Layout | None:
     """The header of a table; None when there is nothing like one.
 
     A row is taken when it holds every column that the mapping names; without a mapping, when it
-    names a time and a joint; failing that, when it names two joints.
+    names a time and a joint; failing that, when it names two joints. ``joints`` are the joints of the
+    robot that is to be driven: their own names in a header are understood too.
     """
     rows = list(islice(grid.rows(), PREVIEW + SEARCH))
     if given.header_row is not None:
@@ -122,7 +123,8 @@ def find_layout(grid: Grid, given: Mapping) -> Layout | None:
         roles = [h.role for h in layout.headers]
         if wanted and wanted <= {_same(h.text) for h in layout.headers}:
             return layout
-        if Role.TIME in roles and Role.JOINT in roles and not wanted:
+        own = bool(joints) and set(map(_same, joints)) <= {_same(h.text) for h in layout.headers}
+        if Role.TIME in roles and (Role.JOINT in roles or own) and not wanted:
             return layout
         if roles.count(Role.JOINT) >= 2 or (wanted and Role.JOINT in roles):
             second = second or layout

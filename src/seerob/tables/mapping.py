@@ -18,6 +18,8 @@ class TimeUnit(StrEnum):
 
     S = "s"
     MS = "ms"
+    US = "us"
+    MIN = "min"
 
 
 class PositionUnit(StrEnum):
@@ -55,6 +57,8 @@ class LengthUnit(StrEnum):
 SI: dict[str, tuple[str, float]] = {
     "s": ("s", 1.0),
     "ms": ("s", 1e-3),
+    "us": ("s", 1e-6),
+    "min": ("s", 60.0),
     "deg": ("rad", pi / 180),
     "rad": ("rad", 1.0),
     "mm": ("m", 1e-3),

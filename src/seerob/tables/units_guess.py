@@ -55,7 +55,7 @@ def guess_units(layout: Layout, columns: Columns, given: Mapping) -> Units:
         found,
         "time",
         "time_unit",
-        ("s", "ms"),
+        ("s", "ms", "us", "min"),
         "ms" if step >= 0.5 else "s",
         f"steps of {step:g}",
     )

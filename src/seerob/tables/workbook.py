@@ -46,7 +46,9 @@ def check_workbook(path: Path, name: str) -> None:
                     with archive.open(part) as stream:
                         if b"<!DOCTYPE" in stream.read(4096):
                             raise InputError.at(name, part.filename, "declares a document type", SAVE_AS)
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, OSError, NotImplementedError, RuntimeError) as error:
+    except InputError:
+        raise
+    except Exception as error:  # zipfile and zlib raise many things over a broken archive
         raise InputError.at(name, "", f"not a workbook: {error}", SAVE_AS) from error
 
 

@@ -33,7 +33,8 @@ export class ArrowDrawn implements Drawn<Arrow> {
     this.stroke.update(origin, this.anchor, marker.verdict);
     this.head.visible = this.length > 1e-9;
     this.head.position.copy(this.anchor);
-    if (this.head.visible) this.head.quaternion.copy(turn.setFromUnitVectors(UP, vector.divideScalar(this.length)));
+    if (this.head.visible)
+      this.head.quaternion.copy(turn.setFromUnitVectors(UP, vector.divideScalar(this.length)));
     this.head.material = markerMaterial("line", marker.verdict);
   }
 

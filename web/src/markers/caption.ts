@@ -23,7 +23,12 @@ export class Caption {
   private shown = "";
 
   constructor() {
-    this.material = new SpriteMaterial({ depthTest: false, transparent: true, toneMapped: false, fog: false });
+    this.material = new SpriteMaterial({
+      depthTest: false,
+      transparent: true,
+      toneMapped: false,
+      fog: false,
+    });
     this.object = new Sprite(this.material);
     this.object.renderOrder = 10;
     this.object.raycast = () => {};

@@ -2,7 +2,7 @@
 // no garbage to speak of.
 
 import { Group } from "three";
-import { stateOf, STATE_ORDER } from "../verdicts";
+import { STATE_ORDER, stateOf } from "../verdicts";
 import type { Marker, Result, Verdict } from "../wire";
 import { Caption } from "./caption";
 import type { Drawn, View } from "./drawn";
@@ -30,7 +30,12 @@ export class MarkerLayer {
    * @param selected Criterion whose labels are always written, beside the worst three.
    * @param captions Whether labels are written at all.
    */
-  update(results: readonly Result[], muted: ReadonlySet<string>, selected: string | null, captions: boolean): void {
+  update(
+    results: readonly Result[],
+    muted: ReadonlySet<string>,
+    selected: string | null,
+    captions: boolean,
+  ): void {
     this.painted.clear();
     const captioned = captions ? worst(results, muted) : new Set<string>();
     if (captions && selected) captioned.add(selected);
@@ -81,7 +86,7 @@ export class MarkerLayer {
   }
 
   private write(slot: Slot, marker: Marker, captioned: boolean): void {
-    const text = captioned && "label" in marker && marker.type !== "highlight" ? marker.label : "";
+    const text = captioned && "label" in marker ? marker.label : "";
     if (text === "") {
       if (slot.caption) slot.caption.object.visible = false;
       return;
@@ -112,7 +117,12 @@ export class MarkerLayer {
 function worst(results: readonly Result[], muted: ReadonlySet<string>): Set<string> {
   const rank = (r: Result): number => STATE_ORDER.indexOf(stateOf(r));
   const shown = results.filter((r) => !muted.has(r.name) && r.markers.length > 0);
-  return new Set(shown.sort((a, b) => rank(a) - rank(b)).slice(0, CAPTIONED_RESULTS).map((r) => r.name));
+  return new Set(
+    shown
+      .sort((a, b) => rank(a) - rank(b))
+      .slice(0, CAPTIONED_RESULTS)
+      .map((r) => r.name),
+  );
 }
 
 const RANK: (Verdict | null)[] = [null, "within", "undecided", "exceeded"];

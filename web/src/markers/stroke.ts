@@ -31,7 +31,8 @@ export class Stroke {
     this.length = along.length();
     this.object.visible = this.length > 1e-9;
     this.object.position.addVectors(this.start, this.end).multiplyScalar(0.5);
-    if (this.object.visible) this.object.quaternion.copy(turn.setFromUnitVectors(UP, along.divideScalar(this.length)));
+    if (this.object.visible)
+      this.object.quaternion.copy(turn.setFromUnitVectors(UP, along.divideScalar(this.length)));
     this.solid.material = markerMaterial("line", verdict);
     this.ghost.material = markerMaterial("ghost", verdict);
   }

@@ -23,6 +23,12 @@ export function CriteriaTable() {
   return (
     <section class="criteria scroll" aria-label="Criteria">
       <table class={stale.value ? "stale" : ""}>
+        <colgroup>
+          <col />
+          <col class="col-value" />
+          <col class="col-limit" />
+          <col class="col-state" />
+        </colgroup>
         <thead>
           <tr>
             <th scope="col">Criterion</th>
@@ -40,7 +46,11 @@ export function CriteriaTable() {
         <tbody>
           {orderedRows.value.map((row) => (
             <Fragment key={row.info.name}>
-              <CriterionRow row={row} open={opened.value === row.info.name} onToggle={() => toggle(row.info.name)} />
+              <CriterionRow
+                row={row}
+                open={opened.value === row.info.name}
+                onToggle={() => toggle(row.info.name)}
+              />
               {opened.value === row.info.name && (
                 <tr class="details">
                   <td colSpan={COLUMNS}>
@@ -67,49 +77,65 @@ function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onTogg
   const unit = result?.unit ?? info.unit;
   const reason = result?.reason ?? (state === "missing" ? "nothing was said about it in this snapshot" : "");
   const shown = stale.value && state !== "missing" ? "off" : state;
+  const look = `row-${shown} ${chosen ? "selected" : ""}`;
   return (
-    <tr class={`row row-${shown} ${chosen ? "selected" : ""}`} data-criterion={info.name} title={hint(row)}>
-      <th scope="row">
-        <button type="button" class={`twist ${open ? "open" : ""}`} aria-expanded={open} onClick={onToggle}>
-          <Icon name="chevron" />
-          <span class="criterion-name">{info.name}</span>
-        </button>
-        <button
-          type="button"
-          class={`eye ${muted ? "off" : ""}`}
-          aria-label={`${muted ? "Show" : "Hide"} markers of ${info.name}`}
-          onClick={() => toggleMuted(info.name)}
-        >
-          <Icon name={muted ? "eye-off" : "eye"} />
-        </button>
-        {reason !== "" && <span class="reason">{reason}</span>}
-      </th>
-      <td class="number">
-        <span class="value">{formatNumber(result?.value ?? null, limit)}</span> <span class="unit">{unit}</span>
-        {result && <Usage result={result} />}
-      </td>
-      <td class="number limit">
-        {limit === null ? (
-          "–"
-        ) : (
-          <>
-            <span class="bound" title={info.at_most ? "at most" : "at least"}>
-              {info.at_most ? "≤" : "≥"}
-            </span>{" "}
-            {formatNumber(limit)} <span class="unit">{unit}</span>
-          </>
-        )}
-        {result && limit !== null && (
-          <span class="margin" title="Distance to the limit, as a share of the limit">
-            {formatPercent(margin(result))}
-          </span>
-        )}
-      </td>
-      <td class="state">
-        <StateBadge state={state} />
-        {result?.t !== null && result?.t !== undefined && <span class="instant">at {formatTime(result.t)}</span>}
-      </td>
-    </tr>
+    <>
+      <tr
+        class={`row ${look} ${reason === "" ? "" : "explained"}`}
+        data-criterion={info.name}
+        title={hint(row)}
+      >
+        <th scope="row">
+          <button type="button" class={`twist ${open ? "open" : ""}`} aria-expanded={open} onClick={onToggle}>
+            <Icon name="chevron" />
+            <span class="criterion-name">{info.name}</span>
+          </button>
+          <button
+            type="button"
+            class={`eye ${muted ? "off" : ""}`}
+            aria-label={`${muted ? "Show" : "Hide"} markers of ${info.name}`}
+            onClick={() => toggleMuted(info.name)}
+          >
+            <Icon name={muted ? "eye-off" : "eye"} />
+          </button>
+        </th>
+        <td class="number">
+          <span class="value">{formatNumber(result?.value ?? null, limit)}</span>{" "}
+          <span class="unit">{unit}</span>
+          {result && <Usage result={result} />}
+        </td>
+        <td class="number limit">
+          {limit === null ? (
+            "–"
+          ) : (
+            <>
+              <span class="bound" title={info.at_most ? "at most" : "at least"}>
+                {info.at_most ? "≤" : "≥"}
+              </span>{" "}
+              {formatNumber(limit)} <span class="unit">{unit}</span>
+            </>
+          )}
+          {result && limit !== null && (
+            <span class="margin" title="Left to the limit; negative is beyond it">
+              {leftOf(result)}
+            </span>
+          )}
+        </td>
+        <td class="state">
+          <StateBadge state={state} />
+          {result?.t !== null && result?.t !== undefined && (
+            <span class="instant">at {formatTime(result.t)}</span>
+          )}
+        </td>
+      </tr>
+      {reason !== "" && (
+        <tr class={`row explanation ${look}`}>
+          <td colSpan={COLUMNS}>
+            <span class="reason">{reason}</span>
+          </td>
+        </tr>
+      )}
+    </>
   );
 }
 
@@ -125,6 +151,14 @@ function Usage({ result }: { result: Result }) {
       <b style={{ left: share(limit) }} />
     </span>
   );
+}
+
+// A share of the limit; of a limit that is zero there is none, so the difference itself.
+function leftOf(result: Result): string {
+  const share = margin(result);
+  if (share !== null || result.value === null || result.limit === null) return formatPercent(share);
+  const left = result.at_most ? result.limit - result.value : result.value - result.limit;
+  return formatQuantity(left, result.unit, result.value);
 }
 
 function hint({ info }: Row): string {

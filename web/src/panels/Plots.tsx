@@ -3,7 +3,19 @@
 import { effect, signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { formatQuantity } from "../format";
-import { isLive, lookingAt, now, reach, rows, scene, select, selection, stale, traces, tracesRevision } from "../page_state";
+import {
+  isLive,
+  lookingAt,
+  now,
+  reach,
+  rows,
+  scene,
+  select,
+  selection,
+  stale,
+  traces,
+  tracesRevision,
+} from "../page_state";
 import { Chart, type ChartView } from "../plots/chart";
 import { useActions } from "./app_context";
 import { StateBadge } from "./StateBadge";
@@ -58,7 +70,9 @@ export function Plots({ count }: { count: number }) {
 // Those with a limit first, in the file's order; the selected one is always among them.
 function plotted(count: number): string[] {
   const all = scene.value?.criteria ?? [];
-  const ranked = [...all.filter((c) => c.limit !== null), ...all.filter((c) => c.limit === null)].map((c) => c.name);
+  void tracesRevision.value;
+  const judged = all.filter((c) => c.limit !== null || traces.get(c.name)?.judged);
+  const ranked = [...judged, ...all.filter((c) => !judged.includes(c))].map((c) => c.name);
   const names = ranked.slice(0, count);
   const chosen = selection.value?.kind === "criterion" ? selection.value.name : null;
   if (chosen && ranked.includes(chosen) && !names.includes(chosen)) names[names.length - 1] = chosen;
@@ -110,10 +124,12 @@ function viewNow(): ChartView {
   const at = now.peek();
   const { start, end } = reach.peek();
   if (isLive.peek()) {
-    const span = width ?? Math.max(end - firstTime(), 10);
-    if (lookingAt.peek() === null) return { start: end - span, end, now: at };
-    const middle = Math.min(Math.max(at + span / 2, firstTime() + span), Math.max(end, firstTime() + span));
-    return { start: middle - span, end: middle, now: at };
+    const first = firstTime();
+    const span = width ?? Math.max(end - first, 10);
+    const newest = Math.max(end, first + span);
+    const right =
+      lookingAt.peek() === null ? newest : Math.min(Math.max(at + span / 2, first + span), newest);
+    return { start: right - span, end: right, now: at };
   }
   if (width === null || width >= end - start) return { start, end: Math.max(end, start + 1e-3), now: at };
   const left = Math.min(Math.max(at - width / 2, start), end - width);

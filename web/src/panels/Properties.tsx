@@ -14,7 +14,9 @@ export function Properties() {
   const first = nodes[0];
   if (!first) return <p class="empty">{chosen.name} is not in this scene.</p>;
   const mechanism = chosen.kind === "owner" ? run.mechanisms.find((m) => m.name === chosen.name) : undefined;
-  const findings = run.findings.filter((f) => nodes.some((n) => isAbout(f.subject, n)) || f.subject === chosen.name);
+  const findings = run.findings.filter(
+    (f) => nodes.some((n) => isAbout(f.subject, n)) || f.subject === chosen.name,
+  );
   return (
     <div class="properties">
       <h2>{chosen.name}</h2>
@@ -84,7 +86,9 @@ function Mass({ nodes }: { nodes: readonly Node[] }) {
           </>
         )}
         {unknown > 0 && (
-          <span class="unknown">{nodes.length === 1 ? "not given" : ` ${unknown} of ${nodes.length} not given`}</span>
+          <span class="unknown">
+            {nodes.length === 1 ? "not given" : ` ${unknown} of ${nodes.length} not given`}
+          </span>
         )}
       </dd>
     </>

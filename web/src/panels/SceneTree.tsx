@@ -23,7 +23,10 @@ interface Owner {
 export function SceneTree() {
   const search = useSignal("");
   const owners = useComputed(() => ownersOf(scene.value?.nodes ?? [], search.value.trim().toLowerCase()));
-  const roles = ROLES.map(([role, title]) => ({ title, owners: owners.value.filter((o) => o.role === role) }));
+  const roles = ROLES.map(([role, title]) => ({
+    title,
+    owners: owners.value.filter((o) => o.role === role),
+  }));
   const known = new Set(ROLES.map(([role]) => role));
   roles.push({ title: "Other", owners: owners.value.filter((o) => !known.has(o.role)) });
   return (

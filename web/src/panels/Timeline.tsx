@@ -13,15 +13,16 @@ const LIVE_LEAST_S = 60;
 export function Timeline() {
   const { time } = useActions();
   const canvas = useRef<HTMLCanvasElement>(null);
-  const judged = scene.value?.criteria.filter((c) => c.limit !== null || hasVerdicts(c.name)) ?? [];
   void tracesRevision.value;
+  const judged = scene.value?.criteria.filter((c) => c.limit !== null || traces.get(c.name)?.judged) ?? [];
   const names = judged.map((c) => c.name);
   const key = names.join("\n");
 
   useEffect(() => {
     const target = canvas.current;
     if (!target) return;
-    const draw = (): void => drawLanes(target, key === "" ? [] : key.split("\n"), stripRange(), now.peek(), stale.peek());
+    const draw = (): void =>
+      drawLanes(target, key === "" ? [] : key.split("\n"), stripRange(), now.peek(), stale.peek());
     const resized = new ResizeObserver(draw);
     resized.observe(target);
     let waiting = 0;
@@ -91,10 +92,6 @@ export function Timeline() {
 function stripRange(): TimeRange {
   const { start, end } = reach.value;
   if (!isLive.value) return { start, end: Math.max(end, start + 1e-3) };
-  return { start: Math.min(start, end - LIVE_LEAST_S), end };
-}
-
-function hasVerdicts(name: string): boolean {
-  const trace = traces.get(name);
-  return trace !== undefined && trace.spans.length > 0;
+  const from = Number.isFinite(start) ? start : 0;
+  return { start: from, end: Math.max(end, from + LIVE_LEAST_S) };
 }

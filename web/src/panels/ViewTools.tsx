@@ -2,8 +2,8 @@
 
 import { useSignal } from "@preact/signals";
 import { mutedCriteria, scene, toggleMuted } from "../page_state";
-import type { Preset } from "../scene/viewpoint";
 import { showCaptions, showGrid } from "../scene/viewer";
+import type { Preset } from "../scene/viewpoint";
 import { useActions } from "./app_context";
 import { Icon } from "./Icon";
 
@@ -28,7 +28,12 @@ export function ViewTools() {
             {title}
           </button>
         ))}
-        <button type="button" title="Frame the selection (F)" aria-label="Frame the selection" onClick={() => actions.frameSelection()}>
+        <button
+          type="button"
+          title="Frame the selection (F)"
+          aria-label="Frame the selection"
+          onClick={() => actions.frameSelection()}
+        >
           <Icon name="frame" />
         </button>
       </fieldset>
@@ -53,7 +58,11 @@ function OverlayList() {
     <div class="overlay-list">
       {scene.value?.criteria.map(({ name }, i) => (
         <label key={name}>
-          <input type="checkbox" checked={!mutedCriteria.value.has(name)} onChange={() => toggleMuted(name)} />
+          <input
+            type="checkbox"
+            checked={!mutedCriteria.value.has(name)}
+            onChange={() => toggleMuted(name)}
+          />
           <span>{name}</span>
           {i < 9 && <kbd>{i + 1}</kbd>}
         </label>

@@ -58,7 +58,12 @@ export class Chart {
   }
 
   private options(): uPlot.Options {
-    const axis = { stroke: TEXT, grid: { stroke: GRID, width: 1 }, ticks: { show: false }, font: "11px system-ui" };
+    const axis = {
+      stroke: TEXT,
+      grid: { stroke: GRID, width: 1 },
+      ticks: { show: false },
+      font: "11px system-ui",
+    };
     return {
       width: Math.max(this.element.clientWidth, 50),
       height: Math.max(this.element.clientHeight, 50),
@@ -68,7 +73,13 @@ export class Chart {
       scales: { x: { time: false, auto: false }, y: { auto: false } },
       axes: [
         { ...axis, size: 22, gap: 2, values: (_, ticks) => ticks.map(shortTime) },
-        { ...axis, size: 48, gap: 4, space: 26, values: (_, ticks) => ticks.map((y) => formatNumber(y, Math.max(...ticks.map(Math.abs)))) },
+        {
+          ...axis,
+          size: 48,
+          gap: 4,
+          space: 26,
+          values: (_, ticks) => ticks.map((y) => formatNumber(y, Math.max(...ticks.map(Math.abs)))),
+        },
       ],
       series: [
         {},
@@ -108,7 +119,9 @@ export class Chart {
 }
 
 function shortTime(t: number): string {
-  return t >= 60 || t <= -60 ? formatTime(t).replace(/\.?0+$/, "") : `${Number(t.toFixed(3))}`.replace("-", "−");
+  return t >= 60 || t <= -60
+    ? formatTime(t).replace(/\.?0+$/, "")
+    : `${Number(t.toFixed(3))}`.replace("-", "−");
 }
 
 // Room for every value and for the limit, with a little air.

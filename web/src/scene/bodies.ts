@@ -1,10 +1,22 @@
 // The bodies of the twin: one group per node, posed by the newest block, dressed by its mesh.
 
-import { Box3, Group, type Material, Mesh, type Object3D, Quaternion, Vector3 } from "three";
+import {
+  Box3,
+  Group,
+  type Material,
+  Mesh,
+  MeshStandardMaterial,
+  type Object3D,
+  Quaternion,
+  Vector3,
+} from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { FLOATS_PER_NODE } from "../poses";
 import type { Node, Scene, Verdict } from "../wire";
 import { bodyMaterial } from "./materials";
+
+/** Light that a selected body gives off. */
+const SELECTED_GLOW = 0x1c4a7d;
 
 const ONE = new Vector3(1, 1, 1);
 
@@ -14,6 +26,7 @@ export class Body {
   readonly extent = new Box3();
   private dressed: { mesh: Mesh; own: Material | Material[] }[] = [];
   private painted: Verdict | null | undefined = undefined;
+  private lit = false;
 
   constructor(readonly node: Node) {
     this.group.name = node.name;
@@ -27,6 +40,10 @@ export class Body {
       if (!(part instanceof Mesh)) return;
       part.castShadow = true;
       part.receiveShadow = true;
+      // Its own copy: bodies that share a mesh are selected one by one.
+      part.material = Array.isArray(part.material)
+        ? part.material.map((m) => m.clone())
+        : part.material.clone();
       this.dressed.push({ mesh: part, own: part.material });
     });
     this.extent.setFromObject(model);
@@ -41,9 +58,19 @@ export class Body {
     this.repaint();
   }
 
+  /** Make it stand out as selected. */
+  light(on: boolean): void {
+    if (on === this.lit) return;
+    this.lit = on;
+    this.repaint();
+  }
+
   private repaint(): void {
     for (const { mesh, own } of this.dressed) {
       mesh.material = this.painted === undefined ? own : bodyMaterial(this.painted);
+      for (const material of [own].flat()) {
+        if (material instanceof MeshStandardMaterial) material.emissive.setHex(this.lit ? SELECTED_GLOW : 0);
+      }
     }
   }
 }
@@ -106,6 +133,11 @@ export class Bodies {
 
   hide(names: ReadonlySet<string>): void {
     for (const body of this.list) body.group.visible = !names.has(body.node.name);
+  }
+
+  /** Make these stand out as selected, and only these. */
+  light(names: ReadonlySet<string>): void {
+    for (const body of this.list) body.light(names.has(body.node.name));
   }
 
   /** Colour the bodies that verdicts are about, and only those. */

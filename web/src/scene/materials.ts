@@ -27,7 +27,7 @@ type Kind = "line" | "ghost" | "fill" | "edge";
 const LOOK: Record<Kind, { opacity: number; depthTest: boolean; depthWrite: boolean }> = {
   line: { opacity: 1, depthTest: true, depthWrite: true },
   ghost: { opacity: 0.35, depthTest: false, depthWrite: false },
-  fill: { opacity: 0.24, depthTest: true, depthWrite: false },
+  fill: { opacity: 0.15, depthTest: true, depthWrite: false },
   edge: { opacity: 0.9, depthTest: true, depthWrite: false },
 };
 

@@ -1,6 +1,13 @@
 // What is selected: corner brackets around each body's own box.
 
-import { type Box3, BufferGeometry, Float32BufferAttribute, LineBasicMaterial, LineSegments, type Object3D } from "three";
+import {
+  type Box3,
+  BufferGeometry,
+  Float32BufferAttribute,
+  LineBasicMaterial,
+  LineSegments,
+  type Object3D,
+} from "three";
 import type { Bodies } from "./bodies";
 
 const COLOR = 0xffffff;

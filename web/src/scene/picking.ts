@@ -16,7 +16,10 @@ export function pickOnClick(stage: Stage, bodies: Bodies, picked: (name: string 
   canvas.addEventListener("pointerup", (event) => {
     if (event.button !== 0 || pressed.distanceTo(at.set(event.clientX, event.clientY)) > STILL_PX) return;
     const box = canvas.getBoundingClientRect();
-    at.set(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
+    at.set(
+      ((event.clientX - box.left) / box.width) * 2 - 1,
+      1 - ((event.clientY - box.top) / box.height) * 2,
+    );
     ray.setFromCamera(at, stage.camera);
     const hits = ray.intersectObject(bodies.root, true);
     picked(hits.map((hit) => nodeOf(hit.object)).find((name) => name !== null) ?? null);

@@ -3,8 +3,8 @@
 import { effect, signal } from "@preact/signals";
 import { Quaternion, Vector3 } from "three";
 import type { PoseFeed } from "../connection";
-import { MarkerLayer } from "../markers/layer";
 import type { View } from "../markers/drawn";
+import { MarkerLayer } from "../markers/layer";
 import type { Frame } from "../messages";
 import { hidden, mutedCriteria, select, selectedNodes, selection, stale } from "../page_state";
 import type { Scene } from "../wire";
@@ -51,7 +51,7 @@ export class Viewer {
     unseen.value = await this.bodies.load(scene);
     if (feed !== this.feed) return;
     this.bodies.hide(hidden.peek());
-    this.outline.show(selectedNodes.peek());
+    this.emphasize();
     this.dressed = true;
     this.stage.moved();
   }
@@ -109,10 +109,19 @@ export class Viewer {
     this.stage.invalidate();
   }
 
+  // A body is bracketed, a whole robot or person only lit; a criterion shows itself by its markers.
+  private emphasize(): void {
+    const chosen = selection.peek();
+    const names = selectedNodes.peek();
+    this.bodies.light(chosen?.kind === "criterion" ? new Set() : names);
+    this.outline.show(chosen?.kind === "node" ? names : new Set());
+    this.stage.invalidate();
+  }
+
   private follow(): void {
     effect(() => {
-      this.outline.show(selectedNodes.value);
-      this.stage.invalidate();
+      void [selection.value, selectedNodes.value];
+      this.emphasize();
     });
     effect(() => {
       this.bodies.hide(hidden.value);

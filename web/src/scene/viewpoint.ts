@@ -85,7 +85,9 @@ export class Viewpoint {
     for (const { group, node } of this.bodies.byName.values()) {
       if (node.role !== "human") this.box.union(worldBox(group));
     }
-    const target = this.box.isEmpty() ? eye.clone().add(new Vector3(0, 0, -1)) : this.box.getCenter(this.size);
+    const target = this.box.isEmpty()
+      ? eye.clone().add(new Vector3(0, 0, -1))
+      : this.box.getCenter(this.size);
     const reach = target.clone().sub(eye).setLength(0.12);
     this.stage.camera.position.copy(eye).add(reach);
     this.controls.target.copy(target);
@@ -100,4 +102,3 @@ function worldBox(object: Object3D): Box3 {
   object.updateWorldMatrix(true, true);
   return scratch.setFromObject(object);
 }
-

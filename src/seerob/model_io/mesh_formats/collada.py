@@ -13,6 +13,7 @@ from seerob.model_io.mesh_formats.source import Color, MeshSource, RawFile, RawM
 from seerob.transforms import Array
 
 _MAX_DEPTH = 200
+_MAX_NODES = 200_000
 
 
 def read(source: MeshSource) -> RawFile:
@@ -34,15 +35,16 @@ def read(source: MeshSource) -> RawFile:
         for error in document.errors:
             source.note(f"ignored: {type(error).__name__}: {str(error)[:200]}", level="warning")
         meshes: list[RawMesh] = []
-        count = 0
+        count = visited = 0
         # A stack instead of recursion: depth is the file's choice.
         stack: list[tuple[Any, Array, tuple[str, ...]]] = (
             [] if document.scene is None else [(n, np.eye(4), ()) for n in reversed(document.scene.nodes)]
         )
         while stack:
             node, matrix, names = stack.pop()
-            if len(names) > _MAX_DEPTH:
-                source.fail(f"nodes are nested deeper than {_MAX_DEPTH}")
+            visited += 1
+            if len(names) > _MAX_DEPTH or visited > _MAX_NODES:
+                source.fail(f"has more than {_MAX_NODES} nodes, or nests them deeper than {_MAX_DEPTH}")
             if isinstance(node, collada.scene.GeometryNode):
                 for mesh in _meshes(source, node, matrix, names):
                     count += len(mesh.faces)

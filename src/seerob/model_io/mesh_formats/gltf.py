@@ -16,6 +16,8 @@ _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_mesh_quantization", "KHR_lights_")
 _MAX_DEPTH = 200
+_MAX_ZEROS = 5_000_000
+"""Elements that an accessor may have without data of its own."""
 
 
 def read(source: MeshSource) -> RawFile:
@@ -162,8 +164,8 @@ class _Reader:
         component, width = accessor["componentType"], _WIDTHS[accessor["type"]]
         count = int(accessor["count"])
         dtype = np.dtype(_COMPONENTS[component])
-        if not 0 <= count <= 100_000_000:
-            self.source.fail(f"accessors[{index}] has {count} elements")
+        if count < 0 or ("bufferView" not in accessor and count > _MAX_ZEROS):
+            self.source.fail(f"accessors[{index}] has {count} elements", "export it again")
         if "bufferView" in accessor:
             values = self.view(accessor["bufferView"], accessor.get("byteOffset", 0), dtype, count, width)
         else:
@@ -185,7 +187,11 @@ class _Reader:
         start, size = int(view.get("byteOffset", 0)), int(view["byteLength"])
         stride = int(view.get("byteStride", dtype.itemsize * width))
         needed = offset + (count - 1) * stride + dtype.itemsize * width if count else 0
-        if min(start, size, offset, stride) < 0 or start + size > len(data) or needed > size:
+        if (
+            min(start, size, offset, stride - dtype.itemsize * width) < 0
+            or start + size > len(data)
+            or needed > size
+        ):
             self.source.fail(f"bufferViews[{index}] reaches past its data: truncated?", "export it again")
         return np.ndarray((count, width), dtype, data, start + offset, (stride, dtype.itemsize))
 

@@ -78,10 +78,10 @@ class _Package:
             return self.models[part]
         root = self.models[part] = self._xml(part)
         colors: dict[tuple[str, int], Color] = {}
-        for group in root.iter("{*}basematerials"):
+        for group in root.iterfind(".//{*}basematerials"):
             for number, base in enumerate(group.findall("{*}base")):
                 colors[group.get("id"), number] = _color(base.get("displaycolor", ""))
-        for element in root.iter("{*}object"):
+        for element in root.iterfind(".//{*}object"):
             if element.get("type", "model") in {"support", "other"}:
                 continue
             self.objects[part, element.get("id")] = self._object(part, element, colors)

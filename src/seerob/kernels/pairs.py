@@ -1,0 +1,219 @@
+"""Two solids at given poses: where they are, whether one is inside the other, how near their cores are.
+
+Columns of ``which``, per solid: body, is a mesh, has an inside, is closed, first and last node, first
+and last triangle, first and last probe (a vertex of each connected piece), number of corners.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from seerob.kernels.boxes import box_box, segment_box
+from seerob.kernels.primitives import segment_segment
+from seerob.kernels.search import mesh_mesh, mesh_segment
+from seerob.kernels.winding import contains
+from seerob.transforms import Array
+
+Links = NDArray[np.int32]
+Indices = NDArray[np.int64]
+
+BODY, MESH, VOLUME, CLOSED, NODE, NODE_END, TRIANGLE, TRIANGLE_END, PROBE, PROBE_END, CORNERS = range(11)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def place(
+    rotation: Array,
+    position: Array,
+    which: Indices,
+    local: Array,
+    ball: Array,
+    corners: Array,
+    used: Indices,
+    world: Array,
+    centre: Array,
+    at: Array,
+    moved: Array,
+) -> int:
+    """World poses, ball centres and corners of the solids in use, and how far each has moved.
+
+    Returns the body of a pose that is not finite, or -1.
+    """
+    for s in used:
+        body = which[s, BODY]
+        R = rotation[body]
+        p = position[body]
+        size = 0.0
+        for c in range(3):
+            size += abs(R[c, 0]) + abs(R[c, 1]) + abs(R[c, 2]) + abs(p[c])
+        if not size < 1e100:
+            return int(body)
+        for c in range(3):
+            for d in range(3):
+                world[s, 3 * c + d] = (
+                    R[c, 0] * local[s, d] + R[c, 1] * local[s, 3 + d] + R[c, 2] * local[s, 6 + d]
+                )
+            world[s, 9 + c] = R[c, 0] * local[s, 9] + R[c, 1] * local[s, 10] + R[c, 2] * local[s, 11] + p[c]
+        for c in range(3):
+            centre[s, c] = (
+                world[s, 3 * c] * ball[s, 0]
+                + world[s, 3 * c + 1] * ball[s, 1]
+                + world[s, 3 * c + 2] * ball[s, 2]
+                + world[s, 9 + c]
+            )
+        most = 0.0
+        for k in range(which[s, CORNERS]):
+            gap = 0.0
+            for c in range(3):
+                x = (
+                    world[s, 3 * c] * corners[s, k, 0]
+                    + world[s, 3 * c + 1] * corners[s, k, 1]
+                    + world[s, 3 * c + 2] * corners[s, k, 2]
+                    + world[s, 9 + c]
+                )
+                gap += (x - at[s, k, c]) ** 2
+                at[s, k, c] = x
+            most = max(most, gap)
+        moved[s] = math.sqrt(most) + 1e-12
+    return -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _into(world: Array, s: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A world point in the frame of solid s."""
+    x -= world[s, 9]
+    y -= world[s, 10]
+    z -= world[s, 11]
+    return (
+        world[s, 0] * x + world[s, 3] * y + world[s, 6] * z,
+        world[s, 1] * x + world[s, 4] * y + world[s, 7] * z,
+        world[s, 2] * x + world[s, 5] * y + world[s, 8] * z,
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def inside(
+    i: int, j: int, which: Indices, nodes: Array, links: Links, T: Array, probes: Array, world: Array
+) -> bool:
+    """Whether a connected piece of core i begins inside the mesh of solid j."""
+    for k in range(which[i, PROBE], which[i, PROBE_END]):
+        x = world[i, 0] * probes[k, 0] + world[i, 1] * probes[k, 1] + world[i, 2] * probes[k, 2] + world[i, 9]
+        y = (
+            world[i, 3] * probes[k, 0]
+            + world[i, 4] * probes[k, 1]
+            + world[i, 5] * probes[k, 2]
+            + world[i, 10]
+        )
+        z = (
+            world[i, 6] * probes[k, 0]
+            + world[i, 7] * probes[k, 1]
+            + world[i, 8] * probes[k, 2]
+            + world[i, 11]
+        )
+        x, y, z = _into(world, j, x, y, z)
+        if contains(
+            nodes[which[j, NODE] : which[j, NODE_END]],
+            links[which[j, NODE] : which[j, NODE_END]],
+            T[which[j, TRIANGLE] : which[j, TRIANGLE_END]],
+            x,
+            y,
+            z,
+        ):
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _relative(world: Array, i: int, j: int, R: Array, t: Array) -> None:
+    """Pose of solid j in the frame of solid i, to R (9,) and t (3,)."""
+    for c in range(3):
+        for d in range(3):
+            R[3 * c + d] = (
+                world[i, c] * world[j, d]
+                + world[i, 3 + c] * world[j, 3 + d]
+                + world[i, 6 + c] * world[j, 6 + d]
+            )
+    t[0], t[1], t[2] = _into(world, i, world[j, 9], world[j, 10], world[j, 11])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def root_bound(
+    i: int, j: int, which: Indices, nodes: Array, world: Array, at: Array, R: Array, t: Array
+) -> float:
+    """Lower bound of the distance of cores i (a mesh where one is) and j, from their root boxes [m]."""
+    if not which[i, MESH]:
+        return 0.0
+    A = nodes[which[i, NODE] : which[i, NODE_END]]
+    if which[j, MESH]:
+        _relative(world, i, j, R, t)
+        return math.sqrt(box_box(A, 0, nodes[which[j, NODE] : which[j, NODE_END]], 0, R, t, np.inf))
+    ax, ay, az = _into(world, i, at[j, 0, 0], at[j, 0, 1], at[j, 0, 2])
+    bx, by, bz = _into(world, i, at[j, 1, 0], at[j, 1, 1], at[j, 1, 2])
+    bx -= ax
+    by -= ay
+    bz -= az
+    return math.sqrt(segment_box(A, 0, ax, ay, az, bx, by, bz, bx * bx + by * by + bz * bz, np.inf))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def core_distance(
+    i: int,
+    j: int,
+    limit: float,
+    which: Indices,
+    nodes: Array,
+    links: Links,
+    T: Array,
+    world: Array,
+    at: Array,
+    first: Indices,
+    stack: Links,
+    bounds: Array,
+    R: Array,
+    t: Array,
+    W: Array,
+) -> float:
+    """Squared distance of two cores, with world points on i and j in ``W[:6]``; i is a mesh where one is."""
+    if not which[i, MESH]:
+        a = at[i]
+        b = at[j]
+        ex, ey, ez = b[1, 0] - b[0, 0], b[1, 1] - b[0, 1], b[1, 2] - b[0, 2]
+        dx, dy, dz = a[1, 0] - a[0, 0], a[1, 1] - a[0, 1], a[1, 2] - a[0, 2]
+        d2, u, v = segment_segment(
+            a[0, 0], a[0, 1], a[0, 2], dx, dy, dz, b[0, 0], b[0, 1], b[0, 2], ex, ey, ez
+        )
+        W[0], W[1], W[2] = a[0, 0] + u * dx, a[0, 1] + u * dy, a[0, 2] + u * dz
+        W[3], W[4], W[5] = b[0, 0] + v * ex, b[0, 1] + v * ey, b[0, 2] + v * ez
+        return d2
+    A = nodes[which[i, NODE] : which[i, NODE_END]]
+    LA = links[which[i, NODE] : which[i, NODE_END]]
+    TA = T[which[i, TRIANGLE] : which[i, TRIANGLE_END]]
+    if which[j, MESH]:
+        B = nodes[which[j, NODE] : which[j, NODE_END]]
+        LB = links[which[j, NODE] : which[j, NODE_END]]
+        TB = T[which[j, TRIANGLE] : which[j, TRIANGLE_END]]
+        _relative(world, i, j, R, t)
+        d2, ka, kb = mesh_mesh(A, LA, TA, B, LB, TB, R, t, limit, first[0], first[1], stack, bounds, W)
+        if d2 == 0.0:
+            d2, ka, kb = mesh_mesh(A, LA, TA, B, LB, TB, R, t, np.inf, -1, -1, stack, bounds, W)
+        if ka >= 0:
+            first[0] = ka
+            first[1] = kb
+    else:
+        ax, ay, az = _into(world, i, at[j, 0, 0], at[j, 0, 1], at[j, 0, 2])
+        bx, by, bz = _into(world, i, at[j, 1, 0], at[j, 1, 1], at[j, 1, 2])
+        d2, ka = mesh_segment(
+            A, LA, TA, ax, ay, az, bx - ax, by - ay, bz - az, limit, first[0], stack[:, 0], bounds, W
+        )
+        if ka >= 0:
+            first[0] = ka
+    for e in (0, 3):
+        x, y, z = W[e], W[e + 1], W[e + 2]
+        for c in range(3):
+            W[e + c] = (
+                world[i, 3 * c] * x + world[i, 3 * c + 1] * y + world[i, 3 * c + 2] * z + world[i, 9 + c]
+            )
+    return d2

@@ -1,0 +1,86 @@
+"""How far what is shown sticks out of what distances see.
+
+Makers simplify collision meshes, and a simplified mesh is not larger everywhere: a distance to it may
+be that much too long. The figure is a finding of the model; it is sampled, so a lower bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from seerob.geometry import Solid
+from seerob.kernels.protrusion import outside
+from seerob.kernels.tree_file import tree_of
+from seerob.model_io.description import Description, Link
+from seerob.snapshot import Finding
+from seerob.transforms import Array
+
+WORTH_SAYING = 1e-4
+"""Protrusions below this are not reported [m]."""
+SAMPLES = 2000
+"""Vertices looked at per link, besides the extreme ones."""
+
+
+def protrusions(description: Description) -> dict[str, float]:
+    """Largest distance [m] by which each link's display meshes leave its solids; links with both only."""
+    return {link.name: float(depths.max(initial=0.0)) for link, depths in _depths(description)}
+
+
+def with_protrusions(description: Description) -> Description:
+    """The description with a finding per link whose shown shape sticks out of the one for distances."""
+    found = []
+    for link, depths in _depths(description):
+        if depths.max(initial=0.0) > WORTH_SAYING:
+            text = (
+                f"the shape shown sticks out of the collision shape by up to {depths.max() * 1e3:.1f} mm "
+                f"(99 % of it by at most {np.quantile(depths, 0.99) * 1e3:.1f} mm; sampled): "
+                "distances may be that much too long"
+            )
+            found.append(Finding(level="warning", subject=f"{description.name}/{link.name}", text=text))
+    return replace(description, findings=(*description.findings, *found))
+
+
+def _depths(description: Description) -> Iterator[tuple[Link, Array]]:
+    for link in description.links:
+        if link.visual and link.solids:
+            yield link, outside_distances(link)
+
+
+def outside_distances(link: Link) -> Array:
+    """Distance [m] of sampled display vertices to the nearest solid, 0 inside, shape (n,)."""
+    points = np.concatenate([_sampled(mesh.vertices, SAMPLES // len(link.visual) + 1) for mesh in link.visual])
+    least = np.full(len(points), np.inf)
+    for solid in link.solids:
+        # Points that some solid contains need not be looked at again.
+        rest = least > 0
+        least[rest] = np.minimum(least[rest], _from_solid(solid, points[rest]))
+    return least
+
+
+def _from_solid(solid: Solid, points: Array) -> Array:
+    if solid.mesh is not None:
+        tree = tree_of(solid.mesh.vertices, solid.mesh.faces)
+        depth = outside(tree.nodes, tree.links, tree.triangles, np.ascontiguousarray(points))
+        return np.asarray(np.maximum(depth - solid.radius, 0.0))
+    assert solid.points is not None
+    corner, *ends = solid.points
+    offset = points - corner
+    nearest = np.zeros_like(points)
+    for end in ends:
+        edge = end - corner
+        squared = float(edge @ edge)
+        share = np.clip(offset @ edge / squared, 0, 1) if squared else np.zeros(len(points))
+        nearest += share[:, None] * edge
+    return np.asarray(np.maximum(np.linalg.norm(offset - nearest, axis=1) - solid.radius, 0.0))
+
+
+def _sampled(vertices: Array, count: int) -> Array:
+    """Every so-many-th vertex, and the outermost along 13 directions."""
+    grid = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], [-1, 0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
+    along = vertices @ grid[14:].T
+    outer = np.concatenate([along.argmax(axis=0), along.argmin(axis=0)])
+    step = max(1, len(vertices) // count)
+    return vertices[np.unique(np.concatenate([np.arange(0, len(vertices), step), outer]))]

@@ -1,0 +1,104 @@
+"""Where the inputs of a result come from, for its `Basis`. Asked once, when a criterion is bound."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from seerob.model import Gap, Mechanism, Model
+from seerob.snapshot import Input, Origin
+
+WORST_FIRST = list(reversed(Origin))
+
+
+def motion(model: Model, *names: str) -> tuple[Input, ...]:
+    """Where the motion of robots and people comes from."""
+    found = []
+    for name in dict.fromkeys(names):
+        mechanism = model.mechanism(name)
+        source = next((s for s in model.workstation.sources if s.target() == name), None)
+        if source is not None:
+            # A twin follows what was heard; whether that was measured, the source's own findings say.
+            measured = getattr(source, "origin", None) == "controller"
+            kind = Origin.MEASURED if measured else Origin.GIVEN
+            found.append(Input(name=f"motion of {name}", origin=kind, source=source.name))
+        elif mechanism.home_given:
+            where = "posture" if mechanism.role == "human" else "q"
+            found.append(
+                Input(
+                    name=f"pose of {name}",
+                    origin=Origin.GIVEN,
+                    source=f"workstation file ({where}), stands still",
+                )
+            )
+        else:
+            found.append(Input(name=f"pose of {name}", origin=Origin.MISSING))
+    return tuple(found)
+
+
+def masses(model: Model, mechanism: Mechanism) -> tuple[Input, ...]:
+    """Masses that the mass matrix of a robot is made of, and whether rotors are in it."""
+    links = [link.inertial for link in mechanism.description.links if link.inertial is not None]
+    found = [
+        Input(
+            name=f"link masses of {mechanism.name}",
+            value=sum(inertial.mass for inertial in links),
+            unit="kg",
+            origin=_worst(inertial.origin for inertial in links),
+            source="; ".join(dict.fromkeys(inertial.source for inertial in links)),
+        )
+    ]
+    found += [
+        Input(name=text.removeprefix("nobody gave ").strip(), origin=Origin.MISSING)
+        for text in mechanism.unknown_masses
+    ]
+    for index in mechanism.carried:
+        body = model.bodies[index]
+        if body.mass is not None:
+            found.append(
+                Input(
+                    name=f"mass of {body.owner}",
+                    value=body.mass.value,
+                    unit="kg",
+                    origin=body.mass.origin,
+                    source=body.mass.source,
+                )
+            )
+    rotors = [joint.armature for joint in mechanism.joints if joint.armature is not None]
+    found.append(
+        Input(
+            name="rotor inertia",
+            origin=rotors[0].origin if mechanism.rotor_inertia_known and rotors else Origin.MISSING,
+            source=rotors[0].source if rotors else "not given: link side only",
+        )
+    )
+    return tuple(found)
+
+
+def shapes(gap: Gap) -> tuple[Input, ...]:
+    """What the surfaces are that a distance was measured between."""
+    found = [Input(name="shape", value=note, origin=Origin.ESTIMATED, source="model") for note in gap.notes]
+    if gap.deviation > 0:
+        found.append(
+            Input(
+                name="surfaces may be nearer by",
+                value=gap.deviation,
+                unit="m",
+                origin=Origin.COMPUTED,
+                source="display meshes against collision meshes",
+            )
+        )
+    return tuple(found)
+
+
+def given(name: str, value: float, unit: str) -> Input:
+    """A number that the workstation file gives."""
+    return Input(name=name, value=value, unit=unit, origin=Origin.GIVEN, source="workstation file")
+
+
+def limit(value: float | None, unit: str) -> tuple[Input, ...]:
+    """The limit that the workstation file gives, if any."""
+    return () if value is None else (given("limit", value, unit),)
+
+
+def _worst(origins: Iterable[Origin]) -> Origin:
+    return min(origins, key=WORST_FIRST.index, default=Origin.MISSING)

@@ -1,0 +1,337 @@
+"""The main path: pump samples in, move the twin, judge it, write it out; once per tick.
+
+Live, replayed and as-fast-as-possible runs are this same loop with another clock.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from importlib.metadata import version
+
+import numpy as np
+from msgspec.structs import replace
+
+from seerob.criterion import Criterion, Evaluate
+from seerob.engine import Engine
+from seerob.errors import InputError, Problem, SeerobError, Undecided
+from seerob.model import Model
+from seerob.results import ResultLog
+from seerob.samples import Mailbox, Sample
+from seerob.sink import Writer
+from seerob.snapshot import (
+    Basis,
+    CriterionInfo,
+    Finding,
+    JointInfo,
+    MechanismInfo,
+    Node,
+    Result,
+    Scene,
+    Snapshot,
+    Verdict,
+)
+from seerob.source import Opened, Pump, Source, Target
+from seerob.state import State
+from seerob.workstation import content_hash
+
+Feed = Iterator[tuple[Sample, ...]]
+"""For each tick, from t = 0 on, the samples that were heard for it; ends when the run does."""
+
+
+# -- before the run -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A criterion whose names are resolved."""
+
+    criterion: Criterion
+    group: str
+    evaluate: Evaluate
+    basis: Basis
+
+
+def bind(model: Model) -> tuple[Bound, ...]:
+    """Bind every criterion and rule of the workstation.
+
+    Raises:
+        InputError: With every name that does not exist and every option that cannot be.
+    """
+    bound: list[Bound] = []
+    problems: list[Problem] = []
+    file = next(iter(model.workstation.files), "workstation")
+    for group in ("safety", "ergonomics"):
+        for i, criterion in enumerate(getattr(model.workstation, group)):
+            try:
+                bound.append(Bound(criterion, group, criterion.bind(model), criterion.basis(model)))
+            except SeerobError as error:
+                problems.append(Problem(file, f"{group}[{i}] ({criterion.name})", str(error)))
+    if problems:
+        raise InputError(problems)
+    return tuple(bound)
+
+
+def target(model: Model, name: str) -> Target | None:
+    """What a source needs to know of the robot or human it drives; None for no name."""
+    if not name:
+        return None
+    mechanism = model.mechanism(name)
+    return Target(
+        name=name,
+        joints=tuple(joint.name for joint in mechanism.joints),
+        units=mechanism.units,
+        lower=tuple(mechanism.lower.tolist()),
+        upper=tuple(mechanism.upper.tolist()),
+        velocity=tuple(None if v is None else v.value for v in mechanism.velocity_limits),
+        description=mechanism.description,
+    )
+
+
+def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
+    """Open every source of the workstation and check it against what it drives.
+
+    Raises:
+        InputError: With every mistake in every file.
+    """
+    opened: list[tuple[Source, Opened]] = []
+    problems: list[Problem] = []
+    for source in model.workstation.sources:
+        try:
+            opened.append((source, source.open(model.folder, target(model, source.target()))))
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return tuple(opened)
+
+
+def scene(model: Model, bound: Sequence[Bound], findings: Iterable[Finding] = ()) -> Scene:
+    """What sinks and the page need to know once."""
+    station = model.workstation
+    return Scene(
+        title=station.title,
+        edition=station.edition,
+        version=version("seerob"),
+        workstation_hash=content_hash(model.files),
+        period=station.engine.tick,
+        nodes=tuple(
+            Node(
+                name=body.name,
+                role=body.role,
+                owner=body.owner,
+                mesh=body.mesh,
+                triangles=body.triangles,
+                moves=bool(body.carrier),
+                mass=None if body.mass is None else body.mass.value,
+                mass_origin=model.mass_origin(body),
+                note=body.note,
+            )
+            for body in model.bodies
+        ),
+        mechanisms=tuple(
+            MechanismInfo(
+                name=m.name,
+                role=m.role,
+                joints=tuple(
+                    JointInfo(name=joint.name, unit=unit, lower=joint.lower, upper=joint.upper)
+                    for joint, unit in zip(m.joints, m.units, strict=True)
+                ),
+            )
+            for m in model.mechanisms.values()
+        ),
+        criteria=tuple(
+            CriterionInfo(
+                name=b.criterion.name,
+                kind=type(b.criterion).__module__.removeprefix(f"seerob.{b.group}."),
+                group=b.group,
+                title=(type(b.criterion).__doc__ or "").strip().split("\n")[0],
+                subjects=b.criterion.subjects(),
+                unit=b.criterion.unit,
+                limit=getattr(b.criterion, "limit", None),
+                at_most=b.criterion.at_most,
+                basis=b.basis,
+            )
+            for b in bound
+        ),
+        findings=(*model.findings, *findings),
+    )
+
+
+# -- feeds: what is heard for each tick ---------------------------------------------------------
+
+
+def pump(opened: Sequence[tuple[Source, Opened]], period: float, *, endless: bool = False) -> Feed:
+    """Samples of recorded sources as run time passes.
+
+    Ends with the last sample of the last source; a source that loops does not keep a run going
+    on its own unless ``endless``. Without sources there is one tick.
+    """
+    pumps = [Pump(o, loop=source.loop, pause=source.loop_pause) for source, o in opened]
+    duration = max((o.duration for _, o in opened), default=0.0)
+    last = round(duration / period - 0.5 + 1e-9)
+    mailbox = Mailbox()
+    k = 0
+    while endless or k <= last:
+        for each in pumps:
+            # One tick ahead, so that the references reach to the tick's end.
+            for sample in each.until(k * period):
+                mailbox.post(sample)
+        yield mailbox.take()
+        k += 1
+
+
+# -- the loop -----------------------------------------------------------------------------------
+
+
+class Judge:
+    """Asks every criterion at its period; what it cannot know becomes UNDECIDED."""
+
+    def __init__(self, bound: Sequence[Bound]) -> None:
+        self._bound = bound
+        self._due = [0.0] * len(bound)
+        self._last: list[Result | None] = [None] * len(bound)
+
+    def __call__(self, state: State) -> tuple[Result, ...]:
+        """Results at this state, in the order of the file."""
+        return tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
+
+    def _one(self, i: int, bound: Bound, state: State) -> Result:
+        last = self._last[i]
+        if last is not None and state.t < self._due[i] - 1e-9:
+            return last
+        criterion = bound.criterion
+        try:
+            result = bound.evaluate(state)
+            if result.value is not None and not np.isfinite(result.value):
+                raise Undecided(f"the value is {result.value}, not a finite number")
+        except Undecided as reason:
+            result = Result(
+                name=criterion.name,
+                unit=criterion.unit,
+                limit=getattr(criterion, "limit", None),
+                at_most=criterion.at_most,
+                verdict=Verdict.UNDECIDED,
+                reason=str(reason),
+            )
+        result = replace(result, basis=bound.basis)
+        if criterion.every is not None:
+            result = replace(result, t=state.t)
+            self._due[i] = state.t + criterion.every
+            self._last[i] = result
+        return result
+
+
+def snapshot(state: State, seq: int, results: tuple[Result, ...]) -> Snapshot:
+    """What goes out of a state."""
+    mechanisms = state.model.mechanisms.values()
+    return Snapshot(
+        seq=seq,
+        t=state.t,
+        poses=state.poses(),
+        joints={m.name: tuple(state.joint_positions(m).tolist()) for m in mechanisms},
+        tracking={m.name: state.hearings[m.name].error for m in mechanisms},
+        results=results,
+    )
+
+
+def ticks(engine: Engine, judge: Judge, feed: Feed) -> Iterator[tuple[Snapshot, tuple[Sample, ...]]]:
+    """The road: for each tick what goes out, and the samples it was made from."""
+    for seq, samples in enumerate(feed):
+        engine.take(samples)
+        state = engine.tick() if seq else engine.start()
+        yield snapshot(state, seq, judge(state)), samples
+
+
+class Clock:
+    """Holds a loop to real time; one that falls behind slips instead of hurrying after it."""
+
+    SLIP = 0.25
+    """Lag that is made up for [s]; beyond it the clock is set back."""
+
+    def __init__(self) -> None:
+        self._start = time.monotonic()
+        self.slipped = 0.0
+        """How much later than real time the run is by now [s]."""
+
+    def wait(self, t: float) -> None:
+        """Sleep until run time ``t`` [s] has come."""
+        ahead = self._start + t - time.monotonic()
+        if ahead > 0:
+            time.sleep(ahead)
+        elif ahead < -self.SLIP:
+            self._start -= ahead
+            self.slipped -= ahead
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a run came to."""
+
+    results: ResultLog
+    scene: Scene
+    ticks: int
+    duration: float
+    """Run time [s]."""
+    wall: float
+    """Time it took [s]."""
+    slipped: float
+    """Real time that was lost in a live run [s]."""
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """Verdict of the whole run."""
+        return self.results.verdict
+
+
+def run(
+    model: Model,
+    feed: Feed,
+    *,
+    bound: Sequence[Bound],
+    scene: Scene,
+    writers: Sequence[Writer] = (),
+    clock: Clock | None = None,
+    stop: Callable[[], bool] = lambda: False,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Summary:
+    """Run to the end of the feed, or until asked to stop.
+
+    Args:
+        model: The compiled workstation.
+        feed: Samples per tick.
+        bound: Criteria, from `bind`.
+        scene: From `scene`, the same that the writers were opened with.
+        writers: Open sinks; they are closed at the end, whatever happens.
+        clock: Real time; as fast as possible when None.
+        stop: Asked once per tick.
+        progress: Told the run time once per tick [s].
+    """
+    driven = {source.target(): source.timeout for source in model.workstation.sources if source.target()}
+    log = ResultLog(scene.criteria)
+    begun = time.perf_counter()
+    count, t = 0, 0.0
+    with ExitStack() as open_writers:
+        for writer in writers:
+            open_writers.enter_context(writer)
+        engine = Engine(model, driven=driven)
+        for out, samples in ticks(engine, Judge(bound), feed):
+            count, t = count + 1, out.t
+            log.add(out)
+            for writer in writers:
+                writer.write(out, samples)
+            progress(t)
+            if stop():
+                break
+            if clock is not None:
+                clock.wait(t + model.workstation.engine.tick)
+    return Summary(
+        results=log,
+        scene=scene,
+        ticks=count,
+        duration=t,
+        wall=time.perf_counter() - begun,
+        slipped=0.0 if clock is None else clock.slipped,
+    )

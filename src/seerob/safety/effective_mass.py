@@ -1,0 +1,193 @@
+r"""Effective mass of a point of a robot, [Weistroffer2022]_ Eqs. 7 and 8, [Khatib1995]_."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from msgspec import Meta
+
+from seerob import provenance
+from seerob.criterion import Criterion, Evaluate, judge
+from seerob.errors import Undecided
+from seerob.model import Mechanism, Model
+from seerob.snapshot import Arrow, Basis, Ellipsoid, Result, Verdict
+from seerob.state import State
+from seerob.transforms import Array, wxyz_from_rotation
+from seerob.workstation import Metres3
+
+DRAWN = 0.02
+"""Half axis, or arrow, drawn for 1 kg [m]."""
+LARGEST_DRAWN = 0.6
+STANDSTILL = 1e-3
+"""Speed below which a motion has no direction [m/s]."""
+
+
+def inverse_effective_mass(J_v: Array, M: Array) -> Array:
+    r"""Inverse of the effective mass matrix, :math:`\Lambda^{-1} = J_v M^{-1} J_v^T` (Eq. 7).
+
+    Args:
+        J_v: Linear Jacobian of the point, shape (..., 3, n).
+        M: Joint-space mass matrix, positive definite, shape (..., n, n).
+
+    Returns:
+        Symmetric matrix, shape (..., 3, 3) [1/kg]; singular where the point cannot be pushed.
+    """
+    return J_v @ np.linalg.solve(M, np.swapaxes(J_v, -1, -2))
+
+
+def projected_mass(inverse: Array, u: Array) -> Array:
+    r"""Mass felt along a direction, :math:`1/m_u = u^T \Lambda^{-1} u` (Eq. 8).
+
+    Args:
+        inverse: Λ⁻¹, shape (..., 3, 3) [1/kg].
+        u: Unit directions, shape (..., 3).
+
+    Returns:
+        Mass [kg], shape (...); inf where the point cannot be pushed that way.
+    """
+    mobility = np.einsum("...i,...ij,...j->...", u, inverse, u)
+    with np.errstate(divide="ignore"):
+        return np.asarray(1.0 / np.maximum(mobility, 0.0))
+
+
+def principal_masses(inverse: Array) -> tuple[Array, Array]:
+    """Effective masses along the principal axes, smallest first [kg], and the axes as columns."""
+    mobility, axes = np.linalg.eigh(inverse)
+    with np.errstate(divide="ignore"):
+        return 1.0 / np.maximum(mobility, 0.0)[..., ::-1], axes[..., ::-1]
+
+
+def moving_mass(model: Model, robot: Mechanism) -> tuple[float, float]:
+    """Total mass of the links that move, and of what is mounted on them [kg].
+
+    Raises:
+        Undecided: A mass that nobody gave.
+    """
+    if robot.unknown_masses:
+        raise Undecided("; ".join(robot.unknown_masses))
+    masses = {
+        name: model.mj.body(int(i)).mass[0] for i in robot.mj_bodies for name in [model.mj.body(int(i)).name]
+    }
+    links = sum(float(m) for name, m in masses.items() if name.startswith(f"{robot.name}/"))
+    return links, float(sum(masses.values())) - links
+
+
+class EffectiveMass(Criterion, frozen=True, kw_only=True):
+    """Mass that somebody hit by a point of the robot would feel, along its motion or toward a person."""
+
+    unit: ClassVar[str] = "kg"
+
+    at: str
+    """Point: a robot (its tool's working point) or the full name of a link."""
+    offset: Metres3 = (0.0, 0.0, 0.0)
+    """The point in that frame [m]."""
+    along: Literal["motion", "worst"] = "motion"
+    """Direction: of the point's motion, or the heaviest one."""
+    toward: str | None = None
+    """Instead: the direction from the point to the nearest point of this human or set."""
+    limit: Annotated[float, Meta(gt=0, extra={"unit": "kg"})] | None = None
+    """Largest admissible mass [kg]."""
+
+    def subjects(self) -> tuple[str, ...]:
+        """The point, and whom it faces."""
+        return (self.at,) if self.toward is None else (self.at, self.toward)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        frame = model.frame(self.at)
+        robot = model.carrier(frame)
+        offset = np.array(self.offset)
+        gap = None if self.toward is None else model.gap(robot.moving, model.select(self.toward))
+        links, load = (0.0, 0.0) if robot.unknown_masses else moving_mass(model, robot)
+        simplified = Result(name="M/2 + m_L", value=links / 2 + load, unit="kg")
+
+        def direction(state: State, J_v: Array, masses: Array, axes: Array) -> tuple[Array | None, str]:
+            if gap is not None:
+                closest = state.closest(gap)
+                line = closest.point_b - closest.point_a
+                length = float(np.linalg.norm(line))
+                if length < 1e-9:
+                    return None, "touching: the line to the person has no direction"
+                return line / length, ""
+            if self.along == "worst":
+                return axes[:, -1], ""
+            v = J_v @ state.qd(robot)
+            speed = float(np.linalg.norm(v))
+            return (v / speed, "") if speed > STANDSTILL else (None, "stands still: no direction of motion")
+
+        def evaluate(state: State) -> Result:
+            M = state.mass_matrix(robot)
+            J_v = state.jacobian(frame, robot, offset)[:3]
+            inverse = inverse_effective_mass(J_v, M)
+            masses, axes = principal_masses(inverse)
+            u, reason = direction(state, J_v, masses, axes)
+            mass = None if u is None else float(projected_mass(inverse, u))
+            verdict = self._verdict(mass)
+            rotation, position = state.pose(frame)
+            center = position + rotation @ offset
+            turn = axes * np.array([1, 1, np.sign(np.linalg.det(axes))])
+            ellipsoid = Ellipsoid(
+                center=tuple(center.tolist()),
+                wxyz=tuple(wxyz_from_rotation(turn).tolist()),
+                radii=tuple(np.minimum(DRAWN * masses, LARGEST_DRAWN).tolist()),
+                verdict=verdict,
+            )
+            arrows: tuple[Arrow, ...] = ()
+            if u is not None and mass is not None:
+                length = min(DRAWN * mass, LARGEST_DRAWN)
+                arrows = (
+                    Arrow(
+                        origin=tuple(center.tolist()),
+                        vector=tuple((length * u).tolist()),
+                        label=f"{mass:.1f} kg",
+                        verdict=verdict,
+                    ),
+                )
+            return Result(
+                name=self.name,
+                value=mass if mass is not None and np.isfinite(mass) else None,
+                unit=self.unit,
+                limit=self.limit,
+                verdict=verdict,
+                reason=reason
+                or ("" if mass is None or np.isfinite(mass) else "cannot be pushed that way: infinite"),
+                parts=(
+                    *(
+                        Result(name=f"m{i + 1}", value=float(m) if np.isfinite(m) else None, unit="kg")
+                        for i, m in enumerate(masses)
+                    ),
+                    simplified,
+                ),
+                markers=(ellipsoid, *arrows),
+            )
+
+        return evaluate
+
+    def _verdict(self, mass: float | None) -> Verdict | None:
+        return None if mass is None else judge(mass, self.limit)
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        robot = model.carrier(model.frame(self.at))
+        which = (
+            f"toward {self.toward}"
+            if self.toward
+            else {"motion": "along the motion", "worst": "worst"}[self.along]
+        )
+        return Basis(
+            formula=f"1/m_u = uᵀ J_v M⁻¹ J_vᵀ u, u {which}",
+            source="Weistroffer et al. 2022, Eqs. 7 and 8; Khatib 1995",
+            inputs=provenance.motion(model, robot.name)
+            + provenance.masses(model, robot)
+            + provenance.limit(self.limit, "kg"),
+            not_modelled=(
+                "joints held by brakes, friction or position control, which make the robot heavier",
+                *(
+                    ()
+                    if robot.rotor_inertia_known
+                    else ("rotor inertia: link side only, too light in some directions",)
+                ),
+                "does not replace M/2 + m_L of ISO/TS 15066 Annex A, shown beside it",
+            ),
+        )

@@ -1,0 +1,85 @@
+r"""Kinetic energy of a robot, [Weistroffer2022]_ Eq. 5."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from msgspec import Meta
+
+from seerob import provenance
+from seerob.criterion import Criterion, Evaluate, judge
+from seerob.model import Model
+from seerob.snapshot import Basis, Result, Sphere
+from seerob.state import State
+from seerob.transforms import Array
+
+DRAWN = 0.1
+"""Radius of the sphere of 1 J [m]; the volume is proportional to the energy."""
+
+
+def kinetic_energy(M: Array, qd: Array) -> Array:
+    r"""Kinetic energy :math:`E = \frac{1}{2} \dot{q}^T M(q) \dot{q}`.
+
+    Args:
+        M: Joint-space mass matrix [kg, kg·m or kg·m²], shape (..., n, n).
+        qd: Joint velocities [rad/s or m/s], shape (..., n).
+
+    Returns:
+        Energy [J], shape (...).
+    """
+    return np.asarray(0.5 * np.einsum("...i,...ij,...j->...", qd, M, qd))
+
+
+class KineticEnergy(Criterion, frozen=True, kw_only=True):
+    """Kinetic energy of a whole robot with everything mounted on it."""
+
+    unit: ClassVar[str] = "J"
+
+    robot: str
+    limit: Annotated[float, Meta(gt=0, extra={"unit": "J"})] | None = None
+    """Largest admissible energy [J]."""
+
+    def subjects(self) -> tuple[str, ...]:
+        """The robot."""
+        return (self.robot,)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        robot = model.robot(self.robot)
+
+        def evaluate(state: State) -> Result:
+            energy = float(kinetic_energy(state.mass_matrix(robot), state.qd(robot)))
+            verdict = judge(energy, self.limit)
+            _, position = state.pose(robot.tip)
+            sphere = Sphere(
+                center=tuple(position.tolist()),
+                radius=DRAWN * max(energy, 0.0) ** (1 / 3),
+                label=f"{energy:.2f} J",
+                verdict=verdict,
+            )
+            return Result(
+                name=self.name,
+                value=energy,
+                unit=self.unit,
+                limit=self.limit,
+                verdict=verdict,
+                markers=(sphere,),
+            )
+
+        return evaluate
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        robot = model.robot(self.robot)
+        return Basis(
+            formula="E = ½ q̇ᵀ M(q) q̇, whole robot",
+            source="Weistroffer et al. 2022, Eq. 5",
+            inputs=provenance.motion(model, robot.name)
+            + provenance.masses(model, robot)
+            + provenance.limit(self.limit, "J"),
+            not_modelled=(
+                "not the energy of an impact, ½ μ v_rel², that ISO/TS 15066 limits per body region",
+                *(() if robot.rotor_inertia_known else ("energy of rotors and gears",)),
+            ),
+        )

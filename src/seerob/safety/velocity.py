@@ -1,0 +1,113 @@
+r"""Speed of a point, or of the fastest point of a set of bodies, [Weistroffer2022]_ Eq. 4."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from msgspec import Meta
+
+from seerob import provenance
+from seerob.criterion import Criterion, Evaluate, judge
+from seerob.model import Model
+from seerob.snapshot import Arrow, Basis, Result
+from seerob.state import State
+from seerob.transforms import Array
+from seerob.workstation import Metres3
+
+DRAWN = 0.5
+"""Length of the arrow of a speed of 1 m/s [m]."""
+
+
+def point_velocity(J: Array, qd: Array) -> Array:
+    r"""Velocity of a point :math:`\dot x = J(q) \dot q`.
+
+    Args:
+        J: Jacobian, linear rows first, shape (..., 6, n) [m/rad or 1] and [1].
+        qd: Joint velocities [rad/s or m/s], shape (..., n).
+
+    Returns:
+        Twist (v, ω) at the point [m/s, rad/s], world axes, shape (..., 6).
+    """
+    return np.asarray(np.einsum("...ij,...j->...i", J, qd))
+
+
+class Velocity(Criterion, frozen=True, kw_only=True):
+    """Speed of a point of a robot or person, or of the fastest point of a set of bodies."""
+
+    unit: ClassVar[str] = "m/s"
+
+    at: str | None = None
+    """Point: a robot (its tool's working point) or the full name of a link."""
+    offset: Metres3 = (0.0, 0.0, 0.0)
+    """The point in that frame [m]."""
+    of: str | None = None
+    """Instead of a point: everything that this name means, judged by its fastest point."""
+    limit: Annotated[float, Meta(gt=0, extra={"unit": "m/s"})] | None = None
+    """Largest admissible speed [m/s]."""
+
+    def __post_init__(self) -> None:
+        if (self.at is None) == (self.of is None):
+            raise ValueError("give either at, a point, or of, a set of bodies")
+
+    def subjects(self) -> tuple[str, ...]:
+        """The point or the set."""
+        return (self.at or self.of or "",)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        return self._bind_point(model) if self.at is not None else self._bind_set(model)
+
+    def _bind_point(self, model: Model) -> Evaluate:
+        frame = model.frame(self.at or "")
+        mechanism = model.carrier(frame)
+        offset = np.array(self.offset)
+
+        def evaluate(state: State) -> Result:
+            v = point_velocity(state.jacobian(frame, mechanism, offset), state.qd(mechanism))[:3]
+            rotation, position = state.pose(frame)
+            return self._result(float(np.linalg.norm(v)), position + rotation @ offset, v)
+
+        return evaluate
+
+    def _bind_set(self, model: Model) -> Evaluate:
+        bodies = [i for i in model.select(self.of or "") if model.bodies[i].carrier]
+
+        def evaluate(state: State) -> Result:
+            found = [(*state.fastest_point(i), i) for i in bodies]
+            speed, point, v, body = max(found, key=lambda entry: entry[0])
+            return self._result(speed, point, v, model.bodies[body].name)
+
+        return evaluate
+
+    def _result(self, speed: float, point: Array, v: Array, where: str = "") -> Result:
+        verdict = judge(speed, self.limit)
+        arrow = Arrow(
+            origin=tuple(point.tolist()),
+            vector=tuple((DRAWN * v).tolist()),
+            label=f"{speed:.2f} m/s",
+            verdict=verdict,
+        )
+        return Result(
+            name=self.name,
+            value=speed,
+            unit=self.unit,
+            limit=self.limit,
+            verdict=verdict,
+            reason=where,
+            markers=(arrow,),
+        )
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        if self.at is not None:
+            carriers = [model.carrier(model.frame(self.at)).name]
+            formula = "|v|, v = J_v(q) q̇"
+        else:
+            carriers = [model.bodies[i].carrier for i in model.select(self.of or "")]
+            formula = "max over all points of |v + ω × r|"
+        return Basis(
+            formula=formula,
+            source="Weistroffer et al. 2022, Eq. 4",
+            inputs=provenance.motion(model, *filter(None, carriers)) + provenance.limit(self.limit, "m/s"),
+        )

@@ -1,0 +1,121 @@
+"""What a colleague would write about a run: sentences from numbers, no judgement beyond the verdict."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+from seerob.results import ResultLog
+from seerob.series import CODES, Series
+from seerob.snapshot import Verdict
+
+_NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+
+
+def number(value: float | None, unit: str = "") -> str:
+    """Four significant digits with the unit; a dash for what is not there."""
+    if value is None or math.isnan(value):
+        return "–"
+    text = f"{value:.4g}".replace("-", "−")
+    return f"{text} {unit}".rstrip()
+
+
+def percent(share: float) -> str:
+    """A share 0…1; never rounded to 0 or to 100 % when it is neither."""
+    if 0 < share < 0.001:
+        return "< 0.1 %"
+    if 0.999 < share < 1:
+        return "> 99.9 %"
+    return f"{100 * share:.1f} %".replace(".0 %", " %")
+
+
+def counted(n: int, what: str, many: str | None = None) -> str:
+    """``one criterion``, ``two criteria``."""
+    name = _NUMBERS[n] if n < len(_NUMBERS) else str(n)
+    return f"{name} {what if n == 1 else many or what + 's'}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """``a, b and c``."""
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def summary(log: ResultLog) -> list[str]:
+    """What the first paragraph says."""
+    span = (log.end or 0.0) - (log.start or 0.0)
+    by: dict[Verdict | None, list[str]] = {v: [] for v in (*Verdict, None)}
+    for series in log.values():
+        by[series.verdict].append(series.name)
+    if not log.ticks:
+        return ["Nothing was evaluated: the run has no tick."]
+    criteria = counted(len(log), "criterion was", "criteria were")
+    said = [f"Over {number(span, 's')} of motion ({log.ticks} ticks) {criteria} evaluated."]
+    if names := by[Verdict.EXCEEDED]:
+        said.append(f"{counted(len(names), 'limit was', 'limits were').capitalize()} exceeded: {listed(names)}.")
+    if names := by[Verdict.UNDECIDED]:
+        said.append(
+            f"{counted(len(names), 'criterion', 'criteria').capitalize()} could not be decided for at least a part "
+            f"of the run: {listed(names)}. Undecided is not a pass; what is missing is said below."
+        )
+    if names := by[Verdict.WITHIN]:
+        said.append(f"{counted(len(names), 'criterion', 'criteria').capitalize()} stayed within the limit throughout.")
+    if names := by[None]:
+        said.append(f"{counted(len(names), 'figure').capitalize()} without a limit for information: {listed(names)}.")
+    return said
+
+
+def about(series: Series) -> list[str]:
+    """What the paragraph of one criterion says."""
+    if not series.known:
+        return [
+            "This criterion was set up but never gave a result, so nothing can be said. It is not a pass: find "
+            "out why it was silent."
+        ]
+    worst, shares = series.worst(), series.shares()
+    said = []
+    if share := shares.get(Verdict.EXCEEDED):
+        stretches = series.intervals()
+        beyond = "above" if series.at_most else "below"
+        said.append(
+            f"The value was {beyond} the limit in {percent(share)} of the evaluated ticks, in "
+            f"{counted(len(stretches), 'stretch', 'stretches')}; the longest lasted "
+            f"{number(max(b - a for a, b in stretches), 's')}."
+        )
+        said.append(f"Worst at {worst.t:.2f} s: {number(worst.value, series.unit)}{_against(series)}.")
+    if share := shares.get(Verdict.UNDECIDED):
+        said.append(f"In {percent(share)} of the evaluated ticks nothing can be said. {_reasons(series)}")
+    if series.verdict is Verdict.WITHIN:
+        said.append(
+            f"Within the limit throughout. Closest to it at {worst.t:.2f} s: {number(worst.value, series.unit)}"
+            f"{_against(series)}."
+        )
+    if series.verdict is None:
+        extreme = "Largest" if series.at_most else "Smallest"
+        said.append(f"No limit was given. {extreme} value {number(worst.value, series.unit)} at {worst.t:.2f} s.")
+    if worst.verdict is not Verdict.UNDECIDED and (worst.reason or worst.part):
+        governs = worst.part if not worst.reason or worst.reason == worst.part else worst.reason
+        extra = f" ({worst.part})" if worst.part and worst.part not in governs else ""
+        said.append(f"What governs there: {governs}{extra}.")
+    return said
+
+
+def _against(series: Series) -> str:
+    worst = series.worst()
+    if worst.limit is None or worst.value is None:
+        return ""
+    gap = worst.limit - worst.value if series.at_most else worst.value - worst.limit
+    side = "inside" if gap >= 0 else "beyond"
+    return f", {number(abs(gap), series.unit)} {side} the limit of {number(worst.limit, series.unit)}"
+
+
+def _reasons(series: Series) -> str:
+    """The most frequent reasons; those that differ in their numbers only count as one."""
+    seen: dict[str, list[str]] = {}
+    for verdict, reason in zip(series.verdicts.tolist(), series.reasons, strict=False):
+        if verdict == CODES[Verdict.UNDECIDED]:
+            seen.setdefault(re.sub(r"\d+(\.\d+)?", "0", reason), []).append(reason or "no reason given")
+    most = sorted(seen.values(), key=len, reverse=True)
+    texts = [alike[0] + (" and alike" if len(set(alike)) > 1 else "") for alike in most[:3]]
+    more = f"; and {len(most) - 3} more" if len(most) > 3 else ""
+    return ("Reason: " if len(most) == 1 else "Reasons: ") + "; ".join(texts) + more + "."

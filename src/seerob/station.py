@@ -1,0 +1,189 @@
+"""The Python API: a workstation that has been read and compiled, and its runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from msgspec.structs import replace
+
+from seerob import run as road
+from seerob.compilation import Progress, compile_workstation
+from seerob.criterion import Criterion
+from seerob.errors import InputError
+from seerob.model import Model
+from seerob.reading import read
+from seerob.recording import Recording
+from seerob.run import Bound, Clock, Feed, Summary
+from seerob.sink import Sink, Writer
+from seerob.snapshot import Scene
+from seerob.source import Opened, Source
+from seerob.workstation import Workstation
+
+
+class Station:
+    """A workstation, read and compiled.
+
+    Attributes:
+        workstation: What the file says.
+        model: The compiled twin.
+    """
+
+    def __init__(
+        self, workstation: Workstation, *, cache: Path | None = None, progress: Progress = lambda _: None
+    ) -> None:
+        """Compile a workstation; see `load` for the usual way.
+
+        Raises:
+            InputError: With every mistake in every file that it names.
+        """
+        self.workstation = workstation
+        self.model: Model = compile_workstation(workstation, cache=cache, progress=progress)
+
+    @cached_property
+    def bound(self) -> tuple[Bound, ...]:
+        """Its criteria and rules, names resolved."""
+        return road.bind(self.model)
+
+    @cached_property
+    def sources(self) -> tuple[tuple[Source, Opened], ...]:
+        """Its sources, opened and checked."""
+        return road.open_sources(self.model)
+
+    @property
+    def duration(self) -> float:
+        """Length of its longest source [s]."""
+        return max((opened.duration for _, opened in self.sources), default=0.0)
+
+    def scene(self, *, with_sources: bool = True) -> Scene:
+        """What sinks and the page need to know once."""
+        opened = self.sources if with_sources else ()
+        return road.scene(self.model, self.bound, [f for _, o in opened for f in o.findings])
+
+    def with_criteria(self, *criteria: Criterion) -> Station:
+        """The same compiled workstation with more safety criteria."""
+        other = object.__new__(Station)
+        other.workstation = replace(self.workstation, safety=(*self.workstation.safety, *criteria))
+        from dataclasses import replace as replaced
+
+        other.model = replaced(self.model, workstation=other.workstation)
+        return other
+
+    def open_sinks(self, sinks: Sequence[Sink], folder: Path, scene: Scene) -> list[Writer]:
+        """Open sinks for one run, all or none.
+
+        Raises:
+            InputError: One of them cannot be opened; the others are closed again.
+        """
+        opened: list[Writer] = []
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            for sink in sinks:
+                opened.append(sink.open(scene, self.model.meshes, self.model.files, folder))
+        except BaseException:
+            for writer in opened:
+                writer.close()
+            raise
+        return opened
+
+    def run(
+        self,
+        *,
+        folder: Path | str | None = None,
+        sinks: Sequence[Sink] = (),
+        writers: Sequence[Writer] = (),
+        live: bool = False,
+        feed: Feed | None = None,
+        scene: Scene | None = None,
+        stop: Callable[[], bool] = lambda: False,
+        progress: Callable[[float], None] = lambda _: None,
+    ) -> Summary:
+        """Run from the first to the last sample of the sources.
+
+        Args:
+            folder: Where ``sinks`` write; needed when there are any.
+            sinks: Opened for this run and closed after it.
+            writers: Sinks that are open already; closed after the run too.
+            live: In real time and without end (until ``stop``), instead of as fast as possible.
+            feed: What is heard, instead of the workstation's sources.
+            scene: The one that ``writers`` were opened with.
+            stop: Asked once per tick.
+            progress: Told the run time once per tick [s].
+
+        Returns:
+            The results by criterion, ``summary.results["tcp speed"].max()``, and how it went.
+
+        Raises:
+            InputError: A source, a criterion or a sink cannot be used as the file has it.
+            SimulationDiverged: The physics produced a number that is not finite.
+        """
+        if sinks and folder is None:
+            raise InputError.at("run", "folder", "missing", "sinks need a folder to write to")
+        if feed is None:
+            feed = road.pump(self.sources, self.workstation.engine.tick, endless=live)
+            scene = scene or self.scene()
+        else:
+            scene = scene or self.scene(with_sources=False)
+        opened = self.open_sinks(sinks, Path(folder or "."), scene) if sinks else []
+        return road.run(
+            self.model,
+            feed,
+            bound=self.bound,
+            scene=scene,
+            writers=[*opened, *writers],
+            clock=Clock() if live else None,
+            stop=stop,
+            progress=progress,
+        )
+
+    def replay(
+        self,
+        recording: Recording,
+        *,
+        folder: Path | str | None = None,
+        sinks: Sequence[Sink] = (),
+        stop: Callable[[], bool] = lambda: False,
+        progress: Callable[[float], None] = lambda _: None,
+    ) -> Summary:
+        """Compute a recording again from its samples: same samples, same ticks, same figures.
+
+        Raises:
+            InputError: The recording was made with another tick than this workstation has.
+        """
+        if abs(recording.scene.period - self.workstation.engine.tick) > 1e-12:
+            raise InputError.at(
+                recording.path,
+                "period",
+                f"recorded with a tick of {recording.scene.period} s",
+                f"set engine.tick = {recording.scene.period} in the workstation file",
+            )
+        findings = [f for f in recording.scene.findings if f not in self.model.findings]
+        scene = road.scene(self.model, self.bound, findings)
+        feed = (tuple(tick.samples) for tick in recording.ticks())
+        return self.run(folder=folder, sinks=sinks, feed=feed, scene=scene, stop=stop, progress=progress)
+
+
+def load(path: Path | str, *, cache: Path | None = None) -> Station:
+    """Read and compile a workstation.
+
+    Args:
+        path: A workstation file, or a folder with a ``workstation.toml``.
+        cache: Folder that keeps what takes long to make between starts.
+
+    Raises:
+        InputError: With every mistake in the file and in the files it names.
+    """
+    return Station(read(path), cache=cache)
+
+
+def load_recorded(recording: Recording, *, cache: Path | None = None) -> Station:
+    """The workstation that a recording was made with, from the files inside it.
+
+    Raises:
+        InputError: It needs files that the recording does not carry.
+    """
+    with TemporaryDirectory(prefix="seerob-") as folder:
+        recording.extract(Path(folder))
+        return Station(read(folder), cache=cache)

@@ -1,0 +1,168 @@
+"""The page is one file, says everything, and lets nothing from a file become markup."""
+
+import re
+from html.parser import HTMLParser
+
+import made_run
+import pytest
+
+from seerob.errors import InputError
+from seerob.sinks.dossier import Dossier
+
+VOID = {"meta", "img", "br", "col", "link", "input", "hr", "base"}
+
+
+class Page(HTMLParser):
+    """Tags with attributes, text outside of styles, and whether elements nest."""
+
+    def __init__(self, source):
+        super().__init__(convert_charrefs=True)
+        self.tags, self.text, self._open = [], "", []
+        self.feed(source)
+        self.close()
+        assert self._open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self._open.pop() == tag
+
+    def handle_data(self, data):
+        if self._open and self._open[-1] != "style":
+            self.text += data
+
+
+def write(folder, n=120, **options):
+    with Dossier(**options).open(made_run.scene(), made_run.MESHES, made_run.FILES, folder) as writer:
+        for k in range(n):
+            writer.write(made_run.snapshot(k), made_run.samples(k))
+    return (folder / "report.html").read_text()
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    return write(tmp_path_factory.mktemp("dossier"))
+
+
+@pytest.fixture(scope="module")
+def page(source):
+    return Page(source)
+
+
+def test_nothing_refers_outside_and_nothing_runs(source, page):
+    for tag, attributes in page.tags:
+        assert tag not in {"script", "link", "iframe", "object", "embed", "base", "form", "foreignobject"}
+        for key, value in attributes.items():
+            assert not key.startswith("on")
+            if key in {"src", "href", "xlink:href", "action", "data", "poster", "srcset"}:
+                assert value.startswith(("#", "data:image/png;base64,")), (tag, key, value[:80])
+    assert not re.search(r"url\((?!#)", source)
+    assert "@import" not in source
+    assert "://" not in page.text
+    policy = next(a["content"] for t, a in page.tags if a.get("http-equiv") == "Content-Security-Policy")
+    assert policy.startswith("default-src 'none'")
+
+
+def test_links_and_ids_inside_the_page_fit(page):
+    ids = [a["id"] for _, a in page.tags if "id" in a]
+    targets = {v[1:] for _, a in page.tags for k, v in a.items() if k.endswith("href") and v.startswith("#")}
+    assert targets <= set(ids)
+    criteria = [i for i in ids if i.startswith("criterion-")]
+    assert len(criteria) == len(set(criteria)) == len(made_run.scene().criteria)
+
+
+def test_every_criterion_finding_basis_file_and_body_is_there(page):
+    scene = made_run.scene()
+    for criterion in scene.criteria:
+        assert criterion.name in page.text
+    for finding in scene.findings:
+        assert finding.subject in page.text
+        assert finding.text in page.text
+    for item in made_run.SEPARATION.inputs:
+        assert item.name in page.text
+        assert item.source in page.text
+    for text in (*made_run.SEPARATION.not_modelled, made_run.SEPARATION.formula, made_run.SEPARATION.source):
+        assert text in page.text
+    for name in made_run.FILES:
+        assert name in page.text
+    for node in scene.nodes:
+        assert node.name in page.text
+    assert scene.workstation_hash in page.text
+    assert scene.edition in page.text
+
+
+def test_hostile_names_stay_text(source, page):
+    assert "<script" not in source
+    assert page.text.count(made_run.HOSTILE) >= 6
+
+
+def test_the_worst_instant_is_named_with_value_limit_and_what_governs(page):
+    assert "Worst at 0.50 s: 0.3 m, 0.2503 m beyond the limit of 0.5503 m." in page.text
+    assert "ur10/forearm_link ↔ operator/head" in page.text
+    assert "One limit was exceeded: separation." in page.text
+
+
+def test_undecided_never_looks_like_a_pass(page):
+    badges = [a["class"] for t, a in page.tags if t == "span" and a.get("class", "").startswith("badge")]
+    assert badges.count("badge undecided") == 4  # twice in the table, twice above the sections
+    assert "Undecided is not a pass" in page.text
+    assert "It is not a pass: find out why it was silent." in page.text
+
+
+@pytest.mark.parametrize("word", [r"certif\w*", r"\bsafe\b", r"complian\w*", r"\bcompl(y|ies)\b"])
+def test_it_is_an_evaluation_and_claims_nothing_more(page, word):
+    assert not re.search(word, page.text, re.IGNORECASE)
+    assert "evaluation" in page.text
+
+
+def test_pictures_are_drawn_for_the_worst_criteria_first(tmp_path, page):
+    alts = [a["alt"] for t, a in page.tags if t == "img"]
+    assert [alt.split(" at ")[0] for alt in alts] == ["separation", "tool speed"]
+    only = [a["alt"] for t, a in Page(write(tmp_path, 60, pictures=1)).tags if t == "img"]
+    assert only == alts[:1]
+
+
+def test_the_file_is_replaced_whole_or_left(tmp_path, monkeypatch):
+    before = write(tmp_path, 2)
+    monkeypatch.setattr("seerob.sinks._page.page", lambda _: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        write(tmp_path, 3)
+    assert (tmp_path / "report.html").read_text() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_a_run_without_ticks_and_without_criteria_still_gives_a_page(tmp_path):
+    text = Page(write(tmp_path, 0)).text
+    assert "Nothing was evaluated: the run has no tick." in text
+    with Dossier().open(made_run.scene(criteria=()), {}, {}, tmp_path):
+        pass
+    assert "there is no verdict" in Page((tmp_path / "report.html").read_text()).text
+
+
+def test_progress_is_told(tmp_path):
+    told = []
+    with Dossier().open(made_run.scene(), made_run.MESHES, {}, tmp_path) as writer:
+        writer.progress = lambda done, total: told.append((done, total))
+        writer.write(made_run.snapshot(50), ())
+    assert told == [(1, 2), (2, 2)]
+
+
+def test_a_mesh_that_cannot_be_read_is_a_finding_not_a_failure(tmp_path):
+    meshes = made_run.MESHES | {"b" * 64: b"not a mesh"}
+    with Dossier().open(made_run.scene(), meshes, {}, tmp_path) as writer:
+        writer.write(made_run.snapshot(50), ())
+    assert "its mesh cannot be shown in pictures" in Page((tmp_path / "report.html").read_text()).text
+
+
+def test_options_are_checked(tmp_path):
+    for options in ({"file": "a/b.html"}, {"file": "x.pdf"}, {"pictures": -1}):
+        with pytest.raises(InputError, match="dossier"):
+            Dossier(**options).open(made_run.scene(), {}, {}, tmp_path)
+    with pytest.raises(InputError, match="cannot be written"):
+        write(tmp_path / "none", 1)

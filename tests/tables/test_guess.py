@@ -1,0 +1,214 @@
+import tomllib
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from seerob.errors import InputError
+from seerob.tables.guess import guess
+from seerob.tables.mapping import Mapping
+from seerob.tables.motion import read_motion
+
+
+def table(path, header, columns, *, delimiter=";", comma=False, above=()):
+    def text(value):
+        return str(value).replace(".", ",") if comma else str(value)
+
+    lines = [*above, delimiter.join(header)]
+    lines += [delimiter.join(map(text, row)) for row in np.column_stack(columns).tolist()]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+T = np.arange(20) * 0.02
+Q = np.column_stack([0.3 * np.sin(T + i) for i in range(3)])
+
+
+def confirm(found):
+    """What a user does with the snippet: paste it into the workstation file."""
+    pasted = tomllib.loads(found.toml())["sources"]["mapping"]
+    return msgspec.convert(pasted, Mapping)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    name=st.sampled_from(["J{}", "Joint {}", "Achse {}", "axe {}", "A{}", "q_{}"]),
+    time=st.sampled_from(["Time", "Zeit", "temps", "t"]),
+    unit=st.sampled_from([None, "deg", "rad"]),
+    time_unit=st.sampled_from([None, "s", "ms"]),
+    dof=st.integers(1, 8),
+    first=st.integers(0, 1),
+    delimiter=st.sampled_from([";", ",", "\t", "|"]),
+    comma=st.booleans(),
+    velocity=st.booleans(),
+    seed=st.integers(0, 9),
+)
+def test_a_guess_is_sure_exactly_when_units_are_declared_and_its_snippet_reads_the_file_exactly(
+    tmp_path, name, time, unit, time_unit, dof, first, delimiter, comma, velocity, seed
+):
+    comma = comma and delimiter != ","
+    rng = np.random.default_rng(seed)
+    t = np.arange(9) * (20.0 if time_unit == "ms" else 0.02)
+    q = np.round(rng.uniform(-1, 1, (9, dof)), 5)
+    order = rng.permutation(dof)
+    suffix = f" [{unit}]" if unit else ""
+    header = [time + (f" [{time_unit}]" if time_unit else "")]
+    header += [name.format(i + first) + suffix for i in order]
+    columns = [t, *(q[:, i] for i in order)]
+    if velocity:
+        header += [
+            f"Velocity {name.format(i + first)}" + (f" [{unit}/s]" if unit else "") for i in range(dof)
+        ]
+        columns += [q[:, i] for i in range(dof)]
+    path = table(tmp_path / "a.csv", header, columns, delimiter=delimiter, comma=comma)
+    found = guess(path)
+    asked = set() if unit else {"joint_unit"}
+    asked |= set() if time_unit else {"time_unit"}
+    asked |= {"velocity_unit"} if velocity and not unit else set()
+    assert set(found.questions) == asked
+    trajectory, used, _ = read_motion(path, confirm(found))
+    scale = np.pi / 180 if used.mapping.joint_unit == "deg" else 1.0
+    np.testing.assert_array_equal(trajectory.q, q * scale)
+    np.testing.assert_array_equal(trajectory.t, t * (1e-3 if used.mapping.time_unit == "ms" else 1.0))
+    assert (trajectory.qd is not None) == velocity
+
+
+def test_a_doubt_is_an_error_that_holds_the_text_to_paste(tmp_path):
+    path = table(tmp_path / "a.csv", ["Time [s]", "J1", "J2", "J3"], [T, Q])
+    with pytest.raises(InputError) as error:
+        read_motion(path)
+    text = str(error.value)
+    assert "mapping.joint_unit" in text
+    assert "could be rad or deg" in text
+    snippet = text[text.index("[sources.mapping]") :]
+    pasted = msgspec.convert(tomllib.loads(snippet)["sources"]["mapping"], Mapping)
+    np.testing.assert_array_equal(read_motion(path, pasted)[0].q, Q)
+
+
+def test_a_range_that_cannot_be_radians_is_guessed_as_degrees_and_still_asked(tmp_path):
+    path = table(tmp_path / "a.csv", ["Time [s]", "J1", "J2", "J3"], [T, np.degrees(Q)])
+    found = guess(path)
+    assert found.mapping.joint_unit == "deg"
+    assert "too much for rad" in found.questions["joint_unit"]
+
+
+@pytest.mark.parametrize(
+    ("names", "convention", "sure"),
+    [
+        (["RX [deg]", "RY [deg]", "RZ [deg]"], "XYZ", False),
+        (["Roll [deg]", "Pitch [deg]", "Yaw [deg]"], "rpy", False),
+        (["A [deg]", "B [deg]", "C [deg]"], "ZYX", False),
+        (["qw", "qx", "qy", "qz"], "wxyz", True),
+        (["qx", "qy", "qz", "qw"], "wxyz", True),
+    ],
+)
+def test_only_named_quaternions_are_a_sure_orientation(tmp_path, names, convention, sure):
+    header = ["Time [s]", "J1 [rad]", "X [mm]", "Y [mm]", "Z [mm]", *names]
+    cells = [T, Q[:, 0], *[T * 0 + 5] * 3, *[T * 0 + 0.5] * len(names)]
+    found = guess(table(tmp_path / "a.csv", header, cells))
+    assert found.mapping.tcp_convention == convention
+    assert ("tcp_convention" not in found.questions) == sure
+    motion = read_motion(tmp_path / "a.csv", confirm(found))[0]
+    assert motion.tcp_wxyz is not None
+    np.testing.assert_allclose(motion.tcp_position, 0.005)
+    np.testing.assert_allclose(np.linalg.norm(motion.tcp_wxyz, axis=1), 1)
+
+
+def test_tool_columns_that_are_not_wanted_are_left_out_without_a_question(tmp_path):
+    header = ["Time [s]", "J1 [rad]", "X", "Y", "Z", "A", "B", "C"]
+    path = table(tmp_path / "a.csv", header, [T, Q[:, 0], *[T] * 6])
+    assert set(guess(path).questions) == {"tcp_position_unit", "tcp_convention", "tcp_orientation_unit"}
+    found = guess(path, Mapping(tcp_position=(), tcp_orientation=()))
+    assert found.certain
+    assert "X, Y, Z" in " ".join(found.notes)
+
+
+def test_two_columns_for_one_joint_and_two_kinds_of_joints_are_asked(tmp_path):
+    twice = table(tmp_path / "a.csv", ["Time [s]", "J1 [rad]", "Axis 1 [rad]"], [T, Q[:, 0], Q[:, 1]])
+    assert "joint 1" in guess(twice).questions["joints"]
+    both = table(tmp_path / "b.csv", ["Time [s]", "J1 ist [rad]", "J1 soll [rad]"], [T, Q[:, 0], Q[:, 1]])
+    found = guess(both)
+    assert "measured and commanded" in found.questions["joints"]
+    assert found.mapping.joints == ("J1 ist [rad]",)
+    gap = table(tmp_path / "c.csv", ["Time [s]", "J1 [rad]", "J3 [rad]"], [T, Q[:, 0], Q[:, 1]])
+    assert "numbered 1, 3" in guess(gap).questions["joints"]
+    times = table(tmp_path / "d.csv", ["Time [s]", "t [ms]", "J1 [rad]"], [T, T * 1000, Q[:, 0]])
+    assert "'Time [s]', 't [ms]'" in guess(times).questions["time"]
+
+
+def test_a_mapping_by_names_numbers_or_pattern_reads_what_no_guess_understands(tmp_path):
+    header = ["Uhr", "winkel_a3", "winkel_a1", "winkel_a2"]
+    path = table(tmp_path / "a.csv", header, [T, Q[:, 2], Q[:, 0], Q[:, 1]], above=("Protokoll;x", ""))
+    units = {"time_unit": "s", "joint_unit": "rad"}
+    for joints in (r"winkel_a(\d)", ("winkel_a1", "WINKEL_A2", "winkel_a3"), (3, 4, 2)):
+        mapping = Mapping(time="Uhr", joints=joints, **units)
+        np.testing.assert_array_equal(read_motion(path, mapping)[0].q, Q)
+    bare = tmp_path / "bare.csv"
+    np.savetxt(bare, np.column_stack([T, Q]), delimiter=",")
+    mapping = Mapping(header_row=0, time=1, joints=(2, 3, 4), **units)
+    np.testing.assert_array_equal(read_motion(bare, mapping)[0].q, Q)
+
+
+@pytest.mark.parametrize(
+    ("mapping", "words"),
+    [
+        ({"time": "Time s"}, ["mapping.time", "'Time s'", "did you mean 'Time [s]'"]),
+        ({"joints": ("J1 [rad]", "J9")}, ["mapping.joints[1]", "'J9'"]),
+        ({"joints": (2, 99)}, ["mapping.joints[1]", "no column 99"]),
+        ({"joints": (2, 2)}, ["twice"]),
+        ({"joints": r"X(\d)"}, ["matches no header"]),
+        ({"joints": r"(J\d).*"}, ["first group is not a number"]),
+        ({"joints": "("}, ["not a pattern"]),
+        ({"joint_unit": ("rad",)}, ["1 units for 3 columns"]),
+        ({"velocities": ("J1 [rad]",)}, ["1 columns for 3 joints"]),
+        ({"tcp_position": ("J1 [rad]",)}, ["name x, y and z"]),
+        ({"tcp_convention": "XXZ"}, ["'XXZ'", "rotation_vector"]),
+        ({"header_row": 500}, ["beyond the table"]),
+        ({"delimiter": "ab"}, ["single character"]),
+    ],
+)
+def test_a_mapping_that_does_not_fit_names_key_value_and_remedy(tmp_path, mapping, words):
+    path = table(tmp_path / "a.csv", ["Time [s]", "J1 [rad]", "J2 [rad]", "J3 [rad]"], [T, Q])
+    with pytest.raises(InputError) as error:
+        read_motion(path, msgspec.convert(mapping, Mapping))
+    for word in words:
+        assert word in str(error.value)
+
+
+def test_a_unit_that_contradicts_the_header_is_used_and_said(tmp_path):
+    path = table(tmp_path / "a.csv", ["Time [s]", "J1 [deg]"], [T, Q[:, 0]])
+    trajectory, _, notes = read_motion(path, msgspec.convert({"joint_unit": "rad"}, Mapping))
+    np.testing.assert_array_equal(trajectory.q[:, 0], Q[:, 0])
+    assert any("says deg, the mapping says rad" in n for n in notes)
+
+
+def test_a_comma_that_could_separate_thousands_is_asked(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("Time [ms];J1 [deg]\n1,000;2,125\n2,000;2,250\n3,000;2,375\n")
+    assert set(guess(path).questions) == {"decimal_comma"}
+    yes = read_motion(path, Mapping(decimal_comma=True))[0]
+    np.testing.assert_allclose(yes.t, [1e-3, 2e-3, 3e-3])
+    with pytest.raises(InputError, match="'1,000'"):
+        read_motion(path, Mapping(decimal_comma=False))
+
+
+def test_linear_joints_have_their_own_unit_and_must_fit_the_robot(tmp_path):
+    from seerob.source import Target
+
+    path = table(tmp_path / "a.csv", ["Time [s]", "J1 [mm]", "J2 [deg]"], [T, Q[:, 0], Q[:, 1]])
+    names = {"name": "gantry", "joints": ("x", "c"), "lower": (-9.0, -9.0), "upper": (9.0, 9.0)}
+    fits = Target(units=("m", "rad"), velocity=(None, None), **names)
+    q = read_motion(path, target=fits)[0].q
+    np.testing.assert_array_equal(q, Q[:, :2] * [1e-3, np.pi / 180])
+    turned = Target(units=("rad", "m"), velocity=(None, None), **names)
+    with pytest.raises(InputError, match="'x' is in rad") as error:
+        read_motion(path, target=turned)
+    assert len(error.value.problems) == 2
+
+
+def test_grad_is_a_degree_to_some_and_less_to_others(tmp_path):
+    path = table(tmp_path / "a.csv", ["Zeit [s]", "Achse 1 [Grad]"], [T, 50 * Q[:, 0]])
+    found = guess(path)
+    assert "header says grad" in found.questions["joint_unit"]

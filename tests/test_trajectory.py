@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seerob.errors import InputError
+from seerob.samples import Quality
+from seerob.trajectory import (
+    MotionOrigin,
+    Trajectory,
+    TrajectorySamples,
+    derive_velocities,
+    origin_finding,
+)
+
+
+def made(**changes):
+    t = np.arange(5) * 0.1
+    return Trajectory(**{"file": "a.csv", "t": t, "q": np.outer(t, [1.0, 2.0]), **changes})
+
+
+def test_samples_start_at_zero_keep_the_device_time_and_can_be_iterated_twice():
+    motion = made(t=np.arange(5) * 0.1 + 4029.5, invalid=np.array([0, 0, 1, 0, 0], bool))
+    samples = TrajectorySamples(motion, "excel ur10", "ur10", None)
+    first = list(samples)
+    assert first == list(samples)
+    assert [s.t for s in first] == pytest.approx([0, 0.1, 0.2, 0.3, 0.4], abs=1e-9)
+    assert [s.t_device for s in first] == motion.t.tolist()
+    assert [s.seq for s in first] == list(range(5))
+    assert [s.quality for s in first].count(Quality.INVALID) == 1
+    assert first[2].quality is Quality.INVALID
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"t": np.array([0, 0.1, 0.1, 0.2, 0.3])}, ["repeats", "0.1 s", "sample 2"]),
+        ({"t": np.array([0, 0.1, 0.05, 0.2, 0.3])}, ["goes back", "0.05 s after 0.1 s"]),
+        ({"t": np.array([0, 0.1, np.nan, 0.2, 0.3])}, ["time is nan", "sample 2"]),
+        ({"qd": np.zeros((5, 3))}, ["qd", "(5, 3)", "(5, 2)"]),
+        ({"qd": np.full((5, 2), np.inf)}, ["qd[0] is inf", "10 such"]),
+        ({"tcp_wxyz": np.zeros((5, 3))}, ["tcp_wxyz"]),
+        ({"t": np.zeros(1), "q": np.zeros((1, 2))}, ["1 sample;", "at least 2"]),
+        ({"t": np.zeros(0), "q": np.zeros((0, 2))}, ["0 samples;"]),
+        ({"q": np.zeros((5, 0))}, ["not a table"]),
+    ],
+)
+def test_what_is_no_trajectory_is_refused_with_place_and_value(changes, words):
+    with pytest.raises(InputError) as error:
+        made(**changes)
+    for word in words:
+        assert word in str(error.value)
+
+
+def test_places_name_sheet_row_and_column():
+    motion = made(rows=np.arange(10, 15), sheet="Joints")
+    assert motion.place(2, "J1") == "sheet 'Joints' row 12 column 'J1'"
+
+
+@given(
+    st.lists(st.floats(0.001, 1.0), min_size=3, max_size=30),
+    st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3)),
+)
+def test_derived_velocities_are_exact_for_parabolas_at_any_spacing(steps, c):
+    t = np.concatenate([[0], np.cumsum(steps)])
+    q = (c[0] + c[1] * t + c[2] * t**2)[:, None]
+    np.testing.assert_allclose(derive_velocities(t, q).qd[:, 0], c[1] + 2 * c[2] * t, atol=1e-7)
+
+
+def test_error_of_derived_velocities_is_estimated_within_a_factor_of_two():
+    t = np.linspace(0, 6, 301)
+    derived = derive_velocities(t, np.sin(3 * t)[:, None])
+    # At interior points; the one-sided ends are worse and are not estimated.
+    true = np.abs(derived.qd[2:-2, 0] - 3 * np.cos(3 * t)[2:-2]).max()
+    assert derived.error is not None
+    assert true / 2 < derived.error < true * 2
+
+
+def test_two_samples_give_the_slope_and_no_error_estimate():
+    derived = derive_velocities(np.array([0.0, 2.0]), np.array([[0.0], [1.0]]))
+    np.testing.assert_array_equal(derived.qd, [[0.5], [0.5]])
+    assert derived.error is None
+
+
+@pytest.mark.parametrize("origin", MotionOrigin)
+def test_all_but_the_controller_and_recordings_are_preliminary(origin):
+    finding = origin_finding(origin, "ur10", "a.csv")
+    preliminary = origin not in (MotionOrigin.CONTROLLER, MotionOrigin.RECORDING)
+    assert ("preliminary" in finding.text) == preliminary
+    assert (finding.level == "assumed") == preliminary

@@ -1,0 +1,67 @@
+// A real browser for the tests. Wait for states, never for milliseconds: frame rates mean nothing here.
+
+import fs from "node:fs";
+import os from "node:os";
+import path from "node:path";
+import { chromium } from "playwright-core";
+
+const SOFTWARE_GL = process.env.EGL_PLATFORM
+  ? ["--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist"]
+  : ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+
+const FLAGS = [
+  "--headless=new",
+  "--no-sandbox",
+  "--disable-quic",
+  "--no-first-run",
+  "--disable-background-networking",
+  "--disable-component-update",
+  "--disable-sync",
+  "--force-prefers-reduced-motion",
+  ...SOFTWARE_GL,
+];
+
+/** Path of the browser, or an error that says how to get one. */
+export function browserPath() {
+  const asked = process.env.CHROMIUM;
+  const candidates = asked
+    ? [asked]
+    : ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
+  const found = candidates.find((file) => fs.existsSync(file));
+  if (found) return found;
+  throw new Error(
+    `no browser at ${candidates.join(", ")}: install one (apt-get install chromium) or set CHROMIUM to its path`,
+  );
+}
+
+/**
+ * Open a browser with an empty profile.
+ *
+ * @returns The page, everything it complained about, and `close`.
+ */
+export async function openBrowser({ width = 960, height = 640 } = {}) {
+  const executablePath = browserPath();
+  const profile = fs.mkdtempSync(path.join(os.tmpdir(), "seerob-web-"));
+  const context = await chromium.launchPersistentContext(profile, {
+    executablePath,
+    args: FLAGS,
+    ignoreDefaultArgs: ["--headless"],
+    viewport: { width, height },
+  });
+  const page = context.pages()[0] ?? (await context.newPage());
+  const complaints = [];
+  const outside = [];
+  page.on("pageerror", (error) => complaints.push(String(error)));
+  page.on("console", (message) => {
+    if (message.type() === "error") complaints.push(message.text());
+  });
+  page.on("request", (request) => {
+    const { protocol, hostname } = new URL(request.url());
+    if (!["data:", "blob:"].includes(protocol) && hostname !== "127.0.0.1") outside.push(request.url());
+  });
+  const close = async () => {
+    await context.close();
+    fs.rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
+  };
+  return { page, context, complaints, outside, close };
+}

@@ -1,0 +1,73 @@
+// What the tests compare with, and how they wait for it.
+
+import assert from "node:assert/strict";
+
+/** A pose of the wire (z up; x, y, z, w, x, y, z) as three.js must have it (y up; quaternion x, y, z, w). */
+export function turned([x, y, z, qw, qx, qy, qz]) {
+  // Minus 90 degrees about x: (x, y, z) becomes (x, z, −y); its quaternion is (c, −c, 0, 0), c = √½.
+  const c = Math.SQRT1_2;
+  const w = c * (qw + qx);
+  return {
+    position: [x, z, -y],
+    quaternion: [c * (qx - qw), c * (qy + qz), c * (qz - qy), w],
+  };
+}
+
+/** Fail unless two poses are the same up to float32 and to the sign of the quaternion. */
+export function assertSamePose(actual, expected, name) {
+  const near = (a, b) => a.every((x, i) => Math.abs(x - b[i]) < 2e-6);
+  const same =
+    near(actual.position, expected.position) &&
+    (near(actual.quaternion, expected.quaternion) ||
+      near(
+        actual.quaternion.map((x) => -x),
+        expected.quaternion,
+      ));
+  assert.ok(same, `${name}: ${JSON.stringify(actual)} instead of ${JSON.stringify(expected)}`);
+}
+
+/** Open the page and wait until it shows something. */
+export async function show(page, url) {
+  await page.goto(url);
+  await page.waitForFunction(() => Number.isFinite(window.seerob?.t), null, { timeout: 30_000 });
+  await page.waitForSelector("tr[data-criterion]");
+}
+
+/** Wait until the shown run time stays the same, and return it. */
+export async function settled(page) {
+  let before = Number.NaN;
+  for (;;) {
+    const t = await page.evaluate(() => window.seerob.t);
+    if (t === before) return t;
+    before = t;
+    await page.waitForTimeout(300);
+  }
+}
+
+/** Poses of some bodies as drawn. */
+export function poses(page, names) {
+  return page.evaluate((all) => Object.fromEntries(all.map((name) => [name, window.seerob.pose(name)])), names);
+}
+
+/** Fail unless every body is where the snapshot of this run time has it. */
+export async function assertShown(page, served, t) {
+  const told = await served.tell(`snapshot ${t}`);
+  assert.ok(Math.abs(told.t - t) < 1e-9);
+  const drawn = await poses(page, Object.keys(told.poses));
+  for (const [name, pose] of Object.entries(told.poses)) assertSamePose(drawn[name], turned(pose), name);
+  return told;
+}
+
+/** Pixels of a part of the screen: width, height and RGBA bytes. */
+export async function pixels(page, clip) {
+  const png = (await page.screenshot({ clip })).toString("base64");
+  return page.evaluate(async (data) => {
+    const image = new Image();
+    image.src = `data:image/png;base64,${data}`;
+    await image.decode();
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const brush = canvas.getContext("2d");
+    brush.drawImage(image, 0, 0);
+    return [...brush.getImageData(0, 0, image.width, image.height).data];
+  }, png);
+}

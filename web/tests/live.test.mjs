@@ -1,0 +1,149 @@
+// A live run in a real browser, from the real server.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { openBrowser } from "./browser.mjs";
+import { assertShown, settled, show } from "./expect.mjs";
+import { serve } from "./served.mjs";
+
+const HOSTILE = "<img src=x onerror=window.hacked=1>";
+let served;
+let browser;
+let page;
+
+before(async () => {
+  served = await serve("--mode", "live");
+  browser = await openBrowser();
+  page = browser.page;
+  await show(page, served.url);
+});
+
+after(async () => {
+  await browser?.close();
+  await served?.close();
+});
+
+test("nothing comes from elsewhere, nothing complains, memory is shared", async () => {
+  assert.equal(await page.evaluate(() => globalThis.crossOriginIsolated), true);
+  assert.deepEqual(browser.outside, []);
+  assert.deepEqual(browser.complaints, []);
+});
+
+test("names from files are shown as text, and only as text", async () => {
+  assert.equal(await page.evaluate(() => globalThis.hacked), undefined);
+  assert.equal(await page.textContent("h1"), `UR10 assembly ${HOSTILE}`);
+  assert.equal(await page.getByRole("button", { name: HOSTILE, exact: true }).count(), 1);
+  assert.equal(await page.locator("img[src=x]").count(), 0);
+});
+
+test("the table says values, units, limits and words; UNDECIDED gives its reason and its own look", async () => {
+  const speed = await page.locator('tr[data-criterion="tcp speed"]').innerText();
+  assert.match(speed, /0\.\d{3}\sm\/s[\s\S]*≤\s0\.700\sm\/s[\s\S]*(within|exceeded)/);
+  const mass = page.locator('tr[data-criterion="effective mass"]');
+  assert.match(await mass.innerText(), /–\skg[\s\S]*undecided/);
+  assert.equal(await mass.locator(".badge-icon").innerText(), "?");
+  const reason = await page.locator("tr.explanation", { hasText: "given by nobody" }).innerText();
+  assert.match(reason, /mass of ur10\/shoulder_link was given by nobody/);
+  const looks = await page.evaluate(() => {
+    const look = (name) => {
+      const row = document.querySelector(`tr[data-criterion="${name}"]`);
+      const style = getComputedStyle(row.querySelector("td"));
+      const icon = getComputedStyle(row.querySelector(".badge-icon"));
+      return [style.backgroundImage, icon.borderStyle, getComputedStyle(row.querySelector(".badge")).color];
+    };
+    return { undecided: look("effective mass"), within: look("work area") };
+  });
+  assert.match(looks.undecided[0], /gradient/);
+  looks.undecided.forEach((style, i) => assert.notEqual(style, looks.within[i]));
+});
+
+test("the worst comes first and the pill names it", async () => {
+  const states = await page.locator("tr[data-criterion] .badge").allInnerTexts();
+  const rank = ["exceeded", "undecided", "no result", "within, close", "within", "informs"];
+  const ranks = states.map((text) => rank.findIndex((word) => text.trim().endsWith(word)));
+  assert.ok(!ranks.includes(-1), `${states}`);
+  assert.equal(ranks[0], Math.min(...ranks));
+  assert.match(await page.locator("output.pill").innerText(), /LIMIT EXCEEDED|UNDECIDED/);
+});
+
+test("a row opens to its basis: formula, source, inputs with origin, what is not modelled", async () => {
+  const row = page.locator('tr[data-criterion="separation"]');
+  await row.getByRole("button", { expanded: false }).click();
+  const details = page.locator("tr.details");
+  const text = await details.innerText();
+  for (const said of ["S_p = v_h (T_r + T_s)", "5.5.4.2.3, Eq. 2", "stated", "missing", "uncertainty of the person's position"]) {
+    assert.ok(text.includes(said), said);
+  }
+  await row.getByRole("button", { expanded: true }).click();
+  assert.equal(await details.count(), 0);
+});
+
+test("a live run that falls silent is said to be silent, and nothing stays green", async () => {
+  await served.tell("freeze");
+  await page.waitForSelector(".pill.state-off");
+  assert.equal(await page.locator(".criteria table.stale").count(), 1);
+  assert.match(await page.locator(".source").innerText(), /nothing heard/);
+});
+
+test("every body is where the last snapshot has it, turned from z-up to y-up", async () => {
+  await assertShown(page, served, await settled(page));
+});
+
+test("looking back shows an earlier instant; L follows again", async () => {
+  await served.tell("go");
+  await page.waitForSelector(".pill:not(.state-off)");
+  const newest = await page.evaluate(() => window.seerob.t);
+  await page.keyboard.press("Space");
+  await page.waitForSelector(".behind");
+  const held = await settled(page);
+  assert.ok(held >= newest);
+  await page.keyboard.press("Shift+ArrowLeft");
+  await page.waitForFunction((t) => window.seerob.t < t - 0.5, held);
+  const back = await settled(page);
+  assert.ok(Math.abs(back - (held - 1)) < 0.1, `${back} is not a second before ${held}`);
+  await assertShown(page, served, back);
+  await page.keyboard.press("l");
+  await page.waitForFunction((t) => window.seerob.t > t + 0.2, held);
+  assert.equal(await page.locator(".behind").count(), 0);
+});
+
+test("findings are one click away", async () => {
+  await page.getByRole("tab", { name: /Findings/ }).click();
+  const levels = await page.locator(".finding-level").allInnerTexts();
+  assert.deepEqual(
+    levels.map((text) => text.replace(/^\S+\s/, "")),
+    ["warning", "assumed", "note"],
+  );
+  await page.getByRole("tab", { name: "Criteria" }).click();
+});
+
+test("the tree selects, filters and hides", async () => {
+  await page.getByRole("searchbox").fill("wrist_2");
+  await page.getByRole("button", { name: "wrist_2_link", exact: true }).click();
+  assert.match(await page.locator(".properties").innerText(), /ur10\/wrist_2_link[\s\S]*not given[\s\S]*envelope/);
+  await page.getByRole("button", { name: "Hide ur10/wrist_2_link" }).click();
+  assert.equal(await page.getByRole("button", { name: "Show ur10/wrist_2_link" }).count(), 1);
+  await page.getByRole("button", { name: "Show ur10/wrist_2_link" }).click();
+  await page.getByRole("searchbox").fill("");
+});
+
+test("a lost server greys everything out; the page finds it again by itself", async () => {
+  await served.tell("stop");
+  await page.waitForSelector(".pill.state-off");
+  assert.match(await page.locator(".pill").innerText(), /NO CURRENT DATA/);
+  assert.match(await page.locator(".source").innerText(), /disconnected|connecting/);
+  assert.equal(await page.locator(".criteria table.stale").count(), 1);
+  await served.tell("start");
+  await page.waitForSelector(".pill:not(.state-off)", { timeout: 20_000 });
+  assert.equal(await page.locator(".criteria table.stale").count(), 0);
+});
+
+test("a narrow screen loses nothing to the right", async () => {
+  await page.setViewportSize({ width: 1024, height: 700 });
+  const over = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+  assert.ok(over <= 0);
+  for (const selector of [".pill", ".criteria td.state .badge", ".transport", ".strip"]) {
+    const box = await page.locator(selector).first().boundingBox();
+    assert.ok(box && box.x >= 0 && box.x + box.width <= 1024, selector);
+  }
+});

@@ -1,0 +1,86 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { Worker } from "node:worker_threads";
+import { built, load } from "./source.mjs";
+
+const address = await built("poses");
+const { PoseReader, PoseWriter, poseBufferBytes } = await import(address);
+const bytesOf = (floats) => new Uint8Array(Float32Array.from(floats).buffer);
+
+test("the reader gets the newest block, once", () => {
+  const buffer = new SharedArrayBuffer(poseBufferBytes(7));
+  const writer = new PoseWriter(buffer);
+  const reader = new PoseReader(buffer);
+  assert.equal(reader.read(), null);
+  for (let k = 1; k <= 5; k += 1) assert.ok(writer.write(bytesOf(Array(7).fill(k)), k / 10, k));
+  assert.deepEqual([...reader.read()], Array(7).fill(5));
+  assert.equal(reader.t, 0.5);
+  assert.equal(reader.read(), null);
+});
+
+test("what is being read is never written", () => {
+  const buffer = new SharedArrayBuffer(poseBufferBytes(7));
+  const writer = new PoseWriter(buffer);
+  const reader = new PoseReader(buffer);
+  writer.write(bytesOf(Array(7).fill(1)), 1, 1);
+  const held = reader.read();
+  for (let k = 2; k < 50; k += 1) {
+    writer.write(bytesOf(Array(7).fill(k)), k, k);
+    assert.deepEqual([...held], Array(7).fill(1));
+  }
+});
+
+test("a block of another scene is refused", () => {
+  const writer = new PoseWriter(new SharedArrayBuffer(poseBufferBytes(14)));
+  assert.equal(writer.write(bytesOf(Array(7).fill(1)), 0, 0), false);
+});
+
+test("two threads: no torn block and no step back in a hundred thousand writes", async () => {
+  const floats = 700;
+  const writes = 100_000;
+  const buffer = new SharedArrayBuffer(poseBufferBytes(floats));
+  const code = `
+    const { workerData } = require("node:worker_threads");
+    import(workerData.address).then(({ PoseWriter }) => {
+      const writer = new PoseWriter(workerData.buffer);
+      const block = new Float32Array(workerData.floats);
+      const bytes = new Uint8Array(block.buffer);
+      for (let k = 1; k <= workerData.writes; k += 1) { block.fill(k); writer.write(bytes, k, k); }
+    });`;
+  const worker = new Worker(code, { eval: true, workerData: { address, buffer, floats, writes } });
+  let ended = false;
+  worker.on("exit", () => {
+    ended = true;
+  });
+  const reader = new PoseReader(buffer);
+  let last = 0;
+  let reads = 0;
+  while (!ended || last < writes) {
+    const block = reader.read();
+    if (block) {
+      reads += 1;
+      const first = block[0];
+      assert.ok(first >= last, `${first} after ${last}`);
+      assert.ok(
+        block.every((x) => x === first),
+        `torn at ${first}`,
+      );
+      last = first;
+    }
+    if (!block || reads % 64 === 0) await new Promise(setImmediate);
+  }
+  assert.equal(last, writes);
+  assert.ok(reads > 100, `only ${reads} blocks were read while writing`);
+});
+
+test("looking back finds the first kept snapshot at or after an instant, within the budget", async () => {
+  const { Recent } = await load("recent");
+  const recent = new Recent(800, 0.04);
+  const at = (t) => new Float64Array(recent.at(t).slice().buffer)[0];
+  for (let k = 0; k < 500; k += 1) recent.keep(k / 100, new Uint8Array(Float64Array.of(k / 100).buffer), false);
+  const kept = 4.99 - recent.oldest;
+  assert.ok(kept > 90 * 0.04 && kept < 110 * 0.05, `${kept} s are kept`);
+  for (const t of [4.01, 3.333, 4.5]) assert.ok(at(t) >= t && at(t) < t + 0.06, `${at(t)} for ${t}`);
+  assert.equal(at(0), recent.oldest);
+  assert.ok(at(99) > 4.94);
+});

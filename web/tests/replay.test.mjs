@@ -1,0 +1,105 @@
+// A recording in a real browser: one time cursor for the room, the table, the plots and the strip.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { openBrowser } from "./browser.mjs";
+import { assertShown, settled, show } from "./expect.mjs";
+import { serve } from "./served.mjs";
+
+let served;
+let browser;
+let page;
+
+before(async () => {
+  served = await serve("--mode", "replay", "--seconds", "20");
+  browser = await openBrowser();
+  page = browser.page;
+  await show(page, served.url);
+});
+
+after(async () => {
+  await browser?.close();
+  await served?.close();
+});
+
+const reaches = (t) => page.waitForFunction((to) => Math.abs(window.seerob.t - to) < 0.006, t);
+
+test("a click on the strip moves the cursor, the room and the numbers", async () => {
+  const box = await page.locator(".strip").boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  await page.waitForFunction(() => Math.abs(window.seerob.t - 10) < 0.1);
+  const t = await settled(page);
+  const told = await assertShown(page, served, t);
+  const value = told.results.find((r) => r.name === "separation").value;
+  await page.waitForFunction(
+    (text) => document.querySelector('tr[data-criterion="separation"] .value').textContent === text,
+    value.toFixed(3),
+  );
+  assert.equal(await page.locator(".strip").getAttribute("aria-valuenow"), String(t));
+});
+
+test("arrows step by one snapshot, with shift by a second", async () => {
+  const t = await settled(page);
+  await page.keyboard.press("ArrowRight");
+  await reaches(t + 0.01);
+  await page.keyboard.press("ArrowLeft");
+  await reaches(t);
+  await page.keyboard.press("Shift+ArrowLeft");
+  await reaches(t - 1);
+  await assertShown(page, served, await settled(page));
+});
+
+test("] goes to where a limit begins to be exceeded, and [ back", async () => {
+  const start = await settled(page);
+  await page.keyboard.press("]");
+  await page.waitForFunction((t) => window.seerob.t > t + 0.02, start);
+  const t = await settled(page);
+  const verdicts = async (at) => (await served.tell(`snapshot ${at}`)).results.map((r) => r.verdict === "exceeded");
+  const [now, just] = [await verdicts(t), await verdicts(t - 0.01)];
+  assert.ok(
+    now.some((exceeded, i) => exceeded && !just[i]),
+    `nothing begins to be exceeded at ${t}`,
+  );
+  await page.waitForSelector(".pill.state-exceeded");
+  assert.match(await page.locator(".pill").innerText(), /✕[\s\S]*LIMIT EXCEEDED/);
+  await page.keyboard.press("[");
+  await page.waitForFunction((before) => window.seerob.t < before - 0.02, t);
+});
+
+test("space plays at the chosen speed and pauses", async () => {
+  await page.getByLabel("Speed").selectOption("4");
+  const start = await settled(page);
+  await page.locator("body").press("Space");
+  await page.waitForFunction((t) => window.seerob.t > t + 1, start);
+  await page.keyboard.press("Space");
+  await page.waitForSelector('button[aria-label="Play (space)"]');
+  const t = await settled(page);
+  await assertShown(page, served, t);
+});
+
+test("a click on a plot seeks too, and a lane's name selects its criterion everywhere", async () => {
+  await page.locator(".lane-names button", { hasText: "tcp speed" }).click();
+  assert.equal(await page.locator('tr[data-criterion="tcp speed"].selected').count(), 1);
+  assert.equal(await page.locator(".plot.selected .plot-name").innerText(), "tcp speed");
+  const over = await page.locator(".plot.selected .u-over").boundingBox();
+  await page.mouse.click(over.x + over.width * 0.25, over.y + over.height / 2);
+  await page.waitForFunction(() => Math.abs(window.seerob.t - 5) < 0.15);
+});
+
+test("where memory cannot be shared, poses come by message and are the same", async () => {
+  const other = await browser.context.newPage();
+  await other.route("**/*", async (route) => {
+    const response = await route.fetch();
+    const headers = { ...response.headers() };
+    delete headers["cross-origin-opener-policy"];
+    delete headers["cross-origin-embedder-policy"];
+    await route.fulfill({ response, headers });
+  });
+  await show(other, served.url);
+  assert.equal(await other.evaluate(() => globalThis.crossOriginIsolated), false);
+  await other.keyboard.press("Shift+ArrowLeft");
+  await assertShown(other, served, await settled(other));
+  await other.close();
+});
+
+test("nothing complained", () => assert.deepEqual(browser.complaints, []));

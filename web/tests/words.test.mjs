@@ -1,0 +1,67 @@
+import assert from "node:assert/strict";
+import fs from "node:fs";
+import { test } from "node:test";
+import { load } from "./source.mjs";
+
+const { margin, stateOf, worstState, STATE_WORDS, STATE_ICONS, VERDICT_TEXT } = await load("verdicts");
+const { formatNumber, formatTime, formatPercent, formatQuantity } = await load("format");
+
+test("numbers have three digits, a true minus, and the limit's decimals", () => {
+  assert.equal(formatNumber(0.12345), "0.123");
+  assert.equal(formatNumber(-12.34), "−12.3");
+  assert.equal(formatNumber(1234.5), "1235");
+  assert.equal(formatNumber(-0.0001, 1), "−1.00e−4");
+  assert.equal(formatNumber(0.9, 100), "1");
+  assert.equal(formatNumber(-0.004, 10), "0.0");
+  assert.equal(formatNumber(null), "–");
+  assert.equal(formatQuantity(0.61, "m"), "0.610\u00a0m");
+  assert.equal(formatPercent(-0.123), "−12\u00a0%");
+  assert.equal(formatTime(83.456), "1:23.46");
+  assert.equal(formatTime(59.999), "1:00.00");
+});
+
+test("the margin is positive on the admissible side, whichever that is", () => {
+  assert.equal(margin({ value: 0.75, limit: 1, at_most: true }), 0.25);
+  assert.equal(margin({ value: 0.75, limit: 1, at_most: false }), -0.25);
+  assert.equal(margin({ value: -3, limit: -2, at_most: true }), 0.5);
+  assert.equal(margin({ value: 1, limit: 0, at_most: true }), null);
+});
+
+test("nothing but WITHIN looks within, and the worst counts", () => {
+  const of = (verdict, value = 0.5) => stateOf({ verdict, value, limit: 1, at_most: true });
+  assert.deepEqual(
+    [of("within"), of("within", 0.95), of("exceeded"), of("undecided"), of(null)],
+    ["within", "close", "exceeded", "undecided", "none"],
+  );
+  assert.equal(worstState(["within", "missing", "none"]), "missing");
+  assert.equal(worstState(["undecided", "exceeded", "within"]), "exceeded");
+  assert.equal(worstState([]), "none");
+  const words = Object.values(STATE_WORDS);
+  assert.equal(new Set(words).size, words.length);
+  assert.ok(!words.some((word) => /safe|certif|complian|pass|ok/i.test(word)));
+  assert.notEqual(STATE_ICONS.undecided, STATE_ICONS.within);
+});
+
+test("text on panels has a contrast of at least 4.5", () => {
+  const css = fs.readFileSync(new URL("../src/look/base.css", import.meta.url), "utf8");
+  const color = Object.fromEntries([...css.matchAll(/--([\w-]+):\s*(#[0-9a-f]{6})/g)].map((m) => [m[1], m[2]]));
+  const texts = ["text", "text-2", "text-3", "within-text", "exceeded-text", "undecided-text", "off-text"];
+  for (const ground of ["ground", "panel", "raised"]) {
+    for (const text of texts) {
+      assert.ok(contrast(color[text], color[ground]) >= 4.5, `${text} on ${ground}`);
+    }
+  }
+  for (const text of Object.values(VERDICT_TEXT)) assert.ok(contrast(text, color.ground) >= 4.5, text);
+  assert.ok(contrast("#ffffff", color.exceeded) >= 4.5);
+});
+
+function luminance(hex) {
+  const [r, g, b] = [1, 3, 5].map((i) => Number.parseInt(hex.slice(i, i + 2), 16) / 255);
+  const linear = (c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+  return 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+}
+
+function contrast(a, b) {
+  const [high, low] = [luminance(a), luminance(b)].sort((x, y) => y - x);
+  return (high + 0.05) / (low + 0.05);
+}

@@ -110,7 +110,7 @@ def person_motion(ticks: int) -> tuple[Array, Array]:
             y = np.cross(z, [1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.cross(z, [0.0, 1.0, 0.0])
             y /= np.linalg.norm(y)
             R[k, i] = lean @ np.column_stack([np.cross(y, z), y, z])
-            x[k, i] = pelvis + lean @ (np.array(middle) + [0, 0, swing * np.sin(2 * t + middle[1])])
+            x[k, i] = pelvis + lean @ (np.array(middle) + np.array([0, 0, swing * np.sin(2 * t + middle[1])]))
     return R, x
 
 
@@ -245,7 +245,7 @@ def person(kind: str, ticks: int) -> tuple[float, float]:
     times["seerob, 25 parts, batch/tick"][0] /= ticks
     count = sum(len(mesh.faces) for _, mesh in links)
     report(
-        f"person at {nearest:.2f} … {farthest:.2f} m × UR10 {kind} ({count} triangles, built in {built:.2f} s)",
+        f"person at {nearest:.2f} … {farthest:.2f} m × UR10 {kind} ({count} triangles, {built:.2f} s)",
         times,
         "coal, 25 parts",
         worst,

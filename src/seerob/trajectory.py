@@ -7,7 +7,7 @@ derived by second-order central differences, and the result says so.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -52,7 +52,7 @@ def origin_finding(origin: MotionOrigin, subject: str, file: str) -> Finding:
     return Finding(level="assumed", subject=subject, text=text)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory:
     """Joint values over time, one row per sample of the file.
 
@@ -86,6 +86,9 @@ class Trajectory:
         problems = list(self._shape_problems()) or list(self._value_problems())
         if problems:
             raise InputError(problems)
+
+    def __repr__(self) -> str:
+        return f"Trajectory({self.file!r}, {len(self.t)} samples of {self.dof} joints, {self.duration:g} s)"
 
     @property
     def dof(self) -> int:
@@ -187,7 +190,7 @@ class TrajectorySamples:
     trajectory: Trajectory
     source: str
     target: str
-    qd: Array | None
+    qd: Array | None = field(repr=False)
     """Velocities to hand on: the file's own or derived [rad/s or m/s], shape (n, dof)."""
 
     def __len__(self) -> int:

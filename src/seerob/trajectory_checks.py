@@ -156,7 +156,8 @@ def _speed(trajectory: Trajectory, target: Target, slopes: Array, j: int) -> lis
 def _wrapped(trajectory: Trajectory, slopes: Array, j: int) -> Problem | None:
     """A jump of about one turn within one short step is an angle folded into ±180°, not a motion."""
     step = np.abs(np.diff(trajectory.q[:, j]))
-    jumps = np.flatnonzero((step > 1.8 * pi) & (np.abs(slopes[:, j]) > 4 * pi))
+    turn = np.abs(step - 2 * pi) < 0.2 * pi
+    jumps = np.flatnonzero(turn & (np.abs(slopes[:, j]) > 4 * pi))
     if not jumps.size:
         return None
     i = int(jumps[0]) + 1

@@ -73,9 +73,9 @@ def test_velocity_is_the_derivative_and_continuous():
 
 
 def test_sampled_velocity_is_the_derivative_of_the_sampled_position():
-    t, q, qd = sample(keyframes.read("library:reach_into_cell", PERSON), PERSON, 1000.0)
+    t, q, qd = sample(keyframes.read("library:reach_into_cell", PERSON), PERSON, 500.0)
     central = (q[2:] - q[:-2]) / (t[2] - t[0])
-    assert np.abs(central - qd[1:-1]).max() < 2e-3 * np.abs(qd).max()
+    assert np.abs(central - qd[1:-1]).max() < 5e-3 * np.abs(qd).max()
 
 
 def test_a_bent_pose_between_straight_ones_keeps_the_feet_down():
@@ -97,7 +97,7 @@ def test_a_bent_pose_between_straight_ones_keeps_the_feet_down():
 
 def test_walking_does_not_slide_and_gets_on():
     """No point of a sole that touches the floor moves over it; the gait makes about 0.85 m/s."""
-    t, q, _ = sample(keyframes.read("library:walk", PERSON), PERSON, 1000.0)
+    t, q, _ = sample(keyframes.read("library:walk", PERSON), PERSON, 500.0)
     rotations, positions = bone_poses(PERSON, q)
     touching, centers, owners = sole_corners(PERSON, rotations, positions)
     rows = np.arange(len(t) - 1)

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from seerob.errors import InputError, UnknownName
 from seerob.geometry import Solid
-from seerob.human import anthropometry, manikin, skin
+from seerob.human import anthropometry, manikin, skin, zatsiorsky
 from seerob.human.skeleton import AXES, BONES, bone_poses
+from seerob.human.tables import table
 from seerob.model_io.description import Description, JointKind
 from seerob.snapshot import Origin
 
@@ -20,8 +21,8 @@ SEXES, LENGTHS = ("male", "female"), ("drillis", "deleva")
 PEOPLE = st.tuples(st.floats(1.2, 2.3), st.floats(30, 250), st.sampled_from(SEXES), st.sampled_from(LENGTHS))
 
 
-def person(stature=1.75, mass=75.0, sex="male", lengths="drillis", hand="right"):
-    return manikin.build(name="p", stature=stature, mass=mass, sex=sex, lengths=lengths, hand=hand)
+def person(stature=1.75, mass=75.0, sex="male", lengths="drillis", **more):
+    return manikin.build(name="p", stature=stature, mass=mass, sex=sex, lengths=lengths, **more)
 
 
 def corners(solid: Solid) -> np.ndarray:
@@ -54,7 +55,7 @@ def test_21_bones_47_joint_axes_and_6_of_the_waist():
     assert [j.name for j in joints] == [a.name for a in AXES]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(PEOPLE)
 def test_chain_closes_at_the_stature_and_masses_at_the_body_mass(who):
     stature, mass, _, _ = who
@@ -65,7 +66,7 @@ def test_chain_closes_at_the_stature_and_masses_at_the_body_mass(who):
     assert high == pytest.approx(stature, abs=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(PEOPLE)
 def test_every_bone_is_a_body_that_can_exist(who):
     for link in person(*who).links[1:]:
@@ -125,7 +126,7 @@ def whole(description: Description, bones: tuple[str, ...]) -> tuple[float, np.n
 def test_the_reference_man_of_de_leva_comes_back():
     """1.741 m, 73 kg: lengths, centres and radii of gyration of Table 4, split bones taken together."""
     description = person(1.741, 73.0, "male", "deleva")
-    rows = anthropometry.table("de_leva")["male"]
+    rows = table("de_leva")["male"]
     rows = rows["segments"] | rows["alternatives"]
     _, positions = bone_poses(description, np.zeros(53))
 
@@ -174,7 +175,7 @@ def test_trunk_together_has_its_published_centre():
 
 @pytest.mark.parametrize(("sex", "total"), [("male", 100.00), ("female", 99.99)])
 def test_check_sums_of_table_4(sex, total):
-    rows = anthropometry.table("de_leva")[sex]["segments"]
+    rows = table("de_leva")[sex]["segments"]
     single = ("head", "upper_trunk", "middle_trunk", "lower_trunk")
     weights = {k: 1 if k in single else 2 for k in rows}
     assert sum(weights[k] * row["mass"] for k, row in rows.items()) == pytest.approx(total, abs=1e-9)
@@ -182,13 +183,49 @@ def test_check_sums_of_table_4(sex, total):
 
 def test_trunk_pieces_are_the_trunk_of_table_4():
     for sex, trunk, length in (("male", 43.46, 603.3), ("female", 42.57, 614.8)):
-        people = anthropometry.table("de_leva")[sex]
+        people = table("de_leva")[sex]
         rows = people["segments"]
         pieces = ("upper_trunk", "middle_trunk", "lower_trunk")
         assert sum(rows[k]["mass"] for k in pieces) == pytest.approx(trunk)
         high = people["alternatives"]["upper_trunk_2"]["length"]
         parts = high + rows["middle_trunk"]["length"] + rows["lower_trunk"]["length"]
         assert parts == pytest.approx(length) == pytest.approx(people["alternatives"]["trunk_2"]["length"])
+
+
+MEAN_MAN = {  # men's mean table of the same study, transcribed by others: kg, kg cm2 about AP, ML, long axis
+    "foot": (0.997, 44, 40, 10.3),
+    "shank": (3.16, 385, 371, 64.6),
+    "thigh": (10.36, 1997.8, 1999.4, 413.4),
+    "hand": (0.447, 13.2, 8.76, 5.37),
+    "forearm": (1.177, 64.7, 60.2, 12.6),
+    "upper_arm": (1.98, 127.3, 114.4, 38.95),
+    "head": (5.018, 272.1, 293.9, 202.4),
+    "upper_trunk": (11.654, 1725.6, 705.2, 1454.5),
+    "middle_trunk": (11.953, 1280.8, 819.1, 1203.1),
+    "lower_trunk": (8.164, 656.8, 525.0, 592.4),
+}
+
+
+@pytest.mark.parametrize("segment", MEAN_MAN)
+def test_regressions_give_the_mean_man(segment):
+    mass, *moments = MEAN_MAN[segment]
+    reference = {"mass": 73.0, "stature": 1.741}
+    assert zatsiorsky.masses(**reference)[segment] == pytest.approx(mass, rel=0.02)
+    found = np.array(zatsiorsky.moments(segment, **reference)) * 1e4
+    assert found == pytest.approx(moments, rel=0.015)
+
+
+def test_regressions_nearly_conserve_mass_and_the_manikin_exactly():
+    masses = zatsiorsky.masses(mass=80.0, stature=1.8)
+    single = ("head", "upper_trunk", "middle_trunk", "lower_trunk")
+    assert sum(m * (1 if k in single else 2) for k, m in masses.items()) == pytest.approx(80, rel=0.005)
+    description = person(1.8, 80.0, masses="zatsiorsky")
+    assert math.fsum(k.inertial.mass for k in description.links[1:]) == pytest.approx(80, rel=1e-12)
+    mass, _, inertia = whole(description, ("head", "neck"))
+    scale = mass / masses["head"]
+    sagittal, transverse, longitudinal = zatsiorsky.moments("head", mass=80.0, stature=1.8)
+    assert np.diag(inertia) == pytest.approx(scale * np.array([sagittal, transverse, longitudinal]))
+    assert "Zatsiorsky" in description.link("left_thigh").inertial.source
 
 
 def test_drillis_heights():
@@ -251,6 +288,9 @@ def test_limits_contain_zero_and_are_the_same_on_both_sides():
         ({"mass": math.inf}, "30…250 kg"),
         ({"sex": "other"}, "male, female"),
         ({"lengths": "guess"}, "drillis, deleva"),
+        ({"masses": "dempster"}, "deleva, zatsiorsky"),
+        ({"masses": "zatsiorsky", "sex": "female"}, "masses = deleva"),
+        ({"masses": "zatsiorsky", "mass": 30.0, "stature": 2.3}, "impossible segments for 30 kg"),
         ({"hand": "both"}, "right or left"),
     ],
 )
@@ -287,7 +327,7 @@ def test_body_regions():
 
 
 def test_statures_are_in_order_and_unknown_ones_say_so():
-    for population in anthropometry.table("statures"):
+    for population in table("statures"):
         for sex in SEXES:
             p5, p50, p95 = (anthropometry.stature(population, sex, p) for p in (5, 50, 95))
             assert 1.4 < p5 < p50 < p95 < 1.9

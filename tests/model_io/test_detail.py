@@ -25,6 +25,16 @@ def subdivided(body, times):
     return body
 
 
+def shrunk(body, factor):
+    """Scaled without trimesh's own merging of what it takes for equal."""
+    return Mesh(np.array(body.vertices) * factor, np.array(body.faces, np.int32))
+
+
+def volume(mesh):
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
+    return np.einsum("ij,ij->", a, np.cross(b, c)) / 6
+
+
 def slotted():
     return trimesh.creation.box((0.3, 0.2, 0.1)).difference(trimesh.creation.box((0.1, 0.1, 1.0)))
 
@@ -35,20 +45,19 @@ def slotted():
         (subdivided(trimesh.creation.box((0.3, 0.2, 0.1)), 4), 12),
         (subdivided(slotted(), 3), 32),
         # Finer than the tolerance on purpose: many small moves must not add up.
-        (trimesh.creation.icosphere(5, 0.0005), 12_000),
+        (shrunk(trimesh.creation.icosphere(5), 0.0005), 12_000),
         (trimesh.creation.cylinder(0.01, 0.2, sections=2000), 2000),
-        (trimesh.creation.torus(0.002, 0.001, 80, 80), 10_000),
+        (shrunk(trimesh.creation.torus(2, 1, 80, 80), 0.001), 10_000),
         (trimesh.creation.box((1, 1, 1)), 12),
     ],
 )
 def test_the_mesh_for_distances_is_the_same_surface_within_two_micrometres(body, at_most):
-    light = physics_mesh(soup(mesh_of(body)))
+    mesh = body if isinstance(body, Mesh) else mesh_of(body)
+    light = physics_mesh(soup(mesh))
     assert len(light.faces) <= at_most
-    assert hausdorff(mesh_of(body), light, 300) <= light.deviation + 1e-12
+    assert hausdorff(mesh, light, 300) <= light.deviation + 1e-12
     assert light.deviation <= 2e-6
-    assert trimesh.Trimesh(light.vertices, light.faces, process=False).volume == pytest.approx(
-        body.volume, rel=1e-3
-    )
+    assert volume(light) == pytest.approx(volume(mesh), rel=3e-3)
 
 
 def test_an_open_body_stays_as_it_is_and_a_closed_one_beside_it_is_simplified():
@@ -78,7 +87,7 @@ def test_an_inverted_mesh_keeps_its_sense():
     body.invert()
     light = physics_mesh(mesh_of(body))
     assert len(light.faces) == 12
-    assert trimesh.Trimesh(light.vertices, light.faces, process=False).volume == pytest.approx(-1)
+    assert volume(light) == pytest.approx(-1)
 
 
 @pytest.mark.parametrize("closed", [True, False])

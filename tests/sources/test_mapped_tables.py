@@ -293,7 +293,8 @@ def test_naming_a_kind_loads_no_heavy_package():
         "import sys, seerob; before = set(sys.modules)\n"
         "from seerob.plugin import kinds, load; from seerob.source import Source\n"
         "for kind in kinds('sources'): load('sources', kind, Source)\n"
-        "print(sorted({'openpyxl', 'mcap', 'scipy', 'mujoco', 'trimesh', 'numba'} & (set(sys.modules) - before)))"
+        "heavy = {'openpyxl', 'mcap', 'scipy', 'mujoco', 'trimesh', 'numba'}\n"
+        "print(sorted(heavy & (set(sys.modules) - before)))"
     )
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
 

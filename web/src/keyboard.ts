@@ -6,12 +6,21 @@ import type { Actions } from "./panels/app_context";
 const BACK = -1;
 const AHEAD = 1;
 
+/** Whether the focus was brought where it is by keys; a button that was clicked does not own the space bar. */
+let byKeys = false;
+
 export function listenToKeys(actions: Actions): void {
+  window.addEventListener("pointerdown", () => {
+    byKeys = false;
+  });
   window.addEventListener("keydown", (event) => {
+    if (event.key === "Tab") byKeys = true;
     if (event.ctrlKey || event.metaKey || event.altKey || needsKeys(event.target, event.key)) return;
     const act = actionOf(event.key, event.shiftKey, actions);
     if (!act) return;
     event.preventDefault();
+    // A button that was clicked keeps the focus, and some browsers would press it again on release.
+    if (event.target instanceof HTMLButtonElement && event.key === " ") event.target.blur();
     act();
   });
 }
@@ -51,6 +60,6 @@ function overlay(key: string): (() => void) | null {
 function needsKeys(target: EventTarget | null, key: string): boolean {
   if (!(target instanceof HTMLElement)) return false;
   if (target.matches("input:not([type=checkbox]), select, textarea")) return true;
-  if (key === " ") return target.matches("button, summary, input, a");
-  return key.startsWith("Arrow") && target.matches("[role=tree] *, [role=tablist] *");
+  if (key === " ") return target.matches("input") || (byKeys && target.matches("button"));
+  return false;
 }

@@ -18,6 +18,8 @@ const FLAGS = [
   "--disable-component-update",
   "--disable-sync",
   "--force-prefers-reduced-motion",
+  // A response that a test rewrote has no address, and its page could not reach this machine.
+  "--disable-features=LocalNetworkAccessChecks",
   ...SOFTWARE_GL,
 ];
 

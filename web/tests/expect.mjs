@@ -46,7 +46,10 @@ export async function settled(page) {
 
 /** Poses of some bodies as drawn. */
 export function poses(page, names) {
-  return page.evaluate((all) => Object.fromEntries(all.map((name) => [name, window.seerob.pose(name)])), names);
+  return page.evaluate(
+    (all) => Object.fromEntries(all.map((name) => [name, window.seerob.pose(name)])),
+    names,
+  );
 }
 
 /** Fail unless every body is where the snapshot of this run time has it. */

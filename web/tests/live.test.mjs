@@ -54,7 +54,7 @@ test("the table says values, units, limits and words; UNDECIDED gives its reason
     return { undecided: look("effective mass"), within: look("work area") };
   });
   assert.match(looks.undecided[0], /gradient/);
-  looks.undecided.forEach((style, i) => assert.notEqual(style, looks.within[i]));
+  for (const [i, style] of looks.undecided.entries()) assert.notEqual(style, looks.within[i]);
 });
 
 test("the worst comes first and the pill names it", async () => {
@@ -71,7 +71,13 @@ test("a row opens to its basis: formula, source, inputs with origin, what is not
   await row.getByRole("button", { expanded: false }).click();
   const details = page.locator("tr.details");
   const text = await details.innerText();
-  for (const said of ["S_p = v_h (T_r + T_s)", "5.5.4.2.3, Eq. 2", "stated", "missing", "uncertainty of the person's position"]) {
+  for (const said of [
+    "S_p = v_h (T_r + T_s)",
+    "5.5.4.2.3, Eq. 2",
+    "stated",
+    "missing",
+    "uncertainty of the person's position",
+  ]) {
     assert.ok(text.includes(said), said);
   }
   await row.getByRole("button", { expanded: true }).click();
@@ -92,6 +98,8 @@ test("every body is where the last snapshot has it, turned from z-up to y-up", a
 test("looking back shows an earlier instant; L follows again", async () => {
   await served.tell("go");
   await page.waitForSelector(".pill:not(.state-off)");
+  const resumed = await page.evaluate(() => window.seerob.t);
+  await page.waitForFunction((t) => window.seerob.t > t + 1.5, resumed);
   const newest = await page.evaluate(() => window.seerob.t);
   await page.keyboard.press("Space");
   await page.waitForSelector(".behind");
@@ -120,7 +128,10 @@ test("findings are one click away", async () => {
 test("the tree selects, filters and hides", async () => {
   await page.getByRole("searchbox").fill("wrist_2");
   await page.getByRole("button", { name: "wrist_2_link", exact: true }).click();
-  assert.match(await page.locator(".properties").innerText(), /ur10\/wrist_2_link[\s\S]*not given[\s\S]*envelope/);
+  assert.match(
+    await page.locator(".properties").innerText(),
+    /ur10\/wrist_2_link[\s\S]*not given[\s\S]*envelope/,
+  );
   await page.getByRole("button", { name: "Hide ur10/wrist_2_link" }).click();
   assert.equal(await page.getByRole("button", { name: "Show ur10/wrist_2_link" }).count(), 1);
   await page.getByRole("button", { name: "Show ur10/wrist_2_link" }).click();

@@ -54,7 +54,8 @@ test("] goes to where a limit begins to be exceeded, and [ back", async () => {
   await page.keyboard.press("]");
   await page.waitForFunction((t) => window.seerob.t > t + 0.02, start);
   const t = await settled(page);
-  const verdicts = async (at) => (await served.tell(`snapshot ${at}`)).results.map((r) => r.verdict === "exceeded");
+  const verdicts = async (at) =>
+    (await served.tell(`snapshot ${at}`)).results.map((r) => r.verdict === "exceeded");
   const [now, just] = [await verdicts(t), await verdicts(t - 0.01)];
   assert.ok(
     now.some((exceeded, i) => exceeded && !just[i]),
@@ -67,9 +68,9 @@ test("] goes to where a limit begins to be exceeded, and [ back", async () => {
 });
 
 test("space plays at the chosen speed and pauses", async () => {
-  await page.getByLabel("Speed").selectOption("4");
+  await page.getByLabel("Speed", { exact: true }).selectOption("4");
   const start = await settled(page);
-  await page.locator("body").press("Space");
+  await page.keyboard.press("Space");
   await page.waitForFunction((t) => window.seerob.t > t + 1, start);
   await page.keyboard.press("Space");
   await page.waitForSelector('button[aria-label="Play (space)"]');

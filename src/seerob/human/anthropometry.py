@@ -1,24 +1,23 @@
 """A body from stature, body mass and sex: where the joints are and what every segment weighs.
 
 Lengths: Drillis and Contini 1966 (fractions of stature; what the paper cites) or de Leva 1996
-(distances of joint centres). Masses, centres and radii of gyration: de Leva 1996, Table 4. The tables
+(distances of joint centres). Masses, centres and radii of gyration: de Leva 1996, Table 4, or for men the
+regressions of Zatsiorsky and Seluyanov 1979 (what the paper cites). The tables
 with their sources are ``data/*.toml``. What has no published source is a choice that the findings name.
 """
 
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache
-from importlib.resources import files
-from typing import Any
 
 import numpy as np
 
 from seerob.errors import InputError, Problem, UnknownName
+from seerob.human import zatsiorsky
 from seerob.human.skeleton import SIDES
+from seerob.human.tables import table
 from seerob.snapshot import Finding
 from seerob.transforms import Array
 
@@ -44,12 +43,6 @@ class Lengths(StrEnum):
     DELEVA = "deleva"
 
 
-@cache
-def table(name: str) -> dict[str, Any]:
-    """One of the tables in ``data/``, by name without ending."""
-    return tomllib.loads(files("seerob.human").joinpath(f"data/{name}.toml").read_text("utf-8"))
-
-
 def stature(population: str, sex: str, percentile: int) -> float:
     """Published stature [m] of a population.
 
@@ -73,14 +66,25 @@ def stature(population: str, sex: str, percentile: int) -> float:
     return float(people[key]) * 1e-3
 
 
+class Masses(StrEnum):
+    """Where the segments' masses and moments of inertia come from."""
+
+    DELEVA = "deleva"
+    """Shares of the body mass and radii of gyration; men and women."""
+    ZATSIORSKY = "zatsiorsky"
+    """Regressions on body mass and stature; men only."""
+
+
 @dataclass(frozen=True, eq=False)
 class Body:
     """A person's dimensions and segment masses, all in SI."""
 
+    name: str
     stature: float
     mass: float
     sex: Sex
     lengths: Lengths
+    masses: Masses
     length: dict[str, float]
     """Heights and lengths [m] by name, as in `_lengths`."""
     offset: dict[str, Array]
@@ -94,24 +98,39 @@ class Body:
         return self.share[bone] * self.mass
 
 
-def body(*, name: str, stature: float, mass: float, sex: str, lengths: str = "drillis") -> Body:
+def body(
+    *, name: str, stature: float, mass: float, sex: str, lengths: str = "drillis", masses: str = "deleva"
+) -> Body:
     """The body of a person of that stature [m], body mass [kg] and sex.
 
     Raises:
         InputError: A value is not a plausible adult's, or not one of the choices; all are named.
     """
-    _check(name, stature, mass, sex, lengths)
-    chosen, kind = Sex(sex), Lengths(lengths)
+    _check(name, stature, mass, {"sex": sex, "lengths": lengths, "masses": masses})
+    chosen, kind, by = Sex(sex), Lengths(lengths), Masses(masses)
     length, findings = _lengths(name, stature, chosen, kind)
     index = mass / stature**2
     low, high = BODY_MASS_INDEX_RANGE
     if not low <= index <= high:
         text = f"body mass index {index:.1f} kg/m² is outside {low:g}…{high:g}: the tables fit badly"
         findings.append(Finding(level="warning", subject=name, text=text))
-    return Body(stature, mass, chosen, kind, length, _offsets(length), _shares(chosen), tuple(findings))
+    share = _shares(chosen, by, mass, stature)
+    if min(share.values()) <= 0:
+        raise unfit(name, mass, stature)
+    offset = _offsets(length)
+    return Body(name, stature, mass, chosen, kind, by, length, offset, share, tuple(findings))
 
 
-def _check(name: str, stature: float, mass: float, sex: str, lengths: str) -> None:
+def unfit(name: str, mass: float, stature: float) -> InputError:
+    """The regressions give a segment that cannot exist."""
+    what = f"the regressions give impossible segments for {mass:g} kg and {stature:g} m"
+    return InputError.at(name, "masses", what, "give masses = deleva")
+
+
+CHOICES: dict[str, type[StrEnum]] = {"sex": Sex, "lengths": Lengths, "masses": Masses}
+
+
+def _check(name: str, stature: float, mass: float, chosen: dict[str, str]) -> None:
     problems = []
     for key, value, (low, high), unit in (
         ("stature", stature, STATURE_RANGE, "m"),
@@ -121,9 +140,13 @@ def _check(name: str, stature: float, mass: float, sex: str, lengths: str) -> No
             problems.append(
                 Problem(name, key, f"{value:g} {unit} is not an adult's", f"give {low:g}…{high:g} {unit}")
             )
-    for key, text, choices in (("sex", sex, tuple(Sex)), ("lengths", lengths, tuple(Lengths))):
+    for key, text in chosen.items():
+        choices = tuple(CHOICES[key])
         if text not in choices:
             problems.append(Problem(name, key, f"{text!r} is not known", f"give one of {', '.join(choices)}"))
+    if chosen["masses"] == Masses.ZATSIORSKY and chosen["sex"] == Sex.FEMALE:
+        what = "the women's regressions as published do not conserve mass"
+        problems.append(Problem(name, "masses", what, "give masses = deleva"))
     if problems:
         raise InputError(problems)
 
@@ -205,10 +228,16 @@ def _offsets(length: dict[str, float]) -> dict[str, Array]:
     return offset
 
 
-def _shares(sex: Sex) -> dict[str, float]:
+def _shares(sex: Sex, by: Masses, mass: float, stature: float) -> dict[str, float]:
     people = table("de_leva")[sex]
     percent = {k: row["mass"] for k, row in people["segments"].items()}
-    pieces = people["pieces"]
+    pieces = dict(people["pieces"])
+    if by is Masses.ZATSIORSKY:
+        shares = zatsiorsky.masses(mass=mass, stature=stature)
+        # Pieces keep their part of the segment that they belong to.
+        for piece, of in (("neck", "head"), ("clavicle", "upper_trunk"), ("toes", "foot")):
+            pieces[piece] *= shares[of] / percent[of]
+        percent = shares
     bones = {
         "pelvis": percent["lower_trunk"],
         "lumbar": percent["middle_trunk"],
@@ -223,6 +252,6 @@ def _shares(sex: Sex) -> dict[str, float]:
         "foot": percent["foot"] - pieces["toes"],
     }
     bones |= {f"{side}_{k}": v for k, v in limbs.items() for side in SIDES}
-    # The female table sums to 99.99 %.
+    # Neither the female table (99.99 %) nor the regressions sum to the whole.
     total = math.fsum(bones.values())
     return {k: v / total for k, v in bones.items()}

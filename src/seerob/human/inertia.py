@@ -1,10 +1,11 @@
-r"""Mass properties of every bone from the tables of de Leva 1996.
+"""Mass properties of every bone from the tables of de Leva 1996 or Zatsiorsky and Seluyanov 1979.
 
 A table's segment that is one bone here keeps mass, centre and radii of gyration, scaled by the length.
 Where a segment is several bones (trunk top = thorax and two clavicles, head = head and neck, foot = foot
 and toes), the small piece is a uniform body of the bone's length and the large one is what remains, so that
-the bones together have exactly the segment's mass, centre and inertia. Pieces scale with the lengths, as the
-table does: what remains is a possible body for every stature and mass.
+the bones together have exactly the segment's mass, centre and inertia. Pieces scale with the lengths, as
+de Leva's table does: what remains is a possible body for every stature and mass. The regressions replace
+masses and moments, the centres stay de Leva's.
 """
 
 from __future__ import annotations
@@ -13,15 +14,22 @@ import math
 
 import numpy as np
 
-from seerob.human.anthropometry import Body, table
+from seerob.human import zatsiorsky
+from seerob.human.anthropometry import Body, Masses, unfit
 from seerob.human.skeleton import BONES, SIDES, without_side
+from seerob.human.tables import table
 from seerob.model_io.description import Inertial
 from seerob.snapshot import Origin
 from seerob.transforms import Array
 
-SOURCE = "de Leva 1996, Table 4 (percent of body mass, radii of gyration), scaled to this person"
-SPLIT = "split of a de Leva 1996 segment (shares and shape are a choice): uniform body of the bone's length"
-REMAINDER = "de Leva 1996 segment less its split pieces, scaled to this person"
+SOURCES = {
+    Masses.DELEVA: "de Leva 1996, Table 4 (shares of body mass, radii of gyration)",
+    Masses.ZATSIORSKY: "Zatsiorsky and Seluyanov 1979, regressions for men; centre: de Leva 1996, Table 4",
+}
+SPLIT = "; split (share and shape are a choice): uniform body of the bone's length"
+REMAINDER = "; less what was split off"
+SEGMENTS = {"pelvis": "lower_trunk", "lumbar": "middle_trunk", "thorax": "upper_trunk"}
+"""Bone → the tables' name where it is another."""
 CLAVICLE_RADIUS = 0.2
 """Of the cylinder that stands for clavicle and flesh, as a share of its length: a choice."""
 
@@ -37,11 +45,15 @@ def remainder(whole: Inertial, pieces: list[tuple[float, Array, Array]]) -> Iner
     com = (whole.mass * whole.com - sum((m * c for m, c, _ in pieces), np.zeros(3))) / mass
     about_whole = whole.inertia - sum((_shifted(i, m, c - whole.com) for m, c, i in pieces), np.zeros((3, 3)))
     inertia = _shifted(about_whole, -mass, com - whole.com)
-    return Inertial(mass, com, inertia, Origin.ESTIMATED, REMAINDER)
+    return Inertial(mass, com, inertia, Origin.ESTIMATED, whole.source + REMAINDER)
 
 
 def inertials(body: Body) -> dict[str, Inertial]:
-    """Mass properties of every bone in its own frame."""
+    """Mass properties of every bone in its own frame.
+
+    Raises:
+        InputError: The regressions were asked for and give a bone that cannot exist.
+    """
     result = {bone: (_piece if without_side(bone) in _PIECES else _segment)(body, bone) for bone in BONES}
     groups = {"head": ("neck",), "thorax": tuple(f"{s}_clavicle" for s in SIDES)}
     groups |= {f"{s}_foot": (f"{s}_toes",) for s in SIDES}
@@ -51,7 +63,15 @@ def inertials(body: Body) -> dict[str, Inertial]:
             shift = -body.offset["head"] if piece == "neck" else body.offset[piece]
             taken.append((result[piece].mass, result[piece].com + shift, result[piece].inertia))
         result[bone] = remainder(result[bone], taken)
+    if not all(map(_possible, result.values())):
+        raise unfit(body.name, body.mass, body.stature)
     return result
+
+
+def _possible(inertial: Inertial) -> bool:
+    """Whether any distribution of mass has these moments."""
+    smallest, middle, largest = np.linalg.eigvalsh(inertial.inertia)
+    return bool(inertial.mass > 0 and smallest > 0 and smallest + middle > largest)
 
 
 _PIECES = ("neck", "clavicle", "toes")
@@ -64,7 +84,9 @@ def _piece(body: Body, bone: str) -> Inertial:
         forward, side = length["foot"] - length["heel"] - length["toe_joint"], length["foot_breadth"]
         com = np.array([forward / 2, -length["toe_joint_height"] / 2, 0.0])
         square = np.array([forward**2, length["toe_joint_height"] ** 2, side**2]) / 12
-        return Inertial(mass, com, mass * np.diag(square.sum() - square), Origin.ESTIMATED, SPLIT)
+        return Inertial(
+            mass, com, mass * np.diag(square.sum() - square), Origin.ESTIMATED, SOURCES[body.masses] + SPLIT
+        )
     if bone == "neck":
         along = body.offset["head"]
         row = table("de_leva")[body.sex]["alternatives"]["head_2"]
@@ -75,7 +97,7 @@ def _piece(body: Body, bone: str) -> Inertial:
     size = float(np.linalg.norm(along))
     axis = np.outer(along, along) / size**2
     inertia = mass * (turning**2 * axis + (turning**2 / 2 + size**2 / 12) * (np.eye(3) - axis))
-    return Inertial(mass, along / 2, inertia, Origin.ESTIMATED, SPLIT)
+    return Inertial(mass, along / 2, inertia, Origin.ESTIMATED, SOURCES[body.masses] + SPLIT)
 
 
 def _segment(body: Body, bone: str) -> Inertial:
@@ -96,30 +118,39 @@ def _segment(body: Body, bone: str) -> Inertial:
         height -= row["com"] / 100 * row["length"]
         if plain == "thorax":
             mass += sum(body.bone_mass(f"{s}_clavicle") for s in SIDES)
-        return _inertial(mass, np.array([0, height * scale - start, 0]), row["radii"], row["length"] * scale)
+        return _inertial(
+            body, bone, mass, np.array([0, height * scale - start, 0]), row["radii"], row["length"] * scale
+        )
     if plain == "head":
         row, both = rows["head_2"], length["neck"] + length["head"]
-        com = length["head"] - row["com"] / 100 * both
-        return _inertial(mass + body.bone_mass("neck"), np.array([0, com, 0]), row["radii"], both)
+        com = np.array([0, length["head"] - row["com"] / 100 * both, 0])
+        return _inertial(body, bone, mass + body.bone_mass("neck"), com, row["radii"], both)
     if plain == "foot":
         row = rows["foot"]
-        com_foot = [
-            row["com"] / 100 * length["foot"] - length["heel"],
-            length["foot_com_height"] - length["ankle_height"],
-            0,
-        ]
+        forward = row["com"] / 100 * length["foot"] - length["heel"]
+        com = np.array([forward, length["foot_com_height"] - length["ankle_height"], 0])
         sagittal, transverse, longitudinal = row["radii"]
         # The foot's long axis points forward.
         radii = [longitudinal, transverse, sagittal]
         mass += body.bone_mass(bone.replace("foot", "toes"))
-        return _inertial(mass, np.array(com_foot), radii, length["foot"])
+        return _inertial(body, bone, mass, com, radii, length["foot"])
     row = rows["hand_2"] if plain == "hand" else rows[plain]
-    return _inertial(mass, np.array([0, -row["com"] / 100 * length[plain], 0]), row["radii"], length[plain])
-
-
-def _inertial(mass: float, com: Array, radii: list[float], length: float) -> Inertial:
-    """Radii of gyration [%] about the sagittal (X), transverse (Z) and longitudinal (Y) axis."""
-    sagittal, transverse, longitudinal = (mass * (r / 100 * length) ** 2 for r in radii)
-    return Inertial(
-        mass, com.astype(float), np.diag([sagittal, longitudinal, transverse]), Origin.ESTIMATED, SOURCE
+    return _inertial(
+        body, bone, mass, np.array([0, -row["com"] / 100 * length[plain], 0]), row["radii"], length[plain]
     )
+
+
+def _inertial(body: Body, bone: str, mass: float, com: Array, radii: list[float], length: float) -> Inertial:
+    """Radii of gyration [%] about the bone's X, Z and Y axis, or the regressions' moments about them."""
+    x, z, y = (mass * (r / 100 * length) ** 2 for r in radii)
+    if body.masses is Masses.ZATSIORSKY:
+        plain = without_side(bone)
+        name = SEGMENTS.get(plain, plain)
+        given = {"mass": body.mass, "stature": body.stature}
+        # Masses were brought to the sum of the body mass; moments go with them.
+        scale = mass / zatsiorsky.masses(**given)[name]
+        sagittal, transverse, longitudinal = (scale * i for i in zatsiorsky.moments(name, **given))
+        x, y, z = sagittal, longitudinal, transverse
+        if plain == "foot":
+            x, y = y, x
+    return Inertial(mass, com.astype(float), np.diag([x, y, z]), Origin.ESTIMATED, SOURCES[body.masses])

@@ -12,10 +12,11 @@ import math
 import numpy as np
 
 from seerob.errors import InputError
-from seerob.human.anthropometry import Body, body, table
+from seerob.human.anthropometry import Body, Masses, Sex, body
 from seerob.human.inertia import inertials
 from seerob.human.skeleton import AXES, BONES, PARENTS, ROOT, ROOT_FROM_ISB, SIDES, Axis
 from seerob.human.skin import skin
+from seerob.human.tables import table
 from seerob.model_io.description import Description, Joint, JointKind, Link, Quantity
 from seerob.snapshot import Finding, Origin
 from seerob.transforms import transform
@@ -25,7 +26,14 @@ GRAVITY = 9.81
 
 
 def build(
-    *, name: str, stature: float, mass: float, sex: str, lengths: str = "drillis", hand: str = "right"
+    *,
+    name: str,
+    stature: float,
+    mass: float,
+    sex: str,
+    lengths: str = "drillis",
+    masses: str = "deleva",
+    hand: str = "right",
 ) -> Description:
     """A standing person: 21 bones, 47 joint axes and six of the waist.
 
@@ -35,6 +43,7 @@ def build(
         mass: Body mass [kg].
         sex: ``male`` or ``female``: which published table of segments.
         lengths: ``drillis`` (fractions of the stature) or ``deleva`` (distances of joint centres).
+        masses: ``deleva`` or, for men, ``zatsiorsky``: segments' masses and moments of inertia.
         hand: Dominant side, ``right`` or ``left``; its hand is the description's tip.
 
     Returns:
@@ -46,9 +55,9 @@ def build(
     """
     if hand not in SIDES:
         raise InputError.at(name, "hand", f"{hand!r} is not a side", "give right or left")
-    person = body(name=name, stature=stature, mass=mass, sex=sex, lengths=lengths)
+    person = body(name=name, stature=stature, mass=mass, sex=sex, lengths=lengths, masses=masses)
     solids = skin(person)
-    masses = inertials(person)
+    mass_properties = inertials(person)
     links = [Link(ROOT, None, np.eye(4))]
     for bone in BONES:
         rotation = ROOT_FROM_ISB if PARENTS[bone] == ROOT else np.eye(3)
@@ -60,13 +69,13 @@ def build(
                 PARENTS[bone],
                 transform(rotation, position),
                 joints=tuple(_joint(axis, person) for axis in AXES if axis.bone == bone),
-                inertial=masses[bone],
+                inertial=mass_properties[bone],
                 solids=solids[bone],
             )
         )
     source = (
-        f"digital human: {sex}, {stature:g} m, {mass:g} kg, {hand}-handed; lengths {person.lengths}, "
-        "masses de Leva 1996"
+        f"digital human: {sex}, {stature:g} m, {mass:g} kg, {hand}-handed; "
+        f"lengths {person.lengths}, masses {person.masses}"
     )
     return Description(name, tuple(links), f"{hand}_hand", source, findings=_findings(name, person))
 
@@ -121,6 +130,10 @@ def _findings(name: str, person: Body) -> tuple[Finding, ...]:
         groups = sorted({a.group for a in AXES if _uses(a, key)})
         found.append(note(f"torque limits of {', '.join(groups)}: {row['text']}", "assumed"))
     found.append(note("no torque limit is known for clavicle and toes, no speed limit for any joint"))
+    if person.masses is Masses.ZATSIORSKY:
+        found.append(note("masses of the regressions brought to the body mass, moments of inertia with them"))
+    elif person.sex is Sex.FEMALE:
+        found.append(note("female segment masses of de Leva sum to 99.99 % and are divided by that"))
     return (*found, *person.findings)
 
 

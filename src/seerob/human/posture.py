@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from seerob import units
 from seerob.errors import InputError, Problem, UnknownName
-from seerob.human.anthropometry import table
 from seerob.human.skeleton import AXES, JOINTS, bone_poses, resolve
+from seerob.human.tables import table
 from seerob.model_io.description import Description, JointKind
 from seerob.transforms import Array
 

@@ -19,8 +19,9 @@ from collections.abc import Callable
 import numpy as np
 
 from seerob.geometry import Solid, capsule, dilated_rectangle
-from seerob.human.anthropometry import Body, table
+from seerob.human.anthropometry import Body
 from seerob.human.skeleton import without_side
+from seerob.human.tables import table
 from seerob.transforms import Array
 
 Vector = Array

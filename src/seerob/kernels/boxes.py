@@ -160,7 +160,7 @@ def segment_box(
     if q > radius * radius:
         gap = math.sqrt(q) - radius
         if gap * gap > cut:
-            return gap * gap
+            return float(gap * gap)
     low = 0.0
     reach = 0.0
     for a in range(3):
@@ -176,7 +176,7 @@ def segment_box(
     if q > reach:
         gap = q - reach
         low = max(low, gap * gap / q)
-    return low
+    return float(low)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -200,7 +200,7 @@ def box_box(A: Array, i: int, B: Array, j: int, R: Array, t: Array, cut: float) 
     if q > radius * radius:
         gap = math.sqrt(q) - radius
         if gap * gap > cut:
-            return gap * gap
+            return float(gap * gap)
     # Centre of B in the frame of mesh b, seen from A's centre.
     bx = R[0] * cx + R[3] * cy + R[6] * cz
     by = R[1] * cx + R[4] * cy + R[7] * cz
@@ -239,4 +239,4 @@ def box_box(A: Array, i: int, B: Array, j: int, R: Array, t: Array, cut: float) 
     if q > reach:
         gap = q - reach
         low = max(low, gap * gap / q)
-    return low
+    return float(low)

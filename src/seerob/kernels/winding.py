@@ -102,7 +102,7 @@ def contains(nodes: Array, links: Links, T: Array, x: float, y: float, z: float)
         or abs(z - nodes[0, 2]) > nodes[0, 5]
     ):
         return False
-    for far in (4.0, 12.0):
+    for far in (6.0, 16.0):
         w, error = winding_number(nodes, links, T, x, y, z, far)
         if abs(abs(w) - 0.5) > error + 1e-6:
             return abs(w) > 0.5

@@ -1,8 +1,9 @@
 """Envelopes of the library's robots: convex pieces that contain the maker's shape, and a look inside them.
 
-A piece is a ``box = [[min], [max]]`` or a ``tube = [[start], [end]]`` with a ``radius``, all in metres
-in the link's frame. Distances see the box, or the 16-sided prism around the tube; the screen
-sees a rounded body that never leaves it.
+A piece is a ``box = [[min], [max]]``, a ``tube = [[start], [end]]`` with a ``radius``, or a
+``slot = [[[start], [end]], [[start], [end]]]`` with two radii, the convex hull of two parallel tubes; all
+in metres in the link's frame. Distances see the box, the 16-sided prism around the tube, or the
+hull of two prisms; the screen sees a rounded body that never leaves it.
 """
 
 from __future__ import annotations
@@ -30,13 +31,14 @@ def shapes_of(piece: Mapping[str, Any]) -> tuple[Mesh, Mesh]:
     """Mesh for distances and mesh for the screen of one piece; the second lies inside the first."""
     color = COLORS[piece.get("color", "body")]
     if "tube" in piece:
-        start, end = (np.array(p, float) for p in piece["tube"])
+        start, end = piece["tube"]
         radius = float(piece["radius"])
-        length = float(np.linalg.norm(end - start))
-        profile = shapes.rounded_profile(radius, length, 0.25 * radius)
-        return shapes.prism_mesh(start, end, radius), shapes.lathe_mesh(
-            start, end, profile, sides=48, color=color
-        )
+        return shapes.prism_mesh(start, end, radius), _rounded_tube(start, end, radius, color)
+    if "slot" in piece:
+        ends, radii = piece["slot"], piece["radius"]
+        prisms = [shapes.prism_mesh(*end, radius) for end, radius in zip(ends, radii, strict=True)]
+        looks = [_rounded_tube(*end, radius, color) for end, radius in zip(ends, radii, strict=True)]
+        return shapes.hull_mesh(prisms, color), shapes.hull_mesh(looks, color)
     lower, upper = (np.array(p, float) for p in piece["box"])
     return shapes.box_mesh(lower, upper), _rounded_in_box(lower, upper, color)
 
@@ -46,6 +48,12 @@ def shapes_for(pieces: Sequence[Mapping[str, Any]]) -> tuple[tuple[Solid, ...], 
     made = [shapes_of(piece) for piece in pieces]
     solids = tuple(Solid(mesh=mesh, name=f"envelope_{i}", note=NOTE) for i, (mesh, _) in enumerate(made))
     return solids, tuple(visual for _, visual in made)
+
+
+def _rounded_tube(start: Sequence[float], end: Sequence[float], radius: float, color: shapes.Color) -> Mesh:
+    length = float(np.linalg.norm(np.subtract(end, start)))
+    profile = shapes.rounded_profile(radius, length, 0.25 * radius)
+    return shapes.lathe_mesh(start, end, profile, sides=48, color=color)
 
 
 def _rounded_in_box(lower: Array, upper: Array, color: shapes.Color) -> Mesh:

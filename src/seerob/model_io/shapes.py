@@ -146,3 +146,17 @@ def cylinder_solid(start: ArrayLike, end: ArrayLike, radius: float, *, name: str
     excess = radius * (1 / math.cos(math.pi / 64) - 1)
     note = f"cylinder as a circumscribed prism of 64 sides, at most {excess * 1e3:.2g} mm larger"
     return Solid(mesh=prism_mesh(start, end, radius, sides=64), name=name, note=note)
+
+
+def hull_mesh(meshes: Sequence[Mesh], color: Color = GREY) -> Mesh:
+    """The convex hull of meshes: closed, counter-clockwise from outside."""
+    from scipy.spatial import ConvexHull
+
+    points = np.concatenate([mesh.vertices for mesh in meshes])
+    hull = ConvexHull(points)
+    faces = hull.simplices
+    a, b, c = (points[faces[:, i]] for i in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces = np.where(inward[:, None], faces[:, ::-1], faces)
+    used, index = np.unique(faces, return_inverse=True)
+    return Mesh(points[used], index.reshape(faces.shape).astype(np.int32), color)

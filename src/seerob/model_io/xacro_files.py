@@ -80,7 +80,7 @@ def _guarded(xacro: ModuleType, resolver: Resolver) -> Iterator[None]:
                 return str(root)
         raise _Refused(f"no package {package!r} was found")
 
-    def refused(*_: Any) -> Any:
+    def refused(*_: Any, **__: Any) -> Any:
         raise _Refused("$(eval …), $(env …) and $(optenv …) are not evaluated")
 
     patches = [

@@ -59,15 +59,16 @@ class Hub:
         self._feed, self._patience = feed, patience
         hello = Hello(server=_name(), mode=feed.mode, duration=feed.duration, schema=schema())
         self._hello, self._scene = _encode(hello), _encode(scene)
-        self._newest: tuple[int, bytes] | None = None
+        self._newest: Snapshot | None = None
         self._ended: Closing | None = None
         self.clients: set[Client] = set()
 
     def show(self, snapshot: Snapshot) -> None:
         """Send a snapshot to every page."""
-        # Encoded also when nobody looks: the next to come must not wait for the next tick.
+        self._newest = snapshot
+        if not self.clients:
+            return
         payload = _encode(on_the_wire(snapshot))
-        self._newest = snapshot.seq, payload
         for client in self.clients:
             client.offer_frame(snapshot.seq, payload)
 
@@ -108,7 +109,7 @@ class Hub:
         client.offer("History", _encode(self._feed.history()))
         client.offer("Transport", _encode(self._feed.transport()))
         if self._newest is not None:
-            client.offer_frame(*self._newest)
+            client.offer_frame(self._newest.seq, _encode(on_the_wire(self._newest)))
         self.clients.add(client)
         tasks = [asyncio.create_task(client.send()), asyncio.create_task(self._listen(client, socket))]
         try:

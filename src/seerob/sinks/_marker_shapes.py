@@ -17,6 +17,8 @@ _CUBE = np.array(
     np.int32,
 )  # fmt: skip
 
+_EDGES = [(a, a | bit) for a in range(8) for bit in (1, 2, 4) if not a & bit]
+
 
 def draw_marker(canvas: Canvas, marker: Marker) -> None:
     """Draw one marker over the bodies; highlights are the bodies' own colour and not drawn here."""
@@ -36,7 +38,10 @@ def draw_marker(canvas: Canvas, marker: Marker) -> None:
             vertices, faces = ball()
             canvas.veil(vertices * radii @ rotation_from_wxyz(wxyz).T + center, faces, fill, _VEIL)
         case Box():
-            canvas.veil(corners(marker), _CUBE, fill, _VEIL)
+            points = corners(marker)
+            canvas.veil(points, _CUBE, fill, _VEIL)
+            for a, b in _EDGES:
+                canvas.line(points[a], points[b], dark, width=1.6, hidden=0.35)
         case Hull(vertices=points, faces=hull_faces):
             inside = [f for f in hull_faces if all(0 <= i < len(points) for i in f)]
             if inside:
@@ -71,7 +76,7 @@ def label_of(marker: Marker) -> tuple[str, Vec3]:
     if not text or not points:
         return "", (0.0, 0.0, 0.0)
     mark = "" if marker.verdict is None else MARK[marker.verdict] + " "
-    middle = np.mean(points if isinstance(marker, Segment) else points[:1], axis=0)
+    middle = np.mean(points if isinstance(marker, Segment | Box | Hull) else points[:1], axis=0)
     return mark + text, (float(middle[0]), float(middle[1]), float(middle[2]))
 
 

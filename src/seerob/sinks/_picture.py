@@ -8,21 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.errors import InputError
-from seerob.kernels.raster import raster
-from seerob.sinks._camera import Camera, look_along
+from seerob.sinks._camera import Camera
 from seerob.sinks._canvas import Canvas, Color, font, png, words
+from seerob.sinks._close_up import close_up, inset
 from seerob.sinks._glb_reader import read_glb
 from seerob.sinks._marker_shapes import draw_marker, label_of, points_of
 from seerob.sinks._palette import DARK, FILL
+from seerob.sinks._viewpoint import best_view, scattered
 from seerob.snapshot import Finding, Highlight, Result, Scene, Segment, Snapshot
 from seerob.transforms import Array, rotation_from_wxyz
 
 SIZE = (1000, 640)
 """Width and height [px]."""
 
-_VIEWS = [(np.deg2rad(a), np.deg2rad(e)) for e in (18, 35) for a in range(-150, 210, 30)]
-_PREFERRED = np.deg2rad(-60)
-"""Azimuth taken when nothing speaks for another [rad]."""
 _MOVERS = ("robot", "human", "tool", "workpiece")
 
 
@@ -60,6 +58,7 @@ class Stage:
         self._node = np.concatenate([np.zeros(0), *nodes]).astype(np.int64)
         self._ids: NDArray[np.int32] = np.concatenate([np.zeros(0, np.int32), *ids]).astype(np.int32)
         table = np.array(colors).reshape(-1, 4)
+        self._scatter_weight, self._scatter_face = scattered(self._vertices, self._faces, 20_000)
         self._colors, self._color_node = table[:, :3], table[:, 3].astype(np.int64)
 
     def picture(
@@ -80,18 +79,25 @@ class Stage:
             size: Width and height [px].
             camera: The view; found when not given.
         """
-        vertices, normals = self._placed(snapshot)
-        markers = () if result is None else result.markers
+        placed = self._placed(snapshot)
         if camera is None:
-            camera = self._view(vertices, result, tuple(subjects), size)
+            camera = self._view(placed[0], result, tuple(subjects), size)
+        canvas = self._drawn(camera, placed, result)
+        image = self._with_labels(canvas, result)
+        near = close_up(camera, () if result is None else result.markers)
+        if near is not None:
+            image = inset(image, canvas, self._drawn(near, placed, result).pixels())
+        return png(image)
+
+    def _drawn(self, camera: Camera, placed: tuple[Array, Array], result: Result | None) -> Canvas:
+        vertices, normals = placed
         canvas = Canvas(camera)
         canvas.shadow(vertices, self._faces, 0.0)
         self._grid(canvas, vertices)
-        colors = self._painted(result)
-        canvas.bodies(vertices, normals, self._faces, self._ids, colors)
-        for marker in markers:
+        canvas.bodies(vertices, normals, self._faces, self._ids, self._painted(result))
+        for marker in () if result is None else result.markers:
             draw_marker(canvas, marker)
-        return png(self._with_labels(canvas, result))
+        return canvas
 
     def _placed(self, snapshot: Snapshot) -> tuple[Array, Array]:
         poses = np.frombuffer(snapshot.poses, "<f4").reshape(-1, 7).astype(float)
@@ -133,14 +139,12 @@ class Stage:
     def _view(
         self, vertices: Array, result: Result | None, subjects: tuple[str, ...], size: tuple[int, int]
     ) -> Camera:
-        focus = self._focus(vertices, result, subjects)
-        if result is None or not result.markers:
-            return look_along(_PREFERRED, np.deg2rad(22), focus, size)
-        width = 160
-        small = (width, max(1, round(width * size[1] / size[0])))
-        views = [(self._worth(vertices, result, a, e, focus, small), a, e) for a, e in _VIEWS]
-        _, azimuth, elevation = max(views)
-        return look_along(azimuth, elevation, focus, size)
+        corners = vertices[self._faces[self._scatter_face]]
+        surface = np.einsum("nk,nkj->nj", self._scatter_weight, corners)
+        owner = self._node[self._faces[self._scatter_face, 0]]
+        markers = () if result is None else result.markers
+        names = [node.name for node in self.scene.nodes]
+        return best_view(surface, owner, markers, names, self._focus(vertices, result, subjects), size)
 
     def _focus(self, vertices: Array, result: Result | None, subjects: tuple[str, ...]) -> Array:
         def belongs(name: str, owner: str, role: str) -> bool:
@@ -156,47 +160,7 @@ class Stage:
         extremes = shown[:: max(1, len(shown) // 5000)]
         return np.concatenate([extremes, np.array(marks).reshape(-1, 3)])
 
-    def _worth(
-        self,
-        vertices: Array,
-        result: Result,
-        azimuth: float,
-        elevation: float,
-        focus: Array,
-        size: tuple[int, int],
-    ) -> float:
-        """How well a view shows the markers: in sight, seen from the side, and not from odd angles."""
-        camera = look_along(azimuth, elevation, focus, size)
-        screen, inverse = camera.project(vertices)
-        shape = (camera.height, camera.width)
-        depth, owner = np.zeros(shape), np.full(shape, -1, np.int32)
-        raster(
-            screen,
-            inverse,
-            np.zeros(len(vertices)),
-            self._faces,
-            self._node[self._faces[:, 0]].astype(np.int32) if len(self._faces) else self._ids,
-            depth,
-            np.zeros(shape),
-            owner,
-        )
-        worth = 0.15 * np.cos(azimuth - _PREFERRED) - 0.1 * abs(elevation - np.deg2rad(22))
-        names = [node.name for node in self.scene.nodes]
-        for marker in result.markers:
-            if isinstance(marker, Segment):
-                a, b = np.array(marker.start), np.array(marker.end)
-                samples = a + np.linspace(0, 1, 12)[:, None] * (b - a)
-                worth += _in_sight(camera, depth, samples)
-                length = float(np.linalg.norm(b - a))
-                if length > 1e-6:
-                    worth += 0.8 * float(np.linalg.norm(np.cross((b - a) / length, camera.axes[2])))
-            elif isinstance(marker, Highlight) and marker.body in names:
-                share = np.count_nonzero(owner == names.index(marker.body)) / owner.size
-                worth += min(10 * share, 0.5)
-            else:
-                points = np.array(points_of(marker)).reshape(-1, 3)
-                worth += 0.3 * _in_sight(camera, depth, points)
-        return float(worth)
+    # -- words ----------------------------------------------------------------------------------
 
     def _with_labels(self, canvas: Canvas, result: Result | None) -> NDArray[np.uint8]:
         from PIL import Image, ImageDraw
@@ -205,32 +169,23 @@ class Stage:
         if result is None:
             return pixels
         image = Image.fromarray(pixels)
-        draw, type_ = ImageDraw.Draw(image), font(max(12, round(canvas.camera.height / 38)))
-        taken: list[tuple[float, float, float, float]] = []
+        camera = canvas.camera
+        height = max(12, round(camera.height / 38))
+        draw, type_ = ImageDraw.Draw(image), font(height)
+        taken: list[tuple[float, float, float]] = []
         for marker in result.markers:
             text, at = label_of(marker)
-            if not text:
-                continue
-            screen, inverse = canvas.camera.project(np.array(at))
-            if inverse[0] <= 0:
+            screen, inverse = camera.project(np.array([at, *points_of(marker)]))
+            if not text or inverse[0] <= 0:
                 continue
             text = text if len(text) <= 48 else text[:47] + "…"
             half = draw.textlength(text, type_) / 2 + 6
-            x = float(np.clip(screen[0, 0], half, max(half, canvas.camera.width - half)))
-            y = float(np.clip(screen[0, 1] - 16, 14, canvas.camera.height - 14))
-            while any(abs(x - u) < half + w and abs(y - v) < 20 for u, v, w, _ in taken) and y > 20:
-                y -= 20
-            taken.append((x, y, half, 0.0))
+            # Above a line, not on it.
+            top = screen[inverse > 0, 1].min() if isinstance(marker, Segment) else screen[0, 1]
+            x = float(np.clip(screen[0, 0], half, max(half, camera.width - half)))
+            y = float(np.clip(top - 1.4 * height, height, camera.height - height))
+            while y > height and any(abs(x - u) < half + w and abs(y - v) < 1.3 * height for u, v, w in taken):
+                y -= 1.3 * height
+            taken.append((x, y, half))
             words(draw, (x, y), text, DARK[marker.verdict], type_)
         return np.asarray(image)
-
-
-def _in_sight(camera: Camera, depth: Array, points: Array) -> float:
-    """Share of points (n, 3) that lie in the picture with nothing before them."""
-    if not len(points):
-        return 0.0
-    screen, inverse = camera.project(points)
-    x = np.clip(screen[:, 0].astype(int), 0, camera.width - 1)
-    y = np.clip(screen[:, 1].astype(int), 0, camera.height - 1)
-    # Points lie on surfaces; coarse pixels need 2 % of slack.
-    return float(((inverse > 0) & (inverse >= 0.98 * depth[y, x])).mean())

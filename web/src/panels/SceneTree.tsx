@@ -64,7 +64,7 @@ export function SceneTree() {
 
 function OwnerItem({ owner, open }: { owner: Owner; open: boolean }) {
   const expanded = useSignal(false);
-  const alone = owner.nodes.length === 1;
+  const alone = owner.nodes.length === 1 && owner.nodes[0]!.name === owner.name;
   const shown = !alone && (expanded.value || open);
   const chosen = selection.value;
   const active = chosen?.name === owner.name && chosen.kind !== "criterion";

@@ -1,0 +1,116 @@
+# make demo   set everything up and run the UR10 assembly workstation live
+# make test   set everything up and run every check
+#
+# Everything is installed into .venv and web/node_modules, with versions locked in requirements/ and
+# web/package-lock.json. What it needs beside: Python >= 3.11, make; Debian packages are installed when
+# missing and allowed, else the message says which.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DELETE_ON_ERROR:
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RUN := $(VENV)/.run
+DEV := $(VENV)/.dev
+NODE := $(VENV)/.node
+PAGE := src/seerob/server/page/index.html
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: help demo test setup check format lint types imports unit web-test package bench soak wire web build docs lock clean
+
+help:
+	@sed -n 's/^# \(make .*\)/\1/p' Makefile
+	@echo "also: check format unit web-test package bench soak wire web build docs lock clean"
+
+# -- the two commands ---------------------------------------------------------------------------
+
+demo: $(RUN) $(PAGE)
+	$(BIN)/seerob run workstations/ur10_assembly
+
+test: setup check unit web-test package
+
+# -- set-up -------------------------------------------------------------------------------------
+
+$(VENV)/bin/python:
+	scripts/make-venv $(PYTHON) $(VENV)
+
+$(RUN): $(VENV)/bin/python requirements/run.txt pyproject.toml
+	$(BIN)/python -m pip install -q --require-hashes -r requirements/run.txt
+	$(BIN)/python -m pip install -q --no-deps --no-build-isolation --require-hashes -r requirements/build.txt
+	$(BIN)/python -m pip install -q --no-deps --no-build-isolation -e .
+	touch $@
+
+$(DEV): $(RUN) requirements/dev.txt
+	$(BIN)/python -m pip install -q --require-hashes -r requirements/dev.txt
+	touch $@
+
+$(NODE): $(VENV)/bin/python requirements/node.txt
+	scripts/find-node $(VENV)
+	touch $@
+
+web/node_modules/.installed: web/package-lock.json $(NODE)
+	cd web && ../scripts/npm ci --no-audit --no-fund
+	touch $@
+
+$(PAGE): web/node_modules/.installed $(shell find web/src web/public web/index.html web/vite.config.ts -type f 2>/dev/null)
+	cd web && ../scripts/npm run build
+	touch $@
+
+setup: $(DEV) $(PAGE)
+
+# -- checks -------------------------------------------------------------------------------------
+
+check: $(DEV) lint types imports
+	$(BIN)/python -m seerob.wire --check
+
+lint: $(DEV)
+	$(BIN)/ruff format --check
+	$(BIN)/ruff check
+
+types: $(DEV)
+	$(BIN)/mypy
+
+imports: $(DEV)
+	$(BIN)/lint-imports
+
+unit: $(DEV) $(PAGE)
+	$(BIN)/pytest -n 2 --dist loadgroup
+
+web-test: $(DEV) $(PAGE)
+	CHROMIUM="$$(scripts/find-browser)" && export CHROMIUM && cd web && ../scripts/npm run check && ../scripts/npm run lint && ../scripts/npm test
+
+package: $(DEV) $(PAGE)
+	scripts/test-wheel $(BIN)/python
+
+# -- other work ---------------------------------------------------------------------------------
+
+bench: $(DEV)
+	for file in benchmarks/[a-z]*.py; do echo "== $$file"; $(BIN)/python $$file; done
+
+soak: $(DEV)
+	$(BIN)/pytest -m soak tests/soak
+
+format: $(DEV)
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+wire: $(DEV)
+	$(BIN)/python -m seerob.wire
+
+web: $(PAGE)
+
+build: $(DEV) $(PAGE)
+	rm -rf dist
+	$(BIN)/python -m build --no-isolation --wheel --sdist
+
+docs: $(DEV)
+	$(BIN)/python scripts/write-docs
+
+# New versions: run, read the difference, run the tests, commit.
+lock: $(DEV)
+	scripts/lock $(BIN)/python
+
+clean:
+	rm -rf $(VENV) web/node_modules dist src/seerob/server/page .mypy_cache .ruff_cache .pytest_cache

@@ -1,0 +1,57 @@
+"""The command line: ``seerob run``, ``seerob assess`` and the rest; see ``seerob --help``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.metadata import version
+
+from seerob.commands import Exit
+from seerob.errors import SeerobError
+
+COMMANDS = ("new", "check_file", "run", "assess", "replay", "report", "kinds", "schema")
+"""One module each in `seerob.commands`, with ``HELP``, ``EXAMPLE``, ``add`` and ``run``."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    top = argparse.ArgumentParser(
+        prog="seerob",
+        description="Evaluate the safety and ergonomics of a cobotic workstation with a physics-based twin.",
+        epilog="exit code: 0 within, 1 exceeded, 2 undecided, 3 error",
+    )
+    top.add_argument("--version", action="version", version=f"seerob {version('seerob')}")
+    commands = top.add_subparsers(dest="command", required=True, metavar="command")
+    for name in COMMANDS:
+        module = import_module(f"seerob.commands.{name}")
+        sub = commands.add_parser(
+            name.replace("_", "-"),
+            help=module.HELP,
+            description=module.HELP,
+            epilog=f"example: {module.EXAMPLE}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add(sub)
+        sub.set_defaults(run=module.run)
+    return top
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code; errors end in a message, never in a traceback."""
+    options = parser().parse_args(arguments)
+    try:
+        return int(options.run(options))
+    except SeerobError as error:
+        sys.stderr.write(f"{error}\n")
+        return Exit.ERROR
+    except KeyboardInterrupt:
+        sys.stderr.write("stopped\n")
+        return Exit.ERROR
+    except BrokenPipeError:
+        return Exit.ERROR
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,195 @@
+"""The commands of the command line, one file each, and the words they share."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from enum import IntEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+
+from seerob.snapshot import Finding, Verdict
+
+if TYPE_CHECKING:
+    from seerob.results import Series
+    from seerob.run import Summary
+    from seerob.station import Station
+
+OUT = Console(highlight=False, soft_wrap=True)
+STATUS = Console(highlight=False, soft_wrap=True, stderr=True)
+"""For progress: what is piped on stays clean."""
+
+WORDS = {
+    Verdict.WITHIN: ("within", "cyan"),
+    Verdict.EXCEEDED: ("EXCEEDED", "bold red"),
+    Verdict.UNDECIDED: ("undecided", "yellow"),
+    None: ("", "dim"),
+}
+
+
+class Exit(IntEnum):
+    """Exit codes."""
+
+    WITHIN = 0
+    EXCEEDED = 1
+    UNDECIDED = 2
+    ERROR = 3
+
+
+def exit_code(verdict: Verdict | None) -> Exit:
+    """Exit code of a verdict; a run in which nothing is judged is not exceeded."""
+    return {
+        Verdict.WITHIN: Exit.WITHIN,
+        Verdict.EXCEEDED: Exit.EXCEEDED,
+        Verdict.UNDECIDED: Exit.UNDECIDED,
+        None: Exit.WITHIN,
+    }[verdict]
+
+
+def line(word: str, text: str, style: str = "") -> None:
+    """One line of calm output: a word, then what it is about."""
+    OUT.print(f"{word:<12} ", style=style, end="", markup=False)
+    OUT.print(text, markup=False)
+
+
+def cache_folder() -> Path:
+    """Where distance trees and convex pieces are kept between starts."""
+    from platformdirs import user_cache_path
+
+    return user_cache_path("seerob", appauthor=False)
+
+
+def add_workstation(sub: argparse.ArgumentParser) -> None:
+    """The argument that nearly every command takes."""
+    sub.add_argument("workstation", type=Path, help="folder with a workstation.toml, or the file itself")
+
+
+def add_output(sub: argparse.ArgumentParser) -> None:
+    """Options of commands that write files."""
+    sub.add_argument(
+        "-o", "--output", type=Path, help="folder to write to (default: runs/<time> beside the workstation)"
+    )
+    sub.add_argument("--json", action="store_true", help="results as JSON on standard output")
+
+
+def run_folder(near: Path, wanted: Path | None) -> Path:
+    """A new folder for the files of one run."""
+    if wanted is not None:
+        return wanted
+    stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
+    folder = near / "runs" / stamp
+    n = 1
+    while folder.exists():
+        n += 1
+        folder = near / "runs" / f"{stamp}-{n}"
+    return folder
+
+
+def compiled(path: Path, *, quiet: bool = False) -> Station:
+    """The workstation of a path, compiled, with what is being read shown meanwhile."""
+    from seerob.reading import read
+    from seerob.station import Station
+
+    workstation = read(path)
+    if quiet or not STATUS.is_terminal:
+        return Station(workstation, cache=cache_folder())
+    with STATUS.status("reading") as status:
+        return Station(workstation, cache=cache_folder(), progress=lambda text: status.update(text))
+
+
+@contextmanager
+def progress(duration: float, what: str) -> Iterator[Callable[[float], None]]:
+    """A bar over run time on a terminal; silence elsewhere."""
+    if not STATUS.is_terminal or duration <= 0:
+        yield lambda _: None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (BarColumn(), TextColumn("{task.description}"), TimeRemainingColumn())
+    with Progress(*columns, console=STATUS, transient=True) as bar:
+        task = bar.add_task(what, total=duration)
+        yield lambda t: bar.update(task, completed=t)
+
+
+def describe(station: Station) -> None:
+    """What was loaded, and what was assumed."""
+    w = station.workstation
+    parts = [
+        f"{len(entries)} {noun}{'' if len(entries) == 1 else 's'}"
+        for entries, noun in (
+            (w.robots, "robot"),
+            (w.humans, "human"),
+            (w.tools, "tool"),
+            (w.parts, "part"),
+            (w.sources, "source"),
+        )
+        if entries
+    ]
+    n = len(w.safety) + len(w.ergonomics)
+    parts.append("1 criterion" if n == 1 else f"{n} criteria")
+    line("workstation", f"{w.title}: {', '.join(parts)}", "bold")
+
+
+def tell(findings: tuple[Finding, ...]) -> None:
+    """Warnings and assumptions, one line each; notes are in the report."""
+    for finding in findings:
+        if finding.level != "note":
+            line(
+                finding.level,
+                f"{finding.subject}: {finding.text}",
+                "dim" if finding.level == "assumed" else "yellow",
+            )
+
+
+def tell_results(summary: Summary) -> None:
+    """One line per criterion, in the order of the file."""
+    width = max((len(name) for name in summary.results), default=0)
+    for name, series in summary.results.items():
+        word, style = WORDS[series.verdict]
+        line(word, f"{name:<{width}}  {extreme(series)}", style)
+
+
+def extreme(series: Series) -> str:
+    """The figure that matters: ``max 0.84 m/s at 12.31 s   limit 1.00``."""
+    worst = series.worst()
+    if series.verdict is Verdict.UNDECIDED:
+        return f"{worst.reason} (first at {worst.t:.2f} s)" if worst.t is not None else worst.reason
+    if worst.value is None:
+        return "no value"
+    what = "max" if series.at_most else "min"
+    text = f"{what} {worst.value:.3g} {series.unit} at {worst.t:.2f} s"
+    if worst.limit is not None:
+        text += f", limit {worst.limit:.3g}"
+    return text + (f" ({worst.reason})" if worst.reason else "")
+
+
+def results_json(summary: Summary, **more: Any) -> str:
+    """The results for machines."""
+    criteria = []
+    for name, series in summary.results.items():
+        worst = series.worst()
+        criteria.append(
+            {
+                "name": name,
+                "verdict": series.verdict,
+                "unit": series.unit,
+                "worst": {"t": worst.t, "value": worst.value, "limit": worst.limit, "reason": worst.reason},
+            }
+        )
+    whole = {
+        "verdict": summary.verdict,
+        "duration": summary.duration,
+        "ticks": summary.ticks,
+        "workstation_hash": summary.scene.workstation_hash,
+        "criteria": criteria,
+        "findings": [
+            {"level": f.level, "subject": f.subject, "text": f.text} for f in summary.scene.findings
+        ],
+        **more,
+    }
+    return json.dumps(whole, ensure_ascii=False, indent=1, allow_nan=False)

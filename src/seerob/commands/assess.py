@@ -1,0 +1,51 @@
+"""``seerob assess``: as fast as possible, from the first to the last sample."""
+
+from __future__ import annotations
+
+import argparse
+
+from seerob.commands import (
+    OUT,
+    add_output,
+    add_workstation,
+    compiled,
+    describe,
+    exit_code,
+    line,
+    progress,
+    results_json,
+    run_folder,
+    tell,
+    tell_results,
+)
+from seerob.commands.sinks import sinks_of
+
+HELP = "evaluate a workstation as fast as possible; write recording, report and tables"
+EXAMPLE = "seerob assess my_cell"
+
+
+def add(sub: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    add_workstation(sub)
+    add_output(sub)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Evaluate, print, and return the exit code of the verdict."""
+    station = compiled(options.workstation, quiet=options.json)
+    folder = run_folder(station.model.folder, options.output)
+    scene = station.scene()
+    if not options.json:
+        describe(station)
+        tell(scene.findings)
+    sinks = sinks_of(station.workstation, lossless=True)
+    with progress(station.duration, f"{station.duration:.1f} s of motion") as tick:
+        summary = station.run(folder=folder, sinks=sinks, scene=scene, progress=tick)
+    if options.json:
+        OUT.print(results_json(summary, folder=str(folder)), markup=False)
+        return exit_code(summary.verdict)
+    line("ran", f"{summary.duration:.1f} s of motion in {summary.wall:.1f} s")
+    tell_results(summary)
+    for sink in sinks:
+        line("wrote", str(folder / str(getattr(sink, "file", ""))))
+    return exit_code(summary.verdict)

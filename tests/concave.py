@@ -1,0 +1,64 @@
+"""Concave meshes and motions for the tests of distances."""
+
+import manifold3d
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from seerob.geometry import Mesh, Solid, capsule, dilated_rectangle
+
+IDENTITY = np.eye(3)
+
+
+def bumpy_ball(seed: int, size: float = 1.0, subdivisions: int = 2) -> Mesh:
+    """A concave star about the origin."""
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions)
+    noise = np.random.default_rng(seed).uniform(0.4, 1.2, len(ball.vertices)) * size
+    return Mesh(np.array(ball.vertices * noise[:, None]), np.array(ball.faces, np.int32))
+
+
+def boxes(*bounds) -> Mesh:
+    """Overlapping boxes, each its own shell."""
+    mesh = trimesh.util.concatenate([trimesh.creation.box(bounds=np.array(b, float)) for b in bounds])
+    return Mesh(np.array(mesh.vertices), np.array(mesh.faces, np.int32))
+
+
+def cut(solid: manifold3d.Manifold) -> Mesh:
+    mesh = solid.to_mesh64()
+    return Mesh(np.array(mesh.vert_properties[:, :3], float), np.array(mesh.tri_verts, np.int32))
+
+
+def cube(x, y, z):
+    return manifold3d.Manifold.cube((x, y, z), True)
+
+
+SLOT = cut(cube(0.6, 0.4, 0.3) - cube(0.7, 0.1, 0.2).translate((0, 0, 0.1)))
+U_BOXES = [
+    ((-0.4, -0.4, 0), (-0.3, 0.4, 0.2)),
+    ((0.3, -0.4, 0), (0.4, 0.4, 0.2)),
+    ((-0.4, -0.4, 0), (0.4, -0.3, 0.2)),
+]
+
+
+def poses(n: int, bodies: int, spread: float, seed: int = 0):
+    rng = np.random.default_rng(seed)
+    R = Rotation.random(n * bodies, rng).as_matrix().reshape(n, bodies, 3, 3)
+    return R, rng.uniform(-spread, spread, (n, bodies, 3))
+
+
+def walk(n: int, bodies: int, spread: float, seed: int = 0):
+    """Poses that follow each other closely."""
+    rng = np.random.default_rng(seed)
+    turn = np.cumsum(rng.normal(size=(n, bodies, 3)) * 0.05, axis=0)
+    x = np.cumsum(rng.normal(size=(n, bodies, 3)) * 0.02, axis=0) + rng.uniform(-spread, spread, (bodies, 3))
+    return Rotation.from_rotvec(turn.reshape(-1, 3)).as_matrix().reshape(n, bodies, 3, 3), x
+
+
+SOLIDS = {
+    "concave mesh": Solid(mesh=bumpy_ball(5, 0.7)),
+    "dilated mesh": Solid(mesh=bumpy_ball(6, 0.5), radius=0.05),
+    "capsule": capsule([-0.2, 0.1, 0], [0.4, 0.2, 0.1], 0.07),
+    "ball": capsule([0.1, 0, 0], [0.1, 0, 0], 0.1),
+    "rectangle": dilated_rectangle([0.1, 0, 0.2], [0.5, 0, 0], [0, 0.2, 0.3], 0.06),
+    "narrow rectangle": dilated_rectangle([0, 0, 0], [0, 0, 0], [0, 0.6, 0], 0.03),
+}

@@ -1,0 +1,154 @@
+// Every kind of marker is on the screen, where it should be, in its verdict's colour. What a marker changes
+// is found by taking the same picture with its criterion's markers on and off.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { openBrowser } from "./browser.mjs";
+import { pixels, settled, show } from "./expect.mjs";
+import { serve } from "./served.mjs";
+
+const COLORS = {
+  within: [20, 170, 184],
+  exceeded: [193, 21, 64],
+  undecided: [252, 234, 146],
+  none: [170, 182, 198],
+};
+const AROUND_PX = 16;
+let served;
+let browser;
+let page;
+let results;
+
+before(async () => {
+  served = await serve("--mode", "replay", "--seconds", "8");
+  browser = await openBrowser({ width: 1280, height: 800 });
+  page = browser.page;
+  await show(page, served.url);
+  await page.keyboard.press("Shift+ArrowRight");
+  await page.waitForFunction(() => Math.abs(window.seerob.t - 1) < 0.006);
+  // Labels would lie over what is looked at.
+  await page.getByRole("button", { name: "Overlays" }).click();
+  await page.getByLabel("Labels of the worst three").uncheck();
+  await page.getByRole("button", { name: "Overlays" }).click();
+  const told = await served.tell(`snapshot ${await settled(page)}`);
+  results = Object.fromEntries(told.results.map((result) => [result.name, result]));
+});
+
+after(async () => {
+  await browser?.close();
+  await served?.close();
+});
+
+const marker = (criterion, type) => results[criterion].markers.find((m) => m.type === type);
+const plus = (a, b, share = 1) => a.map((x, i) => x + share * b[i]);
+
+/** Wait until the room has drawn what was asked for. */
+const drawn = () =>
+  page.evaluate(
+    () =>
+      new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 100)))),
+  );
+
+/** Pixels that the markers of a criterion change around a point of the world, with and without them. */
+async function changed(criterion, point) {
+  const [x, y] = await page.evaluate((p) => window.seerob.project(p), point);
+  const clip = {
+    x: Math.round(x) - AROUND_PX,
+    y: Math.round(y) - AROUND_PX,
+    width: 2 * AROUND_PX,
+    height: 2 * AROUND_PX,
+  };
+  const key = String(Object.keys(results).indexOf(criterion) + 1);
+  await drawn();
+  const shown = await pixels(page, clip);
+  await page.keyboard.press(key);
+  await drawn();
+  const without = await pixels(page, clip);
+  await page.keyboard.press(key);
+  const pairs = [];
+  for (let i = 0; i < shown.length; i += 4) {
+    const [a, b] = [shown.slice(i, i + 3), without.slice(i, i + 3)];
+    if (distance(a, b) > 12) pairs.push([a, b]);
+  }
+  return pairs;
+}
+
+const distance = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
+
+async function assertDrawn(criterion, point, verdict) {
+  const pairs = await changed(criterion, point);
+  const color = COLORS[verdict ?? "none"];
+  assert.ok(pairs.length >= 12, `${pairs.length} pixels changed`);
+  const closer = pairs.filter(([shown, without]) => distance(shown, color) < distance(without, color));
+  assert.ok(
+    closer.length > 0.75 * pairs.length,
+    `${closer.length} of ${pairs.length} pixels turned to ${verdict}`,
+  );
+}
+
+test("a segment, along its length", async () => {
+  const { start, end, verdict } = marker("separation", "segment");
+  const along = end.map((x, i) => x - start[i]);
+  for (const share of [0.3, 0.7]) await assertDrawn("separation", plus(start, along, share), verdict);
+});
+
+test("a sphere, at its rim", async () => {
+  const { center, radius, verdict } = marker("separation", "sphere");
+  await assertDrawn("separation", plus(center, [0, 0, 1], radius), verdict);
+});
+
+test("a highlight, on the body it names", async () => {
+  const { verdict } = marker("separation", "highlight");
+  const { center } = marker("separation", "sphere");
+  await assertDrawn("separation", plus(center, [0.02, 0, 0]), verdict);
+});
+
+test("an arrow, on its shaft", async () => {
+  const { origin, vector, verdict } = marker("tcp speed", "arrow");
+  await assertDrawn("tcp speed", plus(origin, vector, 0.7), verdict);
+});
+
+test("an ellipsoid, at the end of its longest axis", async () => {
+  const { center, wxyz, radii, verdict } = marker("manipulability", "ellipsoid");
+  const [w, x, y, z] = wxyz;
+  const first = [1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)];
+  await assertDrawn("manipulability", plus(center, first, radii[0]), verdict);
+});
+
+test("a box, at its corners", async () => {
+  const { center, size, verdict } = marker("work area", "box");
+  await assertDrawn("work area", plus(center, size, 0.5), verdict);
+  await assertDrawn("work area", plus(center, [size[0], size[1], -size[2]], 0.5), verdict);
+});
+
+test("a hull, on its surface, hatched where it is undecided", async () => {
+  const { vertices, verdict } = marker("work area", "hull");
+  assert.equal(verdict, "undecided");
+  const foot = [0, 1, 2].map((i) => (vertices[0][i] + vertices[1][i] + vertices[2][i]) / 3);
+  const apex = vertices[3];
+  const middle = foot.map((x, i) => apex[i] + 0.3 * (x - apex[i]));
+  const pairs = await changed("work area", middle);
+  const yellow = pairs.map(([[r, , b], [r0, , b0]]) => r - b - (r0 - b0));
+  const strong = yellow.filter((x) => x > 8).length;
+  assert.ok(strong > 20, `${strong} pixels turned yellow`);
+  assert.ok(
+    Math.max(...yellow) > 3 * Math.max(1, yellow.sort((a, b) => a - b)[yellow.length >> 3]),
+    "no hatch",
+  );
+});
+
+test("a label is written, as text whatever it says", async () => {
+  const { position } = marker("work area", "label");
+  const pairs = await changed("work area", plus(position, [0, 0, 0.05]));
+  const bright = pairs.filter(([shown]) => Math.min(...shown) > 150).length;
+  const plate = pairs.filter(([shown]) => Math.max(...shown) < 60).length;
+  assert.ok(bright > 30 && plate > 60, `${bright} pixels of letters on ${plate} of plate`);
+  assert.equal(await page.evaluate(() => globalThis.hacked), undefined);
+});
+
+test("markers vanish while nothing is known", async () => {
+  const { center, size } = marker("work area", "box");
+  await served.tell("stop");
+  await page.waitForSelector(".pill.state-off");
+  assert.deepEqual(await changed("work area", plus(center, size, 0.5)), []);
+});

@@ -185,8 +185,7 @@ class _Compiler:
             lengths=human.lengths,
             hand=human.hand,
         )
-        wanted = {**posture.named(human.posture), **human.joints}
-        home = posture.posture(description, wanted, file=f"{human.name}.joints")
+        home = posture.posture(description, human.posture, joints=human.joints, file=f"{human.name}.joints")
         self._chain(human.name, description, "human", _matrix(human.at), home, True)
 
     def _chain(

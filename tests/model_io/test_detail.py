@@ -47,7 +47,7 @@ def slotted():
         # Finer than the tolerance on purpose: many small moves must not add up.
         (shrunk(trimesh.creation.icosphere(5), 0.0005), 12_000),
         (trimesh.creation.cylinder(0.01, 0.2, sections=2000), 2000),
-        (shrunk(trimesh.creation.torus(2, 1, 80, 80), 0.001), 10_000),
+        (shrunk(trimesh.creation.torus(2, 1, 80, 80), 0.0003), 12_500),
         (trimesh.creation.box((1, 1, 1)), 12),
     ],
 )

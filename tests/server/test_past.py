@@ -1,29 +1,30 @@
 """Thinning what happened, against what happened."""
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seerob.server.past import KEPT_PER_BUCKET, Past, keep
+from seerob.server.past import KEPT_PER_BUCKET, Past, keep, width_of
 from seerob.snapshot import Result, Snapshot, Verdict
 
 CODES = {Verdict.WITHIN: 0, Verdict.EXCEEDED: 1, Verdict.UNDECIDED: 2, None: 255}
 
 
-@given(st.integers(0, 2**32), st.integers(1, 3000), st.integers(1, 50), st.booleans())
-def test_every_bucket_keeps_its_extremes_and_its_verdicts(seed, n, buckets, at_most):
+@settings(deadline=None)
+@given(st.integers(0, 2**32), st.integers(1, 3000), st.integers(-4, 8), st.booleans())
+def test_every_bucket_keeps_its_extremes_and_its_verdicts(seed, n, power, at_most):
     rng = np.random.default_rng(seed)
     t = np.cumsum(rng.exponential(size=n))
     values = np.where(rng.random(n) < 0.1, np.nan, rng.normal(size=n))
     limits = np.where(rng.random(n) < 0.1, np.nan, rng.normal(size=n))
     verdicts = rng.choice(np.array([0, 0, 0, 0, 1, 2, 255], np.uint8), n)
-    i = keep(t, values, limits, verdicts, at_most=at_most, buckets=buckets)
+    i = keep(t, values, limits, verdicts, at_most=at_most, width=2.0**power)
     assert (np.diff(i) > 0).all()
     assert i[0] == 0
     assert i[-1] == n - 1
-    assert len(i) <= (KEPT_PER_BUCKET + 1) * buckets + 1
     margins = limits - values if at_most else values - limits
-    bucket = np.minimum((t - t[0]) / max(t[-1] - t[0], 1e-300) * buckets, buckets - 1).astype(int)
+    bucket = t // 2.0**power
+    assert len(i) <= KEPT_PER_BUCKET * len(np.unique(bucket)) + 1
     for b in np.unique(bucket):
         whole, kept = np.flatnonzero(bucket == b), i[bucket[i] == b]
         assert set(verdicts[kept]) == set(verdicts[whole])
@@ -52,8 +53,20 @@ def test_a_long_run_takes_bounded_memory_and_loses_no_extremum():
     assert np.isclose(t[kept.argmax()], 0.01)
     for k, verdict in bad.items():
         assert codes[np.isclose(t, k * 0.01)].tolist() == [CODES[verdict]]
-    # Even in time, however often the early part was thinned: no twentieth of the run is empty.
-    assert np.histogram(t, bins=20, range=(0, 200))[0].min() >= 2
+    # However often the early part was thinned, each of its buckets has its true extremes.
+    true_t = np.arange(len(values)) * 0.01
+    width = width_of(200.0, 20)
+    for b in range(int(200 // width) - 1):
+        whole, left = true_t // width == b, t // width == b
+        assert values[whole].max().astype("f4") == kept[left].max()
+        assert values[whole].min().astype("f4") == kept[left].min()
+
+
+@given(st.floats(1e-6, 1e9), st.integers(1, 5000))
+def test_buckets_cover_the_span_and_nest(span, buckets):
+    width = width_of(span, buckets)
+    assert span / buckets <= width <= 2 * span / buckets * (1 + 1e-12)
+    assert np.frexp(width)[0] == 0.5
 
 
 def test_a_result_that_is_shown_again_is_one_point():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from seerob.recording import Recording
+from seerob.server import hub
 from seerob.server.client import WINDOW
 from seerob.server.live import Live, LiveView
 from seerob.server.player import Player
@@ -97,6 +98,39 @@ def test_who_does_not_read_costs_bounded_memory_and_is_cut_off_in_the_end():
                 time.sleep(0.05)
             assert len(server._uvicorn.server_state.connections) == 1
         stalled.socket.socket.close()
+
+
+def test_who_reads_and_never_acknowledges_is_told_why_it_ends():
+    feed = Live(rate=1000.0)
+    with Server(scene=scene(), meshes={}, feed=feed, port=0, patience=0.3) as server:
+        with Visitor(server, acknowledge=False) as page:
+            page.of(Transport)
+            over = threading.Event()
+
+            def publish():
+                k = 0
+                while not over.wait(0.01):
+                    feed.publish(snapshot(k))
+                    k += 1
+
+            publisher = threading.Thread(target=publish)
+            publisher.start()
+            try:
+                assert page.end() == (1013, "nothing acknowledged for 0.3 s")
+            finally:
+                over.set()
+                publisher.join()
+
+
+def test_there_is_an_end_to_how_many_look(live, monkeypatch):
+    server, _ = live
+    monkeypatch.setattr(hub, "MOST_CLIENTS", 2)
+    with Visitor(server) as a, Visitor(server) as b:
+        a.read()
+        b.read()
+        with Visitor(server) as c:
+            assert c.end() == (1013, "2 pages are connected already")
+        assert isinstance(a.read(), Scene)
 
 
 def test_an_acknowledgement_of_nothing_changes_nothing(live):

@@ -355,3 +355,14 @@ def test_a_run_without_ticks_is_a_recording_too(tmp_path):
     assert (recording.complete, recording.duration, list(recording.snapshots())) == (True, 0.0, [])
     with pytest.raises(InputError, match="no snapshot"):
         recording.snapshot_at(0)
+
+
+def test_every_marker_has_a_shape_in_a_viewer(path):
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        updates = [m.decoded_message for m in reader.iter_decoded_messages(topics=["/markers"])]
+    entity = next(e for e in updates[3].entities if e.id == "tool speed")
+    assert (len(entity.lines), len(entity.spheres), len(entity.cubes), len(entity.triangles)) == (1, 2, 1, 1)
+    assert [t.text for t in entity.texts] == ["v", made_run.HOSTILE]
+    assert (entity.spheres[0].size.x, entity.spheres[1].size.z) == (0.4, 0.6)
+    assert {e.id for e in updates[-1].entities} == {r.name for r in made_run.snapshot(0).results}

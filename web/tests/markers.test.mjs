@@ -127,7 +127,9 @@ test("a hull, on its surface, hatched where it is undecided", async () => {
   const foot = [0, 1, 2].map((i) => (vertices[0][i] + vertices[1][i] + vertices[2][i]) / 3);
   const apex = vertices[3];
   const middle = foot.map((x, i) => apex[i] + 0.3 * (x - apex[i]));
+  await page.getByRole("button", { name: "Top", exact: true }).click();
   const pairs = await changed("work area", middle);
+  await page.getByRole("button", { name: "3D", exact: true }).click();
   const yellow = pairs.map(([[r, , b], [r0, , b0]]) => r - b - (r0 - b0));
   const strong = yellow.filter((x) => x > 8).length;
   assert.ok(strong > 20, `${strong} pixels turned yellow`);

@@ -16,6 +16,7 @@ test("numbers have three digits, a true minus, and the limit's decimals", () => 
   assert.equal(formatNumber(null), "–");
   assert.equal(formatQuantity(0.61, "m"), "0.610\u00a0m");
   assert.equal(formatPercent(-0.123), "−12\u00a0%");
+  assert.equal(formatPercent(-0.0021), "−0.2\u00a0%");
   assert.equal(formatTime(83.456), "1:23.46");
   assert.equal(formatTime(59.999), "1:00.00");
 });

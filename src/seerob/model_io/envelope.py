@@ -20,40 +20,63 @@ from seerob.transforms import Array
 NOTE = "envelope made by seerob, not the maker's mesh"
 
 COLORS: Mapping[str, shapes.Color] = {
-    "body": (0.80, 0.82, 0.84, 1.0),
-    "cap": (0.45, 0.62, 0.78, 1.0),
-    "dark": (0.35, 0.37, 0.40, 1.0),
+    "grey": (0.78, 0.80, 0.82, 1.0),
+    "blue": (0.42, 0.62, 0.80, 1.0),
+    "dark": (0.33, 0.35, 0.38, 1.0),
     "orange": (0.93, 0.50, 0.16, 1.0),
 }
-
-
-def shapes_of(piece: Mapping[str, Any]) -> tuple[Mesh, Mesh]:
-    """Mesh for distances and mesh for the screen of one piece; the second lies inside the first."""
-    color = COLORS[piece.get("color", "body")]
-    if "tube" in piece:
-        start, end = piece["tube"]
-        radius = float(piece["radius"])
-        return shapes.prism_mesh(start, end, radius), _rounded_tube(start, end, radius, color)
-    if "slot" in piece:
-        ends, radii = piece["slot"], piece["radius"]
-        prisms = [shapes.prism_mesh(*end, radius) for end, radius in zip(ends, radii, strict=True)]
-        looks = [_rounded_tube(*end, radius, color) for end, radius in zip(ends, radii, strict=True)]
-        return shapes.hull_mesh(prisms, color), shapes.hull_mesh(looks, color)
-    lower, upper = (np.array(p, float) for p in piece["box"])
-    return shapes.box_mesh(lower, upper), _rounded_in_box(lower, upper, color)
+CAP = 0.14
+"""Length of a coloured cap, relative to that of its tube."""
+ROUNDING = 0.25
+"""Radius of a rounded rim, relative to that of its tube."""
 
 
 def shapes_for(pieces: Sequence[Mapping[str, Any]]) -> tuple[tuple[Solid, ...], tuple[Mesh, ...]]:
     """Solids and display meshes of a link's pieces."""
-    made = [shapes_of(piece) for piece in pieces]
-    solids = tuple(Solid(mesh=mesh, name=f"envelope_{i}", note=NOTE) for i, (mesh, _) in enumerate(made))
-    return solids, tuple(visual for _, visual in made)
+    solids = tuple(
+        Solid(mesh=outer(piece), name=f"envelope_{i}", note=NOTE) for i, piece in enumerate(pieces)
+    )
+    return solids, tuple(mesh for piece in pieces for mesh in look(piece))
 
 
-def _rounded_tube(start: Sequence[float], end: Sequence[float], radius: float, color: shapes.Color) -> Mesh:
-    length = float(np.linalg.norm(np.subtract(end, start)))
-    profile = shapes.rounded_profile(radius, length, 0.25 * radius)
-    return shapes.lathe_mesh(start, end, profile, sides=48, color=color)
+def outer(piece: Mapping[str, Any]) -> Mesh:
+    """The convex mesh of a piece that distances see."""
+    if "tube" in piece:
+        return shapes.prism_mesh(*piece["tube"], float(piece["radius"]))
+    if "slot" in piece:
+        tubes = zip(piece["slot"], piece["radius"], strict=True)
+        return shapes.hull_mesh([shapes.prism_mesh(*tube, radius) for tube, radius in tubes])
+    return shapes.box_mesh(*piece["box"])
+
+
+def look(piece: Mapping[str, Any]) -> list[Mesh]:
+    """What the screen shows of a piece: inside its outer mesh, rounded, with coloured caps where asked."""
+    color = COLORS[piece.get("color", "grey")]
+    if "tube" in piece:
+        start, end = (np.array(p, float) for p in piece["tube"])
+        radius, length = float(piece["radius"]), float(np.linalg.norm(end - start))
+        profile = shapes.rounded_profile(radius, length, ROUNDING * radius)
+        if "caps" not in piece:
+            return [shapes.lathe_mesh(start, end, profile, sides=48, color=color)]
+        cap = COLORS[piece["caps"]]
+        low, middle, high = _in_three(profile, max(CAP * length, 1.01 * profile[len(profile) // 2 - 1][1]))
+        parts = ((low, cap), (middle, color), (high, cap))
+        return [shapes.lathe_mesh(start, end, part, sides=48, color=c) for part, c in parts]
+    if "slot" in piece:
+        tubes = zip(piece["slot"], piece["radius"], strict=True)
+        return [shapes.hull_mesh([look({"tube": tube, "radius": r})[0] for tube, r in tubes], color)]
+    lower, upper = (np.array(p, float) for p in piece["box"])
+    return [_rounded_in_box(lower, upper, color)]
+
+
+def _in_three(profile: list[tuple[float, float]], cap: float) -> tuple[list[tuple[float, float]], ...]:
+    """A symmetric profile cut at ``cap`` [m] from both ends, or in the middle when it is too short."""
+    half = len(profile) // 2
+    radius, length = profile[half - 1][0], profile[-1][1]
+    cap = min(cap, 0.45 * length)
+    low = [point for point in profile[:half] if point[1] < cap] + [(radius, cap)]
+    high = [(radius, length - cap)] + [point for point in profile[half:] if point[1] > length - cap]
+    return low, [(radius, cap), (radius, length - cap)], high
 
 
 def _rounded_in_box(lower: Array, upper: Array, color: shapes.Color) -> Mesh:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from math import nan
+from math import ceil, log2, nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +13,24 @@ from seerob.snapshot import History, Result, Snapshot, Trace
 from seerob.transforms import Array
 
 KEPT_PER_BUCKET = 7
-"""First, smallest, largest, nearest to the limit, and the first of each of three verdicts."""
+"""Smallest, largest, smallest margin, and the first of each verdict; the first of all is one of those."""
+
+
+def width_of(span: float, buckets: int) -> float:
+    """Length of a bucket [s]: the smallest power of two of which ``buckets`` cover the span [s].
+
+    Powers of two nest: thinning again what was thinned loses nothing that the first did not.
+    """
+    return 2.0 ** ceil(log2(max(span, 1e-6) / buckets))
 
 
 def keep(
-    t: Array, values: Array, limits: Array, verdicts: NDArray[np.uint8], *, at_most: bool, buckets: int
+    t: Array, values: Array, limits: Array, verdicts: NDArray[np.uint8], *, at_most: bool, width: float
 ) -> NDArray[np.int64]:
     """Indices of the points that keep the picture true, ascending.
 
-    The stretch of time is cut into equal buckets. Of each stay the first point, the smallest and
-    the largest value, the smallest margin, and one point of each verdict that occurs in it.
+    Time is cut into buckets that begin at multiples of ``width``. Of each stay the first point, the
+    smallest and the largest value, the smallest margin, and one point of each verdict in it.
 
     Args:
         t: Times [s], ascending, shape (n,), n > 0.
@@ -30,11 +38,10 @@ def keep(
         limits: Shape (n,); nan where there was none.
         verdicts: Codes as in `snapshot.Trace`, shape (n,).
         at_most: Whether limits bound from above.
-        buckets: How many; at most `KEPT_PER_BUCKET` times as many points stay, and the last one.
+        width: Length of a bucket [s]; at most `KEPT_PER_BUCKET` points stay of each, and the last.
     """
-    span = max(float(t[-1] - t[0]), np.finfo(float).tiny)
-    bucket = np.minimum((t - t[0]) / span * buckets, buckets - 1).astype(np.int64)
-    starts = np.flatnonzero(np.diff(bucket, prepend=-1))
+    bucket = np.floor(t / width).astype(np.int64)
+    starts = np.flatnonzero(np.diff(bucket, prepend=bucket[0] - 1))
     margins = limits - values if at_most else values - limits
     kept = [starts, np.array([len(t) - 1])]
     # Stable sort by bucket, then by key: the first of each bucket is its smallest; nan comes last.
@@ -42,7 +49,7 @@ def keep(
         kept.append(np.lexsort((sort_key, bucket))[starts])
     for code in np.unique(verdicts):
         where = np.flatnonzero(verdicts == code)
-        kept.append(where[np.flatnonzero(np.diff(bucket[where], prepend=-1))])
+        kept.append(where[np.flatnonzero(np.diff(bucket[where], prepend=bucket[0] - 1))])
     return np.unique(np.concatenate(kept))
 
 
@@ -66,7 +73,8 @@ class _Past:
     def thin(self, buckets: int) -> None:
         t, values, limits = (np.array(a, np.float64) for a in (self.t, self.values, self.limits))
         verdicts = np.array(self.verdicts, np.uint8)
-        i = keep(t, values, limits, verdicts, at_most=self.at_most, buckets=buckets)
+        width = width_of(float(t[-1] - t[0]), buckets)
+        i = keep(t, values, limits, verdicts, at_most=self.at_most, width=width)
         self.t, self.values, self.limits = (array("d", a[i].tobytes()) for a in (t, values, limits))
         self.verdicts = array("B", verdicts[i].tobytes())
 
@@ -84,8 +92,8 @@ class Past:
     """The results of a run that has no end yet.
 
     Args:
-        buckets: Stretches of equal length that old points are thinned to; per criterion at most
-            four times `KEPT_PER_BUCKET` as many points are held.
+        buckets: Stretches of equal length that old points are thinned to, at most; per criterion
+            about three times `KEPT_PER_BUCKET` as many points are held, the newest of them whole.
     """
 
     def __init__(self, *, buckets: int = 600) -> None:

@@ -67,7 +67,7 @@ export class Viewpoint {
     const { camera } = this.stage;
     const away = direction?.clone() ?? camera.position.clone().sub(this.controls.target).normalize();
     const half = (camera.fov * Math.PI) / 360;
-    const distance = (radius * 0.92) / Math.sin(Math.min(half, Math.atan(Math.tan(half) * camera.aspect)));
+    const distance = radius / Math.sin(Math.min(half, Math.atan(Math.tan(half) * camera.aspect)));
     this.controls.target.copy(this.center);
     camera.position.copy(this.center).addScaledVector(away, distance);
     this.controls.update();

@@ -8,18 +8,36 @@ run = station.run()
 print(run.results["tcp speed"].max(), run.verdict)
 ```
 
-The names below come in the order in which data meets them.
+The names below come in the order in which data meets them. Each is imported when it is first used:
+the command line's help, and whoever needs only one of them, does not wait for the physics.
 """
 
-from seerob.errors import InputError, SeerobError, Undecided, UnknownName
-from seerob.model import Model
-from seerob.reading import read
-from seerob.recording import Recording
-from seerob.results import ResultLog, Series
-from seerob.run import Summary
-from seerob.snapshot import Origin, Result, Snapshot, Verdict
-from seerob.station import Station, load, load_recorded
-from seerob.workstation import Workstation
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from seerob.errors import InputError, SeerobError, Undecided, UnknownName
+    from seerob.model import Model
+    from seerob.reading import read
+    from seerob.recording import Recording
+    from seerob.results import ResultLog, Series
+    from seerob.run import Summary
+    from seerob.snapshot import Origin, Result, Snapshot, Verdict
+    from seerob.station import Station, load, load_recorded
+    from seerob.workstation import Workstation
+
+_HOMES = {
+    "errors": ("InputError", "SeerobError", "Undecided", "UnknownName"),
+    "model": ("Model",),
+    "reading": ("read",),
+    "recording": ("Recording",),
+    "results": ("ResultLog", "Series"),
+    "run": ("Summary",),
+    "snapshot": ("Origin", "Result", "Snapshot", "Verdict"),
+    "station": ("Station", "load", "load_recorded"),
+    "workstation": ("Workstation",),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "InputError",
@@ -41,3 +59,15 @@ __all__ = [
     "load_recorded",
     "read",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module 'seerob' has no attribute {name!r}")
+    found: object = getattr(import_module(f"seerob.{_HOME[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

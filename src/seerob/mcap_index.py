@@ -40,8 +40,8 @@ class ChunkPlace(NamedTuple):
     """Decompressed [bytes]."""
     crc: int
     compression: str
-    channels: set[int]
-    """Channels that its message indexes name; empty when those are missing."""
+    channels: list[int]
+    """Channels that its message indexes name, as far as they were written; no checksum covers them."""
 
 
 class Attachment(NamedTuple):
@@ -103,6 +103,9 @@ def scan(path: Path) -> McapIndex:
                 position += 9 + length
                 file.seek(position)
             index.unread = 0 if index.finished else size - position
+            if index.chunks and not index.finished:
+                # Its message indexes may have been cut off halfway.
+                index.chunks[-1].channels.clear()
     except OSError as error:
         what = f"cannot be read: {error.strerror}"
         raise InputError.at(path, "", what, "check path and permission") from error
@@ -116,9 +119,9 @@ def _record(index: McapIndex, file: BinaryIO, opcode: int, start: int, length: i
         (stored,) = struct.unpack("<Q", file.read(8))
         if file.tell() + stored > start + length:
             raise Damaged("chunk is longer than its record")
-        index.chunks.append(ChunkPlace(t0, t1, file.tell(), stored, size, crc, compression, set()))
+        index.chunks.append(ChunkPlace(t0, t1, file.tell(), stored, size, crc, compression, []))
     elif opcode == _MESSAGE_INDEX and index.chunks:
-        index.chunks[-1].channels.add(struct.unpack("<H", file.read(2))[0])
+        index.chunks[-1].channels.append(struct.unpack("<H", file.read(2))[0])
     elif opcode == _ATTACHMENT:
         file.seek(16, 1)
         name = _text(file, MAX_TEXT)

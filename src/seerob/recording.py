@@ -25,6 +25,8 @@ from seerob.recording_format import (
     SCENE,
     SNAPSHOT,
     VERSION,
+    VIEW_SCENE,
+    VIEWS,
     BasisChange,
     Tick,
     nanoseconds,
@@ -35,6 +37,8 @@ T = TypeVar("T")
 
 _POSE = 7 * 4
 _CACHED_CHUNKS = 8
+_TICK = {SAMPLES, SNAPSHOT}
+_TICK_VIEWS = {SAMPLES, SNAPSHOT, BASIS, *VIEWS}
 _REMEDY = "give a recording (.mcap) made by seerob"
 _UPGRADE = "read it with the seerob that wrote it"
 
@@ -269,8 +273,12 @@ class Recording:
         ]
 
     def _has(self, chunk: ChunkPlace, *topics: str) -> bool:
-        channels = chunk.channels or {m.channel for m in self._chunk(chunk)}
-        return any(self._topics.get(channel) in topics for channel in channels)
+        listed = [self._topics.get(channel) for channel in chunk.channels]
+        # Message indexes have no checksum: what no recorder would write is looked up in the chunk.
+        plausible = len(set(listed)) == len(listed) and None not in listed
+        if not plausible or (listed not in ([SCENE], [VIEW_SCENE]) and not _TICK <= set(listed) <= _TICK_VIEWS):
+            listed = [self._topics.get(m.channel) for m in self._chunk(chunk)]
+        return any(topic in topics for topic in listed)
 
     def _messages(self, chunk: ChunkPlace, topic: str) -> list[Message]:
         return [m for m in self._chunk(chunk) if self._topics.get(m.channel) == topic]

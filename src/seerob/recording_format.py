@@ -27,6 +27,10 @@ SAMPLES = "/seerob/samples"
 SNAPSHOT = "/seerob/snapshot"
 BASIS = "/seerob/basis"
 
+VIEW_SCENE, VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS = "/scene", "/markers", "/tf", "/results"
+VIEWS = (VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS)
+"""For foreign viewers; `VIEW_SCENE` is sent once, these from time to time."""
+
 MESH_PREFIX = "mesh/"
 """Attachments ``mesh/<hash>.glb``."""
 FILE_PREFIX = "file/"

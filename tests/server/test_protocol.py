@@ -102,24 +102,25 @@ def test_who_does_not_read_costs_bounded_memory_and_is_cut_off_in_the_end():
 
 def test_who_reads_and_never_acknowledges_is_told_why_it_ends():
     feed = Live(rate=1000.0)
-    with Server(scene=scene(), meshes={}, feed=feed, port=0, patience=0.3) as server:
-        with Visitor(server, acknowledge=False) as page:
-            page.of(Transport)
-            over = threading.Event()
+    over = threading.Event()
 
-            def publish():
-                k = 0
-                while not over.wait(0.01):
-                    feed.publish(snapshot(k))
-                    k += 1
+    def publish():
+        k = 0
+        while not over.wait(0.01):
+            feed.publish(snapshot(k))
+            k += 1
 
-            publisher = threading.Thread(target=publish)
-            publisher.start()
-            try:
-                assert page.end() == (1013, "nothing acknowledged for 0.3 s")
-            finally:
-                over.set()
-                publisher.join()
+    publisher = threading.Thread(target=publish)
+    with (
+        Server(scene=scene(), meshes={}, feed=feed, port=0, patience=0.3) as server,
+        Visitor(server, acknowledge=False) as page,
+    ):
+        publisher.start()
+        try:
+            assert page.end() == (1013, "nothing acknowledged for 0.3 s")
+        finally:
+            over.set()
+            publisher.join()
 
 
 def test_there_is_an_end_to_how_many_look(live, monkeypatch):

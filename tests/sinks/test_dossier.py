@@ -129,10 +129,10 @@ def test_pictures_are_drawn_for_the_worst_criteria_first(tmp_path, page):
 
 
 def test_the_file_is_replaced_whole_or_left(tmp_path, monkeypatch):
-    before = write(tmp_path, 2)
+    before = write(tmp_path, 2, pictures=0)
     monkeypatch.setattr("seerob.sinks._page.page", lambda _: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        write(tmp_path, 3)
+        write(tmp_path, 3, pictures=0)
     assert (tmp_path / "report.html").read_text() == before
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
@@ -140,7 +140,7 @@ def test_the_file_is_replaced_whole_or_left(tmp_path, monkeypatch):
 def test_a_run_without_ticks_and_without_criteria_still_gives_a_page(tmp_path):
     text = Page(write(tmp_path, 0)).text
     assert "Nothing was evaluated: the run has no tick." in text
-    with Dossier().open(made_run.scene(criteria=()), {}, {}, tmp_path):
+    with Dossier(pictures=0).open(made_run.scene(criteria=()), {}, {}, tmp_path):
         pass
     assert "there is no verdict" in Page((tmp_path / "report.html").read_text()).text
 
@@ -165,4 +165,4 @@ def test_options_are_checked(tmp_path):
         with pytest.raises(InputError, match="dossier"):
             Dossier(**options).open(made_run.scene(), {}, {}, tmp_path)
     with pytest.raises(InputError, match="cannot be written"):
-        write(tmp_path / "none", 1)
+        write(tmp_path / "none", 0)

@@ -85,7 +85,12 @@ def test_cut_anywhere_it_opens_shorter_or_says_why(path, tmp_path):
     expected = [made_run.snapshot(k) for k in range(N)]
     cut = tmp_path / "cut.mcap"
     lengths = []
-    for size in [*range(0, 120, 3), *range(120, len(whole), len(whole) // 150)]:
+    ends, position = [], 8
+    while position < len(whole) - 8:
+        position += 9 + int.from_bytes(whole[position + 1 : position + 9], "little")
+        ends.append(position)
+    coarse = range(120, len(whole), len(whole) // 100)
+    for size in sorted({*range(0, 120, 3), *coarse, *ends[:200], *(e - 1 for e in ends[:200])}):
         cut.write_bytes(whole[:size])
         try:
             recording = Recording.open(cut)

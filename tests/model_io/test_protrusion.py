@@ -1,0 +1,42 @@
+"""How far one shape leaves another, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from seerob.geometry import Mesh, Solid, capsule, dilated_rectangle
+from seerob.model_io import shapes
+from seerob.model_io.description import Description, Link
+from seerob.model_io.protrusion import protrusions, with_protrusions
+
+
+def robot(visual: Mesh, *solids: Solid) -> Description:
+    link = Link(name="l", parent=None, parent_from_link=np.eye(4), visual=(visual,), solids=solids)
+    return Description(name="r", links=(link,), tip="l", source="test")
+
+
+def cube(half, center=(0, 0, 0)):
+    return shapes.box_mesh(np.array(center) - half, np.array(center) + half)
+
+
+POINT = np.zeros(3)
+
+
+@pytest.mark.parametrize(
+    ("solids", "depth"),
+    [
+        ([Solid(mesh=cube(0.9))], 0.1 * 3**0.5),
+        ([Solid(mesh=cube(1.1))], 0.0),
+        ([Solid(mesh=cube(0.9), radius=0.05)], 0.1 * 3**0.5 - 0.05),
+        ([capsule(POINT, POINT, 1.0)], 3**0.5 - 1),
+        ([capsule(POINT, [0, 0, 1], 1.0)], 3**0.5 - 1),
+        ([dilated_rectangle([-1, -1, 0], [2, 0, 0], [0, 2, 0], 0.5)], 0.5),
+        ([Solid(mesh=cube(0.9)), Solid(mesh=cube(2, (0, 0, 1.5)))], 0.1 * 3**0.5),
+    ],
+)
+def test_the_corners_of_a_cube(solids, depth):
+    made = protrusions(robot(cube(1.0), *solids))
+    assert made["l"] == pytest.approx(depth, abs=1e-12)
+    text = [f.text for f in with_protrusions(robot(cube(1.0), *solids)).findings]
+    assert bool(text) == (depth > 1e-4)

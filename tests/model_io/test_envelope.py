@@ -85,4 +85,7 @@ def test_an_arm_looks_like_one_and_is_light_enough_for_distances():
     robot = library.load("ur10")
     assert sum(len(s.mesh.faces) for link in robot.links for s in link.solids) < 2500
     assert sum(len(v.faces) for link in robot.links for v in link.visual) < 40_000
-    assert {mesh.color for link in robot.links for mesh in link.visual} >= {(0.78, 0.8, 0.82, 1), (0.42, 0.62, 0.8, 1)}
+    assert {mesh.color for link in robot.links for mesh in link.visual} >= {
+        (0.78, 0.8, 0.82, 1),
+        (0.42, 0.62, 0.8, 1),
+    }

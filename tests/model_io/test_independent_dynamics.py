@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from oracles import numpy_dynamics, pinocchio_oracle as oracle
 
+from oracles import numpy_dynamics
+from oracles import pinocchio_oracle as oracle
 from seerob.model_io import library
 from seerob.model_io.loader import load_robot
 
@@ -61,7 +62,9 @@ def test_files_against_pinocchios_own_reader(tail):
         for name in model.names[1:]:
             joint, theirs = joints[name], model.joints[model.getJointId(name)]
             follow = joint.mimic
-            leader, factor, offset = (follow.joint, follow.multiplier, follow.offset) if follow else (name, 1, 0)
+            leader, factor, offset = (
+                (follow.joint, follow.multiplier, follow.offset) if follow else (name, 1, 0)
+            )
             angle, speed = factor * at[leader][0] + offset, factor * at[leader][1]
             theirs_q[theirs.idx_q : theirs.idx_q + theirs.nq] = (
                 [angle] if theirs.nq == 1 else [np.cos(angle), np.sin(angle)]

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oracles import numpy_dynamics
 
+from oracles import numpy_dynamics
 from seerob.errors import InputError
 from seerob.model_io import library
 from seerob.model_io.loader import load_robot
@@ -62,7 +62,7 @@ def test_another_robots_shapes_are_refused(meshes, words):
 def test_links_without_a_namesake_keep_their_envelope(tmp_path):
     text = """<robot name="r"><link name="base_link"/><link name="shoulder_link"><visual><geometry>
     <box size="0.1 0.1 0.1"/></geometry></visual></link><joint name="shoulder_pan_joint" type="continuous">
-    <parent link="base_link"/><child link="shoulder_link"/><origin xyz="0 0 0.1273"/><axis xyz="0 0 1"/></joint>
+    <axis xyz="0 0 1"/><parent link="base_link"/><child link="shoulder_link"/><origin xyz="0 0 0.1273"/></joint>
     </robot>"""
     (tmp_path / "r.urdf").write_text(text)
     dressed = load_robot("library:ur10", folder=tmp_path, meshes="r.urdf")

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
-from oracles import numpy_dynamics
 
+from oracles import numpy_dynamics
 from seerob.errors import InputError
 from seerob.model_io.loader import load_robot
 from seerob.snapshot import Origin
@@ -76,7 +76,9 @@ def test_poses_and_mass_matrix_are_mujocos(tmp_path):
         for name in ("base", "upper", "fore"):
             np.testing.assert_allclose(links[name][0][:3, 3], data.body(name).xpos, atol=1e-12)
             np.testing.assert_allclose(links[name][0][:3, :3].ravel(), data.body(name).xmat, atol=1e-12)
-        np.testing.assert_allclose(links["attachment_site"][0][:3, 3], data.site("attachment_site").xpos, atol=1e-12)
+        np.testing.assert_allclose(
+            links["attachment_site"][0][:3, 3], data.site("attachment_site").xpos, atol=1e-12
+        )
         M = np.zeros((4, 4))
         mujoco.mj_fullM(model, data, M)
         M[np.diag_indices(4)] -= model.dof_armature
@@ -144,7 +146,8 @@ def test_meshes_arrive_where_mujoco_puts_them(tmp_path):
     shape = trimesh.creation.cone(0.1, 0.3).apply_translation([0.2, 0.1, 0])
     shape.export(tmp_path / "assets" / "cone.stl")
     text = """<mujoco><compiler meshdir="assets"/><asset><mesh file="cone.stl"/></asset><worldbody>
-    <body name="b" pos="0 0 1"><joint/><geom type="mesh" mesh="cone" pos="0 0 0.5"/></body></worldbody></mujoco>"""
+    <body name="b" pos="0 0 1"><joint/><geom type="mesh" mesh="cone" pos="0 0 0.5"/></body></worldbody>
+    </mujoco>"""
     made = read(tmp_path, text)
     mesh = made.link("b").solids[0].mesh
     np.testing.assert_allclose(mesh.vertices.min(axis=0), shape.bounds[0] + [0, 0, 0.5], atol=1e-6)
@@ -153,7 +156,9 @@ def test_meshes_arrive_where_mujoco_puts_them(tmp_path):
 
 
 def test_includes_are_read_and_kept(tmp_path):
-    (tmp_path / "part.xml").write_text("<mujocoinclude><body name='b'><joint/><geom size='1'/></body></mujocoinclude>")
+    (tmp_path / "part.xml").write_text(
+        "<mujocoinclude><body name='b'><joint/><geom size='1'/></body></mujocoinclude>"
+    )
     made = read(tmp_path, '<mujoco><worldbody><include file="part.xml"/></worldbody></mujoco>')
     assert "b" in {link.name for link in made.links}
     assert set(made.files) == {"m.xml", "part.xml"}

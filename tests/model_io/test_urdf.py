@@ -197,7 +197,10 @@ def test_one_inertia_for_all_links_is_a_placeholder(tmp_path):
         (arm("<collision><geometry><box size='1 1 0'/></geometry></collision>"), "greater than 0 m"),
         (arm("<collision><geometry><cylinder radius='1'/></geometry></collision>"), "length"),
         (arm("<collision><geometry><mesh filename='a.stl' scale='1 0 1'/></geometry></collision>"), "scale"),
-        (arm("<collision><geometry><mesh filename='http://x/a.stl'/></geometry></collision>"), "never fetched"),
+        (
+            arm("<collision><geometry><mesh filename='http://x/a.stl'/></geometry></collision>"),
+            "never fetched",
+        ),
     ],
 )
 def test_files_that_are_refused(tmp_path, text, words):
@@ -297,7 +300,11 @@ def test_protrusion_of_the_visual_is_measured(tmp_path):
 
 
 def test_primitives_contain_what_they_stand_for(tmp_path):
-    shapes = ("<sphere radius='0.1'/>", "<cylinder radius='0.1' length='0.4'/>", "<capsule radius='0.1' length='0.4'/>")
+    shapes = (
+        "<sphere radius='0.1'/>",
+        "<cylinder radius='0.1' length='0.4'/>",
+        "<capsule radius='0.1' length='0.4'/>",
+    )
     for shape in shapes:
         made = read(tmp_path, arm(f"{INERTIAL}<collision><geometry>{shape}</geometry></collision>"))
         (solid,) = made.link("arm").solids

@@ -9,14 +9,19 @@ from seerob.errors import InputError
 from seerob.model_io.loader import load_robot
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-MAIN = HEAD + """
+MAIN = (
+    HEAD
+    + """
 <xacro:arg name="length" default="0.3"/>
 <xacro:property name="length" value="$(arg length)"/>
 <xacro:include filename="$(find my_robot)/urdf/arm.xacro"/>
 <link name="base"/>
 <xacro:arm name="arm" parent="base" length="${2 * length}"/>
 </robot>"""
-ARM = HEAD + """
+)
+ARM = (
+    HEAD
+    + """
 <xacro:macro name="arm" params="name parent length">
   <link name="${name}">
     <inertial><mass value="${2**2}"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
@@ -27,6 +32,7 @@ ARM = HEAD + """
     <limit lower="${-pi}" upper="${radians(90)}" effort="10" velocity="1"/>
   </joint>
 </xacro:macro></robot>"""
+)
 
 
 @pytest.fixture

@@ -42,11 +42,13 @@ def shapes_for(pieces: Sequence[Mapping[str, Any]]) -> tuple[tuple[Solid, ...], 
 def outer(piece: Mapping[str, Any]) -> Mesh:
     """The convex mesh of a piece that distances see."""
     if "tube" in piece:
-        return shapes.prism_mesh(*piece["tube"], float(piece["radius"]))
+        start, end = piece["tube"]
+        return shapes.prism_mesh(start, end, float(piece["radius"]))
     if "slot" in piece:
         tubes = zip(piece["slot"], piece["radius"], strict=True)
-        return shapes.hull_mesh([shapes.prism_mesh(*tube, radius) for tube, radius in tubes])
-    return shapes.box_mesh(*piece["box"])
+        return shapes.hull_mesh([shapes.prism_mesh(start, end, radius) for (start, end), radius in tubes])
+    lower, upper = piece["box"]
+    return shapes.box_mesh(lower, upper)
 
 
 def look(piece: Mapping[str, Any]) -> list[Mesh]:

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from seerob.geometry import Solid
-from seerob.model_io.description import Description, Inertial, Joint, Link
+from seerob.model_io.description import Description, Inertial, Joint, JointKind, Link
 from seerob.model_io.rigid import groups
 from seerob.model_io.xml_values import Reader
 from seerob.snapshot import Origin
@@ -91,7 +91,7 @@ def plausible_inertial(inertial: Inertial, *, moves: bool) -> tuple[Inertial | N
         return None, "warning", text
     second = (vectors * np.maximum(values, 1e-6 * largest)) @ vectors.T
     mended = np.trace(second) * np.eye(3) - second
-    text = f"principal moments {shown} kg·m² break A + B ≥ C by {max(violation, 0):.2%}, as rounding does: mended"
+    text = f"principal moments {shown} kg·m² break A + B ≥ C by {max(violation, 0):.2%}: rounding, mended"
     return replace(inertial, inertia=0.5 * (mended + mended.T)), "note", text
 
 
@@ -141,11 +141,15 @@ def _findings(description: Description) -> Iterator[tuple[str, str, str]]:
 def flat_limits(which: str, joints: Iterable[Joint]) -> Iterator[tuple[str, str, str]]:
     """One finding when four or more joints of one kind carry the same limit: often a placeholder."""
     quantities = [(joint, getattr(joint, which)) for joint in joints]
-    for kind in {joint.kind for joint, _ in quantities}:
+    for kind in JointKind:
         values = [q.value for joint, q in quantities if joint.kind is kind and q is not None]
         if len(values) >= 4 and all(a == b for a, b in pairwise(values)):
-            text = f"{which} limit is {values[0]:g} for all {len(values)} {kind.value} joints alike: check the source"
-            yield ("warning" if which == "effort" else "note"), "", text
+            same = f"{values[0]:g} for all {len(values)} {kind.value} joints alike"
+            yield (
+                ("warning" if which == "effort" else "note"),
+                "",
+                f"{which} limit is {same}: check the source",
+            )
 
 
 def massless(description: Description) -> Iterator[tuple[str, str, str]]:

@@ -36,10 +36,14 @@ def with_geometry_of(robot: Description, maker: Description) -> Description:
     ours = {joint.name for joint in robot.joints()}
     common = [joint.name for joint in maker.joints() if joint.name in ours]
     if not common:
-        what = f"has no joint in common with {robot.name}: {', '.join(j.name for j in maker.joints()) or 'none'}"
+        what = (
+            f"has no joint in common with {robot.name}: {', '.join(j.name for j in maker.joints()) or 'none'}"
+        )
         raise InputError.at(maker.source, "", what, "joints of " + ", ".join(sorted(ours)))
     offsets = _offsets(robot, maker, common)
-    shaped = {link.name: link for link in maker.links if link.name in offsets and (link.solids or link.visual)}
+    shaped = {
+        link.name: link for link in maker.links if link.name in offsets and (link.solids or link.visual)
+    }
     replaced = _move_with(robot, shaped)
     links = tuple(_dressed(link, shaped, offsets, replaced) for link in robot.links)
     return replace(
@@ -68,14 +72,19 @@ def _offsets(robot: Description, maker: Description, common: list[str]) -> dict[
     }
     strangers = [name for name in names if wrong[name] > TOLERANCE]
     if strangers:
-        what = f"moves {', '.join(strangers)} differently from {robot.source}, by up to {max(wrong.values()):.3g} m"
-        raise InputError.at(maker.source, "", what, "name the description of the same robot in the same version")
+        far = f"by up to {max(wrong.values()):.3g} m"
+        what = f"moves {', '.join(strangers)} differently from {robot.source}, {far}"
+        raise InputError.at(
+            maker.source, "", what, "name the description of the same robot in the same version"
+        )
     return found[0]
 
 
 def _move_with(robot: Description, shaped: Mapping[str, Link]) -> set[str]:
     """Links of ours whose own shapes give way."""
-    return {link.name for group in groups(robot.links) if any(m.name in shaped for m in group) for link in group}
+    return {
+        link.name for group in groups(robot.links) if any(m.name in shaped for m in group) for link in group
+    }
 
 
 def _dressed(

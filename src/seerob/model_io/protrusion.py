@@ -51,7 +51,9 @@ def _depths(description: Description) -> Iterator[tuple[Link, Array]]:
 
 def outside_distances(link: Link) -> Array:
     """Distance [m] of sampled display vertices to the nearest solid, 0 inside, shape (n,)."""
-    points = np.concatenate([_sampled(mesh.vertices, SAMPLES // len(link.visual) + 1) for mesh in link.visual])
+    points = np.concatenate(
+        [_sampled(mesh.vertices, SAMPLES // len(link.visual) + 1) for mesh in link.visual]
+    )
     least = np.full(len(points), np.inf)
     for solid in link.solids:
         # Points that some solid contains need not be looked at again.
@@ -83,4 +85,5 @@ def _sampled(vertices: Array, count: int) -> Array:
     along = vertices @ grid[14:].T
     outer = np.concatenate([along.argmax(axis=0), along.argmin(axis=0)])
     step = max(1, len(vertices) // count)
-    return vertices[np.unique(np.concatenate([np.arange(0, len(vertices), step), outer]))]
+    chosen = np.unique(np.concatenate([np.arange(0, len(vertices), step), outer]))
+    return np.asarray(vertices[chosen])

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
+from typing import NoReturn
 
 from seerob.commands import Exit
 from seerob.errors import SeerobError
@@ -15,12 +17,22 @@ COMMANDS = ("new", "check_file", "run", "assess", "replay", "report", "kinds", "
 """One module each in `seerob.commands`, with ``HELP``, ``EXAMPLE``, ``add`` and ``run``."""
 
 
+class Parser(argparse.ArgumentParser):
+    """A parser whose mistakes end with `Exit.ERROR`: argparse's own 2 means undecided here."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the usage and the mistake, and leave."""
+        self.print_usage(sys.stderr)
+        self.exit(Exit.ERROR, f"{self.prog}: {message}\n")
+
+
 def parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
-    top = argparse.ArgumentParser(
+    top = Parser(
         prog="seerob",
         description="Evaluate the safety and ergonomics of a cobotic workstation with a physics-based twin.",
-        epilog="exit code: 0 within, 1 exceeded, 2 undecided, 3 error",
+        epilog="exit code: 0 within, 1 exceeded, 2 undecided, 3 error\nexample: seerob new my_cell",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     top.add_argument("--version", action="version", version=f"seerob {version('seerob')}")
     commands = top.add_subparsers(dest="command", required=True, metavar="command")
@@ -42,7 +54,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; errors end in a message, never in a traceback."""
     options = parser().parse_args(arguments)
     try:
-        return int(options.run(options))
+        code = int(options.run(options))
+        sys.stdout.flush()
+        return code
     except SeerobError as error:
         sys.stderr.write(f"{error}\n")
         return Exit.ERROR
@@ -50,6 +64,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write("stopped\n")
         return Exit.ERROR
     except BrokenPipeError:
+        # Whoever read has gone; the interpreter must not try to write the rest at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return Exit.ERROR
+    except OSError as error:
+        sys.stderr.write(f"{error.filename or 'seerob'}: {error.strerror or error}\n")
         return Exit.ERROR
 
 

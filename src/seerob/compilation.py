@@ -13,6 +13,7 @@ import numpy as np
 from seerob.contacts import add_contacts
 from seerob.distance import Shapes
 from seerob.errors import InputError, Problem, UnknownName
+from seerob.filing import filed
 from seerob.geometry import Solid
 from seerob.human import manikin, posture
 from seerob.model import Body, Frame, Mechanism, Model
@@ -127,6 +128,13 @@ class _Compiler:
                 )
             home = np.array(robot.q, float)
         self._chain(robot.name, description, "robot", _matrix(robot.base), home, robot.q is not None)
+        self.mounting.files |= filed(
+            robot.name,
+            description.files,
+            folder=self.folder,
+            references=(robot.model, robot.meshes),
+            packages=robot.packages,
+        )
         if robot.tool is not None:
             self.chains[robot.name].tip = self._tip_frame(robot)
 
@@ -193,7 +201,6 @@ class _Compiler:
     ) -> None:
         self.chains[name] = _Chain(description, role, home, given)
         self.mounting.findings += description.findings
-        self.mounting.files.update({f"{name}/{file}": data for file, data in description.files.items()})
         for link in description.links:
             self._link(name, role, link, world_from_base)
 
@@ -268,7 +275,9 @@ class _Compiler:
         self.progress(f"reading {thing.name}")
         loaded = load_thing(thing, self.folder, color, needs_mass=role in ("tool", "workpiece"))
         self.mounting.findings += loaded.findings
-        self.mounting.files.update(loaded.files)
+        self.mounting.files |= filed(
+            thing.name, loaded.files, folder=self.folder, references=(thing.mesh,)
+        )
         carrier = "" if parent is None else self.carriers[parent]
         body = self.mounting.body(thing.name, parent, parent_from_thing)
         if carrier:
@@ -375,6 +384,7 @@ class _Compiler:
             v_address=np.array([mj.jnt_dofadr[i] for i in ids], np.int64),
             coupling=coupling,
             offset=offset,
+            own=np.array([i for i, joint in enumerate(every) if joint.mimic is None], np.int64),
             home=chain.home,
             home_given=chain.home_given,
             tip=tip,
@@ -389,10 +399,17 @@ class _Compiler:
         )
 
     def _unknown_masses(self, name: str) -> tuple[str, ...]:
+        links = self.chains[name].description.links
+        mounted = {thing.on for thing in (*self.station.tools, *self.station.workpieces)}
+        heavy = {link.name for link in links if link.inertial is not None or f"{name}/{link.name}" in mounted}
+        for link in reversed(links):
+            if link.name in heavy and link.parent is not None:
+                heavy.add(link.parent)
+        # A frame between two joints has no mass of its own; a joint that moves nothing heavy has no mass matrix.
         unknown = [
             f"nobody gave the mass of {name}/{link.name}"
-            for link in self.chains[name].description.links
-            if link.joints and link.solids and link.inertial is None
+            for link in links
+            if link.joints and link.inertial is None and (link.solids or link.name not in heavy)
         ]
         by_name: dict[str, list[Quantity | None]] = {}
         for entry in self.mounting.entries:

@@ -51,7 +51,11 @@ def add_contacts(
 
 def select(bodies: Sequence[Body], name: str) -> list[Body]:
     """Bodies that a name means: a carrier with all it carries, or everything below a name."""
-    chosen = [b for b in bodies if name in (b.carrier, b.owner, b.name) or b.name.startswith(name + "/")]
+    chosen = [
+        b
+        for b in bodies
+        if b.role != "area" and (name in (b.carrier, b.owner, b.name) or b.name.startswith(name + "/"))
+    ]
     if not chosen:
         raise UnknownName("robot, human, tool or part with a shape", name, {b.owner for b in bodies})
     return chosen

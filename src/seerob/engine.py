@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from seerob.errors import SimulationDiverged
+from seerob.errors import InputError, SimulationDiverged
 from seerob.inverse_kinematics import solve_pose
 from seerob.model import Mechanism, Model
 from seerob.reference import Reference
@@ -27,6 +27,8 @@ from seerob.samples import JointSample, PoseSample, Quality, Sample, SignalSampl
 from seerob.state import Hearing, State
 from seerob.transforms import Array, rotation_from_wxyz
 
+DEFAULT_TIMEOUT = 0.2
+"""Of what is heard without a source that states one [s]."""
 POSES_FOR_GAINS = 16
 POSE_TOLERANCE = 1e-4
 """Largest error of a solved Cartesian target [m or rad] that still counts as reached."""
@@ -75,7 +77,9 @@ class Engine:
         self._mechanisms = list(model.mechanisms.values())
         self._references = {m.name: Reference(m.home) for m in self._mechanisms}
         self._hearings = {
-            m.name: Hearing(given=m.home_given, driven=m.name in driven, timeout=driven.get(m.name, np.inf))
+            m.name: Hearing(
+                given=m.home_given, driven=m.name in driven, timeout=driven.get(m.name, DEFAULT_TIMEOUT)
+            )
             for m in self._mechanisms
         }
         self._dof = self._mj.jnt_dofadr[self._mj.actuator_trnid[:, 0]]
@@ -97,19 +101,40 @@ class Engine:
             if isinstance(sample, SignalSample):
                 self.signals[sample.source] = sample.values
                 continue
-            name = sample.target.split("/")[0]
-            mechanism = self.model.mechanism(name)
+            mechanism = self._target(sample)
             quality = sample.quality
-            if isinstance(sample, JointSample):
+            if not _finite(sample):
+                # Nothing to be pulled to; not knowing where it is must show all the same.
+                taken, quality = bool(np.isfinite(sample.t)), Quality.INVALID
+            elif isinstance(sample, JointSample):
                 qd = None if sample.qd is None else np.array(sample.qd)
-                self._references[name].take(sample.t, np.array(sample.q), qd)
-            elif not self._take_pose(mechanism, sample):
-                quality = Quality.DEGRADED
-            hearing = self._hearings[name]
-            hearing.sample_t, hearing.quality, hearing.driven = sample.t, quality, True
+                taken = self._references[mechanism.name].take(sample.t, np.array(sample.q), qd)
+            else:
+                taken, reached = self._take_pose(mechanism, sample)
+                quality = quality if reached or quality is Quality.INVALID else Quality.DEGRADED
+            hearing = self._hearings[mechanism.name]
+            hearing.driven = True
+            if taken and (not hearing.heard or sample.t > hearing.heard[-1][0]):
+                hearing.heard.append((sample.t, quality))
 
-    def _take_pose(self, mechanism: Mechanism, sample: PoseSample) -> bool:
-        """Resolve a Cartesian target into joint positions; False when it cannot be reached."""
+    def _target(self, sample: JointSample | PoseSample) -> Mechanism:
+        """Robot or human that a sample drives.
+
+        Raises:
+            UnknownName: There is none.
+            InputError: It has another number of joints.
+        """
+        if isinstance(sample, PoseSample):
+            return self.model.carrier(self.model.frame(sample.target))
+        mechanism = self.model.mechanism(sample.target)
+        n = len(mechanism.joints)
+        if {len(sample.q), n if sample.qd is None else len(sample.qd)} != {n}:
+            heard = f"{len(sample.q)} joint values" + ("" if sample.qd is None else f", {len(sample.qd)} speeds")
+            raise InputError.at(sample.source, sample.target, heard, f"{sample.target} has {n} joints")
+        return mechanism
+
+    def _take_pose(self, mechanism: Mechanism, sample: PoseSample) -> tuple[bool, bool]:
+        """Resolve a Cartesian target into joint positions; whether it was taken, and can be reached."""
         frame = self.model.frame(sample.target)
         reference = self._references[mechanism.name]
         q, error = solve_pose(
@@ -121,8 +146,7 @@ class Engine:
             np.array(sample.position),
             start=reference.newest,
         )
-        reference.take(sample.t, q, None)
-        return error <= POSE_TOLERANCE
+        return reference.take(sample.t, q, None), error <= POSE_TOLERANCE
 
     # -- time -------------------------------------------------------------------------------
 
@@ -138,6 +162,10 @@ class Engine:
             SimulationDiverged: A position that is not finite.
         """
         start = self._tick * self._period
+        for reference in self._references.values():
+            reference.forget(start)
+        for hearing in self._hearings.values():
+            hearing.forget(start)
         for step in range(self._steps):
             if self.controllers:
                 self._pull(start + step * self._dt)
@@ -211,7 +239,8 @@ class Engine:
         data = self._wanted
         for pose in range(POSES_FOR_GAINS):
             for m in self._mechanisms:
-                low, high = np.maximum(m.lower, -np.pi), np.minimum(m.upper, np.pi)
+                low = np.clip(m.lower, -np.pi, np.pi)
+                high = np.clip(m.upper, -np.pi, np.pi)
                 q = m.home if pose == 0 or m.role == "human" else random.uniform(low, high)
                 data.qpos[m.q_address] = m.coupling @ q + m.offset
             mujoco.mj_kinematics(self._mj, data)
@@ -246,3 +275,9 @@ class Engine:
         self._mj.actuator_forcelimited[:] = limited
         self._mj.actuator_forcerange[limited] = np.column_stack([-ranges[limited], ranges[limited]])
         return limits
+
+
+def _finite(sample: JointSample | PoseSample) -> bool:
+    if isinstance(sample, JointSample):
+        return bool(np.isfinite([sample.t, *sample.q, *(sample.qd or ())]).all())
+    return bool(np.isfinite([sample.t, *sample.position, *sample.wxyz]).all())

@@ -88,6 +88,8 @@ class Mechanism:
     """All joints from the commanded ones: ``q_all = coupling @ q + offset``, shape (m, n)."""
     offset: Array
     """Shape (m,)."""
+    own: Indices
+    """Row of each commanded joint among all of them, shape (n,)."""
     home: Array
     """Where it stands when nothing drives it, shape (n,) [rad or m]."""
     home_given: bool
@@ -204,7 +206,7 @@ class Model:
 
         A robot's name means all of its links and everything mounted on it; a human's the whole
         person; a tool's or part's name, or a prefix that ends before a ``/``, everything below
-        it; ``*`` stands for any characters.
+        it; ``*`` stands for any characters. A safety area is meant by its own name only.
 
         Raises:
             UnknownName: The name means no body that has a shape.
@@ -216,7 +218,11 @@ class Model:
             found = tuple(
                 body.index
                 for body in self.bodies
-                if body.name == name or body.name.startswith(name + "/") or fnmatchcase(body.name, name)
+                if name in (body.name, body.owner)
+                or (
+                    body.role != "area"
+                    and (body.name.startswith(name + "/") or fnmatchcase(body.name, name))
+                )
             )
         if not found:
             raise UnknownName("robot, human, tool or part with a shape", name, self.names())

@@ -5,21 +5,24 @@ Between two samples the reference is the cubic that has their positions and velo
 .. math:: q(s) = h_{00} q_0 + h_{10} T \dot q_0 + h_{01} q_1 + h_{11} T \dot q_1,\quad s = (t - t_0)/T
 
 so velocity is continuous and acceleration is known, which feed-forward needs. Samples without
-velocities get that of the chord. After the newest sample the reference holds its position.
+velocities get that of the chord that leads to them. After the newest sample the reference holds
+its position, before the oldest it waits there.
 """
 
 from __future__ import annotations
+
+from bisect import bisect_right
 
 import numpy as np
 
 from seerob.transforms import Array
 
+MAX_KEPT = 4096
+"""Samples kept at most: many times what a fast source sends within one tick."""
+
 
 class Reference:
-    """Motion of one robot or human through its three newest samples.
-
-    Three, because the newest may lie ahead of the tick that is being computed.
-    """
+    """Motion of one robot or human through its newest samples, several of which may lie ahead."""
 
     def __init__(self, home: Array) -> None:
         self._zero = np.zeros(len(home))
@@ -32,27 +35,38 @@ class Reference:
         """Position of the newest sample, or the home position, shape (n,) [rad or m]."""
         return self._points[-1]
 
-    def take(self, t: float, q: Array, qd: Array | None) -> None:
-        """Make a sample the newest one; one that is not newer than the last is dropped."""
+    def take(self, t: float, q: Array, qd: Array | None) -> bool:
+        """Make a sample the newest one; False for one that is not newer than the last, which is dropped."""
         if not self._times:
             self._times, self._points = [t], [q]
             self._velocities = [self._zero if qd is None else qd]
-            return
+            return True
         if t <= self._times[-1]:
-            return
-        chord = (q - self._points[-1]) / (t - self._times[-1])
-        self._times = [*self._times[-2:], t]
-        self._points = [*self._points[-2:], q]
-        self._velocities = [*self._velocities[-2:], chord if qd is None else qd]
+            return False
+        if qd is None:
+            qd = (q - self._points[-1]) / (t - self._times[-1])
+        self._times.append(t)
+        self._points.append(q)
+        self._velocities.append(qd)
+        self._drop(len(self._times) - MAX_KEPT)
+        return True
+
+    def forget(self, t: float) -> None:
+        """Drop what is not needed any more from ``t`` [s] on."""
+        self._drop(bisect_right(self._times, t) - 1)
+
+    def _drop(self, count: int) -> None:
+        if count > 0:
+            del self._times[:count], self._points[:count], self._velocities[:count]
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
         """Position [rad or m], velocity and acceleration at ``t`` [s], each of shape (n,)."""
         times = self._times
-        if len(times) < 2 or t >= times[-1] or t < times[0]:
-            k = 0 if times and t < times[0] else -1
-            moving = bool(times) and t == times[k]
-            return self._points[k], self._velocities[k] if moving else self._zero, self._zero
-        k = 1 if len(times) == 3 and t >= times[1] else 0
+        if not times or t < times[0]:
+            return self._points[0], self._zero, self._zero
+        k = bisect_right(times, t) - 1
+        if k == len(times) - 1:
+            return self._points[k], self._velocities[k] if t == times[k] else self._zero, self._zero
         T = times[k + 1] - times[k]
         s = (t - times[k]) / T
         q0, chord = self._points[k], self._points[k + 1] - self._points[k]

@@ -19,7 +19,7 @@ from seerob.engine import Engine
 from seerob.errors import InputError, Problem, SeerobError, Undecided
 from seerob.model import Model
 from seerob.results import ResultLog
-from seerob.samples import Mailbox, Sample
+from seerob.samples import Sample
 from seerob.sink import Writer
 from seerob.snapshot import (
     Basis,
@@ -172,14 +172,11 @@ def pump(opened: Sequence[tuple[Source, Opened]], period: float, *, endless: boo
     pumps = [Pump(o, loop=source.loop, pause=source.loop_pause) for source, o in opened]
     duration = max((o.duration for _, o in opened), default=0.0)
     last = round(duration / period - 0.5 + 1e-9)
-    mailbox = Mailbox()
     k = 0
     while endless or k <= last:
-        for each in pumps:
-            # One tick ahead, so that the references reach to the tick's end.
-            for sample in each.until(k * period):
-                mailbox.post(sample)
-        yield mailbox.take()
+        # Every sample, not only the newest: the run starts on the first one, and a source that is
+        # faster than the ticks is followed exactly. One ahead, so that references reach to the tick's end.
+        yield tuple(sample for each in pumps for sample in each.until(k * period))
         k += 1
 
 
@@ -193,6 +190,7 @@ class Judge:
         self._bound = bound
         self._due = [0.0] * len(bound)
         self._last: list[Result | None] = [None] * len(bound)
+        self._asked: list[tuple[str, ...]] = [()] * len(bound)
 
     def __call__(self, state: State) -> tuple[Result, ...]:
         """Results at this state, in the order of the file."""
@@ -200,9 +198,11 @@ class Judge:
 
     def _one(self, i: int, bound: Bound, state: State) -> Result:
         last = self._last[i]
-        if last is not None and state.t < self._due[i] - 1e-9:
-            return last
         criterion = bound.criterion
+        # A result between two evaluations lasts only as long as what it rests on is heard.
+        if last is not None and state.t < self._due[i] - 1e-9 and not any(map(state.doubt, self._asked[i])):
+            return last
+        state.asked.clear()
         try:
             result = bound.evaluate(state)
             if result.value is not None and not np.isfinite(result.value):
@@ -221,6 +221,7 @@ class Judge:
             result = replace(result, t=state.t)
             self._due[i] = state.t + criterion.every
             self._last[i] = result
+            self._asked[i] = tuple(sorted(state.asked))
         return result
 
 

@@ -7,7 +7,7 @@ heard, or has a mass that nobody gave: a stale or guessed number can never be gr
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import mujoco
@@ -20,6 +20,10 @@ from seerob.samples import Quality
 from seerob.transforms import Array
 
 
+SLACK = 1e-9
+"""Instants that differ by less are the same [s]: a source's clock and the run's are sums of decimals."""
+
+
 @dataclass
 class Hearing:
     """What is known of where a robot or human really is."""
@@ -28,15 +32,38 @@ class Hearing:
     """It stands where the workstation file puts it; no source drives it."""
     driven: bool
     """A source drives it."""
-    timeout: float = np.inf
+    timeout: float = 0.2
     """[s]"""
-    sample_t: float | None = None
-    """Instant of the newest sample [s]; None before the first."""
-    quality: Quality = Quality.GOOD
+    heard: list[tuple[float, Quality]] = field(default_factory=list)
+    """Instant [s] and quality of the newest samples, oldest first; some may lie ahead of the tick."""
     error: float = 0.0
     """Largest joint error between twin and reference [rad or m]."""
     saturated: bool = False
     """A joint's torque limit was reached: the twin cannot do what was heard."""
+
+    def forget(self, t: float) -> None:
+        """Drop what is older than the last sample at or before ``t`` [s]."""
+        while len(self.heard) > 1 and self.heard[1][0] <= t:
+            del self.heard[0]
+
+    def doubt(self, t: float) -> str:
+        """Why what was heard does not tell where it is at ``t`` [s]; empty when it does.
+
+        A sample ahead of the tick does not make up for silence before it: what happened between two
+        samples that are further apart than the time-out is a guess.
+        """
+        if not self.driven:
+            return "" if self.given else "no source drives it and the file gives no position (q)"
+        k = sum(1 for instant, _ in self.heard if instant <= t + SLACK)
+        if k == 0:
+            return "nothing heard yet"
+        age = t - self.heard[k - 1][0]
+        if age > self.timeout + SLACK:
+            return f"not heard for {age:.2f} s (time-out {self.timeout:g} s)"
+        for _, quality in self.heard[k - 1 : k + 1]:
+            if quality is not Quality.GOOD:
+                return f"its source says {quality.value}"
+        return ""
 
 
 class State:
@@ -48,6 +75,8 @@ class State:
         self.t = 0.0
         """Run time [s]."""
         self.hearings = hearings
+        self.asked: set[str] = set()
+        """Robots and humans that answers have depended on since the set was last cleared."""
         self._mj_ids = np.array([body.mj for body in model.bodies], np.int64)
         n = len(model.bodies)
         self.rotations = np.zeros((n, 3, 3))
@@ -82,6 +111,7 @@ class State:
 
     def require(self, *names: str) -> None:
         """Raise `Undecided` unless each robot or human is where the twin shows it."""
+        self.asked.update(names)
         for name in names:
             reason = self.doubt(name)
             if reason:
@@ -90,15 +120,9 @@ class State:
     def doubt(self, name: str) -> str:
         """Why a twin may not be where the real one is; empty when it may be relied on."""
         hearing = self.hearings[name]
-        if not hearing.driven:
-            return "" if hearing.given else f"{name}: no source drives it and the file gives no position (q)"
-        if hearing.sample_t is None:
-            return f"{name}: nothing heard yet"
-        age = self.t - hearing.sample_t
-        if age > hearing.timeout:
-            return f"{name}: not heard for {age:.2f} s (time-out {hearing.timeout:g} s)"
-        if hearing.quality is not Quality.GOOD:
-            return f"{name}: its source says {hearing.quality.value}"
+        reason = hearing.doubt(self.t)
+        if reason:
+            return f"{name}: {reason}"
         if hearing.error > self._tracking_limit:
             why = " (a torque limit is reached)" if hearing.saturated else ""
             return (
@@ -116,14 +140,12 @@ class State:
 
     def joint_positions(self, mechanism: Mechanism) -> Array:
         """The same without asking whether it was heard: for the picture, never for a verdict."""
-        own = mechanism.coupling.argmax(axis=0)
-        return np.asarray(self.data.qpos[mechanism.q_address[own]])
+        return np.asarray(self.data.qpos[mechanism.q_address[mechanism.own]])
 
     def qd(self, mechanism: Mechanism) -> Array:
         """Joint velocities of the twin [rad/s or m/s], shape (n,)."""
         self.require(mechanism.name)
-        own = mechanism.coupling.argmax(axis=0)
-        return np.asarray(self.data.qvel[mechanism.v_address[own]])
+        return np.asarray(self.data.qvel[mechanism.v_address[mechanism.own]])
 
     # -- dynamics ---------------------------------------------------------------------------
 
@@ -163,7 +185,8 @@ class State:
             offset: The point in the frame [m], shape (3,); its origin when not given.
         """
         self.require(mechanism.name)
-        key = ("J", frame.name, mechanism.name, None if offset is None else offset.tobytes())
+        # Not its name: a tool's working point is called like the tool.
+        key = ("J", id(frame), mechanism.name, None if offset is None else offset.tobytes())
         if key not in self._cache:
             rotation, position = self.pose(frame)
             if offset is not None:
@@ -192,20 +215,24 @@ class State:
         """Bound on the speed of any point of a body, and the point where it is largest.
 
         The speed of a rigid body is a convex function of the point, so over a convex hull it is
-        largest at a corner; a dilation by r adds at most ``|ω| r``.
+        largest at a corner; a dilation by r adds at most ``|ω| r``. So does a real surface that lies
+        outside the shape.
 
         Returns:
             Speed [m/s], the corner in the world [m] (3,), its velocity [m/s] (3,).
         """
+        body = self.model.bodies[index]
+        if body.carrier:
+            self.require(body.carrier)
         key = ("fastest", index)
         if key not in self._cache:
             linear, angular = self.body_velocity(index)
-            body = self.model.bodies[index]
             arms = body.corners @ self.rotations[index].T
             velocities = linear + np.cross(angular, arms)
             squares = np.einsum("ij,ij->i", velocities, velocities)
             k = int(squares.argmax())
-            speed = float(np.sqrt(squares[k]) + np.linalg.norm(angular) * body.radius)
+            reach = body.radius + body.deviation
+            speed = float(np.sqrt(squares[k]) + np.linalg.norm(angular) * reach)
             self._cache[key] = speed, self.positions[index] + arms[k], velocities[k]
         speed, point, velocity = self._cache[key]
         return speed, point, velocity

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from seerob import run as road
 from seerob.compilation import Progress, compile_workstation
 from seerob.criterion import Criterion
-from seerob.errors import InputError
+from seerob.errors import InputError, Problem
 from seerob.model import Model
 from seerob.reading import read
 from seerob.recording import Recording
@@ -20,7 +20,7 @@ from seerob.run import Bound, Clock, Feed, Summary
 from seerob.sink import Sink, Writer
 from seerob.snapshot import Scene
 from seerob.source import Opened, Source
-from seerob.workstation import Workstation
+from seerob.workstation import FILE_NAME, Workstation
 
 
 class Station:
@@ -182,8 +182,28 @@ def load_recorded(recording: Recording, *, cache: Path | None = None) -> Station
     """The workstation that a recording was made with, from the files inside it.
 
     Raises:
-        InputError: It needs files that the recording does not carry.
+        InputError: It needs files that the recording does not carry, or that have changed since.
     """
     with TemporaryDirectory(prefix="seerob-") as folder:
         recording.extract(Path(folder))
-        return Station(read(folder), cache=cache)
+        try:
+            station = Station(read(Path(folder) / _workstation_file(recording)), cache=cache)
+        except InputError as error:
+            problems = [p._replace(file=p.file.removeprefix(f"{folder}/")) for p in error.problems]
+            raise InputError(
+                [*problems, Problem(str(recording.path), "", "cannot be computed from itself", _REMEDY)]
+            ) from error
+    now, then = station.model.files, recording.files
+    changed = sorted(name for name in {*now, *then} if now.get(name) != then.get(name))
+    if changed:
+        what = f"was made with other files than are found now: {', '.join(changed[:6])}"
+        raise InputError.at(recording.path, "", what, _REMEDY)
+    return station
+
+
+def _workstation_file(recording: Recording) -> str:
+    names = [name for name in recording.files if "/" not in name and name.endswith(".toml")]
+    return FILE_NAME if FILE_NAME in names or len(names) != 1 else names[0]
+
+
+_REMEDY = "give the workstation that it was made with (--workstation)"

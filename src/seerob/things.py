@@ -66,8 +66,7 @@ def load_thing(thing: Thing, folder: Path, color: Color, *, needs_mass: bool) ->
         path = folder / thing.mesh
         loaded = load_meshes(path, units=thing.units, up=thing.up)
         findings = tuple(replace_subject(f, thing.name) for f in loaded.findings)
-        parent = Path(thing.mesh).parent
-        files = {str(parent / name): content for name, content in loaded.files.items()}
+        files = loaded.files
         single = len(loaded.meshes) == 1
         own_color = thing.color is not None
         meshes = [

@@ -61,8 +61,10 @@ def test_another_robots_shapes_are_refused(meshes, words):
 
 def test_links_without_a_namesake_keep_their_envelope(tmp_path):
     text = """<robot name="r"><link name="base_link"/><link name="shoulder_link"><visual><geometry>
-    <box size="0.1 0.1 0.1"/></geometry></visual></link><joint name="shoulder_pan_joint" type="continuous">
-    <axis xyz="0 0 1"/><parent link="base_link"/><child link="shoulder_link"/><origin xyz="0 0 0.1273"/></joint>
+    <box size="0.1 0.1 0.1"/></geometry></visual></link>
+    <joint name="shoulder_pan_joint" type="continuous">
+    <axis xyz="0 0 1"/>
+    <parent link="base_link"/><child link="shoulder_link"/><origin xyz="0 0 0.1273"/></joint>
     </robot>"""
     (tmp_path / "r.urdf").write_text(text)
     dressed = load_robot("library:ur10", folder=tmp_path, meshes="r.urdf")

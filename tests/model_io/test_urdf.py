@@ -345,3 +345,5 @@ def test_an_installed_robot_by_its_tail(tmp_path):
     assert sum(link.inertial.mass for link in made.links if link.inertial) == pytest.approx(32.7)
     forearm = next(f.text for f in made.findings if "forearm" in f.subject and "sticks out" in f.text)
     assert "3.4 mm" in forearm
+    # The figure travels with the shape, so that distances carry it as an interval.
+    assert made.link("forearm_link").solids[0].deviation == pytest.approx(0.0034, abs=5e-5)

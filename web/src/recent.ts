@@ -29,17 +29,17 @@ export class Recent {
     this.bytes = 0;
   }
 
-  /** Keep a message unless it follows too closely; `always` keeps it all the same. */
-  keep(t: number, message: Uint8Array, always: boolean): void {
+  /** Keep a message unless it follows too closely. */
+  keep(t: number, message: Uint8Array): void {
     const last = this.kept[this.kept.length - 1];
     if (last && t <= last.t) return;
-    if (last && !always && t - last.t < this.spacing) return;
+    if (last && t - last.t < this.spacing) return;
     this.kept.push({ t, message });
     this.bytes += message.byteLength;
     if (this.bytes > this.budget) this.forget();
   }
 
-  /** First kept message at or after `t`, else the newest. */
+  /** First kept message at or after `t`; null when there is none. */
   at(t: number): Uint8Array | null {
     let low = 0;
     let high = this.kept.length;
@@ -48,7 +48,7 @@ export class Recent {
       if (this.kept[middle]!.t < t - 1e-9) low = middle + 1;
       else high = middle;
     }
-    return (this.kept[low] ?? this.kept[this.kept.length - 1])?.message ?? null;
+    return this.kept[low]?.message ?? null;
   }
 
   // A tenth at a time: shifting one by one would move the whole array at every snapshot.

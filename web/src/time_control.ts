@@ -18,7 +18,9 @@ export class TimeControl {
   /** Show the instant nearest to `t` [s]; in a live run, look back at it. */
   seek(t: number): void {
     const { start, end } = reach.value;
-    const to = Math.min(Math.max(t, start), end);
+    // What is shown may be a little newer than what the reach was last told.
+    const newest = isLive.value && now.value > end ? now.value : end;
+    const to = Math.min(Math.max(t, start), newest);
     if (isLive.value) {
       lookingAt.value = to;
       this.send({ kind: "look", t: to });

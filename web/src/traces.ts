@@ -28,6 +28,10 @@ export class Trace {
   spans: Span[] = [];
   /** Whether there ever was a verdict: what only informs needs no lane. */
   judged = false;
+  /** Whether there ever was a limit. */
+  limited = false;
+  /** Whether the limit was ever exceeded. */
+  exceeded = false;
 
   /** @param capacity Points kept before the older ones are thinned. */
   constructor(
@@ -70,6 +74,8 @@ export class Trace {
     this.verdicts[i] = verdict;
     this.length += 1;
     this.judged ||= verdict !== NO_VERDICT;
+    this.limited ||= !Number.isNaN(limit);
+    this.exceeded ||= verdict === VERDICT_CODES.exceeded;
     this.extendSpans(i);
   }
 

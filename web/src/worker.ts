@@ -22,6 +22,7 @@ let lookingAt: number | null = null;
 let pageWants = true;
 let waiting: Frame | null = null;
 let newest = Number.NaN;
+let newestRaw: Uint8Array | null = null;
 const spare: ArrayBuffer[] = [];
 const collector = new PointCollector();
 const recent = new Recent(RECENT_BYTES, RECENT_SPACING_S);
@@ -60,6 +61,7 @@ function begin(scene: Scene): void {
   lookingAt = null;
   waiting = null;
   newest = Number.NaN;
+  newestRaw = null;
   recent.clear();
   collector.clear();
   post({ kind: "scene", scene, shared });
@@ -71,7 +73,8 @@ function heard(snapshot: Snapshot, raw: Uint8Array): void {
   newest = snapshot.t;
   if (live) {
     collector.add(snapshot);
-    recent.keep(snapshot.t, raw, false);
+    recent.keep(snapshot.t, raw);
+    newestRaw = raw;
   }
   if (lookingAt === null) show(snapshot);
 }
@@ -102,7 +105,7 @@ function deliver(): void {
 function look(t: number | null): void {
   lookingAt = t;
   if (t === null) return;
-  const raw = recent.at(t);
+  const raw = recent.at(t) ?? newestRaw;
   if (raw) show(decoder.decode(raw) as Snapshot);
 }
 

@@ -103,6 +103,13 @@ test("a highlight, on the body it names", async () => {
   await assertDrawn("separation", plus(center, [0.02, 0, 0]), verdict);
 });
 
+test("an area in the colour of a verdict can be seen through", async () => {
+  const pairs = await changed("work area", [-0.3, -0.5, 1.2]);
+  assert.ok(pairs.length > 200, `${pairs.length} pixels changed`);
+  const solid = pairs.filter(([shown]) => distance(shown, COLORS.within) < 60);
+  assert.ok(solid.length < 0.2 * pairs.length, `${solid.length} of ${pairs.length} pixels are opaque`);
+});
+
 test("an arrow, on its shaft", async () => {
   const { origin, vector, verdict } = marker("tcp speed", "arrow");
   await assertDrawn("tcp speed", plus(origin, vector, 0.7), verdict);

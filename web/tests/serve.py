@@ -166,6 +166,10 @@ def workstation() -> tuple[Scene, dict[str, bytes]]:
         mesh = keep(box_mesh(lower, upper, color=color))
         owner = name.split("/")[0]
         nodes.append(Node(name=name, role="part", owner=owner, mesh=mesh, triangles=12, moves=False))
+    room = keep(box_mesh((-0.7, -0.8, 0.7), (0.1, 0.8, 1.9)))
+    nodes.append(
+        Node(name="robot side", role="area", owner="robot side", mesh=room, triangles=12, moves=False)
+    )
     criteria = (
         _criterion("separation", "separation", "m", at_most=False, basis=SEPARATION),
         _criterion("tcp speed", "velocity", "m/s", limit=TCP_LIMIT),
@@ -235,7 +239,7 @@ def snapshot(seq: int, t: float) -> Snapshot:
     arm = arm_poses(t)
     person = person_at(t)
     block = [(*p, *_quaternion(R)) for p, R in arm]
-    block += [(*person, 1, 0, 0, 0)] * len(BODY) + [(0, 0, 0, 1, 0, 0, 0)] * len(PARTS)
+    block += [(*person, 1, 0, 0, 0)] * len(BODY) + [(0, 0, 0, 1, 0, 0, 0)] * (len(PARTS) + 1)
     tcp, hand = arm[-1][0], person + np.array([-0.38, -0.15, 1.12])
     v = (arm_poses(t + 1e-4)[-1][0] - arm_poses(t - 1e-4)[-1][0]) / 2e-4
     distance, speed = float(np.linalg.norm(tcp - hand)), float(np.linalg.norm(v))
@@ -309,6 +313,7 @@ def snapshot(seq: int, t: float) -> Snapshot:
                     faces=((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
                     verdict=Verdict.UNDECIDED,
                 ),
+                Highlight(body="robot side", verdict=Verdict.WITHIN),
                 Label(position=(0.3, 0.0, 1.95), text=HOSTILE, verdict=None),
             ),
         ),
@@ -360,7 +365,11 @@ def _told(scene: Scene, t: float) -> dict[str, object]:
     told = snapshot(round(t / PERIOD), round(t / PERIOD) * PERIOD)
     block = np.frombuffer(told.poses, "<f4").reshape(-1, 7).tolist()
     names = [node.name for node in scene.nodes]
-    return {"t": told.t, "poses": dict(zip(names, block, strict=True)), "results": msgspec.to_builtins(told.results)}
+    return {
+        "t": told.t,
+        "poses": dict(zip(names, block, strict=True)),
+        "results": msgspec.to_builtins(told.results),
+    }
 
 
 def main() -> None:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import math
 from datetime import datetime
 from enum import IntEnum
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from seerob.errors import InputError, Problem
 from seerob.snapshot import Finding, Verdict
 
 if TYPE_CHECKING:
@@ -39,6 +39,24 @@ class Exit(IntEnum):
     EXCEEDED = 1
     UNDECIDED = 2
     ERROR = 3
+
+
+def seconds(text: str) -> float:
+    """A duration on the command line [s]; more than nothing, and finite."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
+    return value
+
+
+def port(text: str) -> int:
+    """A TCP port on the command line; 0 is any free one."""
+    if not text.isascii() or not text.isdigit() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port: give 1…65535, or 0 for any free one")
+    return int(text)
 
 
 def exit_code(verdict: Verdict | None) -> Exit:
@@ -90,30 +108,33 @@ def run_folder(near: Path, wanted: Path | None) -> Path:
     return folder
 
 
-def compiled(path: Path, *, quiet: bool = False) -> Station:
-    """The workstation of a path, compiled, with what is being read shown meanwhile."""
+def compiled(path: Path, *, quiet: bool = False, sources: bool = True) -> Station:
+    """The workstation of a path: read, compiled, its criteria bound and its sources open.
+
+    Args:
+        path: Workstation file, or the folder of one.
+        quiet: Show nothing meanwhile, not even on a terminal.
+        sources: Whether its sources will be played.
+
+    Raises:
+        InputError: With the mistakes of all criteria and all sources together.
+    """
+    from seerob.commands.progress import spinner
     from seerob.reading import read
     from seerob.station import Station
 
     workstation = read(path)
-    if quiet or not STATUS.is_terminal:
-        return Station(workstation, cache=cache_folder())
-    with STATUS.status("reading") as status:
-        return Station(workstation, cache=cache_folder(), progress=lambda text: status.update(text))
-
-
-@contextmanager
-def progress(duration: float, what: str) -> Iterator[Callable[[float], None]]:
-    """A bar over run time on a terminal; silence elsewhere."""
-    if not STATUS.is_terminal or duration <= 0:
-        yield lambda _: None
-        return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (BarColumn(), TextColumn("{task.description}"), TimeRemainingColumn())
-    with Progress(*columns, console=STATUS, transient=True) as bar:
-        task = bar.add_task(what, total=duration)
-        yield lambda t: bar.update(task, completed=t)
+    with spinner(quiet=quiet) as say:
+        station = Station(workstation, cache=cache_folder(), progress=say)
+        problems: list[Problem] = []
+        for prepare in (lambda: station.bound, lambda: station.sources if sources else ()):
+            try:
+                prepare()
+            except InputError as error:
+                problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return station
 
 
 def describe(station: Station) -> None:

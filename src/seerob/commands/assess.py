@@ -12,13 +12,13 @@ from seerob.commands import (
     describe,
     exit_code,
     line,
-    progress,
     results_json,
     run_folder,
     tell,
     tell_results,
 )
-from seerob.commands.sinks import sinks_of
+from seerob.commands.progress import announced, progress
+from seerob.commands.sinks import file_of, sinks_of, tell_files
 
 HELP = "evaluate a workstation as fast as possible; write recording, report and tables"
 EXAMPLE = "seerob assess my_cell"
@@ -40,12 +40,13 @@ def run(options: argparse.Namespace) -> int:
         tell(scene.findings)
     sinks = sinks_of(station.workstation, lossless=True)
     with progress(station.duration, f"{station.duration:.1f} s of motion") as tick:
-        summary = station.run(folder=folder, sinks=sinks, scene=scene, progress=tick)
+        writers = announced(station.open_sinks(sinks, folder, scene), list(map(file_of, sinks)), tick.say)
+        summary = station.run(writers=writers, scene=scene, progress=tick)
+        moving, writing = tick.moving, tick.writing
     if options.json:
         OUT.print(results_json(summary, folder=str(folder)), markup=False)
         return exit_code(summary.verdict)
-    line("ran", f"{summary.duration:.1f} s of motion in {summary.wall:.1f} s")
+    line("ran", f"{summary.duration:.1f} s of motion in {moving:.1f} s, then wrote for {writing:.1f} s")
     tell_results(summary)
-    for sink in sinks:
-        line("wrote", str(folder / str(getattr(sink, "file", ""))))
+    tell_files(sinks, folder)
     return exit_code(summary.verdict)

@@ -18,21 +18,12 @@ def add(sub: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read, compile, bind and open everything; run nothing."""
     station = compiled(options.workstation)
-    problems = []
-    from seerob.errors import InputError
-
-    for step in (lambda: station.bound, lambda: station.sources):
-        try:
-            step()
-        except InputError as error:
-            problems += error.problems
-    if problems:
-        raise InputError(problems)
     describe(station)
     for finding in station.scene().findings:
         line(finding.level, f"{finding.subject}: {finding.text}")
     line(
         "fine",
-        f"{len(station.model.bodies)} bodies, {station.model.mj.nv} degrees of freedom, {station.duration:.2f} s of motion",
+        f"{len(station.model.bodies)} bodies, {station.model.mj.nv} degrees of freedom, "
+        f"{station.duration:.2f} s of motion",
     )
     return Exit.WITHIN

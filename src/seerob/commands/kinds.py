@@ -7,9 +7,8 @@ from typing import Any, get_args
 
 import msgspec
 
-from seerob import plugin
 from seerob.commands import OUT, Exit
-from seerob.reading import BASES
+from seerob.workstation import PLUGINS
 
 HELP = "list every source, criterion, rule and sink with its options"
 EXAMPLE = "seerob kinds safety"
@@ -24,11 +23,15 @@ COMMON = {
 
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
-    sub.add_argument("group", nargs="?", choices=sorted(BASES), help="only these")
+    sub.add_argument("group", nargs="?", choices=PLUGINS, help="only these")
 
 
 def run(options: argparse.Namespace) -> int:
     """Print them."""
+    from seerob import plugin
+    from seerob.model_io import library
+    from seerob.reading import BASES
+
     for group in [options.group] if options.group else list(BASES):
         common = ", ".join(COMMON[group])
         OUT.print(f"[[{group}]]" + (f"  (all: {common})" if common else ""), style="bold", markup=False)
@@ -41,8 +44,6 @@ def run(options: argparse.Namespace) -> int:
             if shown:
                 OUT.print(f"  {'':<18} {', '.join(shown)}", style="dim", markup=False)
     OUT.print("* must be given", style="dim")
-    from seerob.model_io import library
-
     if options.group is None:
         OUT.print("robots", style="bold")
         OUT.print("  " + ", ".join(f"library:{name}" for name in library.names()), markup=False)

@@ -91,3 +91,21 @@ class Announced:
 def announced(writers: Sequence[Writer], files: Sequence[str], say: Callable[[str], None]) -> list[Writer]:
     """Writers that say which file they are writing."""
     return [Announced(writer, file, say) for writer, file in zip(writers, files, strict=True)]
+
+
+@contextmanager
+def spinner(*, quiet: bool = False) -> Iterator[Callable[[str], None]]:
+    """Yields what shows a text and a spinner on a terminal, from its first call on; silence elsewhere."""
+    if quiet or not STATUS.is_terminal:
+        yield lambda _: None
+        return
+    status = STATUS.status("")
+
+    def say(text: str) -> None:
+        status.update(text)
+        status.start()
+
+    try:
+        yield say
+    finally:
+        status.stop()

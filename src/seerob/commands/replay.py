@@ -6,7 +6,7 @@ import argparse
 import time
 from pathlib import Path
 
-from seerob.commands import Exit, line
+from seerob.commands import Exit, line, seconds
 from seerob.commands.run import Stopped, add_page
 
 HELP = "show a recording in the page: play, pause, seek"
@@ -17,7 +17,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     sub.add_argument("recording", type=Path, help="an MCAP file that seerob wrote")
     add_page(sub)
-    sub.add_argument("--seconds", type=float, help="end after this time")
+    sub.add_argument("--seconds", type=seconds, help="end after this time")
 
 
 def run(options: argparse.Namespace) -> int:

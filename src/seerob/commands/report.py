@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from seerob.commands import (
     OUT,
+    WORDS,
     add_output,
     cache_folder,
     compiled,
     exit_code,
+    extreme,
     line,
-    progress,
     results_json,
     run_folder,
     tell_results,
 )
-from seerob.commands.sinks import sinks_of
+from seerob.commands.progress import progress
+from seerob.commands.sinks import sinks_of, tell_files
+
+if TYPE_CHECKING:
+    from seerob.results import Series
 
 HELP = "compute a recording again from its samples; write report and tables"
 EXAMPLE = "seerob report runs/2026-11-21T10-12-00/run.mcap"
@@ -38,27 +45,48 @@ def run(options: argparse.Namespace) -> int:
 
     recording = Recording.open(options.recording)
     if options.workstation is not None:
-        station = compiled(options.workstation, quiet=options.json)
+        station = compiled(options.workstation, quiet=options.json, sources=False)
     else:
         station = load_recorded(recording, cache=cache_folder())
     folder = run_folder(options.recording.parent, options.output)
     sinks = sinks_of(station.workstation, lossless=True, record=False)
     with progress(recording.duration, f"{recording.duration:.1f} s recorded") as tick:
         summary = station.replay(recording, folder=folder, sinks=sinks, progress=tick)
+    before = log_of(recording.snapshots(), recording.scene.criteria)
+    changes = changes_since(before, summary.results)
+    if recording.scene.workstation_hash != summary.scene.workstation_hash:
+        changes.insert(0, "the workstation is not the one that was recorded")
     if options.json:
-        OUT.print(results_json(summary, folder=str(folder)), markup=False)
+        OUT.print(results_json(summary, folder=str(folder), changes=changes), markup=False)
         return exit_code(summary.verdict)
     line("recording", f"{recording.scene.title}: {summary.duration:.1f} s", "bold")
     for finding in recording.findings:
         line(finding.level, finding.text, "yellow")
     tell_results(summary)
-    before = log_of(recording.snapshots(), recording.scene.criteria)
-    for name, series in summary.results.items():
+    for change in changes:
+        line("changed", change, "yellow")
+    tell_files(sinks, folder)
+    return exit_code(summary.verdict)
+
+
+def changes_since(before: Mapping[str, Series], now: Mapping[str, Series]) -> list[str]:
+    """What is judged differently than when it was recorded, one sentence each.
+
+    Args:
+        before: Results as they were recorded.
+        now: Results as they were computed again.
+    """
+    changes = []
+    for name, series in now.items():
         then = before.get(name)
         if then is None:
-            line("new", f"{name} was not judged when this was recorded")
-        elif then.verdict != series.verdict:
-            line("changed", f"{name}: was {then.verdict or 'not judged'} when recorded", "yellow")
-    for sink in sinks:
-        line("wrote", str(folder / str(getattr(sink, "file", ""))))
-    return exit_code(summary.verdict)
+            changes.append(f"{name}: was not asked when this was recorded")
+        elif (_verdict(then), extreme(then)) != (_verdict(series), extreme(series)):
+            changes.append(f"{name}: was {_verdict(then)}, {extreme(then)}")
+    gone = [name for name in before if name not in now]
+    changes += [f"{name}: is asked no more, was {_verdict(before[name])}" for name in gone]
+    return changes
+
+
+def _verdict(series: Series) -> str:
+    return "not judged" if series.verdict is None else WORDS[series.verdict][0]

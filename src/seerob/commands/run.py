@@ -4,20 +4,28 @@ from __future__ import annotations
 
 import argparse
 import signal
+from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from seerob.commands import (
-    STATUS,
-    add_workstation,
     compiled,
     describe,
     exit_code,
     line,
+    port,
     run_folder,
+    seconds,
     tell,
     tell_results,
 )
-from seerob.commands.sinks import sinks_of
+from seerob.commands.progress import announced, spinner
+from seerob.commands.sinks import file_of, sinks_of, tell_files
+from seerob.errors import InputError
+
+if TYPE_CHECKING:
+    from seerob.snapshot import Scene
+    from seerob.station import Station
 
 HELP = "run a workstation live: sources connect, the page opens, recording starts"
 EXAMPLE = "seerob run my_cell            (then open the address it prints; Ctrl-C ends the run)"
@@ -25,20 +33,22 @@ EXAMPLE = "seerob run my_cell            (then open the address it prints; Ctrl-
 
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
-    add_workstation(sub)
+    sub.add_argument(
+        "workstation", type=Path, nargs="?", help="folder with a workstation.toml, or the file itself"
+    )
     add_page(sub)
     sub.add_argument(
-        "-o", "--output", help="folder to write to (default: runs/<time> beside the workstation)"
+        "-o", "--output", type=Path, help="folder to write to (default: runs/<time> beside the workstation)"
     )
     sub.add_argument("--no-record", action="store_true", help="no recording and no report")
-    sub.add_argument("--seconds", type=float, help="end the run after this time")
-    sub.add_argument("--replay", help="show this recording instead (the same as seerob replay)")
+    sub.add_argument("--seconds", type=seconds, help="end the run after this time")
+    sub.add_argument("--replay", type=Path, metavar="FILE", help="show this recording, as seerob replay does")
 
 
 def add_page(sub: argparse.ArgumentParser) -> None:
     """Arguments of commands that serve the page."""
     sub.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine only)")
-    sub.add_argument("--port", type=int, default=8080, help="port of the page; 0 is any free one")
+    sub.add_argument("--port", type=port, default=8080, help="port of the page; 0 is any free one")
     sub.add_argument("--token", help="what visitors must know; needed when not only this machine may visit")
 
 
@@ -61,51 +71,54 @@ class Stopped:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run until Ctrl-C, then write the report."""
-    from pathlib import Path
+    """Run until Ctrl-C, then write the report.
 
-    if options.replay:
+    Raises:
+        InputError: There is nothing to run, or it cannot be used as it is.
+    """
+    if options.replay is not None:
         from seerob.commands import replay
 
-        return replay.show(Path(options.replay), options)
-    from seerob.server.live import LiveView
-
-    stopped = Stopped()
+        return replay.show(options.replay, options)
+    if options.workstation is None:
+        raise InputError.at("seerob run", "workstation", "missing", "name a folder, or --replay FILE")
     station = compiled(options.workstation)
     scene = station.scene()
     describe(station)
     tell(scene.findings)
-    folder = run_folder(station.model.folder, Path(options.output) if options.output else None)
+    return live(station, scene, options)
+
+
+def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
+    """Show, judge and record until Ctrl-C or the time is over."""
+    from seerob.server.live import LiveView
+
+    folder = run_folder(station.model.folder, options.output)
     sinks = [] if options.no_record else sinks_of(station.workstation, lossless=False)
-    view = LiveView(
+    stopped = Stopped()
+    with LiveView(
         scene=scene, meshes=station.model.meshes, host=options.host, port=options.port, token=options.token
-    )
-    if view.server.notice:
-        line("note", view.server.notice)
-    line("page", f"{view.url}  (Ctrl-C ends the run)", "bold")
-    try:
-        writers = station.open_sinks(sinks, folder, scene) if sinks else []
-    except BaseException:
-        view.close()
-        raise
-    now = [0.0]
+    ) as view:
+        if view.server.notice:
+            line("note", view.server.notice)
+        now = 0.0
 
-    def over() -> bool:
-        return stopped() or (options.seconds is not None and now[0] >= options.seconds)
+        def over() -> bool:
+            return stopped() or (options.seconds is not None and now >= options.seconds)
 
-    def note(t: float) -> None:
-        now[0] = t
+        def note(t: float) -> None:
+            nonlocal now
+            now = t
 
-    summary = station.run(writers=[view, *writers], live=True, scene=scene, stop=over, progress=note)
+        with spinner() as say:
+            writers = announced(station.open_sinks(sinks, folder, scene), list(map(file_of, sinks)), say)
+            line("page", f"{view.url}  (Ctrl-C ends the run)", "bold")
+            summary = station.run(writers=[view, *writers], live=True, scene=scene, stop=over, progress=note)
     line("ran", f"{summary.duration:.1f} s" + _slipped(summary.slipped))
     tell_results(summary)
-    for sink in sinks:
-        line("wrote", str(folder / str(getattr(sink, "file", ""))))
-    STATUS.print("", end="")
+    tell_files(sinks, folder)
     return exit_code(summary.verdict)
 
 
-def _slipped(seconds: float) -> str:
-    return (
-        f", {seconds:.1f} s behind real time: this machine is too slow for the workstation" if seconds else ""
-    )
+def _slipped(lost: float) -> str:
+    return f", {lost:.1f} s behind real time: this machine is too slow for the workstation" if lost else ""

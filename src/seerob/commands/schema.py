@@ -9,10 +9,9 @@ from typing import Any
 
 import msgspec
 
-from seerob import plugin, units
+from seerob import units
 from seerob.commands import OUT, Exit, line
-from seerob.reading import BASES
-from seerob.workstation import Workstation
+from seerob.workstation import PLUGINS, Workstation
 
 HELP = "write the JSON schema of the workstation file, for editors"
 EXAMPLE = "seerob schema -o workstation.schema.json"
@@ -36,6 +35,9 @@ def run(options: argparse.Namespace) -> int:
 
 def schema() -> dict[str, Any]:
     """The schema: the types of the tables, the kinds of the plug-ins, and keys with unit suffixes."""
+    from seerob import plugin
+    from seerob.reading import BASES
+
     classes = {(g, kind): plugin.load(g, kind, base) for g, base in BASES.items() for kind in plugin.kinds(g)}
     order = [Workstation, *classes.values()]
     (top, *refs), definitions = msgspec.json.schema_components(order, ref_template="#/$defs/{name}")
@@ -43,7 +45,7 @@ def schema() -> dict[str, Any]:
     station = definitions[top["$ref"].rsplit("/", 1)[-1]]
     for hidden in ("folder", "files"):
         station["properties"].pop(hidden)
-    for group in BASES:
+    for group in PLUGINS:
         options = []
         for (owner, kind), ref in by_class.items():
             if owner != group:
@@ -65,7 +67,7 @@ def schema() -> dict[str, Any]:
 
 
 def _bodies(station: dict[str, Any]) -> list[dict[str, Any]]:
-    return [body for group in BASES for body in station["properties"][group]["items"]["anyOf"]]
+    return [body for group in PLUGINS for body in station["properties"][group]["items"]["anyOf"]]
 
 
 def _add_suffixes(definition: dict[str, Any]) -> None:

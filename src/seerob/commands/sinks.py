@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 from msgspec.structs import replace
 
+from seerob.commands import line
 from seerob.sink import Sink
-from seerob.sinks.dossier import Dossier
-from seerob.sinks.excel import Excel
-from seerob.sinks.recorder import Recorder
-from seerob.workstation import Workstation
+
+if TYPE_CHECKING:
+    from seerob.workstation import Workstation
 
 
 def sinks_of(workstation: Workstation, *, lossless: bool, record: bool = True) -> list[Sink]:
@@ -19,9 +22,25 @@ def sinks_of(workstation: Workstation, *, lossless: bool, record: bool = True) -
         lossless: Whether the recorder may hold the run up: only when the run is not live.
         record: Whether to record at all; not when a recording is computed again.
     """
+    from seerob.sinks.dossier import Dossier
+    from seerob.sinks.excel import Excel
+    from seerob.sinks.recorder import Recorder
+
     usual: list[Sink] = [Recorder(), Dossier(), Excel()]
     named = list(workstation.sinks)
     chosen = named + [sink for sink in usual if not any(type(sink) is type(other) for other in named)]
     if not record:
         chosen = [sink for sink in chosen if not isinstance(sink, Recorder)]
     return [replace(s, lossless=lossless) if isinstance(s, Recorder) else s for s in chosen]
+
+
+def file_of(sink: Sink) -> str:
+    """Name of the file that a sink writes in the run's folder; empty when it writes none."""
+    return str(getattr(sink, "file", ""))
+
+
+def tell_files(sinks: list[Sink], folder: Path) -> None:
+    """One line per file that was written."""
+    for sink in sinks:
+        if file_of(sink):
+            line("wrote", str(folder / file_of(sink)))

@@ -82,13 +82,20 @@ def _in_three(profile: list[tuple[float, float]], cap: float) -> tuple[list[tupl
 
 
 def _rounded_in_box(lower: Array, upper: Array, color: shapes.Color) -> Mesh:
-    """An elliptical cylinder with rounded rims along the longest edge of a box, touching its sides."""
+    """A box with rounded corners that touches all sides of the given one."""
     size = upper - lower
-    axis = int(size.argmax())
-    rotation = np.roll(np.eye(3), 2 - axis, axis=1)
-    half = 0.5 * size
-    a, b = float(rotation[:, 0] @ half), float(rotation[:, 1] @ half)
-    start, end = 0.5 * (lower + upper), 0.5 * (lower + upper)
-    start[axis], end[axis] = lower[axis], upper[axis]
-    profile = shapes.rounded_profile(1.0, float(size[axis]), 0.2 * min(a, b))
-    return shapes.lathe_mesh(start, end, profile, sides=48, color=color, squeeze=(rotation, a, b))
+    axis = int(size.argmin())
+    corner = 0.35 * float(np.delete(size, axis).min())
+    profile = shapes.rounded_profile(corner, float(size[axis]), ROUNDING * corner)
+    inset = np.full(3, corner)
+    inset[axis] = 0.0
+    tubes = []
+    for bits in range(4):
+        start = lower + inset
+        for bit, side in enumerate(np.delete(np.arange(3), axis)):
+            if bits >> bit & 1:
+                start[side] = upper[side] - corner
+        end = start.copy()
+        end[axis] = upper[axis]
+        tubes.append(shapes.lathe_mesh(start, end, profile, sides=32))
+    return shapes.hull_mesh(tubes, color)

@@ -58,7 +58,7 @@ def _from_file(
 ) -> Description:
     path = _path(model, folder)
     roots = {package: folder / root for package, root in packages.items()}
-    resolver = Resolver(str(path), path.parent, roots)
+    resolver = Resolver(model, path.parent, roots)
     if path.suffix.lower() == ".xacro":
         text, files = expanded(path, resolver, arguments)
         robot = urdf.from_text(text, resolver=resolver, name=name)

@@ -30,8 +30,12 @@ def protrusions(description: Description) -> dict[str, float]:
 
 
 def with_protrusions(description: Description) -> Description:
-    """The description with a finding per link whose shown shape sticks out of the one for distances."""
+    """The description with the figure on each solid that a shown shape sticks out of, and a finding.
+
+    Distances carry the figure as an interval, so a verdict that hangs on it is UNDECIDED.
+    """
     found = []
+    deviating: dict[str, float] = {}
     for link, depths in _depths(description):
         if depths.max(initial=0.0) > WORTH_SAYING:
             text = (
@@ -40,7 +44,14 @@ def with_protrusions(description: Description) -> Description:
                 "distances may be that much too long"
             )
             found.append(Finding(level="warning", subject=f"{description.name}/{link.name}", text=text))
-    return replace(description, findings=(*description.findings, *found))
+            deviating[link.name] = float(depths.max())
+    links = tuple(
+        replace(link, solids=tuple(replace(solid, deviation=deviating[link.name]) for solid in link.solids))
+        if link.name in deviating
+        else link
+        for link in description.links
+    )
+    return replace(description, links=links, findings=(*description.findings, *found))
 
 
 def _depths(description: Description) -> Iterator[tuple[Link, Array]]:

@@ -52,7 +52,6 @@ def lathe_mesh(
     *,
     sides: int,
     color: Color = GREY,
-    squeeze: tuple[Array, float, float] | None = None,
 ) -> Mesh:
     """A closed body of revolution about the line from ``start`` to ``end``.
 
@@ -62,16 +61,11 @@ def lathe_mesh(
         profile: (radius, height) [m] with heights that do not decrease; flat caps are added.
         sides: Points around.
         color: Red, green, blue, alpha.
-        squeeze: Rotation (3, 3) to use instead of one around the axis, and factors on the radius
-            along its first two columns: an elliptical section.
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
-    rotation, a, b = squeeze or (frame_along(end - start), 1.0, 1.0)
+    rotation = frame_along(end - start)
     angles = (np.arange(sides) + 0.5) * (2 * math.pi / sides)
-    rings = [
-        np.column_stack([a * r * np.cos(angles), b * r * np.sin(angles), np.full(sides, h)])
-        for r, h in profile
-    ]
+    rings = [np.column_stack([r * np.cos(angles), r * np.sin(angles), np.full(sides, h)]) for r, h in profile]
     centers = np.array([[0, 0, profile[0][1]], [0, 0, profile[-1][1]]])
     vertices = np.concatenate([*rings, centers]) @ rotation.T + start
     i, j = np.arange(sides), (np.arange(sides) + 1) % sides

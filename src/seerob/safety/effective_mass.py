@@ -85,7 +85,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
     along: Literal["motion", "worst"] = "motion"
     """Direction: of the point's motion, or the heaviest one."""
     toward: str | None = None
-    """Instead: the direction from the point to the nearest point of this human or set."""
+    """Instead: the direction of the shortest line from the robot to this human or set."""
     limit: Annotated[float, Meta(gt=0, extra={"unit": "kg"})] | None = None
     """Largest admissible mass [kg]."""
 
@@ -124,6 +124,8 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
             u, reason = direction(state, J_v, masses, axes)
             mass = None if u is None else float(projected_mass(inverse, u))
             verdict = self._verdict(mass)
+            if u is None and gap is not None and self.limit is not None:
+                verdict = Verdict.UNDECIDED
             rotation, position = state.pose(frame)
             center = position + rotation @ offset
             turn = axes * np.array([1, 1, np.sign(np.linalg.det(axes))])
@@ -170,6 +172,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
         robot = model.carrier(model.frame(self.at))
+        gap = None if self.toward is None else model.gap(robot.moving, model.select(self.toward))
         which = (
             f"toward {self.toward}"
             if self.toward
@@ -178,8 +181,9 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         return Basis(
             formula=f"1/m_u = uᵀ J_v M⁻¹ J_vᵀ u, u {which}",
             source="Weistroffer et al. 2022, Eqs. 7 and 8; Khatib 1995",
-            inputs=provenance.motion(model, robot.name)
+            inputs=provenance.motion(model, robot.name, *(gap.carriers if gap is not None else ()))
             + provenance.masses(model, robot)
+            + (provenance.shapes(gap) if gap is not None else ())
             + provenance.limit(self.limit, "kg"),
             not_modelled=(
                 "joints held by brakes, friction or position control, which make the robot heavier",

@@ -31,10 +31,10 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
 
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
-        areas = {body.name: body.index for body in model.bodies if body.role == "area"}
+        areas = {body.owner for body in model.bodies if body.role == "area"}
         if self.area not in areas:
             raise UnknownName("area", self.area, areas)
-        gap = model.gap((areas[self.area],), model.select(self.of))
+        gap = model.gap(model.select(self.area), model.select(self.of))
 
         def evaluate(state: State) -> Result:
             found = state.closest_per_body(gap)

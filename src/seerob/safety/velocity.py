@@ -9,6 +9,7 @@ from msgspec import Meta
 
 from seerob import provenance
 from seerob.criterion import Criterion, Evaluate, judge
+from seerob.errors import InputError
 from seerob.model import Model
 from seerob.snapshot import Arrow, Basis, Result
 from seerob.state import State
@@ -72,6 +73,8 @@ class Velocity(Criterion, frozen=True, kw_only=True):
 
     def _bind_set(self, model: Model) -> Evaluate:
         bodies = [i for i in model.select(self.of or "") if model.bodies[i].carrier]
+        if not bodies:
+            raise InputError.at(self.name, "of", f"nothing of {self.of!r} moves", "name a robot or human")
 
         def evaluate(state: State) -> Result:
             found = [(*state.fastest_point(i), i) for i in bodies]

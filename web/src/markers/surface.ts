@@ -1,25 +1,8 @@
 // A translucent closed surface with its outline drawn, so that it reads against any background.
 
-import { type BufferGeometry, Group, LineBasicMaterial, LineSegments, Mesh } from "three";
-import { markerMaterial } from "../scene/materials";
-import { NEUTRAL_COLOR, VERDICT_COLORS } from "../verdicts";
+import { type BufferGeometry, Group, LineSegments, Mesh } from "three";
+import { lineMaterial, markerMaterial } from "../scene/materials";
 import type { Verdict } from "../wire";
-
-const lineMaterials = new Map<Verdict | null, LineBasicMaterial>();
-
-function lineMaterial(verdict: Verdict | null): LineBasicMaterial {
-  let material = lineMaterials.get(verdict);
-  if (!material) {
-    material = new LineBasicMaterial({
-      color: verdict ? VERDICT_COLORS[verdict] : NEUTRAL_COLOR,
-      toneMapped: false,
-      transparent: true,
-      opacity: 0.85,
-    });
-    lineMaterials.set(verdict, material);
-  }
-  return material;
-}
 
 export class Surface {
   readonly object = new Group();

@@ -17,6 +17,7 @@ import {
   tracesRevision,
 } from "../page_state";
 import { Chart, type ChartView } from "../plots/chart";
+import { ranked } from "../plots/ranking";
 import { useActions } from "./app_context";
 import { StateBadge } from "./StateBadge";
 
@@ -67,15 +68,13 @@ export function Plots({ count }: { count: number }) {
   );
 }
 
-// Those with a limit first, in the file's order; the selected one is always among them.
+// The selected one is always among them.
 function plotted(count: number): string[] {
-  const all = scene.value?.criteria ?? [];
   void tracesRevision.value;
-  const judged = all.filter((c) => c.limit !== null || traces.get(c.name)?.judged);
-  const ranked = [...judged, ...all.filter((c) => !judged.includes(c))].map((c) => c.name);
-  const names = ranked.slice(0, count);
+  const all = ranked(scene.value?.criteria ?? []).map((criterion) => criterion.name);
+  const names = all.slice(0, count);
   const chosen = selection.value?.kind === "criterion" ? selection.value.name : null;
-  if (chosen && ranked.includes(chosen) && !names.includes(chosen)) names[names.length - 1] = chosen;
+  if (chosen && all.includes(chosen) && !names.includes(chosen)) names[names.length - 1] = chosen;
   return names;
 }
 

@@ -35,7 +35,7 @@ export function Properties() {
             <dd>{nodes.length}</dd>
           </>
         )}
-        <Mass nodes={nodes} />
+        {first.role !== "area" && <Mass nodes={nodes} />}
         <dt>Mesh</dt>
         <dd>{triangles(nodes)}</dd>
         {notes(nodes).map((note) => (

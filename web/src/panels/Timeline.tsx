@@ -3,8 +3,9 @@
 import { effect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { formatTime } from "../format";
-import { isLive, now, reach, scene, select, selection, stale, traces, tracesRevision } from "../page_state";
+import { isLive, now, reach, scene, select, selection, stale, tracesRevision } from "../page_state";
 import { drawLanes, LANE_PX, type TimeRange, timeAt } from "../plots/lanes";
+import { isJudged, ranked } from "../plots/ranking";
 import { useActions } from "./app_context";
 
 /** A live run's strip shows at least so much [s], so that it does not race at the start. */
@@ -14,7 +15,7 @@ export function Timeline() {
   const { time } = useActions();
   const canvas = useRef<HTMLCanvasElement>(null);
   void tracesRevision.value;
-  const judged = scene.value?.criteria.filter((c) => c.limit !== null || traces.get(c.name)?.judged) ?? [];
+  const judged = ranked((scene.value?.criteria ?? []).filter(isJudged));
   const names = judged.map((c) => c.name);
   const key = names.join("\n");
 

@@ -2,6 +2,7 @@
 
 import { formatQuantity } from "../format";
 import { frame, hello, isLive, link, lookingAt, overall, rows, scene, stale } from "../page_state";
+import { orderedRows } from "../row_order";
 import { STATE_ICONS, type State } from "../verdicts";
 
 export function TopBar() {
@@ -63,7 +64,7 @@ function StatusPill() {
       </output>
     );
   }
-  const there = rows.value.filter((row) => row.state === state);
+  const there = orderedRows.value.filter((row) => row.state === state);
   const worst = there[0];
   const others = there.length - 1;
   const detail = worst && state !== "within" && state !== "none" ? ` ${worst.info.name}` : "";
@@ -79,8 +80,13 @@ function StatusPill() {
           {formatQuantity(worst.result.value, worst.result.unit, worst.result.limit)}
         </span>
       )}
+      {!detail && state !== "none" && <span class="pill-more">all {judgedCount()} with a limit</span>}
       {detail && others > 0 && <span class="pill-more">+{others}</span>}
       {lookingAt.value !== null && <span class="pill-more">looking back</span>}
     </output>
   );
+}
+
+function judgedCount(): number {
+  return rows.value.filter((row) => row.state !== "none").length;
 }

@@ -2,7 +2,9 @@
 
 import {
   Box3,
+  EdgesGeometry,
   Group,
+  LineSegments,
   type Material,
   Mesh,
   MeshStandardMaterial,
@@ -13,7 +15,10 @@ import {
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { FLOATS_PER_NODE } from "../poses";
 import type { Node, Scene, Verdict } from "../wire";
-import { bodyMaterial } from "./materials";
+import { bodyMaterial, lineMaterial, markerMaterial } from "./materials";
+
+/** Role of what is only room: a safety area. */
+const AREA = "area";
 
 /** Light that a selected body gives off. */
 const SELECTED_GLOW = 0x1c4a7d;
@@ -25,6 +30,7 @@ export class Body {
   /** Box around its mesh, in its own frame; empty until the mesh came. */
   readonly extent = new Box3();
   private dressed: { mesh: Mesh; own: Material | Material[] }[] = [];
+  private enclosed: { fill: Mesh; edges: LineSegments }[] = [];
   private painted: Verdict | null | undefined = undefined;
   private lit = false;
 
@@ -36,8 +42,15 @@ export class Body {
 
   /** Put on a mesh that is given in the body's frame. */
   dress(model: Object3D): void {
+    const parts: Mesh[] = [];
     model.traverse((part) => {
-      if (!(part instanceof Mesh)) return;
+      if (part instanceof Mesh) parts.push(part);
+    });
+    for (const part of parts) {
+      if (this.node.role === AREA) {
+        this.enclose(part);
+        continue;
+      }
       part.castShadow = true;
       part.receiveShadow = true;
       // Its own copy: bodies that share a mesh are selected one by one.
@@ -45,10 +58,19 @@ export class Body {
         ? part.material.map((m) => m.clone())
         : part.material.clone();
       this.dressed.push({ mesh: part, own: part.material });
-    });
+    }
     this.extent.setFromObject(model);
     this.group.add(model);
     this.repaint();
+  }
+
+  // An area is room, not matter: one sees and clicks through it.
+  private enclose(part: Mesh): void {
+    const edges = new LineSegments(new EdgesGeometry(part.geometry, 12));
+    for (const shape of [part, edges]) shape.raycast = () => {};
+    part.renderOrder = 2;
+    part.add(edges);
+    this.enclosed.push({ fill: part, edges });
   }
 
   /** Show it in the colour of a verdict; `undefined` for its own. */
@@ -66,6 +88,10 @@ export class Body {
   }
 
   private repaint(): void {
+    for (const { fill, edges } of this.enclosed) {
+      fill.material = markerMaterial("fill", this.painted ?? null);
+      edges.material = lineMaterial(this.painted ?? null);
+    }
     for (const { mesh, own } of this.dressed) {
       mesh.material = this.painted === undefined ? own : bodyMaterial(this.painted);
       for (const material of [own].flat()) {

@@ -1,6 +1,13 @@
 // Materials that carry a meaning: their colours are what the legend says, whatever the light.
 
-import { Color, DoubleSide, type Material, MeshBasicMaterial, MeshStandardMaterial } from "three";
+import {
+  Color,
+  DoubleSide,
+  LineBasicMaterial,
+  type Material,
+  MeshBasicMaterial,
+  MeshStandardMaterial,
+} from "three";
 import { NEUTRAL_COLOR, VERDICT_COLORS } from "../verdicts";
 import type { Verdict } from "../wire";
 
@@ -22,13 +29,12 @@ function hatch(material: Material): void {
   material.customProgramCacheKey = () => "hatched";
 }
 
-type Kind = "line" | "ghost" | "fill" | "edge";
+type Kind = "line" | "ghost" | "fill";
 
 const LOOK: Record<Kind, { opacity: number; depthTest: boolean; depthWrite: boolean }> = {
   line: { opacity: 1, depthTest: true, depthWrite: true },
   ghost: { opacity: 0.35, depthTest: false, depthWrite: false },
   fill: { opacity: 0.15, depthTest: true, depthWrite: false },
-  edge: { opacity: 0.9, depthTest: true, depthWrite: false },
 };
 
 const made = new Map<string, Material>();
@@ -46,7 +52,7 @@ function once(key: string, make: () => Material): Material {
 export function markerMaterial(kind: Kind, verdict: Verdict | null): Material {
   const tone: Tone = verdict ?? "none";
   return once(`${kind} ${tone}`, () => {
-    const hatched = tone === "undecided" && kind !== "edge";
+    const hatched = tone === "undecided";
     const material = new MeshBasicMaterial({
       color: colorOf(tone),
       side: DoubleSide,
@@ -56,6 +62,19 @@ export function markerMaterial(kind: Kind, verdict: Verdict | null): Material {
     });
     if (hatched) hatch(material);
     return material;
+  });
+}
+
+/** The shared material of thin lines: edges of translucent things. */
+export function lineMaterial(verdict: Verdict | null): Material {
+  const tone: Tone = verdict ?? "none";
+  return once(`thin ${tone}`, () => {
+    return new LineBasicMaterial({
+      color: colorOf(tone),
+      toneMapped: false,
+      transparent: true,
+      opacity: 0.85,
+    });
   });
 }
 

@@ -1,0 +1,96 @@
+"""Everything together: two robots, one person, every criterion, against real time on one core.
+
+    python benchmarks/everything.py            # prints ms per tick, percentiles, x real time
+    python benchmarks/everything.py --smoke    # a second of motion, correctness only
+
+One tick is pump, engine, all criteria, snapshot and its encoding, as `seerob assess` does it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+
+# One core: the figure must not borrow a second one from a library's threads.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+import gc
+
+import msgspec
+import numpy as np
+
+import seerob as sr
+from seerob import run as road
+from seerob.commands import cache_folder
+from seerob.engine import Engine
+
+FOLDER = Path(__file__).parents[1] / "workstations" / "two_robots"
+
+
+def measure(seconds: float) -> dict[str, float]:
+    """Times of one pass over the workstation's motion [ms], and the factor over real time."""
+    station = sr.load(FOLDER, cache=cache_folder())
+    period = station.workstation.engine.tick
+    driven = {source.target(): source.timeout for source in station.workstation.sources}
+    engine = Engine(station.model, driven=driven)
+    judge = road.Judge(station.bound)
+    feed = road.pump(station.sources, period, endless=True)
+    encoder = msgspec.msgpack.Encoder()
+    stages: dict[str, list[float]] = {"engine": [], "criteria": [], "snapshot": []}
+    whole, worst_distance = [], np.inf
+    gc.collect()
+    for seq, samples in enumerate(feed):
+        begin = time.perf_counter()
+        engine.take(samples)
+        state = engine.tick() if seq else engine.start()
+        moved = time.perf_counter()
+        results = judge(state)
+        judged = time.perf_counter()
+        encoder.encode(road.snapshot(state, seq, results))
+        end = time.perf_counter()
+        if seq >= 20:  # the first ticks touch cold memory
+            whole.append(end - begin)
+            for name, spent in zip(stages, (moved - begin, judged - moved, end - judged), strict=True):
+                stages[name].append(spent)
+        for result in results:
+            if result.unit == "m" and result.value is not None:
+                worst_distance = min(worst_distance, result.value)
+        if state.t >= seconds:
+            break
+    ms = 1e3 * np.array(whole)
+    return {
+        "ticks": len(ms),
+        "criteria": len(station.bound),
+        "dof": station.model.mj.nv,
+        "median_ms": float(np.median(ms)),
+        "mean_ms": float(ms.mean()),
+        "p99_ms": float(np.percentile(ms, 99)),
+        "max_ms": float(ms.max()),
+        **{f"{name}_ms": 1e3 * float(np.median(spent)) for name, spent in stages.items()},
+        "x_real_time": float(period * 1e3 / ms.mean()),
+        "least_distance": float(worst_distance),
+    }
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--smoke", action="store_true")
+    options = parser.parse_args()
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    found = measure(1.0 if options.smoke else 20.0)
+    print(f"two robots, one person: {found['dof']} dof, {found['criteria']} criteria, {found['ticks']} ticks, one core")
+    print(
+        "median {median_ms:.2f} ms (engine {engine_ms:.2f}, criteria {criteria_ms:.2f}, snapshot {snapshot_ms:.2f}), "
+        "p99 {p99_ms:.2f}, max {max_ms:.2f}".format(**found)
+    )
+    print(f"real time / computed time: {found['x_real_time']:.1f} x   (goal: >= 5, p99 < 10 ms)")
+    return 0 if np.isfinite(found["least_distance"]) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,87 @@
+"""Under which name each file that was read travels in a recording.
+
+Files inside the folder of the workstation file go where that file finds them, so that unpacking a
+recording gives a folder that can be read again. What lies outside (an installed package, another
+folder) is kept below `OUTSIDE`, to be looked at and compared: nothing finds it there.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path, PurePosixPath
+
+OUTSIDE = "outside"
+
+
+def filed(
+    owner: str,
+    files: Mapping[str, bytes],
+    *,
+    folder: Path,
+    references: Iterable[str | None],
+    packages: Mapping[str, str] | None = None,
+) -> dict[str, bytes]:
+    """The files of a robot or a thing by the names that they travel under.
+
+    Args:
+        owner: Its name.
+        files: Content by the name its description has for it: a path relative to the description,
+            or a ``package://`` reference.
+        folder: Folder of the workstation file.
+        references: What the workstation file calls its descriptions; nothing for None.
+        packages: Folder of each ROS package that the workstation file names.
+    """
+    bases = [PurePosixPath(r).parent for r in references if r is not None and ":" not in r]
+    placed: dict[str, bytes] = {}
+    for name, content in files.items():
+        for candidate in _candidates(name, bases, packages or {}, folder):
+            if candidate is not None and _is(folder / candidate, content):
+                break
+        else:
+            candidate = _kept(owner, name, inside=any(map(_inside, bases)))
+        placed[candidate] = content
+    return placed
+
+
+def _candidates(
+    name: str, bases: list[PurePosixPath], packages: Mapping[str, str], folder: Path
+) -> Iterable[str | None]:
+    scheme, separator, rest = name.partition("://")
+    if separator:
+        package, _, inner = rest.partition("/")
+        yield _inside(PurePosixPath(packages.get(package, package)) / inner)
+        for base in bases:
+            for ancestor in (base, *base.parents):
+                yield _inside(ancestor / package / inner)
+                if ancestor.name == package:
+                    yield _inside(ancestor / inner)
+    elif Path(name).is_absolute():
+        yield _inside(PurePosixPath(os.path.relpath(name, folder)))
+    else:
+        for base in bases:
+            yield _inside(base / name)
+
+
+def _inside(path: PurePosixPath) -> str | None:
+    """The path without detours when it stays in its folder, else None."""
+    plain = os.path.normpath(path.as_posix()).replace("\\", "/")
+    return None if plain.startswith(("..", "/")) or ":" in plain.split("/")[0] else plain
+
+
+def _is(path: Path, content: bytes) -> bool:
+    try:
+        return path.stat().st_size == len(content) and path.read_bytes() == content
+    except OSError:
+        return False
+
+
+def _kept(owner: str, name: str, *, inside: bool) -> str:
+    scheme, separator, rest = name.partition("://")
+    if separator and scheme in ("package", "model") and inside:
+        # A robot finds its packages beside it or above, so also here.
+        beside = _inside(PurePosixPath(rest))
+        if beside is not None:
+            return beside
+    parts = [part for part in (rest if separator else name).replace("\\", "/").split("/") if part not in ("", ".", "..")]
+    return "/".join([OUTSIDE, owner, *(part.replace(":", "_") for part in parts)])

@@ -1,0 +1,86 @@
+"""Small workstations made on the spot, and states of them: tests import it as ``from made_cell import …``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from seerob.engine import Engine
+from seerob.run import Bound, Judge
+from seerob.samples import JointSample
+from seerob.snapshot import Result
+from seerob.state import State
+from seerob.station import Station, load
+
+FLOATING = "engine = { gravity = [0, 0, 0] }\n"
+
+
+def two_r(*, mimic: str = "", masses: tuple[float, float] = (1.0, 1.0), effort: float = 1000.0) -> str:
+    """A planar arm of two links of 1 m with point masses at their ends, turning about z."""
+    links, joints = ['<link name="base"/>'], []
+    for i, mass in enumerate(masses, 1):
+        links.append(
+            f'<link name="l{i}"><inertial><origin xyz="1 0 0"/><mass value="{mass}"/>'
+            '<inertia ixx="1e-12" iyy="1e-12" izz="1e-12" ixy="0" ixz="0" iyz="0"/></inertial>'
+            '<collision><origin xyz="0.5 0 0"/><geometry><box size="1 0.1 0.1"/></geometry></collision></link>'
+        )
+        parent, x = ("base", 0) if i == 1 else (f"l{i - 1}", 1)
+        joints.append(
+            f'<joint name="j{i}" type="continuous"><parent link="{parent}"/><child link="l{i}"/>'
+            f'<origin xyz="{x} 0 0"/><axis xyz="0 0 1"/><limit effort="{effort}" velocity="10"/>'
+            f"{mimic if i == 2 else ''}</joint>"
+        )
+    tip = (
+        '<link name="tip"/><joint name="end" type="fixed"><parent link="l2"/><child link="tip"/>'
+        '<origin xyz="1 0 0"/></joint>'
+    )
+    return f'<robot name="two_r">{"".join(links + joints)}{tip}</robot>'
+
+
+TWO_R = '[[robots]]\nname = "arm"\nmodel = "arm.urdf"\n'
+
+
+def made(folder: Path, text: str, files: Mapping[str, str | bytes] | None = None) -> Station:
+    """Write a workstation and the files it names, and load it."""
+    for name, content in {"workstation.toml": text, **(files or {})}.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return load(folder)
+
+
+def heard(
+    target: str, t: float, q: Sequence[float], qd: Sequence[float] | None = None, **more: object
+) -> JointSample:
+    """A sample."""
+    speeds = None if qd is None else tuple(map(float, qd))
+    return JointSample(
+        source="test", seq=0, target=target, t=t, q=tuple(map(float, q)), qd=speeds, **more
+    )
+
+
+def state_at(station: Station, **motion: tuple[Sequence[float], Sequence[float]]) -> State:
+    """The twin with each named robot or human at (q, qd), just heard."""
+    engine = Engine(station.model, controllers=False)
+    engine.take([heard(name, 0.0, q, qd) for name, (q, qd) in motion.items()])
+    state = engine.start()
+    state.engine = engine  # keeps MuJoCo's model alive as long as the state
+    return state
+
+
+def results_at(station: Station, **motion: tuple[Sequence[float], Sequence[float]]) -> dict[str, Result]:
+    """What every criterion says at (q, qd)."""
+    return {r.name: r for r in judged(station.bound, state_at(station, **motion))}
+
+
+def judged(bound: Sequence[Bound], state: State) -> tuple[Result, ...]:
+    """Results as the run loop makes them."""
+    return Judge(bound)(state)
+
+
+def hinge_limits(station: Station, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Position limits, those that are missing replaced by ±π."""
+    mechanism = station.model.mechanism(name)
+    return np.clip(mechanism.lower, -np.pi, np.pi), np.clip(mechanism.upper, -np.pi, np.pi)

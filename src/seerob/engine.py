@@ -182,19 +182,21 @@ class Engine:
         for mechanism in self._mechanisms:
             q, v, a = self._references[mechanism.name].at(t)
             wanted.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
-            wanted.qvel[mechanism.v_address] = mechanism.coupling @ v
+            # mj_step moves positions with the velocity at the end of the step, so its velocities
+            # belong half a step earlier than its positions.
+            wanted.qvel[mechanism.v_address] = mechanism.coupling @ (v - 0.5 * self._dt * a)
             wanted.qacc[mechanism.v_address] = mechanism.coupling @ a
         mujoco.mj_kinematics(self._mj, wanted)
         mujoco.mj_comPos(self._mj, wanted)
         mujoco.mj_comVel(self._mj, wanted)
         mujoco.mj_passive(self._mj, wanted)
         mujoco.mj_rne(self._mj, wanted, 1, self._feedforward)
-        # mj_rne knows neither rotor inertia nor passive forces.
+        # mj_rne knows neither rotor inertia nor passive forces. All damping is implicit: it acts on the
+        # velocity at the end of the step.
+        after = wanted.qvel + self._dt * wanted.qacc
         torque = self._feedforward + self._mj.dof_armature * wanted.qacc - wanted.qfrc_passive
-        # mj_step integrates positions with the velocity at the end of the step, so its velocities
-        # belong half a step earlier than its positions.
-        velocity = wanted.qvel - 0.5 * self._dt * wanted.qacc
-        self._data.ctrl[:] = (wanted.qpos + (self._kd * velocity + torque) / self._kp)[self._dof]
+        torque += self._mj.dof_damping * (after - wanted.qvel)
+        self._data.ctrl[:] = (wanted.qpos + (self._kd * after + torque) / self._kp)[self._dof]
 
     def _place(self, t: float) -> None:
         for mechanism in self._mechanisms:

@@ -5,8 +5,8 @@ Between two samples the reference is the cubic that has their positions and velo
 .. math:: q(s) = h_{00} q_0 + h_{10} T \dot q_0 + h_{01} q_1 + h_{11} T \dot q_1,\quad s = (t - t_0)/T
 
 so velocity is continuous and acceleration is known, which feed-forward needs. Samples without
-velocities get that of the chord that leads to them. After the newest sample the reference holds
-its position, before the oldest it waits there.
+velocities get that of the parabola through them and their neighbours, of the two before for the
+newest. After the newest sample the reference holds its position, before the oldest it waits there.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ class Reference:
         self._times: list[float] = []
         self._points: list[Array] = [home.astype(float).copy()]
         self._velocities: list[Array] = [self._zero]
+        self._guessed = [True]
 
     @property
     def newest(self) -> Array:
@@ -40,16 +41,32 @@ class Reference:
         if not self._times:
             self._times, self._points = [t], [q]
             self._velocities = [self._zero if qd is None else qd]
+            self._guessed = [qd is None]
             return True
         if t <= self._times[-1]:
             return False
-        if qd is None:
-            qd = (q - self._points[-1]) / (t - self._times[-1])
         self._times.append(t)
         self._points.append(q)
-        self._velocities.append(qd)
+        self._velocities.append(self._zero if qd is None else qd)
+        self._guessed.append(qd is None)
         self._drop(len(self._times) - MAX_KEPT)
+        self._guess()
         return True
+
+    def _guess(self) -> None:
+        """Velocities of the newest two samples where none were given."""
+        t, q, v = self._times, self._points, self._velocities
+        T = t[-1] - t[-2]
+        chord = (q[-1] - q[-2]) / T
+        before, after = chord, chord
+        if len(t) > 2:
+            T0 = t[-2] - t[-3]
+            bend = (chord - (q[-2] - q[-3]) / T0) / (T + T0)
+            before, after = chord - T * bend, chord + T * bend
+        if self._guessed[-2]:
+            v[-2] = before
+        if self._guessed[-1]:
+            v[-1] = after
 
     def forget(self, t: float) -> None:
         """Drop what is not needed any more from ``t`` [s] on."""
@@ -57,7 +74,8 @@ class Reference:
 
     def _drop(self, count: int) -> None:
         if count > 0:
-            del self._times[:count], self._points[:count], self._velocities[:count]
+            for kept in (self._times, self._points, self._velocities, self._guessed):
+                del kept[:count]
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
         """Position [rad or m], velocity and acceleration at ``t`` [s], each of shape (n,)."""

@@ -103,4 +103,20 @@ test("where memory cannot be shared, poses come by message and are the same", as
   await other.close();
 });
 
+test("a mesh that cannot be had becomes a finding, and the rest is shown", async () => {
+  const other = await browser.context.newPage();
+  let refused = 0;
+  await other.route("**/mesh/**", (route) => (refused++ === 0 ? route.abort() : route.continue()));
+  await show(other, served.url);
+  const findings = other.getByRole("tab", { name: /Findings/ });
+  await findings.getByText("! 4").waitFor();
+  await findings.click();
+  assert.match(
+    await other.locator(".finding").first().innerText(),
+    /ur10\/base_link\s+its mesh could not be fetched/,
+  );
+  await assertShown(other, served, await settled(other));
+  await other.close();
+});
+
 test("nothing complained", () => assert.deepEqual(browser.complaints, []));

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.kernels.paint import averaged, darken, glaze, outline, solid, stroke
 from seerob.kernels.raster import raster
 from seerob.sinks._camera import NEAR, Camera
 from seerob.transforms import Array
@@ -34,8 +35,10 @@ class Canvas:
         shape = (self.fine.height, self.fine.width)
         self.depth = np.zeros(shape)
         self.owner = np.full(shape, -1, np.int32)
-        ramp = np.linspace(1.0, 0.93, shape[0])[:, None, None]
-        self.rgb: Array = np.broadcast_to(np.array(PAPER) * ramp, (*shape, 3)).copy()
+        ramp = np.linspace(1.0, 0.93, shape[0], dtype=np.float32)[:, None, None]
+        self.rgb: NDArray[np.float32] = np.empty((*shape, 3), np.float32)
+        self.rgb[:] = np.array(PAPER, np.float32) * ramp
+        self._scratch: tuple[Array, Array, NDArray[np.int32]] | None = None
 
     def bodies(
         self, vertices: Array, normals: Array, faces: NDArray[np.int32], ids: NDArray[np.int32], colors: Array
@@ -53,54 +56,30 @@ class Canvas:
         lit = np.zeros_like(self.depth)
         shade = brightness(vertices, normals, self.camera.eye)
         raster(screen, inverse, shade, faces, ids, self.depth, lit, self.owner)
-        drawn = self.owner >= 0
-        self.rgb[drawn] = np.clip(colors[self.owner[drawn]] * lit[drawn, None], 0, 1)
-        self._outline()
+        solid(self.rgb, self.owner, lit, np.ascontiguousarray(colors, float).reshape(-1, 3))
+        outline(self.rgb, self.owner, self.depth)
 
     def shadow(self, vertices: Array, faces: NDArray[np.int32], floor: float) -> None:
         """Darken the floor at a height [m] below the bodies, lit almost from above; call before `bodies`."""
         height = np.maximum(vertices[:, 2] - floor, 0.0)
         flat = vertices - height[:, None] * np.array([0.15, -0.2, 1.0])
         screen, inverse = self.fine.project(flat)
-        depth, owner = np.zeros_like(self.depth), np.full(self.owner.shape, -1, np.int32)
-        ids = np.zeros(len(faces), np.int32)
-        raster(screen, inverse, np.zeros(len(flat)), faces, ids, depth, np.zeros_like(depth), owner)
-        self.rgb[owner >= 0] *= 0.9
-
-    def _outline(self) -> None:
-        """A thin dark line where one body ends and another, or the floor, begins."""
-        edge = np.zeros(self.depth.shape, bool)
-        for axis in (0, 1):
-            a = np.take(self.owner, range(1, self.owner.shape[axis]), axis)
-            b = np.take(self.owner, range(self.owner.shape[axis] - 1), axis)
-            za, zb = (
-                np.take(self.depth, range(1, self.depth.shape[axis]), axis),
-                np.take(self.depth, range(self.depth.shape[axis] - 1), axis),
-            )
-            jump = (a != b) | (np.abs(za - zb) > 0.03 * np.maximum(za, zb))
-            lower: tuple[slice, ...] = (slice(1, None), slice(None))
-            upper: tuple[slice, ...] = (slice(None, -1), slice(None))
-            if axis == 1:
-                lower, upper = lower[::-1], upper[::-1]
-            edge[lower] |= jump & (za >= zb)
-            edge[upper] |= jump & (zb > za)
-        self.rgb[edge & (self.owner >= 0)] *= 0.45
+        depth, lit, owner = self._layer()
+        raster(screen, inverse, np.zeros(len(flat)), faces, np.zeros(len(faces), np.int32), depth, lit, owner)
+        darken(self.rgb, owner, 0.9)
 
     def veil(self, vertices: Array, faces: NDArray[np.int32], color: Color, alpha: float) -> None:
         """Draw a translucent surface, world [m], where nothing opaque is before it."""
-        corners = vertices[faces]
+        corners = in_front(self.camera, vertices[faces])
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
         points = corners.reshape(-1, 3)
         screen, inverse = self.fine.project(points)
-        depth, lit = np.zeros_like(self.depth), np.zeros_like(self.depth)
-        owner = np.full(self.owner.shape, -1, np.int32)
+        depth, lit, owner = self._layer()
         index = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
         shade = brightness(points, np.repeat(normal, 3, axis=0), self.camera.eye)
         raster(screen, inverse, shade, index, np.zeros(len(index), np.int32), depth, lit, owner)
-        shown = (owner >= 0) & (depth >= self.depth)
-        tint = np.clip(np.array(color) * (0.5 + 0.5 * lit[shown, None]), 0, 1)
-        self.rgb[shown] = (1 - alpha) * self.rgb[shown] + alpha * tint
+        glaze(self.rgb, self.depth, owner, depth, lit, np.array(color, float), alpha)
 
     def line(
         self, start: Array, end: Array, color: Color, *, width: float, alpha: float = 1.0, hidden: float = 0.0
@@ -119,26 +98,19 @@ class Canvas:
         if ends is None:
             return
         screen, inverse = self.fine.project(ends)
-        along = screen[1] - screen[0]
-        length = float(np.hypot(*along))
-        if length < 1e-9:
+        if float(np.hypot(*(screen[1] - screen[0]))) < 1e-9:
             return
-        half = width * OVERSAMPLING / 2
-        low = np.floor(np.clip(screen.min(axis=0) - half - 1, 0, [self.fine.width, self.fine.height])).astype(int)
-        high = np.ceil(np.clip(screen.max(axis=0) + half + 1, 0, [self.fine.width, self.fine.height])).astype(int)
-        if (high <= low).any():
-            return
-        ys, xs = np.mgrid[low[1] : high[1], low[0] : high[0]] + 0.5
-        s = ((xs - screen[0, 0]) * along[0] + (ys - screen[0, 1]) * along[1]) / length**2
-        s = np.clip(s, 0, 1)
-        off = np.hypot(xs - screen[0, 0] - s * along[0], ys - screen[0, 1] - s * along[1])
-        cover = np.clip(half + 0.5 - off, 0, 1)
-        window = (slice(low[1], high[1]), slice(low[0], high[0]))
-        # Lies on the surface where it ends: a little slack keeps its ends in sight.
-        seen = inverse[0] + s * (inverse[1] - inverse[0]) >= self.depth[window] * 0.995
-        dash = np.mod(s * length, 14 * OVERSAMPLING) < 8 * OVERSAMPLING
-        opacity = cover * np.where(seen, alpha, hidden * dash)
-        self.rgb[window] += opacity[..., None] * (np.array(color) - self.rgb[window])
+        half, dash = width * OVERSAMPLING / 2, 14.0 * OVERSAMPLING
+        stroke(self.rgb, self.depth, screen, inverse, np.array(color, float), half, alpha, hidden, dash)
+
+    def _layer(self) -> tuple[Array, Array, NDArray[np.int32]]:
+        """Empty buffers (1/z, brightness, owner) for one surface; the next call takes them back."""
+        if self._scratch is None:
+            self._scratch = np.zeros_like(self.depth), np.zeros_like(self.depth), np.full_like(self.owner, -1)
+        else:
+            self._scratch[0].fill(0)
+            self._scratch[2].fill(-1)
+        return self._scratch
 
     def dot(self, point: Array, color: Color, *, radius: float) -> None:
         """A filled disc of ``radius`` [px] with a light rim, never hidden."""
@@ -156,13 +128,11 @@ class Canvas:
         off = np.hypot(xs - screen[0, 0], ys - screen[0, 1])
         for size, paint in ((radius + 1.5, (1.0, 1.0, 1.0)), (radius, color)):
             cover = np.clip(size * OVERSAMPLING + 0.5 - off, 0, 1)[..., None]
-            self.rgb[window] += cover * (np.array(paint) - self.rgb[window])
+            self.rgb[window] += (cover * (np.array(paint) - self.rgb[window])).astype(np.float32)
 
     def pixels(self) -> NDArray[np.uint8]:
         """The picture so far, shape (height, width, 3)."""
-        n = OVERSAMPLING
-        mean = self.rgb.reshape(self.camera.height, n, self.camera.width, n, 3).mean(axis=(1, 3))
-        return np.asarray(np.clip(mean * 255 + 0.5, 0, 255), np.uint8)
+        return np.asarray(averaged(self.rgb, OVERSAMPLING))
 
 
 def brightness(vertices: Array, normals: Array, eye: Array) -> Array:
@@ -187,6 +157,25 @@ def clipped(camera: Camera, ends: Array) -> Array | None:
     return np.array([cut, ends[1]]) if z[0] <= 0 else np.array([ends[0], cut])
 
 
+def in_front(camera: Camera, corners: Array) -> Array:
+    """The part of triangles (m, 3, 3) in front of the camera, as triangles (k, 3, 3)."""
+    z = camera.local(corners)[:, 2].reshape(-1, 3) - 2 * NEAR
+    whole = corners[(z > 0).all(axis=1)]
+    made = []
+    for triangle, depth in zip(corners, z, strict=True):
+        if (depth > 0).all() or not (depth > 0).any():
+            continue
+        kept = []
+        for k in range(3):
+            a, b = depth[k], depth[k - 2]
+            if a > 0:
+                kept.append(triangle[k])
+            if (a > 0) != (b > 0):
+                kept.append(triangle[k] + a / (a - b) * (triangle[k - 2] - triangle[k]))
+        made += [[kept[0], kept[k], kept[k + 1]] for k in range(1, len(kept) - 1)]
+    return np.concatenate([whole, np.array(made, float).reshape(-1, 3, 3)])
+
+
 def font(size: int) -> FreeTypeFont:
     """A font that has ✓, ✕ and ↔, which comes along with matplotlib."""
     from pathlib import Path
@@ -208,5 +197,5 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
     from PIL import Image
 
     out = BytesIO()
-    Image.fromarray(pixels).save(out, "PNG", optimize=True)
+    Image.fromarray(pixels).save(out, "PNG", compress_level=6)
     return out.getvalue()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from seerob.snapshot import Basis, Result, Verdict
 
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 Evaluate = Callable[["State"], Result]
 """Called at each tick (or each ``every``); may raise `Undecided`."""
+
+
+_seconds = Meta(gt=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})
 
 
 class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -32,7 +35,7 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     name: str = ""
     """What results are called; made from the kind and the subject when not given."""
-    every: float | None = None
+    every: Annotated[float, _seconds] | None = None
     """Period [s]; each tick when not given."""
 
     def bind(self, model: Model) -> Evaluate:

@@ -74,6 +74,7 @@ class Engine:
         self._period = engine.tick
         self._data = mujoco.MjData(self._mj)
         self._wanted = mujoco.MjData(self._mj)
+        self._shown = mujoco.MjData(self._mj)
         self._mechanisms = list(model.mechanisms.values())
         self._references = {m.name: Reference(m.home) for m in self._mechanisms}
         self._hearings = {
@@ -87,9 +88,10 @@ class Engine:
         self._kp, self._kd = self._gains()
         self._limits = self._torque_limits()
         self._feedforward = np.zeros(self._mj.nv)
+        self._before = np.zeros(self._mj.nv)
         self._unreachable: dict[str, float] = {}
         self.signals: dict[str, dict[str, float | bool | str]] = {}
-        self.state = State(model, self._data, self._hearings)
+        self.state = State(model, self._shown, self._hearings)
         self._tick = 0
         self._place(0.0)
 
@@ -169,11 +171,12 @@ class Engine:
         for step in range(self._steps):
             if self.controllers:
                 self._pull(start + step * self._dt)
+            self._before[:] = self._data.qvel
             mujoco.mj_step(self._mj, self._data)
         self._tick += 1
         self._check_finite()
         t = self._tick * self._period
-        self.state.refresh(t)
+        self._show(t)
         self._note_errors(t)
         return self.state
 
@@ -204,6 +207,16 @@ class Engine:
             self._data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
             self._data.qvel[mechanism.v_address] = mechanism.coupling @ v
         mujoco.mj_forward(self._mj, self._data)
+        self._before[:] = self._data.qvel
+        self._show(t)
+
+    def _show(self, t: float) -> None:
+        shown, data = self._shown, self._data
+        shown.qpos[:] = data.qpos
+        shown.qvel[:] = data.qvel
+        if self.controllers and not data.ncon:
+            # The velocities of mj_step belong half a step earlier than its positions (see _pull).
+            shown.qvel += 0.5 * (data.qvel - self._before)
         self.state.refresh(t)
 
     def _note_errors(self, t: float) -> None:

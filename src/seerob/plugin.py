@@ -11,9 +11,13 @@ import inspect
 import pkgutil
 from typing import TypeVar
 
-from seerob.errors import UnknownName
+from seerob.errors import SeerobError, UnknownName
 
 T = TypeVar("T")
+
+
+class PluginError(SeerobError):
+    """A module that a kind names cannot be used; says what is wrong with it."""
 
 
 def kinds(package: str) -> tuple[str, ...]:
@@ -31,8 +35,11 @@ def load(package: str, kind: str, base: type[T]) -> type[T]:
         base: What the class must derive from.
 
     Raises:
-        UnknownName: No such module, or not exactly one class of that base in it.
+        UnknownName: No such kind.
+        PluginError: A module that is not there, that fails, or that has not exactly one such class.
     """
+    if not all(part.isidentifier() for part in kind.split(".")):
+        raise UnknownName(f"kind of [[{package}]]", kind, kinds(package))
     if "." in kind:
         name = kind
     elif kind in kinds(package):
@@ -42,14 +49,21 @@ def load(package: str, kind: str, base: type[T]) -> type[T]:
     try:
         module = importlib.import_module(name)
     except ModuleNotFoundError as error:
-        if error.name is not None and not name.startswith(error.name):
-            raise UnknownName(f"package, needed by kind {kind!r},", error.name, ()) from error
-        raise UnknownName(f"module for kind of [[{package}]]", kind, kinds(package)) from error
+        if error.name is not None and not (name + ".").startswith(error.name + "."):
+            raise PluginError(f"kind {kind!r} needs the package {error.name!r}: install it") from error
+        raise PluginError(
+            f"no module {name!r} for this kind; install it or put its folder on PYTHONPATH, "
+            f"or take one of: {', '.join(kinds(package)) or 'none'}"
+        ) from error
+    except Exception as error:
+        what = f"{type(error).__name__}: {error}"
+        raise PluginError(f"the module of kind {kind!r} fails when it is imported: {what}") from error
     classes = [
         c
         for _, c in inspect.getmembers(module, inspect.isclass)
         if issubclass(c, base) and c is not base and c.__module__ == name and not c.__name__.startswith("_")
     ]
     if len(classes) != 1:
-        raise UnknownName(f"single {base.__name__} in module", name, [c.__name__ for c in classes])
+        found = ", ".join(c.__name__ for c in classes) or "none"
+        raise PluginError(f"module {name!r} must define one {base.__name__}, it defines: {found}")
     return classes[0]

@@ -10,13 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Annotated
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from seerob.model_io.description import Description
 from seerob.samples import JointSample, Quality, Sample
 from seerob.snapshot import Finding
+
+_seconds = Meta(gt=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})
 
 
 class Target(Struct, frozen=True, kw_only=True):
@@ -52,12 +55,12 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     name: str = ""
     """Made from the kind and the target when not given."""
-    timeout: float = 0.2
+    timeout: Annotated[float, _seconds] = 0.2
     """Age at which what it said no longer counts [s]: dependent verdicts turn UNDECIDED."""
     loop: bool = False
     """Start again at the end. If the ends differ, the way back takes ``loop_pause`` and is UNDECIDED:
     nobody drove it."""
-    loop_pause: float = 1.0
+    loop_pause: Annotated[float, _seconds] = 1.0
     """[s]"""
 
     def target(self) -> str:

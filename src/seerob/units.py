@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 SUFFIXES: dict[str, tuple[str, float]] = {
     "mm": ("m", 1e-3),
@@ -30,11 +31,10 @@ LENGTHS: dict[str, float] = {
 """Units a mesh file may be in → metres."""
 
 
-def split(key: str) -> tuple[str, str, float] | None:
-    """``('rpy', 'rad', π/180)`` of ``'rpy_deg'``; None when the key carries no known suffix."""
+def splits(key: str) -> Iterator[tuple[str, str, float]]:
+    """``('rpy', 'rad', π/180)`` of ``'rpy_deg'``: every way to read a suffix, the longest first."""
     for suffix in sorted(SUFFIXES, key=len, reverse=True):
         stem = key.removesuffix("_" + suffix)
         if stem and stem != key:
             unit, factor = SUFFIXES[suffix]
-            return stem, unit, factor
-    return None
+            yield stem, unit, factor

@@ -7,14 +7,13 @@
 from __future__ import annotations
 
 import hashlib
-import re
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from msgspec import Meta, Struct
 
-from seerob.errors import InputError, Problem, suggestion
+from seerob.errors import InputError
 
 MAX_FILE_SIZE = 4 << 20
 """A workstation file larger than this [byte] is not one."""
@@ -37,6 +36,7 @@ Hertz = Annotated[float, _unit("Hz", gt=0)]
 Metres3 = Annotated[tuple[float, float, float], _unit("m")]
 Radians3 = Annotated[tuple[float, float, float], _unit("rad")]
 Radians = Annotated[tuple[float, ...], _unit("rad")]
+Share = Annotated[float, Meta(ge=0, le=1)]
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=80)]
 PathName = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.\-]+(/[A-Za-z0-9_.\-]+)*$", max_length=200)]
 
@@ -160,7 +160,7 @@ class Thing(_Table, frozen=True, kw_only=True):
     """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]."""
     density: Density | None = None
     """Uniform density [kg/m³] to compute the mass from the shape."""
-    color: tuple[float, float, float] | None = None
+    color: tuple[Share, Share, Share] | None = None
     """Red, green, blue in 0…1."""
 
     def __post_init__(self) -> None:
@@ -265,6 +265,17 @@ class Workstation(_Table, frozen=True, kw_only=True):
     """The file itself, and after `compile` every file it names; not written in it."""
 
 
+TABLES: dict[str, type[Struct]] = {
+    "robots": Robot,
+    "tools": Tool,
+    "workpieces": Workpiece,
+    "parts": Part,
+    "areas": Area,
+    "humans": Human,
+    "contacts": Contact,
+}
+"""Lists of tables and the type of their entries."""
+
 PLUGINS = ("sources", "safety", "ergonomics", "sinks")
 """Tables whose type is told by their ``kind``."""
 
@@ -276,30 +287,45 @@ def locate(path: Path | str) -> Path:
         InputError: There is none.
     """
     path = Path(path)
-    if path.is_dir():
-        path = path / FILE_NAME
-    if not path.is_file():
-        raise InputError.at(
-            path, "", "no such file", f"give a folder with a {FILE_NAME}, or make one with `seerob new`"
-        )
-    return path
+    try:
+        file = path / FILE_NAME if path.is_dir() else path
+        found = file.is_file()
+    except (OSError, ValueError) as error:
+        raise InputError.at(path, "", f"no such file: {error}", "give a folder or a file") from error
+    if not found:
+        remedy = f"give a folder with a {FILE_NAME}, or make one with `seerob new`"
+        raise InputError.at(file, "", "no such file", remedy)
+    return file
 
 
 def read_toml(path: Path) -> tuple[dict[str, Any], bytes]:
     """Content of a TOML file, parsed and raw.
 
     Raises:
-        InputError: Too large, not UTF-8, or not TOML; names line and column.
+        InputError: Too large, not readable, not UTF-8, or not TOML; names line and column.
     """
-    if path.stat().st_size > MAX_FILE_SIZE:
-        raise InputError.at(path, "", f"larger than {MAX_FILE_SIZE} bytes", "is this a workstation file?")
-    raw = path.read_bytes()
+    try:
+        with path.open("rb") as file:
+            raw = file.read(MAX_FILE_SIZE + 1)
+    except OSError as error:
+        raise InputError.at(path, "", f"cannot be read: {error.strerror}", "check its permissions") from error
+    if len(raw) > MAX_FILE_SIZE:
+        raise InputError.at(
+            path,
+            "",
+            f"larger than {MAX_FILE_SIZE >> 20} MiB",
+            "give a workstation file, which is far smaller",
+        )
     try:
         return tomllib.loads(raw.decode("utf-8-sig").replace("\r\n", "\n")), raw
     except UnicodeDecodeError as error:
-        raise InputError.at(path, f"byte {error.start}", "not UTF-8", "save it as UTF-8 text") from error
-    except tomllib.TOMLDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise InputError.at(path, f"line {line}", "not UTF-8", "save it as UTF-8 text") from error
+    except (tomllib.TOMLDecodeError, ValueError) as error:
+        # Also what tomllib lets through: a date that does not exist, a number of 10 000 digits.
         raise InputError.at(path, "", f"not TOML: {error}", "see https://toml.io for the syntax") from error
+    except RecursionError as error:
+        raise InputError.at(path, "", "nested too deeply", "no table needs more than four levels") from error
 
 
 def content_hash(files: dict[str, bytes]) -> str:
@@ -309,50 +335,3 @@ def content_hash(files: dict[str, bytes]) -> str:
         digest.update(f"{name}\0{len(files[name])}\0".encode())
         digest.update(files[name])
     return digest.hexdigest()
-
-
-def check_names(station: Workstation, file: str) -> list[Problem]:
-    """Mistakes that span tables: a name twice, a mount that does not exist or goes in a circle."""
-    problems: list[Problem] = []
-    seen: dict[str, str] = {}
-    for table in ("robots", "tools", "workpieces", "parts", "areas", "humans"):
-        for i, entry in enumerate(getattr(station, table)):
-            key = f"{table}[{i}].name"
-            if entry.name in seen:
-                problems.append(
-                    Problem(
-                        file, key, f"the name {entry.name!r} is taken by {seen[entry.name]}", "choose another"
-                    )
-                )
-            seen.setdefault(entry.name, key)
-    robots = {robot.name for robot in station.robots}
-    mounts = {thing.name: thing.on for thing in (*station.tools, *station.workpieces)}
-    mounted: list[tuple[str, Mounted]] = [(f"tools[{i}].on", t) for i, t in enumerate(station.tools)]
-    mounted += [(f"workpieces[{i}].on", w) for i, w in enumerate(station.workpieces)]
-    for key, thing in mounted:
-        at, steps = thing.on, 0
-        while at in mounts and steps <= len(mounts):
-            at, steps = mounts[at], steps + 1
-        if steps > len(mounts):
-            problems.append(
-                Problem(file, key, f"{thing.name!r} is mounted on itself in a circle", "break it")
-            )
-        elif at.split("/")[0] not in robots:
-            known = [*(f"{robot}/<link>" for robot in robots), *mounts]
-            problems.append(
-                Problem(file, key, f"nothing named {thing.on!r} to mount on", suggestion(at, known))
-            )
-    return problems
-
-
-def source_target_problem(name: str, known: set[str], file: str, key: str) -> Problem | None:
-    """The mistake of a source that drives what does not exist."""
-    if name and name not in known:
-        return Problem(file, key, f"no robot or human named {name!r}", suggestion(name, known))
-    return None
-
-
-def default_name(kind: str, subjects: tuple[str, ...]) -> str:
-    """``minimum distance ur10 – operator`` of a kind and the names it speaks of."""
-    words = re.sub(r"[_.]+", " ", kind).strip()
-    return f"{words} {' – '.join(subjects)}".strip()

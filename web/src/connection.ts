@@ -70,7 +70,7 @@ export class Connection {
     switch (message.kind) {
       case "link":
         if (link.value.state !== "refused") link.value = { state: message.state, reason: message.reason };
-        
+        if (message.state !== "open") stale.value = true;
         return;
       case "hello":
         hello.value = message.hello;
@@ -138,7 +138,7 @@ export class Connection {
 
   // Live numbers that stopped coming must not stay on the screen as if they were true.
   private watch(): void {
-    if (link.value.state !== "open") return;
+    if (link.value.state !== "open") stale.value = true;
     else if (isLive.value && lookingAt.value === null)
       stale.value = performance.now() - this.heardAt > SILENCE_MS;
     else stale.value = frame.value === null && this.pending === null;

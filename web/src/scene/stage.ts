@@ -40,7 +40,7 @@ export class Stage {
     element.append(this.renderer.domElement);
     this.scene.background = new Color(BACKGROUND);
     this.scene.fog = new Fog(BACKGROUND, 14, 40);
-    this.world.rotation.x = Math.PI / 2;
+    this.world.rotation.x = -Math.PI / 2;
     this.rig.add(this.camera);
     this.scene.add(this.world, this.rig, ...lights(), floor(), this.grid);
     new ResizeObserver(() => this.resize()).observe(element);

@@ -159,7 +159,12 @@ def _value(value: Any, wanted: Any, place: str, file: str, problems: list[Proble
     unusable = _unusable(value, place)
     if unusable is not None:
         problems.append(
-            Problem(file, unusable[0], f"{short(unusable[1])} is wrong", "expected a finite number")
+            Problem(
+                file,
+                unusable[0],
+                f"{short(unusable[1])} is wrong",
+                f"expected a finite number, not beyond {LARGEST:g}",
+            )
         )
         return None
     try:

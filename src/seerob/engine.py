@@ -29,6 +29,8 @@ from seerob.transforms import Array, rotation_from_wxyz
 
 DEFAULT_TIMEOUT = 0.2
 """Of what is heard without a source that states one [s]."""
+LARGEST_SPEED = {"rad": 30.0, "m": 10.0}
+"""Above it two samples are a jump [rad/s or m/s]: no arm and no person at work moves like that."""
 POSES_FOR_GAINS = 16
 POSE_TOLERANCE = 1e-4
 """Largest error of a solved Cartesian target [m or rad] that still counts as reached."""
@@ -76,7 +78,7 @@ class Engine:
         self._wanted = mujoco.MjData(self._mj)
         self._shown = mujoco.MjData(self._mj)
         self._mechanisms = list(model.mechanisms.values())
-        self._references = {m.name: Reference(m.home) for m in self._mechanisms}
+        self._references = {m.name: Reference(m.home, _largest_speed(m)) for m in self._mechanisms}
         self._hearings = {
             m.name: Hearing(
                 given=m.home_given, driven=m.name in driven, timeout=driven.get(m.name, DEFAULT_TIMEOUT)
@@ -104,20 +106,22 @@ class Engine:
                 self.signals[sample.source] = sample.values
                 continue
             mechanism = self._target(sample)
-            quality = sample.quality
+            reason = "" if sample.quality is Quality.GOOD else f"its source says {sample.quality.value}"
+            reference = self._references[mechanism.name]
             if not _finite(sample):
                 # Nothing to be pulled to; not knowing where it is must show all the same.
-                taken, quality = bool(np.isfinite(sample.t)), Quality.INVALID
+                taken, reason = bool(np.isfinite(sample.t)), "its source sends values that are not finite"
             elif isinstance(sample, JointSample):
                 qd = None if sample.qd is None else np.array(sample.qd)
-                taken = self._references[mechanism.name].take(sample.t, np.array(sample.q), qd)
+                taken = reference.take(sample.t, np.array(sample.q), qd)
             else:
                 taken, reached = self._take_pose(mechanism, sample)
-                quality = quality if reached or quality is Quality.INVALID else Quality.DEGRADED
+                reason = reason or ("" if reached else f"{sample.target} cannot reach the pose that was heard")
             hearing = self._hearings[mechanism.name]
             hearing.driven = True
             if taken and (not hearing.heard or sample.t > hearing.heard[-1][0]):
-                hearing.heard.append((sample.t, quality))
+                jump = f"its samples jump at {sample.t:.3f} s" if reference.jumped else ""
+                hearing.heard.append((sample.t, reason or jump))
 
     def _target(self, sample: JointSample | PoseSample) -> Mechanism:
         """Robot or human that a sample drives.
@@ -183,7 +187,10 @@ class Engine:
     def _pull(self, t: float) -> None:
         wanted = self._wanted
         for mechanism in self._mechanisms:
-            q, v, a = self._references[mechanism.name].at(t)
+            reference = self._references[mechanism.name]
+            q, v, a = reference.at(t)
+            if reference.lands(t, self._dt):
+                self._put(mechanism, q, v)
             wanted.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
             # mj_step moves positions with the velocity at the end of the step, so its velocities
             # belong half a step earlier than its positions.
@@ -204,11 +211,14 @@ class Engine:
     def _place(self, t: float) -> None:
         for mechanism in self._mechanisms:
             q, v, _ = self._references[mechanism.name].at(t)
-            self._data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
-            self._data.qvel[mechanism.v_address] = mechanism.coupling @ v
+            self._put(mechanism, q, v)
         mujoco.mj_forward(self._mj, self._data)
         self._before[:] = self._data.qvel
         self._show(t)
+
+    def _put(self, mechanism: Mechanism, q: Array, v: Array) -> None:
+        self._data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
+        self._data.qvel[mechanism.v_address] = mechanism.coupling @ v
 
     def _show(self, t: float) -> None:
         shown, data = self._shown, self._data
@@ -290,6 +300,10 @@ class Engine:
         self._mj.actuator_forcelimited[:] = limited
         self._mj.actuator_forcerange[limited] = np.column_stack([-ranges[limited], ranges[limited]])
         return limits
+
+
+def _largest_speed(mechanism: Mechanism) -> Array:
+    return np.array([LARGEST_SPEED[unit] for unit in mechanism.units])
 
 
 def _finite(sample: JointSample | PoseSample) -> bool:

@@ -69,7 +69,7 @@ def expected(wanted: Any, complaint: str) -> str:
         complaint: Message of a `msgspec.ValidationError` without its place.
     """
     allowed = choices(wanted)
-    if allowed and "enum" in complaint:
+    if allowed and ("enum" in complaint or "Expected `str`" in complaint):
         return "one of: " + ", ".join(allowed)
     pattern = re.search(r"matching regex '(.+)'$", complaint)
     if pattern:
@@ -80,5 +80,5 @@ def expected(wanted: Any, complaint: str) -> str:
         return complaint[:1].lower() + complaint[1:]
     nouns = [_NOUNS.get(name, name) for name in found.group(1).split(" | ") if name != "null"]
     unit = unit_of(wanted)
-    rest = found.group(2).replace(".0", "") if found.group(2) else ""
+    rest = re.sub(r"\.0$", "", found.group(2))
     return f"expected {' or '.join(nouns)}{rest}" + (f" [{unit}]" if unit else "")

@@ -24,7 +24,7 @@ class Named(NamedTuple):
     """A name that the file declares."""
 
     table: str
-    index: int
+    entry: int
     name: str
 
 

@@ -7,6 +7,9 @@ Between two samples the reference is the cubic that has their positions and velo
 so velocity is continuous and acceleration is known, which feed-forward needs. Samples without
 velocities get that of the parabola through them and their neighbours, of the two before for the
 newest. After the newest sample the reference holds its position, before the oldest it waits there.
+
+Two samples that only an impossible speed could join are a jump, not a motion: the reference stays
+where it was until the later one, and the twin is put there instead of being pulled.
 """
 
 from __future__ import annotations
@@ -24,7 +27,15 @@ MAX_KEPT = 4096
 class Reference:
     """Motion of one robot or human through its newest samples, several of which may lie ahead."""
 
-    def __init__(self, home: Array) -> None:
+    def __init__(self, home: Array, largest_speed: Array | float = np.inf) -> None:
+        """Rest at home.
+
+        Args:
+            home: Position before the first sample [rad or m], shape (n,).
+            largest_speed: Above it a motion is a jump [rad/s or m/s], shape (n,) or one for all.
+        """
+        self._largest = largest_speed
+        self._jumps: list[float] = []
         self._zero = np.zeros(len(home))
         self._times: list[float] = []
         self._points: list[Array] = [home.astype(float).copy()]
@@ -58,8 +69,13 @@ class Reference:
         t, q, v = self._times, self._points, self._velocities
         T = t[-1] - t[-2]
         chord = (q[-1] - q[-2]) / T
+        if self._impossible(chord, v[-2], v[-1]):
+            self._jumps.append(t[-1])
+            if self._guessed[-1] or self._impossible(v[-1]):
+                v[-1] = self._zero
+            return
         before, after = chord, chord
-        if len(t) > 2:
+        if len(t) > 2 and t[-2] not in self._jumps:
             T0 = t[-2] - t[-3]
             bend = (chord - (q[-2] - q[-3]) / T0) / (T + T0)
             before, after = chord - T * bend, chord + T * bend
@@ -68,12 +84,26 @@ class Reference:
         if self._guessed[-1]:
             v[-1] = after
 
+    def _impossible(self, *speeds: Array) -> bool:
+        return any(bool((np.abs(speed) > self._largest).any()) for speed in speeds)
+
+    @property
+    def jumped(self) -> bool:
+        """Whether a jump led to the newest sample."""
+        return bool(self._jumps) and self._jumps[-1] == self._times[-1]
+
+    def lands(self, t: float, period: float) -> bool:
+        """Whether a jump ends in the step of ``period`` that ends at ``t`` [s]."""
+        return any(t - period < jump <= t for jump in self._jumps)
+
     def forget(self, t: float) -> None:
         """Drop what is not needed any more from ``t`` [s] on."""
         self._drop(bisect_right(self._times, t) - 1)
 
     def _drop(self, count: int) -> None:
         if count > 0:
+            oldest = self._times[count]
+            self._jumps = [jump for jump in self._jumps if jump >= oldest]
             for kept in (self._times, self._points, self._velocities, self._guessed):
                 del kept[:count]
 
@@ -85,6 +115,8 @@ class Reference:
         k = bisect_right(times, t) - 1
         if k == len(times) - 1:
             return self._points[k], self._velocities[k] if t == times[k] else self._zero, self._zero
+        if times[k + 1] in self._jumps:
+            return self._points[k], self._zero, self._zero
         T = times[k + 1] - times[k]
         s = (t - times[k]) / T
         q0, chord = self._points[k], self._points[k + 1] - self._points[k]

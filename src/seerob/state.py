@@ -16,7 +16,6 @@ import numpy as np
 from seerob.distance import Closest, Closests
 from seerob.errors import Undecided
 from seerob.model import Frame, Gap, Mechanism, Model
-from seerob.samples import Quality
 from seerob.transforms import Array
 
 
@@ -34,8 +33,9 @@ class Hearing:
     """A source drives it."""
     timeout: float = 0.2
     """[s]"""
-    heard: list[tuple[float, Quality]] = field(default_factory=list)
-    """Instant [s] and quality of the newest samples, oldest first; some may lie ahead of the tick."""
+    heard: list[tuple[float, str]] = field(default_factory=list)
+    """Instant [s] of the newest samples and why one may not be relied on (empty: it may), oldest first;
+    some may lie ahead of the tick."""
     error: float = 0.0
     """Largest joint error between twin and reference [rad or m]."""
     saturated: bool = False
@@ -60,10 +60,7 @@ class Hearing:
         age = t - self.heard[k - 1][0]
         if age > self.timeout + SLACK:
             return f"not heard for {age:.2f} s (time-out {self.timeout:g} s)"
-        for _, quality in self.heard[k - 1 : k + 1]:
-            if quality is not Quality.GOOD:
-                return f"its source says {quality.value}"
-        return ""
+        return next((reason for _, reason in self.heard[k - 1 : k + 1] if reason), "")
 
 
 class State:

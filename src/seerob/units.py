@@ -38,3 +38,8 @@ def splits(key: str) -> Iterator[tuple[str, str, float]]:
         if stem and stem != key:
             unit, factor = SUFFIXES[suffix]
             yield stem, unit, factor
+
+
+def split(key: str) -> tuple[str, str, float] | None:
+    """The first of `splits`; None when the key carries no known suffix."""
+    return next(splits(key), None)

@@ -26,14 +26,15 @@ def _unit(unit: str, **limits: Any) -> Any:
 
 
 Metre = Annotated[float, _unit("m")]
-Length = Annotated[float, _unit("m", gt=0)]
-Mass = Annotated[float, _unit("kg", gt=0)]
-Density = Annotated[float, _unit("kg/m³", gt=0)]
+Length = Annotated[float, _unit("m", gt=0, le=1000)]
+Mass = Annotated[float, _unit("kg", gt=0, le=1e6)]
+Density = Annotated[float, _unit("kg/m³", gt=0, le=1e5)]
 Inertia = Annotated[float, _unit("kg·m²")]
 Seconds = Annotated[float, _unit("s", gt=0)]
 Radian = Annotated[float, _unit("rad")]
 Hertz = Annotated[float, _unit("Hz", gt=0)]
-Metres3 = Annotated[tuple[float, float, float], _unit("m")]
+Coordinate = Annotated[float, Meta(ge=-1000, le=1000)]
+Metres3 = Annotated[tuple[Coordinate, Coordinate, Coordinate], _unit("m")]
 Radians3 = Annotated[tuple[float, float, float], _unit("rad")]
 Radians = Annotated[tuple[float, ...], _unit("rad")]
 Share = Annotated[float, Meta(ge=0, le=1)]
@@ -72,7 +73,7 @@ class Engine(_Table, frozen=True, kw_only=True):
     """Natural frequency of the critically damped controllers that pull robots [Hz]."""
     human_bandwidth: Annotated[float, _unit("Hz", ge=1, le=40)] = 10.0
     """The same for people [Hz]."""
-    gravity: Metres3 = (0.0, 0.0, -9.81)
+    gravity: Annotated[tuple[Coordinate, Coordinate, Coordinate], _unit("m/s²")] = (0.0, 0.0, -9.81)
     """[m/s²]"""
     tracking_limit: Annotated[float, _unit("rad", gt=0)] = 0.01
     """Joint error [rad or m] beyond which the twin does not follow what was heard: verdicts that

@@ -40,9 +40,9 @@ def separation_bound(v_r: Array, v_h: float, T_r: float, T_s: float, xi: float) 
 class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How the robot stops."""
 
-    reaction: Annotated[float, Meta(ge=0, extra={"unit": "s"})]
+    reaction: Annotated[float, Meta(gt=0, extra={"unit": "s"})]
     """T_r: from the event to the onset of braking, detection and processing included [s]."""
-    stopping: Annotated[float, Meta(ge=0, extra={"unit": "s"})]
+    stopping: Annotated[float, Meta(gt=0, extra={"unit": "s"})]
     """T_s: from the onset of braking to standstill [s]."""
     model: Literal["bound"] = "bound"
     """``bound``: full speed during the whole stop, Eq. 2."""

@@ -161,10 +161,9 @@ def in_front(camera: Camera, corners: Array) -> Array:
     """The part of triangles (m, 3, 3) in front of the camera, as triangles (k, 3, 3)."""
     z = camera.local(corners)[:, 2].reshape(-1, 3) - 2 * NEAR
     whole = corners[(z > 0).all(axis=1)]
+    cut = (z > 0).any(axis=1) & (z <= 0).any(axis=1)
     made = []
-    for triangle, depth in zip(corners, z, strict=True):
-        if (depth > 0).all() or not (depth > 0).any():
-            continue
+    for triangle, depth in zip(corners[cut], z[cut], strict=True):
         kept = []
         for k in range(3):
             a, b = depth[k], depth[k - 2]

@@ -28,6 +28,8 @@ class Primitive(NamedTuple):
     """Shape (m, 3)."""
     color: tuple[float, float, float]
     """sRGB, 0…1."""
+    alpha: float = 1.0
+    """Opacity, 0…1."""
 
 
 def read_glb(data: bytes, name: str) -> tuple[Primitive, ...]:
@@ -85,13 +87,18 @@ def _primitive(document: dict[str, Any], blob: bytes, primitive: dict[str, Any])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
         vertices, normals = corners.reshape(-1, 3), np.repeat(normal, 3, axis=0)
         faces = np.arange(len(vertices)).reshape(-1, 3)
-    factor = (0.7, 0.7, 0.7)
+    factor, alpha = [0.7, 0.7, 0.7, 1.0], 1.0
     if "material" in primitive:
         material = document["materials"][primitive["material"]]
-        factor = material.get("pbrMetallicRoughness", {}).get("baseColorFactor", factor)
+        factor = [float(x) for x in material.get("pbrMetallicRoughness", {}).get("baseColorFactor", factor)]
+        if len(factor) != 4 or not np.isfinite(factor).all():
+            raise ValueError("base colour")
+        # In glTF the fourth number counts only where blending is asked for.
+        if material.get("alphaMode") == "BLEND":
+            alpha = min(max(factor[3], 0.0), 1.0)
     linear = np.clip(np.array(factor[:3], float), 0, 1)
     r, g, b = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055).tolist()
-    return Primitive(vertices, normals, faces.astype(np.int32), (r, g, b))
+    return Primitive(vertices, normals, faces.astype(np.int32), (r, g, b), alpha)
 
 
 def _accessor(document: dict[str, Any], blob: bytes, index: int, kind: str) -> NDArray[Any]:

@@ -7,21 +7,22 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.errors import InputError
 from seerob.sinks._camera import Camera
 from seerob.sinks._canvas import Canvas, Color, font, png, words
 from seerob.sinks._close_up import close_up, inset
-from seerob.sinks._glb_reader import read_glb
 from seerob.sinks._marker_shapes import draw_marker, label_of, points_of
 from seerob.sinks._palette import DARK, FILL
+from seerob.sinks._stage_bodies import MOVERS, poses, read_bodies
 from seerob.sinks._viewpoint import best_view, scattered
-from seerob.snapshot import Finding, Highlight, Result, Scene, Segment, Snapshot
-from seerob.transforms import Array, rotation_from_wxyz
+from seerob.snapshot import Finding, Highlight, Result, Scene, Segment, Snapshot, Verdict
+from seerob.transforms import Array
 
 SIZE = (1000, 640)
 """Width and height [px]."""
 
-_MOVERS = ("robot", "human", "tool", "workpiece")
+_CLEAREST = 0.3
+"""Greatest opacity of what a mesh calls translucent: robots behind it must stay readable."""
+_MOST_EDGES = 400
 
 
 class Stage:
@@ -29,37 +30,11 @@ class Stage:
 
     def __init__(self, scene: Scene, meshes: dict[str, bytes]) -> None:
         self.scene = scene
-        findings = []
-        vertices, normals, faces, nodes, ids, colors = [], [], [], [], [], []
-        count = 0
-        for i, node in enumerate(scene.nodes):
-            data = meshes.get(node.mesh or "")
-            if data is None:
-                continue
-            try:
-                primitives = read_glb(data, node.name)
-            except InputError as error:
-                text = f"its mesh cannot be shown in pictures: {error.problems[0].what}"
-                findings.append(Finding(level="warning", subject=node.name, text=text))
-                continue
-            for p in primitives:
-                vertices.append(p.vertices)
-                normals.append(p.normals)
-                faces.append(p.faces + count)
-                nodes.append(np.full(len(p.vertices), i))
-                ids.append(np.full(len(p.faces), len(colors), np.int32))
-                colors.append((*p.color, i))
-                count += len(p.vertices)
-        self.findings = tuple(findings)
+        self._bodies = read_bodies(scene, meshes)
+        self.findings: tuple[Finding, ...] = self._bodies.findings
         """Nodes whose mesh cannot be read."""
-        self._vertices = np.concatenate([np.zeros((0, 3)), *vertices])
-        self._normals = np.concatenate([np.zeros((0, 3)), *normals])
-        self._faces: NDArray[np.int32] = np.concatenate([np.zeros((0, 3), np.int32), *faces]).astype(np.int32)
-        self._node = np.concatenate([np.zeros(0), *nodes]).astype(np.int64)
-        self._ids: NDArray[np.int32] = np.concatenate([np.zeros(0, np.int32), *ids]).astype(np.int32)
-        table = np.array(colors).reshape(-1, 4)
-        self._scatter_weight, self._scatter_face = scattered(self._vertices, self._faces, 20_000)
-        self._colors, self._color_node = table[:, :3], table[:, 3].astype(np.int64)
+        self._names = [node.name for node in scene.nodes]
+        self._weight, self._face = scattered(self._bodies.vertices, self._bodies.faces, 12_000)
 
     def picture(
         self,
@@ -79,46 +54,50 @@ class Stage:
             size: Width and height [px].
             camera: The view; found when not given.
         """
-        placed = self._placed(snapshot)
+        placed = self._bodies.placed(snapshot)
         if camera is None:
-            camera = self._view(placed[0], result, tuple(subjects), size)
-        canvas = self._drawn(camera, placed, result)
+            camera = self._view(placed[0], snapshot, result, tuple(subjects), size)
+        canvas = self._drawn(camera, placed, snapshot, result)
         image = self._with_labels(canvas, result)
         near = close_up(camera, () if result is None else result.markers)
         if near is not None:
-            image = inset(image, canvas, self._drawn(near, placed, result).pixels())
+            image = inset(image, canvas, self._drawn(near, placed, snapshot, result).pixels())
         return png(image)
 
-    def _drawn(self, camera: Camera, placed: tuple[Array, Array], result: Result | None) -> Canvas:
+    def _drawn(
+        self, camera: Camera, placed: tuple[Array, Array], snapshot: Snapshot, result: Result | None
+    ) -> Canvas:
         vertices, normals = placed
+        bodies = self._bodies
         canvas = Canvas(camera)
-        canvas.shadow(vertices, self._faces, 0.0)
+        canvas.shadow(vertices, bodies.faces, 0.0)
         self._grid(canvas, vertices)
-        canvas.bodies(vertices, normals, self._faces, self._ids, self._painted(result))
+        lit = self._highlights(result)
+        colors = bodies.colors.copy()
+        for node, verdict in lit.items():
+            colors[bodies.color_node == node] = FILL[verdict]
+        canvas.bodies(vertices, normals, bodies.faces, bodies.ids, colors)
+        self._clear(canvas, snapshot, lit)
         for marker in () if result is None else result.markers:
             draw_marker(canvas, marker)
         return canvas
 
-    def _placed(self, snapshot: Snapshot) -> tuple[Array, Array]:
-        poses = np.frombuffer(snapshot.poses, "<f4").reshape(-1, 7).astype(float)
-        # A node that nobody placed has no orientation; it stays where it was drawn.
-        wxyz = np.where(np.linalg.norm(poses[:, 3:], axis=1, keepdims=True) > 0, poses[:, 3:], [1.0, 0, 0, 0])
-        rotation = rotation_from_wxyz(wxyz)[self._node]
-        vertices = np.einsum("nij,nj->ni", rotation, self._vertices) + poses[self._node, :3]
-        return vertices, np.einsum("nij,nj->ni", rotation, self._normals)
+    def _highlights(self, result: Result | None) -> dict[int, Verdict | None]:
+        markers = () if result is None else result.markers
+        named = [m for m in markers if isinstance(m, Highlight) and m.body in self._names]
+        return {self._names.index(m.body): m.verdict for m in named}
 
-    def _painted(self, result: Result | None) -> Array:
-        """Colours with highlighted bodies in the colour of their verdict and bystanders pale."""
-        colors = self._colors.copy()
-        names = [node.name for node in self.scene.nodes]
-        for i, node in enumerate(self.scene.nodes):
-            if node.role not in _MOVERS:
-                rows = self._color_node == i
-                colors[rows] = 0.55 * colors[rows] + 0.45 * np.array([0.86, 0.87, 0.88])
-        for marker in () if result is None else result.markers:
-            if isinstance(marker, Highlight) and marker.body in names:
-                colors[self._color_node == names.index(marker.body)] = FILL[marker.verdict]
-        return colors
+    def _clear(self, canvas: Canvas, snapshot: Snapshot, lit: dict[int, Verdict | None]) -> None:
+        """Translucent bodies, far ones first."""
+        position, rotation = poses(snapshot)
+        shown = [(c, c.vertices @ rotation[c.node].T + position[c.node]) for c in self._bodies.clear]
+        for clear, vertices in sorted(shown, key=lambda s: -canvas.camera.local(s[1].mean(axis=0))[0, 2]):
+            fill, line = clear.color, (0.42, 0.36, 0.12)
+            if clear.node in lit:
+                fill, line = FILL[lit[clear.node]], DARK[lit[clear.node]]
+            canvas.veil(vertices, clear.faces, fill, min(clear.alpha, _CLEAREST))
+            for a, b in clear.edges[:_MOST_EDGES].tolist():
+                canvas.line(vertices[a], vertices[b], line, width=1.3, alpha=0.75)
 
     def _grid(self, canvas: Canvas, vertices: Array) -> None:
         shown = vertices if len(vertices) else np.zeros((1, 3))
@@ -137,28 +116,40 @@ class Stage:
     # -- the view -------------------------------------------------------------------------------
 
     def _view(
-        self, vertices: Array, result: Result | None, subjects: tuple[str, ...], size: tuple[int, int]
+        self,
+        vertices: Array,
+        snapshot: Snapshot,
+        result: Result | None,
+        subjects: tuple[str, ...],
+        size: tuple[int, int],
     ) -> Camera:
-        corners = vertices[self._faces[self._scatter_face]]
-        surface = np.einsum("nk,nkj->nj", self._scatter_weight, corners)
-        owner = self._node[self._faces[self._scatter_face, 0]]
+        # What is translucent hides nothing, so only opaque surfaces count.
+        faces = self._bodies.faces[self._face]
+        surface = np.einsum("nk,nkj->nj", self._weight, vertices[faces])
+        owner = self._bodies.node[faces[:, 0]]
         markers = () if result is None else result.markers
-        names = [node.name for node in self.scene.nodes]
-        return best_view(surface, owner, markers, names, self._focus(vertices, result, subjects), size)
+        focus = self._focus(vertices, snapshot, result, subjects)
+        return best_view(surface, owner, markers, self._names, focus, size)
 
-    def _focus(self, vertices: Array, result: Result | None, subjects: tuple[str, ...]) -> Array:
+    def _focus(
+        self, vertices: Array, snapshot: Snapshot, result: Result | None, subjects: tuple[str, ...]
+    ) -> Array:
         def belongs(name: str, owner: str, role: str) -> bool:
             if subjects:
                 return any(s in (name, owner) or name.startswith(s + "/") for s in subjects)
-            return role in _MOVERS
+            return role in MOVERS
 
         wanted = [i for i, n in enumerate(self.scene.nodes) if belongs(n.name, n.owner, n.role)]
-        shown = vertices[np.isin(self._node, wanted)]
-        if not len(shown):
-            shown = vertices if len(vertices) else np.array([[-1.0, -1, 0], [1, 1, 2]])
+        shown = vertices[np.isin(self._bodies.node, wanted)]
+        extremes = [shown[:: max(1, len(shown) // 5000)]]
+        position, rotation = poses(snapshot)
+        for c in self._bodies.clear:
+            if subjects and c.node in wanted:
+                extremes.append(c.vertices @ rotation[c.node].T + position[c.node])
+        if not sum(map(len, extremes)):
+            extremes = [vertices if len(vertices) else np.array([[-1.0, -1, 0], [1, 1, 2]])]
         marks = [] if result is None else [p for m in result.markers for p in points_of(m)]
-        extremes = shown[:: max(1, len(shown) // 5000)]
-        return np.concatenate([extremes, np.array(marks).reshape(-1, 3)])
+        return np.concatenate([*extremes, np.array(marks).reshape(-1, 3)])
 
     # -- words ----------------------------------------------------------------------------------
 

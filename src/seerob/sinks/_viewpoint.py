@@ -82,6 +82,8 @@ def _worth(
             length = float(np.linalg.norm(along))
             if length > 1e-6:
                 worth += 0.8 * float(np.linalg.norm(np.cross(along / length, camera.axes[2])))
+            # The ends are where the figure comes from: a view that hides one is worth little.
+            worth += 1.5 * _in_sight(camera, depth, points)
             points = points[0] + np.linspace(0, 1, 12)[:, None] * along
             worth += _in_sight(camera, depth, points)
         else:

@@ -83,7 +83,9 @@ def main() -> int:
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     found = measure(1.0 if options.smoke else 20.0)
-    print(f"two robots, one person: {found['dof']} dof, {found['criteria']} criteria, {found['ticks']} ticks, one core")
+    print(
+        f"two robots, one person: {found['dof']} dof, {found['criteria']} criteria, {found['ticks']} ticks, one core"
+    )
     print(
         "median {median_ms:.2f} ms (engine {engine_ms:.2f}, criteria {criteria_ms:.2f}, snapshot {snapshot_ms:.2f}), "
         "p99 {p99_ms:.2f}, max {max_ms:.2f}".format(**found)

@@ -18,7 +18,18 @@ FOLDER = Path(__file__).parents[1] / "workstations" / "ur10_assembly"
 
 def once() -> float:
     begin = time.perf_counter()
-    command = [sys.executable, "-m", "seerob.cli", "run", str(FOLDER), "--port", "0", "--no-record", "--seconds", "0.01"]
+    command = [
+        sys.executable,
+        "-m",
+        "seerob.cli",
+        "run",
+        str(FOLDER),
+        "--port",
+        "0",
+        "--no-record",
+        "--seconds",
+        "0.01",
+    ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert "ran" in done.stdout, done.stdout + done.stderr
     return time.perf_counter() - begin
@@ -31,7 +42,9 @@ def main() -> int:
     subprocess.run([sys.executable, "-c", "import mujoco, numba, trimesh"], check=True)
     bare = time.perf_counter() - bare
     median = statistics.median(times)
-    print(f"start to the end of a run of two ticks: median {median:.2f} s of {len(times)} (goal: <= 5 s warm)")
+    print(
+        f"start to the end of a run of two ticks: median {median:.2f} s of {len(times)} (goal: <= 5 s warm)"
+    )
     print(f"ratio to `import mujoco, numba, trimesh` alone: {median / bare:.1f}")
     return 0
 

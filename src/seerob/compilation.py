@@ -127,7 +127,7 @@ class _Compiler:
                     self.file, "q", f"{len(robot.q)} values", f"{robot.name} has {n} joints: give {n}"
                 )
             home = np.array(robot.q, float)
-        self._chain(robot.name, description, "robot", _matrix(robot.base), home, robot.q is not None)
+        self._chain(robot.name, description, "robot", pose_matrix(robot.base), home, robot.q is not None)
         self.mounting.files |= filed(
             robot.name,
             description.files,
@@ -194,7 +194,7 @@ class _Compiler:
             hand=human.hand,
         )
         home = posture.posture(description, human.posture, joints=human.joints, file=f"{human.name}.joints")
-        self._chain(human.name, description, "human", _matrix(human.at), home, True)
+        self._chain(human.name, description, "human", pose_matrix(human.at), home, True)
 
     def _chain(
         self, name: str, description: Description, role: str, world_from_base: Array, home: Array, given: bool
@@ -228,12 +228,12 @@ class _Compiler:
     # -- things -----------------------------------------------------------------------------
 
     def _part(self, part: Any) -> None:
-        self._thing(part, "part", None, _matrix(part.at), PART_COLOR)
+        self._thing(part, "part", None, pose_matrix(part.at), PART_COLOR)
 
     def _area(self, area: Area) -> None:
         if area.on is not None and not self.mounting.has(area.on):
             raise UnknownName("link, tool or bone", area.on, self.carriers)
-        self._thing(area, "area", area.on, _matrix(area.at), AREA_COLOR)
+        self._thing(area, "area", area.on, pose_matrix(area.at), AREA_COLOR)
 
     def _mount_all(self) -> None:
         """Mount tools and workpieces; what they are mounted on may come later in the file."""
@@ -256,13 +256,13 @@ class _Compiler:
 
     def _mount(self, role: str, thing: Mounted) -> None:
         color = TOOL_COLOR if role == "tool" else WORKPIECE_COLOR
-        self._thing(thing, role, thing.on, _matrix(thing.at), color)
+        self._thing(thing, role, thing.on, pose_matrix(thing.at), color)
         carrier = self.carriers[thing.on]
         if isinstance(thing, Tool):
             chain = self.chains[carrier]
             robot = next(r for r in self.station.robots if r.name == carrier)
             if thing.tcp is not None and robot.tool in (None, thing.name):
-                chain.tip = Frame(thing.name, -1, _matrix(thing.tcp))
+                chain.tip = Frame(thing.name, -1, pose_matrix(thing.tcp))
 
     def _thing(
         self,
@@ -447,7 +447,7 @@ class _Compiler:
         return findings
 
 
-def _matrix(pose: Pose) -> Array:
+def pose_matrix(pose: Pose) -> Array:
     """Homogeneous matrix (4, 4) of a pose in the file."""
     if pose.wxyz is not None:
         return transform(rotation_from_wxyz(pose.wxyz), pose.position)

@@ -31,6 +31,8 @@ DEFAULT_TIMEOUT = 0.2
 """Of what is heard without a source that states one [s]."""
 LARGEST_SPEED = {"rad": 30.0, "m": 10.0}
 """Above it two samples are a jump [rad/s or m/s]: no arm and no person at work moves like that."""
+WILD = 300.0
+"""Above it the physics has lost a joint [rad/s or m/s]."""
 POSES_FOR_GAINS = 16
 POSE_TOLERANCE = 1e-4
 """Largest error of a solved Cartesian target [m or rad] that still counts as reached."""
@@ -57,7 +59,8 @@ class Engine:
         Args:
             model: The compiled workstation.
             driven: Time-out [s] of the source of each robot and human that a source drives.
-            controllers: Whether the twin is pulled at all; off, it moves freely.
+            controllers: Whether the twin is pulled at all; off, it moves freely from where the first
+                samples put it, and nothing that is heard later is compared with it.
             contacts: Whether the contacts that the file asks for act.
         """
         driven = driven or {}
@@ -81,7 +84,10 @@ class Engine:
         self._references = {m.name: Reference(m.home, _largest_speed(m)) for m in self._mechanisms}
         self._hearings = {
             m.name: Hearing(
-                given=m.home_given, driven=m.name in driven, timeout=driven.get(m.name, DEFAULT_TIMEOUT)
+                # What moves freely is where it is, whatever is heard.
+                given=m.home_given or not controllers,
+                driven=m.name in driven and controllers,
+                timeout=driven.get(m.name, DEFAULT_TIMEOUT),
             )
             for m in self._mechanisms
         }
@@ -118,7 +124,7 @@ class Engine:
                 taken, reached = self._take_pose(mechanism, sample)
                 reason = reason or ("" if reached else f"{sample.target} cannot reach the pose that was heard")
             hearing = self._hearings[mechanism.name]
-            hearing.driven = True
+            hearing.driven = self.controllers
             if taken and (not hearing.heard or sample.t > hearing.heard[-1][0]):
                 jump = f"its samples jump at {sample.t:.3f} s" if reference.jumped else ""
                 hearing.heard.append((sample.t, reason or jump))
@@ -177,6 +183,9 @@ class Engine:
                 self._pull(start + step * self._dt)
             self._before[:] = self._data.qvel
             mujoco.mj_step(self._mj, self._data)
+            # Not "> WILD": what is not a number must be caught too.
+            if self.controllers and not np.abs(self._data.qvel).max(initial=0.0) < WILD:
+                self._put_back(start + (step + 1) * self._dt)
         self._tick += 1
         self._check_finite()
         t = self._tick * self._period
@@ -189,7 +198,7 @@ class Engine:
         for mechanism in self._mechanisms:
             reference = self._references[mechanism.name]
             q, v, a = reference.at(t)
-            if reference.lands(t, self._dt):
+            if reference.lands(t):
                 self._put(mechanism, q, v)
             wanted.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
             # mj_step moves positions with the velocity at the end of the step, so its velocities
@@ -220,6 +229,15 @@ class Engine:
         self._data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
         self._data.qvel[mechanism.v_address] = mechanism.coupling @ v
 
+    def _put_back(self, t: float) -> None:
+        """Put what the physics has lost back to where it should be; its verdicts wait until it follows."""
+        for mechanism in self._mechanisms:
+            if not np.abs(self._data.qvel[mechanism.v_address]).max(initial=0.0) < WILD:
+                q, v, _ = self._references[mechanism.name].at(t)
+                self._put(mechanism, q, v)
+                self._data.qacc_warmstart[mechanism.v_address] = 0.0
+                self._hearings[mechanism.name].lost = t
+
     def _show(self, t: float) -> None:
         shown, data = self._shown, self._data
         shown.qpos[:] = data.qpos
@@ -230,6 +248,8 @@ class Engine:
         self.state.refresh(t)
 
     def _note_errors(self, t: float) -> None:
+        if not self.controllers:
+            return
         force = np.zeros(self._mj.nv)
         force[self._dof] = np.abs(self._data.actuator_force)
         for mechanism in self._mechanisms:

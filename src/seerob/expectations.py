@@ -19,10 +19,6 @@ _NOUNS = {
     "object": "a table {...}",
     "null": "nothing",
 }
-_PATTERNS = {
-    r"^[A-Za-z0-9_.\-]+$": "letters, digits, '_', '.' and '-' only",
-    r"^[A-Za-z0-9_.\-]+(/[A-Za-z0-9_.\-]+)*$": "letters, digits, '_', '.', '-', and '/' between them only",
-}
 
 
 def members(wanted: Any) -> tuple[Any, ...]:
@@ -61,6 +57,14 @@ def choices(wanted: Any) -> tuple[str, ...]:
     return tuple(found)
 
 
+def _described(wanted: Any) -> str | None:
+    """What the metadata of a text's pattern say in words."""
+    metas = getattr(wanted, "__metadata__", ())
+    return next(
+        (meta.description for meta in metas if isinstance(meta, msgspec.Meta) and meta.description), None
+    )
+
+
 def expected(wanted: Any, complaint: str) -> str:
     """What would be right, from the type and the complaint of `msgspec`.
 
@@ -71,10 +75,8 @@ def expected(wanted: Any, complaint: str) -> str:
     allowed = choices(wanted)
     if allowed and ("enum" in complaint or "Expected `str`" in complaint):
         return "one of: " + ", ".join(allowed)
-    pattern = re.search(r"matching regex '(.+)'$", complaint)
-    if pattern:
-        plain = pattern.group(1).replace("\\\\", "\\")
-        return "expected " + _PATTERNS.get(plain, f"text that matches {plain}")
+    if "matching regex" in complaint:
+        return "expected " + (_described(wanted) or complaint[complaint.index("matching") :])
     found = re.match(r"Expected `([^`]+)`(.*?)(?:, got .*)?$", complaint)
     if not found:
         return complaint[:1].lower() + complaint[1:]

@@ -36,6 +36,7 @@ class Reference:
         """
         self._largest = largest_speed
         self._jumps: list[float] = []
+        self._landings: list[float] = []
         self._zero = np.zeros(len(home))
         self._times: list[float] = []
         self._points: list[Array] = [home.astype(float).copy()]
@@ -71,6 +72,7 @@ class Reference:
         chord = (q[-1] - q[-2]) / T
         if self._impossible(chord, v[-2], v[-1]):
             self._jumps.append(t[-1])
+            self._landings.append(t[-1])
             if self._guessed[-1] or self._impossible(v[-1]):
                 v[-1] = self._zero
             return
@@ -92,9 +94,11 @@ class Reference:
         """Whether a jump led to the newest sample."""
         return bool(self._jumps) and self._jumps[-1] == self._times[-1]
 
-    def lands(self, t: float, period: float) -> bool:
-        """Whether a jump ends in the step of ``period`` that ends at ``t`` [s]."""
-        return any(t - period < jump <= t for jump in self._jumps)
+    def lands(self, t: float) -> bool:
+        """Whether a jump ended by ``t`` [s]; told once."""
+        due = [jump for jump in self._landings if jump <= t]
+        del self._landings[: len(due)]
+        return bool(due)
 
     def forget(self, t: float) -> None:
         """Drop what is not needed any more from ``t`` [s] on."""

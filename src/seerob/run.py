@@ -14,6 +14,7 @@ from importlib.metadata import version
 import numpy as np
 from msgspec.structs import replace
 
+from seerob.compilation import pose_matrix
 from seerob.criterion import Criterion, Evaluate
 from seerob.engine import Engine
 from seerob.errors import InputError, Problem, SeerobError, Undecided
@@ -33,7 +34,7 @@ from seerob.snapshot import (
     Snapshot,
     Verdict,
 )
-from seerob.source import Opened, Pump, Source, Target
+from seerob.source import Matrix4, Opened, Pump, Source, Target
 from seerob.state import State
 from seerob.workstation import content_hash
 
@@ -87,7 +88,18 @@ def target(model: Model, name: str) -> Target | None:
         upper=tuple(mechanism.upper.tolist()),
         velocity=tuple(None if v is None else v.value for v in mechanism.velocity_limits),
         description=mechanism.description,
+        world_from_base=_world_from_base(model, name),
+        frames=tuple(f.name for f in model.frames.values() if f.mj in mechanism.mj_bodies),
     )
+
+
+def _world_from_base(model: Model, name: str) -> Matrix4 | None:
+    station = model.workstation
+    places = {**{r.name: r.base for r in station.robots}, **{h.name: h.at for h in station.humans}}
+    if name not in places:
+        return None
+    a, b, c, d = (tuple(row) for row in pose_matrix(places[name]).tolist())
+    return a, b, c, d
 
 
 def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:

@@ -43,7 +43,7 @@ class Worst(NamedTuple):
     reason: str
     """Why UNDECIDED, or what governs."""
     part: str
-    """The part that governs; empty when the criterion has none."""
+    """The part whose verdict this is; empty when no part has it."""
 
 
 class Spread(NamedTuple):
@@ -92,7 +92,9 @@ class WorstTracker:
         if self.worst is not None and key >= self._key:
             return False
         self._key = key
-        part = min(result.parts, key=severity).name if result.parts else ""
+        # A part without this verdict informs; it governs nothing.
+        judged = [p for p in result.parts if p.verdict is not None and p.verdict is result.verdict]
+        part = min(judged, key=severity).name if judged else ""
         self.worst = Worst(
             snapshot.t if result.t is None else result.t,
             snapshot.seq,

@@ -16,10 +16,15 @@ from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from seerob.model_io.description import Description
-from seerob.samples import JointSample, Quality, Sample
+from seerob.samples import JointSample, PoseSample, Quality, Sample
 from seerob.snapshot import Finding
 
 _seconds = Meta(gt=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})
+
+
+Row4 = tuple[float, float, float, float]
+Matrix4 = tuple[Row4, Row4, Row4, Row4]
+"""Homogeneous matrix, row by row."""
 
 
 class Target(Struct, frozen=True, kw_only=True):
@@ -37,6 +42,10 @@ class Target(Struct, frozen=True, kw_only=True):
     """Speed limits [rad/s or m/s]; None where nobody stated one."""
     description: Description | None = None
     """Its links and joints, for sources that need lengths (where a person's feet are)."""
+    world_from_base: Matrix4 | None = None
+    """Where its root link stands."""
+    frames: tuple[str, ...] = ()
+    """Full names of what its joints move and a `PoseSample` may drive; empty when nobody says."""
 
 
 class Opened(Struct, frozen=True, kw_only=True):
@@ -124,6 +133,11 @@ class Pump:
 
 
 def _apart(last: Sample | None, first: Sample) -> bool:
-    if not isinstance(last, JointSample) or not isinstance(first, JointSample):
-        return True
-    return max((abs(a - b) for a, b in zip(last.q, first.q, strict=True)), default=0.0) > SAME_PLACE
+    if isinstance(last, JointSample) and isinstance(first, JointSample):
+        return max((abs(a - b) for a, b in zip(last.q, first.q, strict=True)), default=0.0) > SAME_PLACE
+    if isinstance(last, PoseSample) and isinstance(first, PoseSample):
+        # Between unit quaternions of either sign the chord is 2 sin(angle / 4).
+        chord = min(math.dist(last.wxyz, first.wxyz), math.dist(last.wxyz, [-x for x in first.wxyz]))
+        turn = 4 * math.asin(min(1.0, chord / 2))
+        return max(turn, math.dist(last.position, first.position)) > SAME_PLACE
+    return True

@@ -38,6 +38,8 @@ class Hearing:
     some may lie ahead of the tick."""
     error: float = 0.0
     """Largest joint error between twin and reference [rad or m]."""
+    lost: float = -np.inf
+    """When the physics last lost it, so that it was put back [s]."""
     saturated: bool = False
     """A joint's torque limit was reached: the twin cannot do what was heard."""
 
@@ -81,6 +83,7 @@ class State:
         self.positions = np.zeros((n, 3))
         """World position of the bodies' origins [m]."""
         self.quaternions = np.zeros((n, 4))
+        self._period = model.workstation.engine.tick
         self._tracking_limit = model.workstation.engine.tracking_limit
         self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
         self._cache: dict[Any, Any] = {}
@@ -120,6 +123,8 @@ class State:
         reason = hearing.doubt(self.t)
         if reason:
             return f"{name}: {reason}"
+        if hearing.lost > self.t - 2 * self._period:
+            return f"{name}: the physics could not follow what was heard"
         if hearing.error > self._tracking_limit:
             why = " (a torque limit is reached)" if hearing.saturated else ""
             return (

@@ -78,13 +78,22 @@ class Station:
             InputError: One of them cannot be opened; the others are closed again.
         """
         opened: list[Writer] = []
+        if not sinks:
+            return opened
+        new = not folder.exists()
         try:
             folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            what = f"cannot be made: {error.strerror}"
+            raise InputError.at(folder, "", what, "give a folder that may be written") from error
+        try:
             for sink in sinks:
                 opened.append(sink.open(scene, self.model.meshes, self.model.files, folder))
         except BaseException:
             for writer in opened:
                 writer.close()
+            if new and not any(folder.iterdir()):
+                folder.rmdir()
             raise
         return opened
 

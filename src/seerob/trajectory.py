@@ -6,7 +6,7 @@ derived by second-order central differences, and the result says so.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -52,8 +52,72 @@ def origin_finding(origin: MotionOrigin, subject: str, file: str) -> Finding:
     return Finding(level="assumed", subject=subject, text=text)
 
 
+class Timed:
+    """What every motion read from a file has: instants, and places in the file for messages."""
+
+    file: str
+    t: Array
+    rows: NDArray[np.int64] | None
+    sheet: str
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last sample [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    def instant(self, index: int) -> float:
+        """Run time of a sample [s], from 0."""
+        return float(self.t[index] - self.t[0])
+
+    def place(self, index: int, column: str = "") -> str:
+        """Where a sample stands in the file: ``sheet 'Joints' row 17 column 'J3'``."""
+        row = f"row {self.rows[index]}" if self.rows is not None else f"sample {index}"
+        sheet = f"sheet {self.sheet!r} " if self.sheet else ""
+        return sheet + row + (f" column {column!r}" if column else "")
+
+    def _count_problems(self) -> Iterator[Problem]:
+        n = len(self.t)
+        if n < 2:
+            what = f"{n} sample{'s' * (n != 1)}; a trajectory has at least 2"
+            yield Problem(self.file, f"sheet {self.sheet!r}" if self.sheet else "", what, "export more rows")
+        if n > MAX_SAMPLES:
+            yield Problem(self.file, "", f"{n} samples, more than {MAX_SAMPLES}", "split the file")
+
+    def _width_problems(self, wanted: dict[str, int]) -> Iterator[Problem]:
+        n = len(self.t)
+        for name, width in wanted.items():
+            array = getattr(self, name)
+            if array is not None and array.shape != (n, width):
+                yield Problem(self.file, name, f"shape {array.shape} where {(n, width)} is needed")
+
+    def _time_problems(self) -> Iterator[Problem]:
+        finite_time = np.isfinite(self.t)
+        if not finite_time.all():
+            i = int(np.argmin(finite_time))
+            yield Problem(self.file, self.place(i), f"time is {self.t[i]}", "give every row a time")
+            return
+        step = np.diff(self.t)
+        wrong = np.flatnonzero(step <= 0)
+        if wrong.size:
+            i = int(wrong[0]) + 1
+            kind = "repeats" if step[i - 1] == 0 else "goes back"
+            what = f"time {kind}: {self.t[i]:.9g} s after {self.t[i - 1]:.9g} s ({wrong.size} such rows)"
+            yield Problem(self.file, self.place(i), what, "remove the rows, or export one motion per file")
+
+    def _finite_problems(self, names: Iterable[str]) -> Iterator[Problem]:
+        for name in names:
+            array = getattr(self, name)
+            if array is None:
+                continue
+            bad = ~np.isfinite(array)
+            if bad.any():
+                i, j = (int(k) for k in np.argwhere(bad)[0])
+                what = f"{name}[{j}] is {array[i, j]} ({int(bad.sum())} such values)"
+                yield Problem(self.file, self.place(i), what, "every value must be a finite number")
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory:
+class Trajectory(Timed):
     """Joint values over time, one row per sample of the file.
 
     Raises:
@@ -95,61 +159,17 @@ class Trajectory:
         """Number of joints."""
         return int(self.q.shape[1])
 
-    @property
-    def duration(self) -> float:
-        """From the first to the last sample [s]."""
-        return float(self.t[-1] - self.t[0])
-
-    def instant(self, index: int) -> float:
-        """Run time of a sample [s], from 0."""
-        return float(self.t[index] - self.t[0])
-
-    def place(self, index: int, column: str = "") -> str:
-        """Where a sample stands in the file: ``sheet 'Joints' row 17 column 'J3'``."""
-        row = f"row {self.rows[index]}" if self.rows is not None else f"sample {index}"
-        sheet = f"sheet {self.sheet!r} " if self.sheet else ""
-        return sheet + row + (f" column {column!r}" if column else "")
-
     def _shape_problems(self) -> Iterator[Problem]:
-        n = len(self.t)
         if self.t.ndim != 1 or self.q.ndim != 2 or self.q.shape[1] == 0:
             yield Problem(self.file, "", f"time {self.t.shape} and joints {self.q.shape} are not a table")
             return
-        if n < 2:
-            what = f"{n} sample{'s' * (n != 1)}; a trajectory has at least 2"
-            yield Problem(self.file, f"sheet {self.sheet!r}" if self.sheet else "", what, "export more rows")
-        if n > MAX_SAMPLES:
-            yield Problem(self.file, "", f"{n} samples, more than {MAX_SAMPLES}", "split the file")
-        wanted = {"q": self.dof, "qd": self.dof, "tau": self.dof, "tcp_position": 3, "tcp_wxyz": 4}
-        for name, width in wanted.items():
-            array = getattr(self, name)
-            if array is not None and array.shape != (n, width):
-                yield Problem(self.file, name, f"shape {array.shape} where {(n, width)} is needed")
+        yield from self._count_problems()
+        widths = {"q": self.dof, "qd": self.dof, "tau": self.dof, "tcp_position": 3, "tcp_wxyz": 4}
+        yield from self._width_problems(widths)
 
     def _value_problems(self) -> Iterator[Problem]:
-        finite_time = np.isfinite(self.t)
-        if not finite_time.all():
-            i = int(np.argmin(finite_time))
-            yield Problem(self.file, self.place(i), f"time is {self.t[i]}", "give every row a time")
-        else:
-            step = np.diff(self.t)
-            wrong = np.flatnonzero(step <= 0)
-            if wrong.size:
-                i = int(wrong[0]) + 1
-                kind = "repeats" if step[i - 1] == 0 else "goes back"
-                what = f"time {kind}: {self.t[i]:.9g} s after {self.t[i - 1]:.9g} s ({wrong.size} such rows)"
-                yield Problem(
-                    self.file, self.place(i), what, "remove the rows, or export one motion per file"
-                )
-        for name in ("q", "qd", "tau", "tcp_position", "tcp_wxyz"):
-            array = getattr(self, name)
-            if array is None:
-                continue
-            bad = ~np.isfinite(array)
-            if bad.any():
-                i, j = (int(k) for k in np.argwhere(bad)[0])
-                what = f"{name}[{j}] is {array[i, j]} ({int(bad.sum())} such values)"
-                yield Problem(self.file, self.place(i), what, "every value must be a finite number")
+        yield from self._time_problems()
+        yield from self._finite_problems(("q", "qd", "tau", "tcp_position", "tcp_wxyz"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from seerob.errors import InputError, Problem
 from seerob.snapshot import Finding
 from seerob.source import Target
-from seerob.trajectory import Trajectory
+from seerob.trajectory import Timed, Trajectory
 from seerob.transforms import Array
 
 TOLERANCE = 1e-6
@@ -235,7 +235,7 @@ def _disagreement(power_s: float, power_v: float, cross: float) -> str:
     return f"is off by a factor: positions move at {ratio:.4g} × the velocity"
 
 
-def sampling_findings(trajectory: Trajectory, target: str, timeout: float) -> tuple[Finding, ...]:
+def sampling_findings(trajectory: Timed, target: str, timeout: float) -> tuple[Finding, ...]:
     """Gaps longer than the source's time-out, and sampling so odd that the time unit is doubtful."""
     step = np.diff(trajectory.t)
     median, worst = float(np.median(step)), int(np.argmax(step))

@@ -38,8 +38,18 @@ Metres3 = Annotated[tuple[Coordinate, Coordinate, Coordinate], _unit("m")]
 Radians3 = Annotated[tuple[float, float, float], _unit("rad")]
 Radians = Annotated[tuple[float, ...], _unit("rad")]
 Share = Annotated[float, Meta(ge=0, le=1)]
-Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=80)]
-PathName = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.\-]+(/[A-Za-z0-9_.\-]+)*$", max_length=200)]
+Name = Annotated[
+    str,
+    Meta(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=80, description="letters, digits, '_', '.' and '-' only"),
+]
+PathName = Annotated[
+    str,
+    Meta(
+        pattern=r"^[A-Za-z0-9_.\-]+(/[A-Za-z0-9_.\-]+)*$",
+        max_length=200,
+        description="letters, digits, '_', '.', '-', and '/' between them only",
+    ),
+]
 
 
 class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

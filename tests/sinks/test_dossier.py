@@ -103,7 +103,7 @@ def test_hostile_names_stay_text(source, page):
 
 
 def test_the_worst_instant_is_named_with_value_limit_and_what_governs(page):
-    assert "Worst at 0.50 s: 0.3 m, 0.2503 m beyond the limit of 0.5503 m." in page.text
+    assert "Worst at 0.50 s: 0.3 m, 0.2504 m beyond the limit of 0.5504 m." in page.text
     assert "ur10/forearm_link ↔ operator/head" in page.text
     assert "One limit was exceeded: separation." in page.text
 

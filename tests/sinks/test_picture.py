@@ -153,8 +153,8 @@ def test_the_view_is_chosen_so_that_the_segment_is_in_sight():
         made, snapshot = stage(("wall", wall, (0, 0, 1.5)))
         ends = ((side * 1.0, -0.5, 1.0), (side * 1.0, 0.5, 1.0))
         line = Segment(start=ends[0], end=ends[1], verdict=Verdict.EXCEEDED)
-        vertices, _ = made._placed(snapshot)
-        camera = made._view(vertices, Result(name="r", markers=(line,)), (), SIZE)
+        vertices, _ = made._bodies.placed(snapshot)
+        camera = made._view(vertices, snapshot, Result(name="r", markers=(line,)), (), SIZE)
         assert np.sign(camera.eye[0]) == side
 
 

@@ -151,6 +151,12 @@ test("a lost server greys everything out; the page finds it again by itself", as
 
 test("a narrow screen loses nothing to the right", async () => {
   await page.setViewportSize({ width: 1024, height: 700 });
+  const row = page.locator('tr[data-criterion="arm energy"]');
+  await row.getByRole("button", { expanded: false }).click();
+  const list = await page
+    .locator(".criteria")
+    .evaluate((element) => element.scrollWidth - element.clientWidth);
+  assert.ok(list <= 0, `the table is ${list} px too wide`);
   const over = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
   assert.ok(over <= 0);
   for (const selector of [".pill", ".criteria td.state .badge", ".transport", ".strip"]) {

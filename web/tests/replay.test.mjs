@@ -112,8 +112,8 @@ test("a mesh that cannot be had becomes a finding, and the rest is shown", async
   await findings.getByText("! 4").waitFor();
   await findings.click();
   assert.match(
-    await other.locator(".finding").first().innerText(),
-    /ur10\/base_link\s+its mesh could not be fetched/,
+    await other.locator(".findings").innerText(),
+    /warning\s+ur10\/\w+\s+its mesh could not be fetched/,
   );
   await assertShown(other, served, await settled(other));
   await other.close();

@@ -119,14 +119,19 @@ def compiled(path: Path, *, quiet: bool = False, sources: bool = True) -> Statio
     Raises:
         InputError: With the mistakes of all criteria and all sources together.
     """
+    from seerob import naming
     from seerob.commands.progress import spinner
     from seerob.reading import read
     from seerob.station import Station
 
     workstation = read(path)
+    problems: list[Problem] = []
     with spinner(quiet=quiet) as say:
-        station = Station(workstation, cache=cache_folder(), progress=say)
-        problems: list[Problem] = []
+        try:
+            station = Station(workstation, cache=cache_folder(), progress=say)
+        except InputError as error:
+            missing = naming.missing_files(workstation) if sources else []
+            raise InputError([*error.problems, *missing]) from error
         for prepare in (lambda: station.bound, lambda: station.sources if sources else ()):
             try:
                 prepare()

@@ -31,7 +31,6 @@ def show(path: Path, options: argparse.Namespace) -> int:
     from seerob.server.player import Player
     from seerob.server.serving import Server
 
-    stopped = Stopped()
     recording = Recording.open(path)
     line("recording", f"{recording.scene.title}: {recording.duration:.1f} s", "bold")
     for finding in recording.findings:
@@ -44,7 +43,10 @@ def show(path: Path, options: argparse.Namespace) -> int:
         port=options.port,
         token=options.token,
     )
+    stopped = Stopped()
     with server:
+        if server.notice:
+            line("note", server.notice)
         line("page", f"{server.url}  (Ctrl-C ends)", "bold")
         end = time.monotonic() + (options.seconds if options.seconds is not None else float("inf"))
         while not stopped() and time.monotonic() < end:

@@ -31,6 +31,8 @@ def sinks_of(workstation: Workstation, *, lossless: bool, record: bool = True) -
     chosen = named + [sink for sink in usual if not any(type(sink) is type(other) for other in named)]
     if not record:
         chosen = [sink for sink in chosen if not isinstance(sink, Recorder)]
+    # The recorder first: it alone touches the disk when it is opened, and may be refused.
+    chosen.sort(key=lambda sink: not isinstance(sink, Recorder))
     return [replace(s, lossless=lossless) if isinstance(s, Recorder) else s for s in chosen]
 
 

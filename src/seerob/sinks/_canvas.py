@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from io import BytesIO
 from typing import TYPE_CHECKING
 
@@ -175,6 +176,7 @@ def in_front(camera: Camera, corners: Array) -> Array:
     return np.concatenate([whole, np.array(made, float).reshape(-1, 3, 3)])
 
 
+@cache
 def font(size: int) -> FreeTypeFont:
     """A font that has ✓, ✕ and ↔, which comes along with matplotlib."""
     from pathlib import Path

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import hashlib
 from base64 import b64encode
-from collections.abc import Iterable
 from dataclasses import dataclass
 
+from seerob.figures import figure
 from seerob.results import ResultLog
 from seerob.series import Series
 from seerob.sinks import _plots
 from seerob.sinks._html import Html, joined, table, tag
 from seerob.sinks._page_style import STYLE
 from seerob.sinks._palette import MARK, WORD
-from seerob.sinks._sentences import about, number, percent, summary
+from seerob.sinks._sentences import about, bound, number, percent, reached, summary
+from seerob.sinks._setup import UNKNOWN, Setup
 from seerob.snapshot import Basis, CriterionInfo, Finding, Input, Origin, Scene, Verdict
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
@@ -45,6 +46,10 @@ class Report:
     """When the report was written."""
     findings: tuple[Finding, ...]
     """Of the model and of the run."""
+    setup: Setup
+    """Engine and sources."""
+    command: str
+    """What wrote the report."""
 
 
 def page(report: Report) -> str:
@@ -119,7 +124,7 @@ def _verdicts(report: Report) -> Html:
             [
                 link,
                 badge(series.verdict),
-                _whole(number(worst.value, series.unit)),
+                _whole(reached(worst, series)),
                 _whole(_limit(series)),
                 _whole(f"{worst.t:.2f} s"),
                 percent(shares.get(Verdict.EXCEEDED, 0.0)),
@@ -127,12 +132,21 @@ def _verdicts(report: Report) -> Html:
                 worst.reason or worst.part,
             ]
         )
-    head = ["criterion", "verdict", "worst value", "limit", "at", "exceeded", "undecided", "what governs, or why"]
+    head = [
+        "criterion",
+        "verdict",
+        "worst value",
+        "limit",
+        "at",
+        "exceeded",
+        "undecided",
+        "what governs, or why",
+    ]
     shown = [s for s in report.log.ranked() if s.known]
     return joined(
         [
             tag("h2", "Verdicts"),
-            table(head, rows),
+            table(head, rows, class_="overview"),
             tag("p", "Shares are of the evaluated ticks.", class_="lead"),
             tag("figure", _plots.lanes(shown, salt="lanes"), tag("figcaption", "The verdicts over the run."))
             if shown
@@ -142,8 +156,8 @@ def _verdicts(report: Report) -> Html:
 
 
 def _limit(series: Series) -> str:
-    limit = series.worst().limit
-    return "–" if limit is None else ("≤ " if series.at_most else "≥ ") + number(limit, series.unit)
+    worst = series.worst()
+    return "–" if worst.limit is None else ("≤ " if series.at_most else "≥ ") + bound(worst, series)
 
 
 def _whole(figure: str) -> Html:
@@ -184,7 +198,7 @@ def _picture(report: Report, series: Series) -> Html | None:
     if png is None:
         return None
     worst = series.worst()
-    what = f"{series.name} at {worst.t:.2f} s, its worst instant: {number(worst.value, series.unit)}"
+    what = f"{series.name} at {worst.t:.2f} s, its worst instant: {reached(worst, series)}"
     source = f"data:image/png;base64,{b64encode(png).decode()}"
     return tag("figure", tag("img", src=source, alt=what), tag("figcaption", f"{what}."))
 
@@ -200,8 +214,8 @@ def _parts(series: Series) -> Html | None:
             [
                 part.name,
                 badge(part.verdict),
-                number(worst.value, part.unit),
-                number(worst.limit, part.unit),
+                _whole(reached(worst, part)),
+                _whole(bound(worst, part)),
                 f"{worst.t:.2f} s",
                 share,
             ]
@@ -231,14 +245,20 @@ def _basis(basis: Basis | None) -> Html:
 
 def _input(item: Input) -> list[str | Html]:
     value = item.value if isinstance(item.value, str) else number(item.value, item.unit)
-    origin = tag("span", f"! {_WHO[item.origin]}", class_="doubt") if item.origin in _DOUBTFUL else _WHO[item.origin]
+    origin = (
+        tag("span", f"! {_WHO[item.origin]}", class_="doubt")
+        if item.origin in _DOUBTFUL
+        else _WHO[item.origin]
+    )
     return [item.name, value, origin, item.source or "–"]
 
 
 def _assumed(report: Report) -> Html:
     rows: list[list[str | Html]] = []
     for finding in report.findings:
-        mark = {"note": "note", "assumed": "! assumed", "warning": "! warning"}.get(finding.level, finding.level)
+        mark = {"note": "note", "assumed": "! assumed", "warning": "! warning"}.get(
+            finding.level, finding.level
+        )
         rows.append([finding.subject, mark, finding.text])
     doubts: list[list[str | Html]] = []
     for name, basis in report.bases.items():
@@ -278,7 +298,9 @@ def _not_covered(report: Report) -> Html:
                 "forces and pressures, and the response of protective devices are properties of the real machine: "
                 "measure them there.",
             ),
-            tag("p", f"Still to be decided by other means: {', '.join(silent)}.", class_="doubt") if silent else None,
+            tag("p", f"Still to be decided by other means: {', '.join(silent)}.", class_="doubt")
+            if silent
+            else None,
             table(["left out", "by"], [[item, ", ".join(names)] for item, names in left_out.items()])
             if left_out
             else None,
@@ -287,15 +309,20 @@ def _not_covered(report: Report) -> Html:
 
 
 def _evaluated(report: Report) -> Html:
-    scene, log = report.scene, report.log
-    facts = [
+    scene, log, how = report.scene, report.log, report.setup
+    span = f"{figure(log.start, 's')} to {figure(log.end, 's')}, {log.ticks} ticks, period {scene.period:g} s"
+    facts: list[list[str | Html]] = [
         ["workstation", scene.title],
         ["edition of the limits", scene.edition],
-        ["run time", f"{number(log.start, 's')} to {number(log.end, 's')}, {log.ticks} ticks, period {scene.period:g} s"],
+        ["run time", span],
+        *([what, value] for what, value in how.engine),
+        *([f"largest tracking error, {e.name}", f"{number(e.error)} rad or m at {e.t:.2f} s"] for e in log.tracking),
+    ]
+    written: list[list[str | Html]] = [
         ["written", report.date],
+        ["by", tag("code", report.command)],
         ["hash of all inputs (SHA-256)", tag("code", scene.workstation_hash)],
         *([f"version of {name}", version] for name, version in report.versions.items()),
-        *([f"largest tracking error, {e.name}", f"{number(e.error)} rad or m at {e.t:.2f} s"] for e in log.tracking),
     ]
     files = [
         [name, f"{len(data)} bytes", tag("code", hashlib.sha256(data).hexdigest())]
@@ -305,10 +332,15 @@ def _evaluated(report: Report) -> Html:
         [node.name, node.role, number(node.mass, "kg"), _WHO[node.mass_origin], node.note or "–"]
         for node in scene.nodes
     ]
+    heads = ["source", "drives", "from", "what it is", "time-out", "at its end"]
     return joined(
         [
             tag("h2", "What was evaluated"),
             table(["", ""], facts),
+            tag("h4", "Sources"),
+            _sources(heads, how),
+            tag("h4", "With what"),
+            table(["", ""], written),
             tag("h4", "Input files") if files else None,
             table(["file", "size", "SHA-256"], files) if files else None,
             tag("h4", "Bodies of the twin"),
@@ -317,7 +349,14 @@ def _evaluated(report: Report) -> Html:
     )
 
 
+def _sources(heads: list[str], how: Setup) -> Html:
+    if how.sources:
+        text = (
+            "What is older than its time-out no longer counts: every verdict that needs it is undecided from then on."
+        )
+        return joined([table(heads, how.sources), tag("p", text, class_="lead")])
+    return tag("p", "No source: everything stands still." if how.readable else UNKNOWN)
+
+
 def _anchor(report: Report, series: Series) -> str:
     return f"criterion-{list(report.log).index(series.name) + 1}"
-
-

@@ -8,7 +8,7 @@ from seerob.snapshot import Verdict
 STYLE = f"""
 :root {{ --ink: #1a2430; --soft: #5a6672; --rule: #d8dee4; --wash: #f5f7f9; }}
 * {{ box-sizing: border-box; }}
-body {{ margin: 0 auto; max-width: 60rem; padding: 2.5rem 1.5rem 4rem; color: var(--ink); background: #fff;
+body {{ margin: 0 auto; max-width: 64rem; padding: 2.5rem 1.5rem 4rem; color: var(--ink); background: #fff;
   font: 16px/1.55 system-ui, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif;
   overflow-wrap: anywhere; }}
 h1 {{ font-size: 1.9rem; line-height: 1.2; margin: 0 0 .3rem; }}
@@ -23,6 +23,9 @@ th, td {{ text-align: left; vertical-align: top; padding: .32rem .6rem; border-b
   font-variant-numeric: tabular-nums; font-weight: normal; }}
 thead th {{ font-weight: 600; color: var(--soft); border-bottom: 1.5px solid var(--ink); white-space: nowrap; }}
 tbody th {{ font-weight: 600; }}
+.overview tbody th {{ min-width: 9.5rem; }}
+.overview td:last-child {{ min-width: 9rem; }}
+.overview a {{ color: var(--ink); text-decoration-color: var(--rule); text-underline-offset: .2em; }}
 code {{ font-family: ui-monospace, Consolas, "DejaVu Sans Mono", monospace; font-size: .85em; }}
 .whole {{ white-space: nowrap; }}
 .formula {{ background: var(--wash); padding: .5rem .8rem; font-family: ui-monospace, Consolas, monospace;
@@ -50,6 +53,11 @@ h2 + section.criterion {{ border-top: none; margin-top: 0; }}
 @media print {{
   body {{ max-width: none; padding: 0; font-size: 10.5pt; }}
   h2, h3, h4 {{ break-after: avoid; }}
+  table {{ font-size: 8.5pt; }}
+  th, td {{ padding: .2rem .4rem; }}
+  .badge {{ font-size: 7.5pt; padding: .05rem .4rem; }}
+  .overview tbody th {{ min-width: 7.5rem; }}
+  .overview td:last-child {{ min-width: 7rem; }}
   figure, tr, .verdict {{ break-inside: avoid; }}
   thead {{ display: table-header-group; }}
   * {{ print-color-adjust: exact; -webkit-print-color-adjust: exact; }}

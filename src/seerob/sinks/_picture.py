@@ -20,8 +20,9 @@ from seerob.transforms import Array
 SIZE = (1000, 640)
 """Width and height [px]."""
 
-_CLEAREST = 0.3
-"""Greatest opacity of what a mesh calls translucent: robots behind it must stay readable."""
+_CLEAREST, _LIT = 0.14, 0.3
+"""Greatest opacity of what a mesh calls translucent, as a bystander and highlighted: what is behind it
+must stay readable."""
 _MOST_EDGES = 400
 
 
@@ -92,10 +93,10 @@ class Stage:
         position, rotation = poses(snapshot)
         shown = [(c, c.vertices @ rotation[c.node].T + position[c.node]) for c in self._bodies.clear]
         for clear, vertices in sorted(shown, key=lambda s: -canvas.camera.local(s[1].mean(axis=0))[0, 2]):
-            fill, line = clear.color, (0.42, 0.36, 0.12)
+            fill, line, most = clear.color, (0.42, 0.36, 0.12), _CLEAREST
             if clear.node in lit:
-                fill, line = FILL[lit[clear.node]], DARK[lit[clear.node]]
-            canvas.veil(vertices, clear.faces, fill, min(clear.alpha, _CLEAREST))
+                fill, line, most = FILL[lit[clear.node]], DARK[lit[clear.node]], _LIT
+            canvas.veil(vertices, clear.faces, fill, min(clear.alpha, most))
             for a, b in clear.edges[:_MOST_EDGES].tolist():
                 canvas.line(vertices[a], vertices[b], line, width=1.3, alpha=0.75)
 
@@ -175,7 +176,9 @@ class Stage:
             top = screen[inverse > 0, 1].min() if isinstance(marker, Segment) else screen[0, 1]
             x = float(np.clip(screen[0, 0], half, max(half, camera.width - half)))
             y = float(np.clip(top - 1.4 * height, height, camera.height - height))
-            while y > height and any(abs(x - u) < half + w and abs(y - v) < 1.3 * height for u, v, w in taken):
+            while y > height and any(
+                abs(x - u) < half + w and abs(y - v) < 1.3 * height for u, v, w in taken
+            ):
                 y -= 1.3 * height
             taken.append((x, y, half))
             words(draw, (x, y), text, DARK[marker.verdict], type_)

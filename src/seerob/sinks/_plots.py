@@ -51,27 +51,38 @@ def curve(series: Series, *, salt: str) -> Html:
     i = series.thinned(POINTS)
     t, values, limits = series.t[i], series.values[i], series.limits[i]
     with mpl.rc_context({**_STYLE, "svg.hashsalt": salt}):
-        figure = Figure(figsize=(7.4, 2.5), layout="constrained")
+        # Margins by hand: finding them takes as long as drawing.
+        figure = Figure(figsize=(7.4, 2.5))
+        figure.subplots_adjust(left=0.1, right=0.985, bottom=0.19, top=0.88)
         axes = figure.add_subplot()
         span = float(series.t[-1] - series.t[0]) or 1.0
         for verdict in (Verdict.UNDECIDED, Verdict.EXCEEDED):
             _bands(axes, series, verdict, span)
         marker = "o" if np.count_nonzero(np.isfinite(values)) < 3 else None
-        axes.plot(t, _finite(values), color="#1A2430", linewidth=1.3, label="value", marker=marker, markersize=3)
+        axes.plot(
+            t, _finite(values), color="#1A2430", linewidth=1.3, label="value", marker=marker, markersize=3
+        )
         if np.isfinite(limits).any():
             name = "limit (at most)" if series.at_most else "limit (at least)"
             axes.plot(
-                t, _finite(limits), color=DARK_HEX[Verdict.EXCEEDED], linewidth=1.3, linestyle=(0, (5, 2)), label=name
+                t,
+                _finite(limits),
+                color=DARK_HEX[Verdict.EXCEEDED],
+                linewidth=1.3,
+                linestyle=(0, (5, 2)),
+                label=name,
             )
         worst = series.worst()
         if worst.value is not None and np.isfinite(worst.value):
             color = DARK_HEX[worst.verdict]
-            axes.plot([worst.t], [worst.value], "o", color=color, markersize=5, label=f"worst, {worst.t:.2f} s")
+            axes.plot(
+                [worst.t], [worst.value], "o", color=color, markersize=5, label=f"worst, {worst.t:.2f} s"
+            )
         axes.set_xlabel("time [s]")
         axes.set_ylabel(f"[{series.unit}]" if series.unit else "")
         axes.set_xlim(float(series.t[0]) - 0.01 * span, float(series.t[-1]) + 0.01 * span)
         axes.grid(axis="y", color="#E1E6EB", linewidth=0.6)
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.2), ncols=5, frameon=False, fontsize=8)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.18), ncols=5, frameon=False, fontsize=8)
         return svg(figure, f"{series.name} over time")
 
 
@@ -140,7 +151,13 @@ def _bands(axes: Axes, series: Series, verdict: Verdict, span: float) -> None:
         axes.axvspan(start, end, facecolor=HEX[verdict], alpha=_TINT[verdict], linewidth=0)
         # A patch of its own, so that the hatch is not as faint as the tint.
         axes.axvspan(
-            start, end, facecolor="none", edgecolor=DARK_HEX[verdict], hatch=_HATCH[verdict], linewidth=0, label=label
+            start,
+            end,
+            facecolor="none",
+            edgecolor=DARK_HEX[verdict],
+            hatch=_HATCH[verdict],
+            linewidth=0,
+            label=label,
         )
 
 

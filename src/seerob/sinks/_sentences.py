@@ -6,19 +6,52 @@ import math
 import re
 from collections.abc import Sequence
 
+from seerob.figures import against, figure, margin, with_unit
 from seerob.results import ResultLog
-from seerob.series import CODES, Series
+from seerob.series import CODES, Series, Worst
 from seerob.snapshot import Verdict
 
-_NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+_NUMBERS = (
+    "no",
+    "one",
+    "two",
+    "three",
+    "four",
+    "five",
+    "six",
+    "seven",
+    "eight",
+    "nine",
+    "ten",
+    "eleven",
+    "twelve",
+)
 
 
 def number(value: float | None, unit: str = "") -> str:
-    """Four significant digits with the unit; a dash for what is not there."""
+    """Four significant digits with the unit, for inputs; a dash for what is not there."""
     if value is None or math.isnan(value):
         return "–"
     text = f"{value:.4g}".replace("-", "−")
     return f"{text} {unit}".rstrip()
+
+
+def reached(worst: Worst, series: Series) -> str:
+    """The worst value with its unit, not kinder than it is."""
+    if worst.value is None or worst.limit is None:
+        return figure(worst.value, series.unit)
+    return with_unit(
+        against(worst.value, worst.limit, series.unit, at_most=series.at_most).value, series.unit
+    )
+
+
+def bound(worst: Worst, series: Series) -> str:
+    """The limit at the worst instant with its unit, not kinder than it is."""
+    if worst.value is None or worst.limit is None:
+        return figure(worst.limit, series.unit)
+    return with_unit(
+        against(worst.value, worst.limit, series.unit, at_most=series.at_most).limit, series.unit
+    )
 
 
 def percent(share: float) -> str:
@@ -50,18 +83,24 @@ def summary(log: ResultLog) -> list[str]:
     if not log.ticks:
         return ["Nothing was evaluated: the run has no tick."]
     criteria = counted(len(log), "criterion was", "criteria were")
-    said = [f"Over {number(span, 's')} of motion ({log.ticks} ticks) {criteria} evaluated."]
+    said = [f"Over {figure(span, 's')} of motion ({log.ticks} ticks) {criteria} evaluated."]
     if names := by[Verdict.EXCEEDED]:
-        said.append(f"{counted(len(names), 'limit was', 'limits were').capitalize()} exceeded: {listed(names)}.")
+        said.append(
+            f"{counted(len(names), 'limit was', 'limits were').capitalize()} exceeded: {listed(names)}."
+        )
     if names := by[Verdict.UNDECIDED]:
         said.append(
             f"{counted(len(names), 'criterion', 'criteria').capitalize()} could not be decided for at least a part "
             f"of the run: {listed(names)}. Undecided is not a pass; what is missing is said below."
         )
     if names := by[Verdict.WITHIN]:
-        said.append(f"{counted(len(names), 'criterion', 'criteria').capitalize()} stayed within the limit throughout.")
+        said.append(
+            f"{counted(len(names), 'criterion', 'criteria').capitalize()} stayed within the limit throughout."
+        )
     if names := by[None]:
-        said.append(f"{counted(len(names), 'figure').capitalize()} without a limit for information: {listed(names)}.")
+        said.append(
+            f"{counted(len(names), 'figure').capitalize()} without a limit for information: {listed(names)}."
+        )
     return said
 
 
@@ -80,21 +119,21 @@ def about(series: Series) -> list[str]:
         said.append(
             f"The value was {beyond} the limit in {percent(share)} of the evaluated ticks, in "
             f"{counted(len(stretches), 'stretch', 'stretches')}; the longest lasted "
-            f"{number(max(b - a for a, b in stretches), 's')}."
+            f"{figure(max(b - a for a, b in stretches), 's')}."
         )
-        said.append(f"Worst at {worst.t:.2f} s: {number(worst.value, series.unit)}{_against(series)}.")
+        said.append(f"Worst at {worst.t:.2f} s: {reached(worst, series)}{_against(series)}.")
     if share := shares.get(Verdict.UNDECIDED):
         said.append(f"In {percent(share)} of the evaluated ticks nothing can be said. {_reasons(series)}")
     if series.verdict is Verdict.WITHIN:
         said.append(
-            f"Within the limit throughout. Closest to it at {worst.t:.2f} s: {number(worst.value, series.unit)}"
+            f"Within the limit throughout. Closest to it at {worst.t:.2f} s: {reached(worst, series)}"
             f"{_against(series)}."
         )
     if series.verdict is None:
         extreme = "Largest" if series.at_most else "Smallest"
-        said.append(f"No limit was given. {extreme} value {number(worst.value, series.unit)} at {worst.t:.2f} s.")
+        said.append(f"No limit was given. {extreme} value {reached(worst, series)} at {worst.t:.2f} s.")
     if worst.verdict is not Verdict.UNDECIDED and (worst.reason or worst.part):
-        governs = worst.part if not worst.reason or worst.reason == worst.part else worst.reason
+        governs = worst.reason or worst.part
         extra = f" ({worst.part})" if worst.part and worst.part not in governs else ""
         said.append(f"What governs there: {governs}{extra}.")
     return said
@@ -106,7 +145,8 @@ def _against(series: Series) -> str:
         return ""
     gap = worst.limit - worst.value if series.at_most else worst.value - worst.limit
     side = "inside" if gap >= 0 else "beyond"
-    return f", {number(abs(gap), series.unit)} {side} the limit of {number(worst.limit, series.unit)}"
+    size = margin(worst.value, worst.limit, series.unit, at_most=series.at_most)
+    return f", {size} {side} the limit of {bound(worst, series)}"
 
 
 def _reasons(series: Series) -> str:

@@ -8,7 +8,9 @@ from datetime import datetime
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from types import TracebackType
-from typing import Self
+from typing import Annotated, Self
+
+from msgspec import Meta
 
 from seerob.errors import InputError
 from seerob.results import ResultLog, result_named
@@ -23,9 +25,11 @@ Progress = Callable[[int, int], None]
 class Dossier(Sink, frozen=True, kw_only=True):
     """Write a self-contained HTML report at the end of the run."""
 
-    file: str = "report.html"
+    file: Annotated[
+        str, Meta(pattern=r"^[^/\\]+\.(html|htm)$", description="a file name that ends in .html")
+    ] = "report.html"
     """Name in the run's folder; an earlier report of that name is replaced."""
-    pictures: int = 12
+    pictures: Annotated[int, Meta(ge=0)] = 12
     """Largest number of pictures of worst instants; the worst criteria come first."""
 
     def open(
@@ -37,7 +41,9 @@ class Dossier(Sink, frozen=True, kw_only=True):
             InputError: The file's name or the number of pictures is wrong.
         """
         if self.file != Path(self.file).name or not self.file.endswith((".html", ".htm")):
-            raise InputError.at(folder, "dossier.file", f"{self.file!r} is not a file name", "such as report.html")
+            raise InputError.at(
+                folder, "dossier.file", f"{self.file!r} is not a file name", "such as report.html"
+            )
         if self.pictures < 0:
             raise InputError.at(folder, "dossier.pictures", f"{self.pictures} is negative", "0 or more")
         return DossierWriter(scene, meshes, files, folder / self.file, pictures=self.pictures)
@@ -70,6 +76,7 @@ class DossierWriter:
             InputError: It cannot be written.
         """
         from seerob.sinks._page import Report, page
+        from seerob.sinks._setup import command, setup
         from seerob.sinks._versions import versions
 
         pictures = self._drawn()
@@ -82,6 +89,8 @@ class DossierWriter:
             versions=versions(),
             date=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %z"),
             findings=tuple(self.findings),
+            setup=setup(self._files),
+            command=command(),
         )
         write_whole(self.path, page(report).encode())
 
@@ -91,7 +100,9 @@ class DossierWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        # Whoever interrupts a run a second time does not want to wait for this.
+        if kind is None or not issubclass(kind, KeyboardInterrupt):
+            self.close()
 
     def _drawn(self) -> dict[str, bytes]:
         from seerob.sinks._picture import Stage

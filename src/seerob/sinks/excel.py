@@ -10,7 +10,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from tempfile import mkstemp
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+from msgspec import Meta
 
 from seerob.errors import InputError
 from seerob.results import ResultLog, result_named
@@ -35,20 +37,26 @@ Cell = str | float | int | None
 class Excel(Sink, frozen=True, kw_only=True):
     """Write results, joints and findings to an Excel workbook at the end of the run."""
 
-    file: str = "results.xlsx"
+    file: Annotated[str, Meta(pattern=r"^[^/\\]+\.xlsx$", description="a file name that ends in .xlsx")] = (
+        "results.xlsx"
+    )
     """Name in the run's folder; an earlier workbook of that name is replaced."""
-    rows: int = 100_000
+    rows: Annotated[int, Meta(ge=7)] = 100_000
     """Most ticks written per criterion; beyond it they are thinned without losing an extremum or an
     exceedance, and the summary says so."""
 
-    def open(self, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes], folder: Path) -> ExcelWriter:
+    def open(
+        self, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes], folder: Path
+    ) -> ExcelWriter:
         """Start to collect; nothing is written before `ExcelWriter.close`.
 
         Raises:
             InputError: The file's name or the number of rows is wrong.
         """
         if self.file != Path(self.file).name or not self.file.endswith(".xlsx"):
-            raise InputError.at(folder, "excel.file", f"{self.file!r} is not a file name", "such as results.xlsx")
+            raise InputError.at(
+                folder, "excel.file", f"{self.file!r} is not a file name", "such as results.xlsx"
+            )
         if self.rows < 7:
             raise InputError.at(folder, "excel.rows", f"{self.rows} rows hold nothing", "7 or more")
         return ExcelWriter(scene, folder / self.file, rows=self.rows)
@@ -132,7 +140,9 @@ class ExcelWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        # Whoever interrupts a run a second time does not want to wait for this.
+        if kind is None or not issubclass(kind, KeyboardInterrupt):
+            self.close()
 
     def _summary(self) -> Iterator[list[Cell]]:
         for series in self.log.ranked():
@@ -141,12 +151,23 @@ class ExcelWriter:
             verdict = "no limit" if series.verdict is None else series.verdict.value
             tail: list[Cell] = [formula, source, self._scene.edition]
             if not series.known:
-                yield [series.name, verdict, None, series.unit, None, None, None, "never gave a result", "", *tail]
+                yield [
+                    series.name,
+                    verdict,
+                    None,
+                    series.unit,
+                    None,
+                    None,
+                    None,
+                    "never gave a result",
+                    "",
+                    *tail,
+                ]
                 continue
             worst = series.worst()
             yield [
-                series.name, verdict, worst.value, series.unit, worst.limit, "at most" if series.at_most else "at least",
-                worst.t, worst.reason, worst.part, *tail,
+                series.name, verdict, worst.value, series.unit, worst.limit,
+                "at most" if series.at_most else "at least", worst.t, worst.reason, worst.part, *tail,
             ]  # fmt: skip
         yield []
         yield ["workstation", self._scene.title]
@@ -165,7 +186,10 @@ class ExcelWriter:
         return ["t [s]", *names[:n], "tracking error [rad or m]"]
 
     def _joint_rows(self, mechanism: str) -> Iterator[list[Cell]]:
-        columns = [*self._joints[mechanism], self._tracking.get(mechanism, array("d", [math.nan] * len(self._t)))]
+        columns = [
+            *self._joints[mechanism],
+            self._tracking.get(mechanism, array("d", [math.nan] * len(self._t))),
+        ]
         stride = max(1, math.ceil(len(self._t) / self._rows))
         for i in range(0, len(self._t), stride):
             yield [self._t[i], *(column[i] for column in columns)]
@@ -177,8 +201,8 @@ class ExcelWriter:
 
 
 _SUMMARY: list[Cell] = [
-    "criterion", "verdict", "worst value", "unit", "limit", "limit is", "at [s]", "what governs, or why", "part",
-    "formula", "source", "edition",
+    "criterion", "verdict", "worst value", "unit", "limit", "limit is", "at [s]", "what governs, or why",
+    "part", "formula", "source", "edition",
 ]  # fmt: skip
 
 

@@ -8,7 +8,9 @@ from collections import deque
 from pathlib import Path
 from threading import Condition, Thread
 from types import TracebackType
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
+
+from msgspec import Meta
 
 from seerob.errors import InputError, SeerobError
 from seerob.samples import Sample
@@ -28,11 +30,13 @@ _BACKLOG = 20
 class Recorder(Sink, frozen=True, kw_only=True):
     """Record samples and snapshots to an MCAP file."""
 
-    file: str = "run.mcap"
+    file: Annotated[str, Meta(pattern=r"^[^/\\]+\.mcap$", description="a file name that ends in .mcap")] = (
+        "run.mcap"
+    )
     """Name in the run's folder; must not exist yet."""
     lossless: bool = False
     """Whether a full queue holds the run up instead of dropping: for runs as fast as possible."""
-    queue: int = 1000
+    queue: Annotated[int, Meta(ge=1)] = 1000
     """Ticks that may wait for the disk."""
 
     def open(

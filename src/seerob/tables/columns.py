@@ -8,9 +8,9 @@ from typing import Any
 from seerob.errors import Problem
 from seerob.source import Target
 from seerob.tables.grid import blank
-from seerob.tables.headers import Role
+from seerob.tables.headers import ROTATION_VECTOR, UR_POSE, Role
 from seerob.tables.layout import Layout
-from seerob.tables.mapping import Mapping
+from seerob.tables.mapping import Mapping, Motion
 from seerob.tables.orientation import CONVENTIONS, columns_of, is_convention
 
 ORIENTATIONS: dict[tuple[str, ...], str] = {
@@ -19,8 +19,11 @@ ORIENTATIONS: dict[tuple[str, ...], str] = {
     ("roll", "pitch", "yaw"): "rpy",
     ("w", "p", "r"): "rpy",
     ("rx", "ry", "rz"): "XYZ",
+    ROTATION_VECTOR: "rotation_vector",
 }
-"""Names of orientation columns → the convention they most often mean; only the first is certain."""
+"""Names of orientation columns → the convention they most often mean."""
+CERTAIN = (("qw", "qx", "qy", "qz"), ROTATION_VECTOR)
+"""Those that mean nothing else."""
 
 
 @dataclass(eq=False)
@@ -35,20 +38,28 @@ class Columns:
     """Key of the mapping → columns."""
 
 
-def guess_columns(layout: Layout, given: Mapping, target: Target | None) -> Columns:
+def guess_columns(
+    layout: Layout, given: Mapping, target: Target | None, motion: Motion = Motion.JOINTS
+) -> Columns:
     """The columns of every role, given or found; questions where several could be meant."""
     found = Columns()
     _single(layout, given, found, "time", Role.TIME)
     _single(layout, given, found, "robot_column", Role.ROBOT)
     _robots(layout, given, found, target)
-    if not _joints_by_name(layout, given, found, target):
-        _joints(layout, given, found, "joints", Role.JOINT)
-    count = len(found.indices.get("joints", ()))
-    _joints(layout, given, found, "velocities", Role.VELOCITY, count)
-    _joints(layout, given, found, "torques", Role.TORQUE, count)
+    needed = {"time": "time"}
+    if motion is Motion.JOINTS:
+        needed["joints"] = "joint"
+        if not _joints_by_name(layout, given, found, target):
+            _joints(layout, given, found, "joints", Role.JOINT)
+        count = len(found.indices.get("joints", ()))
+        _joints(layout, given, found, "velocities", Role.VELOCITY, count)
+        _joints(layout, given, found, "torques", Role.TORQUE, count)
+    else:
+        needed |= {"tcp_position": "tool position", "tcp_orientation": "tool orientation"}
+        _tool_by_name(layout, given, found)
     _tool(layout, given, found)
     file, header = layout.grid.file, f"row {layout.header_row}"
-    for key, what in (("time", "time"), ("joints", "joint")):
+    for key, what in needed.items():
         if not found.problems and not found.indices.get(key):
             names = ", ".join(repr(h.text) for h in layout.headers[:12] if h.text)
             remedy = f"name it in [sources.mapping]: {key} = …"
@@ -151,6 +162,16 @@ def _joints(
         found.questions[key] = question
 
 
+def _tool_by_name(layout: Layout, given: Mapping, found: Columns) -> None:
+    """Take the columns of a controller's own log, when the mapping names none."""
+    indices = layout.find_all("tcp_position", UR_POSE)
+    if given.tcp_position is not None or given.tcp_orientation is not None or isinstance(indices, list):
+        return
+    for key, group in (("tcp_position", indices[:3]), ("tcp_orientation", indices[3:])):
+        found.indices[key] = group
+        found.mapping[key] = tuple(layout.reference(i) for i in group)
+
+
 def _tool(layout: Layout, given: Mapping, found: Columns) -> None:
     _axes(layout, given, found, "tcp_position", Role.TCP_POSITION, (("x", "y", "z"),))
     _axes(layout, given, found, "tcp_orientation", Role.TCP_ORIENTATION, tuple(ORIENTATIONS))
@@ -170,10 +191,10 @@ def _tool(layout: Layout, given: Mapping, found: Columns) -> None:
         return
     if not indices:
         return
-    which = tuple(layout.headers[i].which for i in indices)
+    which = tuple(layout.headers[i].which if i < len(layout.headers) else "" for i in indices)
     convention = ORIENTATIONS.get(which, "wxyz" if len(indices) == 4 else "ZYX")
     found.mapping["tcp_convention"] = convention
-    if which != ("qw", "qx", "qy", "qz"):
+    if which not in CERTAIN:
         names = ", ".join(layout.label(i) for i in indices)
         found.questions["tcp_convention"] = f"{names} can be several conventions, {convention} among them"
 
@@ -188,6 +209,8 @@ def _axes(
             found.problems += indices
         elif indices:
             found.indices[key] = indices
+        return
+    if key in found.indices:
         return
     named: dict[str, list[int]] = {}
     for i, header in enumerate(layout.headers):

@@ -16,7 +16,7 @@ from seerob.source import Target
 from seerob.tables.candidates import candidates
 from seerob.tables.columns import guess_columns
 from seerob.tables.layout import Layout, find_layout
-from seerob.tables.mapping import Mapping
+from seerob.tables.mapping import Mapping, Motion
 from seerob.tables.units_guess import guess_units
 
 
@@ -54,7 +54,12 @@ class Guess:
 
 
 def guess(
-    path: Path, given: Mapping | None = None, *, name: str | None = None, target: Target | None = None
+    path: Path,
+    given: Mapping | None = None,
+    *,
+    name: str | None = None,
+    target: Target | None = None,
+    motion: Motion = Motion.JOINTS,
 ) -> Guess:
     """Look at a table of motion and say what its columns mean.
 
@@ -63,37 +68,41 @@ def guess(
         given: What the user says; it is never overridden.
         name: The file as messages name it.
         target: The robot it is to drive; tells which rows are its own when several share the table.
+        motion: Whether joints or the tool are looked for; joints may be missing beside the tool.
 
     Raises:
         InputError: No table, no header, no time, no joints, or a mapping that does not fit the file.
     """
     given = given or Mapping()
+    if motion is Motion.TOOL:
+        given = given.without_joints()
     name = name or path.name
     fitting = [
         (layout, base)
         for grid, base in candidates(path, name, given)
-        if (layout := find_layout(grid, given, target.joints if target is not None else ())) is not None
+        if (layout := find_layout(grid, given, () if target is None else target.joints, motion)) is not None
     ]
     if not fitting:
-        raise InputError.at(name, "header", "no row names a time and joints", _remedy(path, name, given))
+        what = f"no row names a time and {motion}"
+        raise InputError.at(name, "header", what, _remedy(path, name, given, motion))
     # Of several ways to cut the same text into columns, the one with the most joints is meant.
-    guesses = [_one(name, layout, base, given, target) for layout, base in fitting]
+    guesses = [_one(name, layout, base, given, target, motion) for layout, base in fitting]
     usable = [g for g in guesses if not isinstance(g, InputError)]
     if not usable:
         raise next(g for g in guesses if isinstance(g, InputError))
-    best = max(usable, key=lambda g: _width(g.mapping))
+    best = max(usable, key=lambda g: _width(g.mapping, motion))
     others = [g.mapping.sheet for g in usable if g.mapping.sheet != best.mapping.sheet]
     if others:
         names = ", ".join(repr(g.mapping.sheet) for g in usable)
-        questions = {"sheet": f"{len(usable)} sheets hold joints over time: {names}", **best.questions}
+        questions = {"sheet": f"{len(usable)} sheets hold {motion} over time: {names}", **best.questions}
         best = Guess(best.file, best.mapping, questions, best.notes, best.layout)
     return best
 
 
 def _one(
-    name: str, layout: Layout, base: Mapping, given: Mapping, target: Target | None
+    name: str, layout: Layout, base: Mapping, given: Mapping, target: Target | None, motion: Motion
 ) -> Guess | InputError:
-    found = guess_columns(layout, given, target)
+    found = guess_columns(layout, given, target, motion)
     if found.problems:
         return InputError(found.problems)
     units = guess_units(layout, found, given)
@@ -113,11 +122,13 @@ def _one(
     return Guess(name, whole, asked, notes, layout)
 
 
-def _width(mapping: Mapping) -> int:
+def _width(mapping: Mapping, motion: Motion) -> int:
+    if motion is Motion.TOOL:
+        return len(mapping.tcp_position or ()) + len(mapping.tcp_orientation or ())
     return len(mapping.joints) if isinstance(mapping.joints, tuple) else 1000
 
 
-def _remedy(path: Path, name: str, given: Mapping) -> str:
+def _remedy(path: Path, name: str, given: Mapping, motion: Motion) -> str:
     if given.header_row is not None:
         return f"header_row = {given.header_row} is beyond the table"
     shown = []
@@ -128,4 +139,5 @@ def _remedy(path: Path, name: str, given: Mapping) -> str:
                 shown.append(" | ".join(text)[:120])
                 break
     seen = f" (the first row reads: {shown[0]})" if shown else " (the table is empty)"
-    return "name the columns in [sources.mapping]: header_row, time, joints and their units" + seen
+    columns = "joints" if motion is Motion.JOINTS else "tcp_position, tcp_orientation, tcp_convention"
+    return f"name the columns in [sources.mapping]: header_row, time, {columns} and their units" + seen

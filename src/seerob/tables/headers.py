@@ -169,11 +169,22 @@ def unit_of(text: str) -> str | None:
     return UNITS.get(unicodedata.normalize("NFKC", text).strip().casefold().strip("[](){}<>").strip())
 
 
+_UR_POSE = re.compile(r"(?:actual|target)_tcp_pose_([0-5])")
+"""Universal Robots' own names: x, y, z [m], then a rotation vector [rad], in the controller's base frame."""
+UR_POSE = tuple(f"actual_TCP_pose_{i}" for i in range(6))
+ROTATION_VECTOR = ("rotation_x", "rotation_y", "rotation_z")
+
+
 def understand(text: str) -> Header:
     """What a header says; ``Role.OTHER`` when it says nothing that is known."""
     text = " ".join(text.split())
     if len(text) > 200:
         return Header(text)
+    ours = _UR_POSE.fullmatch(text.casefold())
+    if ours is not None:
+        i = int(ours[1])
+        # Known by its name alone; it takes no role from columns that a table means as its own.
+        return Header(text, Role.OTHER, ("x", "y", "z", *ROTATION_VECTOR)[i], "m" if i < 3 else "rad")
     name = unicodedata.normalize("NFKC", text)
     unit: str | None = None
     for match in _BRACKET.finditer(name):

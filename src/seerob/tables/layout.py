@@ -9,8 +9,8 @@ from itertools import islice
 
 from seerob.errors import Problem, suggestion
 from seerob.tables.grid import Cell, Grid, blank, number, place
-from seerob.tables.headers import Header, Role, understand, unit_of
-from seerob.tables.mapping import Column, Mapping
+from seerob.tables.headers import UR_POSE, Header, Role, understand, unit_of
+from seerob.tables.mapping import Column, Mapping, Motion
 
 PREVIEW = 400
 """Rows that are looked at before anything is decided."""
@@ -102,13 +102,18 @@ class Layout:
         return tuple(found[k] for k in sorted(found))
 
 
-def find_layout(grid: Grid, given: Mapping, joints: tuple[str, ...] = ()) -> Layout | None:
+def find_layout(
+    grid: Grid, given: Mapping, joints: tuple[str, ...] = (), motion: Motion = Motion.JOINTS
+) -> Layout | None:
     """The header of a table; None when there is nothing like one.
 
     A row is taken when it holds every column that the mapping names; without a mapping, when it
     names a time and a joint; failing that, when it names two joints. ``joints`` are the joints of the
-    robot that is to be driven: their own names in a header are understood too.
+    robot that is to be driven: their own names in a header are understood too. For a motion of the
+    tool its coordinates stand in for the joints.
     """
+    role = Role.JOINT if motion is Motion.JOINTS else Role.TCP_POSITION
+    names = joints if motion is Motion.JOINTS else UR_POSE
     rows = list(islice(grid.rows(), PREVIEW + SEARCH))
     if given.header_row is not None:
         if not 0 <= given.header_row <= len(rows):
@@ -123,10 +128,10 @@ def find_layout(grid: Grid, given: Mapping, joints: tuple[str, ...] = ()) -> Lay
         roles = [h.role for h in layout.headers]
         if wanted and wanted <= {_same(h.text) for h in layout.headers}:
             return layout
-        own = bool(joints) and set(map(_same, joints)) <= {_same(h.text) for h in layout.headers}
-        if Role.TIME in roles and (Role.JOINT in roles or own) and not wanted:
+        own = bool(names) and set(map(_same, names)) <= {_same(h.text) for h in layout.headers}
+        if Role.TIME in roles and (role in roles or own) and not wanted:
             return layout
-        if roles.count(Role.JOINT) >= 2 or (wanted and Role.JOINT in roles):
+        if roles.count(role) >= 2 or (wanted and role in roles):
             second = second or layout
     return second
 

@@ -13,6 +13,13 @@ Column = str | int
 """A header as it stands in the file, or a column number from 1."""
 
 
+class Motion(StrEnum):
+    """What a table is read for."""
+
+    JOINTS = "joints"
+    TOOL = "tool positions"
+
+
 class TimeUnit(StrEnum):
     """Unit of a time column."""
 
@@ -129,6 +136,17 @@ class Mapping(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
                 lines.append(f"# {remarks[name]}")
             lines.append(f"{name} = {_toml(value)}")
         return "\n".join(lines) + "\n"
+
+    def without_joints(self) -> Mapping:
+        """This mapping for a reading of the tool alone."""
+        return structs.replace(
+            self,
+            joints=None,
+            joint_unit=None,
+            velocities=None,
+            velocity_unit=None,
+            torques=None,
+        )
 
     def over(self, other: Mapping) -> Mapping:
         """This mapping, and where it says nothing the other."""

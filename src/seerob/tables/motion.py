@@ -1,42 +1,67 @@
-"""A table and its mapping → a trajectory in SI units."""
+"""A table and its mapping → a trajectory of the joints or of the tool in SI units."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.errors import InputError, Problem, suggestion
 from seerob.source import Target
 from seerob.tables.grid import Numbers, place, read_numbers
 from seerob.tables.guess import Guess, guess
 from seerob.tables.layout import Layout
-from seerob.tables.mapping import SI, Mapping
+from seerob.tables.mapping import SI, Mapping, Motion
 from seerob.tables.orientation import wxyz_from
+from seerob.tool_trajectory import ToolTrajectory
 from seerob.trajectory import Trajectory
 from seerob.transforms import Array
 
 KEYS = ("time", "joints", "velocities", "torques", "tcp_position", "tcp_orientation")
 
 
-def read_motion(
-    path: Path, given: Mapping | None = None, *, name: str | None = None, target: Target | None = None
-) -> tuple[Trajectory, Guess, tuple[str, ...]]:
-    """Read a table of motion.
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table of motion in SI units."""
+
+    guess: Guess
+    """The mapping that was used."""
+    rows: NDArray[np.int64]
+    """Row numbers in the file, from 1, shape (n,)."""
+    blocks: dict[str, Array]
+    """Values per key of the mapping, each of shape (n, columns)."""
+    notes: tuple[str, ...]
+    """What was left out or mended."""
+
+    @property
+    def place(self) -> str:
+        """The table as messages name it."""
+        return place(self.guess.layout.grid)
+
+
+def read_table(
+    path: Path,
+    given: Mapping | None = None,
+    *,
+    name: str | None = None,
+    target: Target | None = None,
+    motion: Motion = Motion.JOINTS,
+) -> Table:
+    """Read the columns of a table of motion.
 
     Args:
         path: A workbook or delimited text.
         given: What the user says of its columns.
         name: The file as messages name it.
         target: The robot it is to drive; its joints say which are lengths.
-
-    Returns:
-        The motion, the mapping that was used, and remarks on what was left out or mended.
+        motion: Whether joints or the tool are read.
 
     Raises:
         InputError: Something must be confirmed first, or the file is wrong.
     """
-    found = guess(path, given, name=name, target=target)
+    found = guess(path, given, name=name, target=target, motion=motion)
     if not found.certain:
         raise found.error()
     layout, mapping = found.layout, found.mapping
@@ -60,30 +85,67 @@ def read_motion(
         select=select,
     )
     _check_selection(found.file, mapping, numbers)
-    blocks = _blocks(numbers, indices, factors)
     notes = list(found.notes)
     if numbers.skipped:
         notes.append(f"{numbers.skipped} blank rows between rows with values were skipped")
+    return Table(found, numbers.rows, _blocks(numbers, indices, factors), tuple(notes))
+
+
+def read_motion(
+    path: Path, given: Mapping | None = None, *, name: str | None = None, target: Target | None = None
+) -> tuple[Trajectory, Guess, tuple[str, ...]]:
+    """Read a table of joint motion; arguments and errors are those of `read_table`.
+
+    Returns:
+        The motion, the mapping that was used, and remarks on what was left out or mended.
+    """
+    table = read_table(path, given, name=name, target=target)
+    blocks, convention = table.blocks, table.guess.mapping.tcp_convention
     wxyz = None
-    if "tcp_orientation" in blocks and mapping.tcp_convention is not None:
+    if "tcp_orientation" in blocks and convention is not None:
         try:
-            wxyz = wxyz_from(mapping.tcp_convention, blocks["tcp_orientation"])
+            wxyz = wxyz_from(convention, blocks["tcp_orientation"])
         except ValueError as error:
-            raise InputError.at(
-                found.file, place(layout.grid), str(error), "leave the columns out"
-            ) from error
+            raise InputError.at(table.guess.file, table.place, str(error), "leave the columns out") from error
     trajectory = Trajectory(
-        file=found.file,
+        file=table.guess.file,
         t=blocks["time"][:, 0],
         q=blocks["joints"],
         qd=blocks.get("velocities"),
         tau=blocks.get("torques"),
         tcp_position=blocks.get("tcp_position"),
         tcp_wxyz=wxyz,
-        rows=numbers.rows,
-        sheet=layout.grid.sheet,
+        rows=table.rows,
+        sheet=table.guess.layout.grid.sheet,
     )
-    return trajectory, found, tuple(notes)
+    return trajectory, table.guess, table.notes
+
+
+def read_tool_motion(
+    path: Path, given: Mapping | None = None, *, name: str | None = None, target: Target | None = None
+) -> tuple[ToolTrajectory, Guess, tuple[str, ...]]:
+    """Read a table of tool poses; it needs no joints. Arguments and errors are those of `read_table`.
+
+    Returns:
+        The motion in whatever frame the file uses, the mapping that was used, and remarks on what was
+        left out or mended.
+    """
+    table = read_table(path, given, name=name, target=target, motion=Motion.TOOL)
+    orientation, convention = table.blocks["tcp_orientation"], table.guess.mapping.tcp_convention
+    # Quaternions go on as they are: one that is not of unit length is a mistake to be named.
+    if convention == "xyzw":
+        orientation = np.roll(orientation, 1, axis=1)
+    elif convention is not None and convention != "wxyz":
+        orientation = wxyz_from(convention, orientation)
+    trajectory = ToolTrajectory(
+        file=table.guess.file,
+        t=table.blocks["time"][:, 0],
+        position=table.blocks["tcp_position"],
+        wxyz=orientation,
+        rows=table.rows,
+        sheet=table.guess.layout.grid.sheet,
+    )
+    return trajectory, table.guess, table.notes
 
 
 def _indices(layout: Layout, mapping: Mapping) -> dict[str, tuple[int, ...]]:
@@ -116,7 +178,7 @@ def _factors(
     file: str, mapping: Mapping, indices: dict[str, tuple[int, ...]], target: Target | None
 ) -> dict[str, Array]:
     """Factor to SI per column of each key; InputError where a unit does not fit the robot's joint."""
-    dof = len(indices["joints"])
+    dof = len(indices.get("joints", ()))
     wanted = target.units if target is not None and len(target.units) == dof else None
     units = {
         "time": (mapping.time_unit,),

@@ -11,6 +11,8 @@ const PAD_PX = 7;
 const HEIGHT_PX = 24;
 const SHARPNESS = 2;
 const LONGEST = 64;
+/** Lower edge of the plate below its point, in heights of the plate: a little above it. */
+const RAISED = -0.35;
 const FONT = `600 ${FONT_PX * SHARPNESS}px system-ui, "Segoe UI", "Noto Sans", sans-serif`;
 
 const at = new Vector3();
@@ -32,7 +34,7 @@ export class Caption {
     this.object = new Sprite(this.material);
     this.object.renderOrder = 10;
     this.object.raycast = () => {};
-    this.object.center.set(0.5, -0.35);
+    this.object.center.set(0.5, RAISED);
   }
 
   update(text: string, verdict: Verdict | null): void {
@@ -47,6 +49,19 @@ export class Caption {
     const { camera, pixel } = view;
     const size = pixel * Math.max(this.object.getWorldPosition(at).distanceTo(camera.position), 0.05);
     this.object.scale.set((this.canvas.width / SHARPNESS) * size, (this.canvas.height / SHARPNESS) * size, 1);
+  }
+
+  get widthPx(): number {
+    return this.canvas.width / SHARPNESS;
+  }
+
+  get heightPx(): number {
+    return HEIGHT_PX;
+  }
+
+  /** Draw it so much higher on the screen than where it belongs [px]. */
+  lift(px: number): void {
+    this.object.center.y = RAISED - px / HEIGHT_PX;
   }
 
   dispose(): void {

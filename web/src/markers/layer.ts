@@ -7,6 +7,7 @@ import type { Marker, Result, Verdict } from "../wire";
 import { Caption } from "./caption";
 import type { Drawn, View } from "./drawn";
 import { makeDrawn } from "./index";
+import { stackCaptions } from "./stacking";
 
 interface Slot {
   type: Marker["type"];
@@ -55,6 +56,13 @@ export class MarkerLayer {
         drawn.face?.(view);
         caption?.face(view);
       }
+    }
+    stackCaptions(this.captions(), view);
+  }
+
+  private *captions(): Iterable<Caption> {
+    for (const slots of this.slots.values()) {
+      for (const { caption } of slots) if (caption?.object.visible) yield caption;
     }
   }
 

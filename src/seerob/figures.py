@@ -1,0 +1,133 @@
+"""Numbers as text that is never kinder than the number.
+
+A value beside its limit keeps its side: what exceeds does not look equal, what is within does not look
+beyond. Where rounding must choose, it chooses against whoever hopes for *within*: a value and its
+excess away from the margin, a limit toward it. Noise of floating-point sums, such as 1e-26 J, is 0.
+"""
+
+from __future__ import annotations
+
+import math
+from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal, localcontext
+from typing import NamedTuple
+
+DECIMALS = {
+    "m": 4,
+    "m/s": 3,
+    "m/s²": 2,
+    "m/rad": 4,
+    "rad": 4,
+    "rad/s": 3,
+    "s": 2,
+    "J": 3,
+    "kg": 3,
+    "N": 1,
+    "N·m": 2,
+    "W": 2,
+}
+"""Places after the point per unit: what a twin can be asked for, 0.1 mm for a distance."""
+_DIGITS = 4
+"""Significant digits of other units."""
+_SMALLEST = 9
+"""Places after the point beyond which other units count as 0 too."""
+_EXACT = 12
+"""Significant digits that a float is trusted for: 0.1 + 0.2 is 0.3."""
+_MOST = 17
+_HUGE = 1e15
+
+
+class Pair(NamedTuple):
+    """A value and its limit, without units."""
+
+    value: str
+    limit: str
+
+
+def figure(value: float | None, unit: str = "") -> str:
+    """A number without a limit, rounded to the nearest, with its unit; a dash for what is not there."""
+    text = _alone(value, unit)
+    return text if text == "–" else with_unit(text, unit)
+
+
+def against(value: float | None, limit: float | None, unit: str = "", *, at_most: bool) -> Pair:
+    """A value and its limit, on the same side of each other as the numbers are.
+
+    Args:
+        value: In ``unit``; None or nan when there is none.
+        limit: In ``unit``.
+        unit: Of both; decides the places after the point, and is not written.
+        at_most: Whether the limit bounds from above.
+    """
+    if value is None or limit is None or not (math.isfinite(value) and math.isfinite(limit)):
+        return Pair(_alone(value, unit), _alone(limit, unit))
+    worse, better = (ROUND_CEILING, ROUND_FLOOR) if at_most else (ROUND_FLOOR, ROUND_CEILING)
+    places = _places(unit, value, limit)
+    for more in range(_MOST):
+        shown = Pair(_text(value, places + more, worse), _text(limit, places + more, better))
+        if _beyond(_back(shown.value), _back(shown.limit), at_most) == _beyond(value, limit, at_most):
+            return shown
+    return Pair(_signed(repr(float(value))), _signed(repr(float(limit))))
+
+
+def margin(value: float, limit: float, unit: str = "", *, at_most: bool) -> str:
+    """How far a value is inside (rounded down) or beyond (rounded up) its limit, with the unit."""
+    gap = limit - value if at_most else value - limit
+    places = _places(unit, value, limit)
+    if gap >= 0:
+        return with_unit(_text(gap, places, ROUND_FLOOR), unit)
+    # An excess below the column's precision is still one.
+    shown = (_text(-gap, places + more, ROUND_CEILING) for more in range(_MOST))
+    return with_unit(next((text for text in shown if _back(text) > 0), repr(-float(gap))), unit)
+
+
+def with_unit(text: str, unit: str) -> str:
+    """``0.56 m``."""
+    return f"{text} {unit}".rstrip()
+
+
+def _alone(value: float | None, unit: str) -> str:
+    if value is None or math.isnan(value):
+        return "–"
+    return _text(value, _places(unit, value), ROUND_HALF_EVEN)
+
+
+def _places(unit: str, *values: float) -> int:
+    if unit in DECIMALS:
+        return DECIMALS[unit]
+    largest = max((abs(v) for v in values if math.isfinite(v)), default=0.0)
+    if largest == 0:
+        return 0
+    return min(max(_DIGITS - 1 - math.floor(math.log10(largest)), 0), _SMALLEST)
+
+
+def _text(value: float, places: int, rounding: str) -> str:
+    if not math.isfinite(value):
+        return "∞" if value > 0 else "−∞"
+    if abs(value) >= _HUGE:
+        return _signed(repr(float(value)))
+    with localcontext() as context:
+        context.prec = 60
+        exact = Decimal(f"{value:.{_EXACT - 1}e}")
+        unit = Decimal(1).scaleb(-places)
+        # Noise must not be lifted to a whole unit by directed rounding.
+        if abs(exact) < unit / 1000:
+            exact = Decimal(0)
+        rounded = exact.quantize(unit, rounding=rounding)
+        text = f"{rounded:f}"
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    if text in ("-0", ""):
+        return "0"
+    return _signed(text)
+
+
+def _signed(text: str) -> str:
+    return text.replace("-", "−")
+
+
+def _back(text: str) -> float:
+    return float(text.replace("−", "-").replace("∞", "inf"))
+
+
+def _beyond(value: float, limit: float, at_most: bool) -> bool:
+    return value > limit if at_most else value < limit

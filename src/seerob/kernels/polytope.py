@@ -1,0 +1,299 @@
+r"""Corners and faces of :math:`\{f \in R^3 : l_i \le a_i^T f \le h_i,\ i = 1 \dots n\}`, exactly.
+
+Each pair of planes that are not parallel meets in a line
+
+.. math:: p + t\,d,\quad d = a_i \times a_j,\quad
+          p = \frac{(b_i - c\,b_j)\,a_i + (b_j - c\,b_i)\,a_j}{1 - c^2},\quad c = a_i^T a_j
+
+with unit normals, :math:`b` one of the two offsets of each. The other slabs clip the line; what is left
+of it is an edge. A bounded polytope in three dimensions has no corner that is not the end of an edge, so
+:math:`2n(n-1)` clippings find every one: :math:`O(n^3)`, where the corners of the box of
+:math:`(l, h)` are :math:`2^n`. A corner where three planes meet is found three times and kept once.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from seerob.transforms import Array
+
+Indices = NDArray[np.int64]
+
+PARALLEL = 1e-12
+"""Sine below which a line and a plane, or two planes, are parallel."""
+INERT = 1e-12
+"""A column shorter than this, relative to the longest, constrains nothing."""
+ROUNDING = 1e-12
+"""How far outside a parallel slab a line may lie, relative to the largest finite offset."""
+
+EMPTY = -1
+"""No point satisfies every constraint."""
+UNBOUNDED = -2
+"""A line satisfies every constraint that is not parallel to it."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def unit_slabs(A: Array, low: Array, high: Array) -> tuple[bool, Array, Array, Array]:
+    """The same polytope with unit normals, without the columns that are zero.
+
+    Args:
+        A: Normals as columns, shape (3, n).
+        low: Lower bounds, -inf for none, shape (n,).
+        high: Upper bounds, inf for none, shape (n,).
+
+    Returns:
+        Whether the zero columns leave anything, unit normals (m, 3), bounds (m,) and (m,).
+    """
+    n = A.shape[1]
+    N, l, h = np.empty((n, 3)), np.empty(n), np.empty(n)
+    longest = 0.0
+    for i in range(n):
+        longest = max(longest, math.sqrt(A[0, i] ** 2 + A[1, i] ** 2 + A[2, i] ** 2))
+    m = 0
+    possible = True
+    for i in range(n):
+        length = math.sqrt(A[0, i] ** 2 + A[1, i] ** 2 + A[2, i] ** 2)
+        if length <= INERT * longest:
+            possible = possible and low[i] <= 0.0 <= high[i]
+            continue
+        for r in range(3):
+            N[m, r] = A[r, i] / length
+        l[m], h[m] = low[i] / length, high[i] / length
+        m += 1
+    return possible, N[:m], l[:m], h[:m]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def corners(N: Array, l: Array, h: Array, V: Array, W: Indices, quality: Array) -> int:
+    """Write the corners of a polytope into ``V``.
+
+    Args:
+        N: Unit normals, shape (n, 3).
+        l: Lower bounds, shape (n,).
+        h: Upper bounds, shape (n,); equal to the lower one for a plane.
+        V: Room for corners, shape (m, 3) with m >= 4 n (n - 1).
+        W: Room for the three planes of each corner, shape (m, 3): ``2 i`` is the lower of constraint i.
+        quality: Room, shape (m,).
+
+    Returns:
+        Number of corners, some of them equal where more than three planes meet; `EMPTY` or `UNBOUNDED`.
+    """
+    n = len(N)
+    scale = 0.0
+    for i in range(n):
+        if math.isfinite(l[i]):
+            scale = max(scale, abs(l[i]))
+        if math.isfinite(h[i]):
+            scale = max(scale, abs(h[i]))
+    slack = ROUNDING * scale
+    count = 0
+    for i in range(n):
+        ax, ay, az = N[i, 0], N[i, 1], N[i, 2]
+        for j in range(i + 1, n):
+            bx, by, bz = N[j, 0], N[j, 1], N[j, 2]
+            dx, dy, dz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            s2 = dx * dx + dy * dy + dz * dz
+            if s2 < PARALLEL * PARALLEL:
+                continue
+            s = math.sqrt(s2)
+            dx, dy, dz = dx / s, dy / s, dz / s
+            c = ax * bx + ay * by + az * bz
+            for side_i in range(2 if l[i] < h[i] else 1):
+                bi = h[i] if side_i else l[i]
+                if not math.isfinite(bi):
+                    continue
+                for side_j in range(2 if l[j] < h[j] else 1):
+                    bj = h[j] if side_j else l[j]
+                    if not math.isfinite(bj):
+                        continue
+                    u, v = (bi - c * bj) / s2, (bj - c * bi) / s2
+                    px, py, pz = u * ax + v * bx, u * ay + v * by, u * az + v * bz
+                    t0, t1, k0, k1 = -np.inf, np.inf, -1, -1
+                    for k in range(n):
+                        if k == i or k == j:
+                            continue
+                        ad = N[k, 0] * dx + N[k, 1] * dy + N[k, 2] * dz
+                        ap = N[k, 0] * px + N[k, 1] * py + N[k, 2] * pz
+                        if abs(ad) < PARALLEL:
+                            if ap > h[k] + slack or ap < l[k] - slack:
+                                t0, t1 = 1.0, 0.0
+                                break
+                            continue
+                        ta, tb, ka, kb = (l[k] - ap) / ad, (h[k] - ap) / ad, 2 * k, 2 * k + 1
+                        if ad < 0.0:
+                            ta, tb, ka, kb = tb, ta, kb, ka
+                        if ta > t0:
+                            t0, k0 = ta, ka
+                        if tb < t1:
+                            t1, k1 = tb, kb
+                        if t0 > t1:
+                            break
+                    if t0 > t1:
+                        continue
+                    if not (math.isfinite(t0) and math.isfinite(t1)):
+                        return UNBOUNDED
+                    for end in range(2):
+                        t, k = (t1, k1) if end else (t0, k0)
+                        if l[k // 2] == h[k // 2]:
+                            k -= k % 2
+                        a, b = 2 * i + side_i, 2 * j + side_j
+                        if k < a:
+                            a, b, k = k, a, b
+                        elif k < b:
+                            b, k = k, b
+                        place = count
+                        for known in range(count):
+                            if W[known, 0] == a and W[known, 1] == b and W[known, 2] == k:
+                                place = known
+                                break
+                        if place < count and quality[place] >= s2:
+                            continue
+                        # Of the three lines through a corner the one between the steepest planes is exact.
+                        W[place, 0], W[place, 1], W[place, 2], quality[place] = a, b, k, s2
+                        V[place, 0], V[place, 1], V[place, 2] = px + t * dx, py + t * dy, pz + t * dz
+                        if place == count:
+                            count += 1
+    return count if count else _without_corners(N, l, h)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _without_corners(N: Array, l: Array, h: Array) -> int:
+    """Whether no corner means nothing or, all planes being parallel, a slab without end."""
+    n = len(N)
+    low, high = -np.inf, np.inf
+    for i in range(n):
+        along = N[0, 0] * N[i, 0] + N[0, 1] * N[i, 1] + N[0, 2] * N[i, 2]
+        if 1.0 - abs(along) > 1e-9:
+            return EMPTY
+        if along > 0:
+            low, high = max(low, l[i]), min(high, h[i])
+        else:
+            low, high = max(low, -h[i]), min(high, -l[i])
+    return UNBOUNDED if low <= high else EMPTY
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def inscribed(l: Array, h: Array) -> float:
+    """Radius of the largest ball about 0 inside; below 0 when 0 is outside. Unit normals."""
+    radius = np.inf
+    for i in range(len(l)):
+        radius = min(radius, h[i], -l[i])
+    return radius
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def largest(A: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
+    """Farthest point and inscribed ball of many polytopes.
+
+    A norm is convex, so it is largest at a corner.
+
+    Args:
+        A: Normals as columns, shape (N, 3, n).
+        low: Shape (N, n).
+        high: Shape (N, n).
+
+    Returns:
+        Norm of the farthest point (N,): inf when unbounded, nan when empty. The point (N, 3), nan when
+        there is none. Radius of the largest ball about 0 inside (N,), below 0 when 0 is outside.
+    """
+    N, _, n = A.shape
+    room = max(4 * n * (n - 1), 1)
+    V, W, quality = np.empty((room, 3)), np.empty((room, 3), np.int64), np.empty(room)
+    norm, point, radius = np.full(N, np.nan), np.full((N, 3), np.nan), np.full(N, np.nan)
+    for s in range(N):
+        possible, normals, l, h = unit_slabs(A[s], low[s], high[s])
+        radius[s] = inscribed(l, h)
+        count = corners(normals, l, h, V, W, quality) if possible and len(l) else EMPTY
+        if possible and not len(l):
+            count = UNBOUNDED
+        if count == UNBOUNDED:
+            norm[s] = np.inf
+        squared = -1.0
+        for k in range(count):
+            q = V[k, 0] ** 2 + V[k, 1] ** 2 + V[k, 2] ** 2
+            if q > squared:
+                squared = q
+                point[s] = V[k]
+        if count > 0:
+            norm[s] = math.sqrt(squared)
+    return norm, point, radius
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def merged(V: Array, tolerance: float) -> Array:
+    """Corners without those nearer than ``tolerance`` to an earlier one."""
+    kept = np.empty_like(V)
+    count = 0
+    for i in range(len(V)):
+        new = True
+        for k in range(count):
+            gap = max(abs(V[i, 0] - kept[k, 0]), abs(V[i, 1] - kept[k, 1]), abs(V[i, 2] - kept[k, 2]))
+            if gap <= tolerance:
+                new = False
+                break
+        if new:
+            kept[count] = V[i]
+            count += 1
+    return kept[:count].copy()
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def faces(N: Array, l: Array, h: Array, V: Array, tolerance: float) -> Indices:
+    """Triangles of the polytope's surface, seen from outside counter-clockwise.
+
+    Args:
+        N: Unit normals, shape (n, 3).
+        l: Shape (n,).
+        h: Shape (n,).
+        V: Distinct corners, shape (k, 3).
+        tolerance: Of a corner's distance to a plane that it lies on.
+
+    Returns:
+        Indices of corners, shape (m, 3); of a flat polytope both sides.
+    """
+    n, k = len(N), len(V)
+    triangles = np.empty((2 * n * max(k, 1), 3), np.int64)
+    seen = np.zeros((2 * n, k), np.bool_)
+    count, planes = 0, 0
+    on, angle = np.empty(k, np.int64), np.empty(k)
+    for plane in range(2 * n):
+        i = plane // 2
+        sign = 1.0 if plane % 2 else -1.0
+        b = h[i] if plane % 2 else l[i]
+        m = 0
+        center = np.zeros(3)
+        seen[planes] = False
+        for v in range(k):
+            if abs(N[i, 0] * V[v, 0] + N[i, 1] * V[v, 1] + N[i, 2] * V[v, 2] - b) <= tolerance:
+                on[m] = v
+                m += 1
+                center += V[v]
+                seen[planes, v] = True
+        if m < 3:
+            continue
+        known = False
+        for other in range(planes):
+            if (seen[other] == seen[planes]).all() and l[i] < h[i]:
+                known = True
+        if known:
+            continue
+        planes += 1
+        center /= m
+        normal = sign * N[i]
+        first = V[on[0]] - center
+        first = first - (first @ normal) * normal
+        second = np.cross(normal, first)
+        for p in range(m):
+            arm = V[on[p]] - center
+            angle[p] = math.atan2(arm @ second, arm @ first)
+        order = np.argsort(angle[:m])
+        for p in range(1, m - 1):
+            triangles[count, 0] = on[order[0]]
+            triangles[count, 1] = on[order[p]]
+            triangles[count, 2] = on[order[p + 1]]
+            count += 1
+    return triangles[:count].copy()

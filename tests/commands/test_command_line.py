@@ -1,0 +1,325 @@
+"""The command line as a user or a pipeline meets it: words, streams, files and exit codes."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import socket
+import subprocess
+import sys
+
+import pytest
+from made_cells import HUMAN, ROBOT, SEPARATION, make_cell, seerob
+from mcap.writer import Writer
+
+import seerob as sr
+from seerob.cli import COMMANDS
+
+FILES = ["report.html", "results.xlsx", "run.mcap"]
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A cell, assessed once: its folder and the folder of its files."""
+    from seerob.cli import main
+
+    folder = tmp_path_factory.mktemp("recorded")
+    cell = make_cell(folder / "cell")
+    assert main(["assess", str(cell), "-o", str(folder / "out"), "--json"]) == 0
+    return cell, folder / "out"
+
+
+# -- help ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_of_each_command_has_one_example_that_parses(capsys, name):
+    from seerob.cli import parser
+
+    code, out, err = seerob(capsys, name.replace("_", "-"), "--help")
+    assert (code, err) == (0, "")
+    (example,) = [line for line in out.splitlines() if line.startswith("example: ")]
+    words = example.removeprefix("example: seerob ").split("   ")[0].split()
+    assert parser().parse_args(words).command == name.replace("_", "-")
+
+
+def test_help_needs_none_of_the_heavy_packages():
+    heavy = [
+        "mujoco",
+        "numba",
+        "trimesh",
+        "scipy",
+        "matplotlib",
+        "openpyxl",
+        "mcap",
+        "starlette",
+        "coacd",
+        "fcl",
+    ]
+    script = (
+        "import sys\nfrom seerob.cli import main\n"
+        "try: main(['--help'])\nexcept SystemExit: pass\n"
+        f"print('loaded', [m for m in {heavy} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert "loaded []" in done.stdout
+    assert "exit code: 0 within, 1 exceeded, 2 undecided, 3 error" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["asses", "x"],
+        ["assess"],
+        ["assess", "x", "--jason"],
+        ["run", "x", "--port", "99999"],
+        ["run", "x", "--port", "http"],
+        ["run", "x", "--seconds", "nan"],
+        ["run", "x", "--seconds", "-1"],
+        ["run"],
+        ["kinds", "robots"],
+    ],
+)
+def test_a_wrong_call_is_an_error_and_not_an_undecided(capsys, arguments):
+    code, out, err = seerob(capsys, *arguments)
+    assert (code, out) == (3, "")
+    assert "seerob" in err
+
+
+# -- new, check-file, kinds, schema -------------------------------------------------------------
+
+
+def test_new_makes_a_folder_that_is_fine_and_touches_nothing_that_exists(capsys, tmp_path):
+    code, out, _ = seerob(capsys, "new", tmp_path / "cell")
+    assert code == 0
+    assert "next" in out
+    assert {p.name for p in (tmp_path / "cell").iterdir()} == {"workstation.toml", "motion.csv"}
+    code, out, err = seerob(capsys, "check-file", tmp_path / "cell")
+    assert (code, err) == (0, "")
+    assert "fine" in out
+    before = (tmp_path / "cell" / "workstation.toml").read_bytes()
+    code, out, err = seerob(capsys, "new", tmp_path / "cell")
+    assert (code, out) == (3, "")
+    assert "exists already" in err
+    assert (tmp_path / "cell" / "workstation.toml").read_bytes() == before
+    code, _, err = seerob(capsys, "new", tmp_path / "cell" / "motion.csv" / "x")
+    assert code == 3
+    assert "motion.csv" in err
+
+
+@pytest.mark.parametrize("command", ["check-file", "assess", "run"])
+def test_mistakes_go_to_standard_error_and_nothing_is_written(capsys, tmp_path, command):
+    cell = make_cell(tmp_path / "cell", more='titl = "x"\nlimits = 3\n')
+    code, out, err = seerob(capsys, command, cell)
+    assert (code, out) == (3, "")
+    lines = err.splitlines()
+    assert len(lines) == 2
+    assert all(line.startswith(f"{cell / 'workstation.toml'}: safety[0].") for line in lines)
+    assert not (cell / "runs").exists()
+
+
+def test_missing_files_and_unknown_links_come_in_one_go(capsys, tmp_path):
+    more = ROBOT.replace("ur5e", "b").replace("library:b", "b.urdf") + '[[parts]]\nname="p"\nmesh="p.stl"\n'
+    cell = make_cell(tmp_path / "cell", more=more)
+    (cell / "motion.csv").unlink()
+    code, _, err = seerob(capsys, "assess", cell)
+    assert code == 3
+    assert all(name in err for name in ("b.urdf", "p.stl", "motion.csv"))
+    assert not (cell / "runs").exists()
+
+
+def test_mistakes_of_criteria_and_of_sources_come_together(capsys, tmp_path):
+    cell = make_cell(tmp_path / "cell", more='[[safety]]\nkind = "velocity"\nat = "ur5e/elbow"\nlimit = 1\n')
+    (cell / "motion.csv").write_text("time [s],J1 [deg],J2 [deg]\n0,1,2\n0.1,1,2\n")
+    code, _, err = seerob(capsys, "check-file", cell)
+    assert code == 3
+    assert "'ur5e/elbow'" in err
+    assert "motion.csv" in err
+
+
+def test_kinds_lists_every_kind_once(capsys):
+    from seerob import plugin
+
+    code, out, _ = seerob(capsys, "kinds")
+    assert code == 0
+    for group in ("sources", "safety", "ergonomics", "sinks"):
+        for kind in plugin.kinds(group):
+            assert sum(line.split()[:1] == [kind] for line in out.splitlines()) >= 1
+    code, only, _ = seerob(capsys, "kinds", "safety")
+    assert "separation" in only
+    assert "recorder" not in only
+
+
+# -- assess and report --------------------------------------------------------------------------
+
+
+def test_assess_as_json_says_what_the_api_says(capsys, tmp_path):
+    cell = make_cell(tmp_path / "cell", limit=0.1)
+    code, out, err = seerob(capsys, "assess", cell, "-o", tmp_path / "out", "--json")
+    said = json.loads(out)
+    run = sr.load(cell).run()
+    worst = run.results["speed"].worst()
+    assert (code, err) == (1, "")
+    assert said["verdict"] == run.verdict == "exceeded"
+    assert said["ticks"] == run.ticks == 31
+    (criterion,) = said["criteria"]
+    assert criterion["worst"] == {"t": worst.t, "value": worst.value, "limit": 0.1, "reason": worst.reason}
+    assert said["workstation_hash"] == run.scene.workstation_hash
+    assert len(said["findings"]) == len(run.scene.findings)
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == FILES
+
+
+def test_exit_codes_tell_within_exceeded_and_undecided(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("seerob.commands.assess.sinks_of", lambda *_, **__: [])
+    far = HUMAN + SEPARATION
+    for name, code, word, cell in (
+        ("w", 0, "within ", make_cell(tmp_path / "w")),
+        ("e", 1, "EXCEEDED ", make_cell(tmp_path / "e", limit=0.01, more=far)),
+        ("u", 2, "undecided ", make_cell(tmp_path / "u", more=far)),
+    ):
+        found, out, err = seerob(capsys, "assess", cell)
+        assert (name, found, err) == (name, code, "")
+        assert any(line.startswith(word) for line in out.splitlines())
+
+
+def test_assess_writes_beside_the_workstation_and_never_over_a_recording(capsys, tmp_path):
+    cell = make_cell(tmp_path / "cell")
+    code, out, _ = seerob(capsys, "assess", cell)
+    assert code == 0
+    (folder,) = (cell / "runs").iterdir()
+    assert [line.split()[-1] for line in out.splitlines() if line.startswith("wrote")] == [
+        str(folder / name) for name in ("run.mcap", "report.html", "results.xlsx")
+    ]
+    before = {p.name: p.read_bytes() for p in folder.iterdir()}
+    code, out, err = seerob(capsys, "assess", cell, "-o", folder)
+    assert code == 3
+    assert err.count("\n") == 1
+    assert "run.mcap: exists already" in err
+    assert {p.name: p.read_bytes() for p in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize("command", ["assess", "run", "report"])
+def test_a_folder_that_cannot_be_made_is_one_line(capsys, tmp_path, recorded, command):
+    (tmp_path / "file").write_text("in the way")
+    what = recorded[1] / "run.mcap" if command == "report" else recorded[0]
+    more = ("--port", "0") if command == "run" else ()
+    code, _, err = seerob(capsys, command, what, "-o", tmp_path / "file" / "out", *more)
+    assert code == 3
+    assert err.count("\n") == 1
+    assert str(tmp_path / "file" / "out") in err
+
+
+def test_report_of_a_recording_repeats_it_and_a_changed_workstation_says_what_changed(
+    capsys, tmp_path, recorded
+):
+    cell, out_folder = recorded
+    recording = out_folder / "run.mcap"
+    code, out, err = seerob(capsys, "report", recording, "-o", tmp_path / "same", "--json")
+    same = json.loads(out)
+    assert (code, err, same["changes"]) == (0, "", [])
+    assert same["criteria"][0]["worst"]["value"] == sr.load(cell).run().results["speed"].worst().value
+    assert sorted(p.name for p in (tmp_path / "same").iterdir()) == FILES[:2]
+
+    other = make_cell(tmp_path / "other", limit=0.01)
+    (other / "motion.csv").unlink()  # what is judged is the recording's motion
+    code, out, err = seerob(
+        capsys, "report", recording, "--workstation", other, "-o", tmp_path / "changed", "--json"
+    )
+    assert (code, err) == (1, "")
+    changes = json.loads(out)["changes"]
+    assert changes[0] == "the workstation is not the one that was recorded"
+    assert changes[1].startswith("speed: was within, max ")
+    assert changes[1].endswith("limit 9")
+
+
+# -- hostile recordings -------------------------------------------------------------------------
+
+
+def recordings(recorded, folder):
+    """Files that call themselves recordings, by what is wrong with them."""
+    good = (recorded[1] / "run.mcap").read_bytes()
+    with (folder / "foreign").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        writer.finish()
+    damaged = bytearray(good)
+    chance = random.Random(1)
+    for _ in range(300):
+        damaged[chance.randrange(len(damaged))] ^= 255
+    return {
+        "empty": b"",
+        "noise": chance.randbytes(4000),
+        "text": b"title = 'x'\n",
+        "foreign": (folder / "foreign").read_bytes(),
+        "cut": good[:3000],
+        "damaged": bytes(damaged),
+    }
+
+
+def test_what_is_no_recording_is_one_line_for_every_command_that_takes_one(capsys, tmp_path, recorded):
+    for name, content in recordings(recorded, tmp_path).items():
+        file = tmp_path / f"{name}.mcap"
+        file.write_bytes(content)
+        for command in (
+            ["report", file],
+            ["replay", file, "--port", "0"],
+            ["run", "--replay", file, "--port", "0"],
+        ):
+            code, out, err = seerob(capsys, *command)
+            assert (name, code, out) == (name, 3, "")
+            assert err.startswith(str(file)), err
+            assert err.count("\n") == 1
+    assert not (tmp_path / "runs").exists()
+    code, _, err = seerob(capsys, "report", tmp_path / "nothing.mcap")
+    assert code == 3
+    assert "nothing.mcap" in err
+
+
+# -- the page -----------------------------------------------------------------------------------
+
+
+def test_run_replay_is_replay(capsys, recorded):
+    recording = recorded[1] / "run.mcap"
+    said = []
+    for command in (["replay", recording], ["run", "--replay", recording]):
+        code, out, err = seerob(capsys, *command, "--port", "0", "--seconds", "0.2")
+        assert (code, err) == (0, "")
+        said.append([line.split("http")[0] for line in out.splitlines()])
+    assert said[0] == said[1]
+
+
+def test_a_taken_port_moves_on_and_says_so(capsys, recorded):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        code, out, _ = seerob(capsys, "replay", recorded[1] / "run.mcap", "--port", port, "--seconds", "0.1")
+    assert code == 0
+    assert f"port {port}: " in out
+
+
+def test_other_machines_need_a_token(capsys, recorded):
+    code, _, err = seerob(
+        capsys, "run", recorded[0], "--host", "0.0.0.0", "--port", "0", "--no-record", "--seconds", "0.1"
+    )
+    assert code == 3
+    assert "token" in err
+    assert err.count("\n") == 1
+
+
+def test_live_for_a_while_writes_everything_and_ends_with_the_verdict(capsys, tmp_path):
+    cell = make_cell(tmp_path / "cell", limit=0.01, more="")
+    code, out, err = seerob(capsys, "run", cell, "--port", "0", "--seconds", "0.3", "-o", tmp_path / "out")
+    assert (code, err) == (1, "")
+    assert "http://127.0.0.1:" in out
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == FILES
+
+
+def test_output_into_a_closed_pipe_is_quiet():
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-m", "seerob.cli", "kinds"], stdout=writing, stderr=subprocess.PIPE, check=False
+    )
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (3, b"")

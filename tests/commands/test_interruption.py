@@ -1,0 +1,76 @@
+"""Ctrl-C: the first ends the run and writes everything, the second does not wait."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from made_cells import make_cell
+
+from seerob.recording import Recording
+
+
+@pytest.fixture
+def live(tmp_path):
+    """A live run in another process that has printed its address, and the folder it writes to."""
+    cell = make_cell(tmp_path / "cell", limit=0.01)
+    command = [
+        sys.executable,
+        "-m",
+        "seerob.cli",
+        "run",
+        cell,
+        "--port",
+        "0",
+        "--seconds",
+        "60",
+        "-o",
+        tmp_path / "out",
+    ]
+    process = subprocess.Popen(
+        list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    for line in process.stdout:
+        if line.startswith("page"):
+            break
+    yield process, tmp_path / "out"
+    process.kill()
+    process.communicate()
+
+
+def until_it_moves(out):
+    """Wait until the recording has begun."""
+    end = time.monotonic() + 20
+    while not (out / "run.mcap").exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    time.sleep(0.6)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_one_signal_ends_the_run_with_recording_report_and_verdict(live, number):
+    process, out = live
+    until_it_moves(out)
+    process.send_signal(number)
+    said, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (1, "")
+    assert "EXCEEDED" in said
+    assert sorted(p.name for p in out.iterdir()) == ["report.html", "results.xlsx", "run.mcap"]
+    recording = Recording.open(out / "run.mcap")
+    assert recording.complete
+    assert recording.duration > 0.3
+
+
+def test_a_second_signal_writes_no_report_but_loses_no_recording(live):
+    process, out = live
+    until_it_moves(out)
+    process.send_signal(signal.SIGINT)
+    time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (3, "stopped\n")
+    assert not (out / "report.html").exists()
+    assert Recording.open(out / "run.mcap").duration > 0.3
+    assert [p.name for p in out.iterdir() if p.name.startswith(".")] == []

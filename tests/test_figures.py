@@ -1,0 +1,65 @@
+"""Text of numbers keeps the side of the limit that the numbers are on, and is never kinder."""
+
+import math
+
+import numpy as np
+import pytest
+
+from seerob.figures import DECIMALS, against, figure, margin
+
+
+def back(text):
+    return float(text.split(" ")[0].replace("−", "-").replace("∞", "inf"))
+
+
+@pytest.mark.parametrize("unit", [*DECIMALS, "", "kN", "N/cm²"])
+def test_a_value_beside_its_limit_keeps_its_side_and_is_not_kinder(unit):
+    rng = np.random.default_rng(5)
+    for scale in 10.0 ** np.arange(-9, 7):
+        limits = rng.normal(0, scale, 30)
+        near = limits + rng.normal(0, 1, 30) * scale * 10.0 ** rng.integers(-14, 1, 30)
+        for value, limit in [*zip(near, limits, strict=True), (scale, scale), (scale, 0.0)]:
+            for at_most in (True, False):
+                shown = against(value, limit, unit, at_most=at_most)
+                v, bound = back(shown.value), back(shown.limit)
+                beyond = value > limit if at_most else value < limit
+                assert (v > bound if at_most else v < bound) == beyond
+                sign = 1 if at_most else -1
+                noise = 1e-11 * max(abs(value), abs(limit)) + 1e-3 * 10.0 ** -DECIMALS.get(unit, 9)
+                assert sign * (v - value) >= -noise
+                assert sign * (limit - bound) >= -noise
+                gap = back(margin(value, limit, unit, at_most=at_most))
+                true = abs(value - limit)
+                assert gap >= true * (1 - 1e-9) - noise if beyond else gap <= true * (1 + 1e-9) + noise
+                assert not beyond or gap > 0
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (1.17e-26, "J", "0 J"),
+        (4.92e-14, "m/s", "0 m/s"),
+        (-3e-9, "m", "0 m"),
+        (0.055751, "m", "0.0558 m"),
+        (-0.2, "m", "−0.2 m"),
+        (0.1 + 0.2, "kg", "0.3 kg"),
+        (0.0, "", "0"),
+        (123456.7, "kPa", "123457 kPa"),
+        (0.00012344, "Nm/kg", "0.0001234 Nm/kg"),
+        (None, "m", "–"),
+        (math.nan, "m", "–"),
+        (math.inf, "m", "∞ m"),
+    ],
+)
+def test_figures_without_a_limit(value, unit, text):
+    assert figure(value, unit) == text
+
+
+def test_what_exceeds_by_a_hair_looks_exceeded_and_what_equals_looks_equal():
+    assert against(1.00001, 1.0, "m/s", at_most=True) == ("1.001", "1")
+    assert against(0.1499999, 0.15, "m", at_most=False) == ("0.1499", "0.15")
+    assert against(0.15, 0.15, "m", at_most=False) == ("0.15", "0.15")
+    assert against(0.99999, 1.0, "m/s", at_most=True) == ("1", "1")
+    assert against(1e-26, 2.0, "J", at_most=True) == ("0", "2")
+    assert against(0.1 + 0.2, 0.3, "m", at_most=True) == ("0.30000000000000004", "0.3")
+    assert margin(1.0000001, 1.0, "m/s", at_most=True) == "0.001 m/s"

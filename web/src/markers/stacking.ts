@@ -1,0 +1,35 @@
+// Captions that would lie over each other on the screen are stacked upward, in a steady order.
+
+import { Vector3 } from "three";
+import type { Caption } from "./caption";
+import type { View } from "./drawn";
+
+const GAP_PX = 2;
+const at = new Vector3();
+
+interface Place {
+  x: number;
+  y: number;
+  width: number;
+}
+
+/** Lift each caption above the ones before it that it would cover. */
+export function stackCaptions(captions: Iterable<Caption>, { camera, pixel }: View): void {
+  const half = Math.tan((camera.fov * Math.PI) / 360) / pixel;
+  const placed: Place[] = [];
+  for (const caption of captions) {
+    caption.object.getWorldPosition(at).project(camera);
+    const step = caption.heightPx + GAP_PX;
+    const place = { x: at.x * half * camera.aspect, y: at.y * half, width: caption.widthPx };
+    const from = place.y;
+    for (let below = covered(placed, place, step); below; below = covered(placed, place, step)) {
+      place.y = below.y + step;
+    }
+    caption.lift(place.y - from);
+    placed.push(place);
+  }
+}
+
+function covered(placed: readonly Place[], { x, y, width }: Place, step: number): Place | undefined {
+  return placed.find((p) => Math.abs(p.x - x) < (p.width + width) / 2 && Math.abs(p.y - y) < step - 1e-6);
+}

@@ -1,0 +1,46 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { load } from "./source.mjs";
+
+const { stackCaptions } = await load("markers/stacking");
+
+// Screen coordinates in and out: the projection is the identity on a square of 200 px.
+const view = { camera: { fov: 90, aspect: 1 }, pixel: 0.01 };
+
+function captionAt(x, y, widthPx) {
+  const caption = { lifted: 0, widthPx, heightPx: 24, object: {} };
+  caption.object.getWorldPosition = (to) => {
+    to.set(x / 100, y / 100, 0);
+    to.project = () => to;
+    return to;
+  };
+  caption.lift = (px) => {
+    caption.lifted = px;
+  };
+  return { caption, x, y, widthPx };
+}
+
+test("no two captions cover each other, and one alone stays where it belongs", () => {
+  let seed = 7;
+  const random = () => {
+    seed = (seed * 16807) % 2147483647;
+    return seed / 2147483647;
+  };
+  for (let round = 0; round < 200; round += 1) {
+    const all = Array.from({ length: 6 }, () =>
+      captionAt(random() * 100, random() * 60, 20 + Math.round(random() * 80)),
+    );
+    stackCaptions(
+      all.map((c) => c.caption),
+      view,
+    );
+    assert.equal(all[0].caption.lifted, 0);
+    for (const [i, a] of all.entries()) {
+      assert.ok(a.caption.lifted >= 0);
+      for (const b of all.slice(0, i)) {
+        const apart = Math.abs(a.y + a.caption.lifted - b.y - b.caption.lifted);
+        assert.ok(Math.abs(a.x - b.x) >= (a.widthPx + b.widthPx) / 2 - 1e-6 || apart >= 24, `${apart} px`);
+      }
+    }
+  }
+});

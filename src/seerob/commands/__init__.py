@@ -10,7 +10,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
+from rich.console import Console as RichConsole
 
 from seerob.errors import InputError, Problem
 from seerob.snapshot import Finding, Verdict
@@ -19,6 +19,15 @@ if TYPE_CHECKING:
     from seerob.results import Series
     from seerob.run import Summary
     from seerob.station import Station
+
+
+class Console(RichConsole):
+    """A console that leaves a closed pipe to `seerob.cli.main`: rich would exit with 1, exceeded."""
+
+    def on_broken_pipe(self) -> None:
+        """Called while a `BrokenPipeError` is handled."""
+        raise BrokenPipeError
+
 
 OUT = Console(highlight=False, soft_wrap=True)
 STATUS = Console(highlight=False, soft_wrap=True, stderr=True)

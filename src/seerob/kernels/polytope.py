@@ -38,7 +38,7 @@ UNBOUNDED = -2
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def unit_slabs(A: Array, low: Array, high: Array) -> tuple[bool, Array, Array, Array]:
-    """The same polytope with unit normals, without the columns that are zero.
+    """The same polytope with unit normals, without columns that are zero or not bounded.
 
     Args:
         A: Normals as columns, shape (3, n).
@@ -59,6 +59,8 @@ def unit_slabs(A: Array, low: Array, high: Array) -> tuple[bool, Array, Array, A
         length = math.sqrt(A[0, i] ** 2 + A[1, i] ** 2 + A[2, i] ** 2)
         if length <= INERT * longest:
             possible = possible and low[i] <= 0.0 <= high[i]
+            continue
+        if low[i] == -np.inf and high[i] == np.inf:
             continue
         for r in range(3):
             N[m, r] = A[r, i] / length
@@ -166,10 +168,10 @@ def _without_corners(N: Array, l: Array, h: Array) -> int:
     n = len(N)
     low, high = -np.inf, np.inf
     for i in range(n):
-        along = N[0, 0] * N[i, 0] + N[0, 1] * N[i, 1] + N[0, 2] * N[i, 2]
-        if 1.0 - abs(along) > 1e-9:
+        across = np.cross(N[0], N[i])
+        if across @ across >= PARALLEL * PARALLEL:
             return EMPTY
-        if along > 0:
+        if N[0] @ N[i] > 0:
             low, high = max(low, l[i]), min(high, h[i])
         else:
             low, high = max(low, -h[i]), min(high, -l[i])
@@ -198,7 +200,8 @@ def largest(A: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
 
     Returns:
         Norm of the farthest point (N,): inf when unbounded, nan when empty. The point (N, 3), nan when
-        there is none. Radius of the largest ball about 0 inside (N,), below 0 when 0 is outside.
+        there is none. Radius of the largest ball about 0 inside (N,): below 0 when 0 is outside, nan
+        when empty.
     """
     N, _, n = A.shape
     room = max(4 * n * (n - 1), 1)
@@ -206,10 +209,11 @@ def largest(A: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
     norm, point, radius = np.full(N, np.nan), np.full((N, 3), np.nan), np.full(N, np.nan)
     for s in range(N):
         possible, normals, l, h = unit_slabs(A[s], low[s], high[s])
-        radius[s] = inscribed(l, h)
-        count = corners(normals, l, h, V, W, quality) if possible and len(l) else EMPTY
-        if possible and not len(l):
-            count = UNBOUNDED
+        count = EMPTY
+        if possible:
+            count = corners(normals, l, h, V, W, quality) if len(l) else UNBOUNDED
+        if count != EMPTY:
+            radius[s] = inscribed(l, h)
         if count == UNBOUNDED:
             norm[s] = np.inf
         squared = -1.0

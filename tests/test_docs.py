@@ -1,0 +1,137 @@
+"""The documentation says what the code does: generated pages, links, command lines, tables, named tests."""
+
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from seerob import cli
+from seerob.human import keyframes, manikin
+from seerob.reading import convert_workstation
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+ONLY_NAMES = ("no robot or human named", "nothing named")
+"""Mistakes of a table that stands alone: what it names is in another block."""
+
+
+def pages() -> list[object]:
+    return [pytest.param(path, id=path.name) for path in PAGES]
+
+
+def blocks(path: Path, language: str) -> list[str]:
+    return [text for kind, text in FENCE.findall(path.read_text(encoding="utf-8")) if kind == language]
+
+
+def inline(path: Path) -> list[str]:
+    return re.findall(r"`([^`\n]+)`", FENCE.sub("", path.read_text(encoding="utf-8")))
+
+
+def anchors(path: Path) -> set[str]:
+    """Anchors of the headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.+)$", FENCE.sub("", path.read_text(encoding="utf-8")), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_generated_pages_are_current() -> None:
+    done = subprocess.run(
+        [sys.executable, ROOT / "scripts/write-docs", "--check"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("path", pages())
+def test_links_lead_somewhere(path: Path) -> None:
+    text = FENCE.sub("", path.read_text(encoding="utf-8"))
+    lost = []
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"[a-z]+:", link):
+            continue
+        name, _, anchor = link.partition("#")
+        target = path.parent / name if name else path
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            lost.append(link)
+    assert not lost
+
+
+def command_lines(path: Path) -> Iterator[list[str]]:
+    for text in blocks(path, ""):
+        for line in text.splitlines():
+            words = line.removeprefix("$ ")
+            if words.startswith("seerob "):
+                yield shlex.split(words, comments=True)[1:]
+    yield from (shlex.split(code)[1:] for code in inline(path) if code.startswith("seerob "))
+
+
+@pytest.mark.parametrize("path", pages())
+def test_command_lines_are_understood(path: Path) -> None:
+    known = {name.replace("_", "-") for name in cli.COMMANDS}
+    for words in command_lines(path):
+        if len(words) == 1 and words[0] in known:
+            continue  # only speaks of the command
+        cli.parser().parse_args(words)
+
+
+@pytest.mark.parametrize("path", pages())
+def test_tables_of_the_workstation_file_are_understood(path: Path) -> None:
+    for text in blocks(path, "toml"):
+        if text.startswith("["):
+            _, problems = convert_workstation(tomllib.loads(text), path.name)
+            assert not [str(p) for p in problems if not p.what.startswith(ONLY_NAMES)], text
+
+
+def test_the_keyframes_of_the_documentation_can_be_played() -> None:
+    (text,) = (t for t in blocks(ROOT / "docs/ergonomics.md", "toml") if "[[keyframes]]" in t)
+    person = manikin.build(name="operator", stature=1.75, mass=75, sex="male")
+    motion = keyframes.parse(text.encode(), person, file="operator.toml")
+    assert motion.duration == pytest.approx(2.4)
+
+
+@pytest.mark.parametrize("path", pages())
+def test_targets_of_make_exist(path: Path) -> None:
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    lines = [line for text in blocks(path, "") for line in text.splitlines()]
+    named = {m[1] for code in (*inline(path), *lines) if (m := re.match(r"make ([a-z-]+)", code))}
+    assert named <= targets
+
+
+@pytest.mark.parametrize("path", pages())
+def test_python_blocks_compile(path: Path) -> None:
+    for text in blocks(path, "python"):
+        compile(text, path.name, "exec")
+
+
+def test_tests_named_as_evidence_exist() -> None:
+    text = (ROOT / "docs/validation.md").read_text(encoding="utf-8")
+    named = re.findall(r"(tests/[\w/.]+\.py)::(\w+)", text)
+    assert named
+    missing = [
+        f"{file}::{test}"
+        for file, test in named
+        if not (ROOT / file).is_file() or f"def {test}(" not in (ROOT / file).read_text(encoding="utf-8")
+    ]
+    assert not missing
+
+
+def test_every_cited_key_is_in_the_references() -> None:
+    references = (ROOT / "docs/references.md").read_text(encoding="utf-8")
+    sources = [*(ROOT / "src").rglob("*.py"), *PAGES]
+    cited = {
+        key
+        for file in sources
+        for key in re.findall(r"\[([A-Z]\w+\d{4}[a-z]?)\](?!\()", file.read_text(encoding="utf-8"))
+    }
+    assert {key for key in cited if f"**[{key}]**" not in references} == set()
+
+
+@pytest.mark.parametrize("path", pages())
+def test_nothing_is_claimed_that_an_evaluation_cannot_claim(path: Path) -> None:
+    assert not re.search(
+        r"\b(certified|guaranteed|compliant)\b", path.read_text(encoding="utf-8"), re.IGNORECASE
+    )

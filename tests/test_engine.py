@@ -79,7 +79,14 @@ def ur10(request, tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("rate", "velocities", "rms"),
-    [(100, True, 1e-6), (50, True, 1e-6), (500, True, 1e-6), (100, False, 1e-5), (500, False, 1e-5), (50, False, 1e-5)],
+    [
+        (100, True, 1e-6),
+        (50, True, 1e-6),
+        (500, True, 1e-6),
+        (100, False, 1e-5),
+        (500, False, 1e-5),
+        (50, False, 1e-5),
+    ],
 )
 @pytest.mark.parametrize("motion", [wave, quintic])
 def test_tool_follows_a_2_rad_per_s_motion(ur10, motion, rate, velocities, rms):
@@ -272,9 +279,7 @@ def test_bad_quality_is_undecided_on_both_sides_of_the_sample(arm, quality):
     def one_bad(k):
         return quality if k == 50 else Quality.GOOD
 
-    samples = tuple(
-        heard("arm", 0.01 * k, (0.1, 0.2), (0.0, 0.0), quality=one_bad(k)) for k in range(101)
-    )
+    samples = tuple(heard("arm", 0.01 * k, (0.1, 0.2), (0.0, 0.0), quality=one_bad(k)) for k in range(101))
     for t, verdict, reason, _ in judged_run(arm, "arm", Opened(samples=samples, duration=1.0)):
         near = 0.485 < t < 0.505
         assert verdict == ("undecided" if near else "within"), (t, reason)
@@ -407,18 +412,17 @@ def test_poses_drive_the_robot_exactly(ur10, target, frame):
         made_by._put(model.robot("arm"), wave(0.01 * k)[0], np.zeros(6))
         made_by._show(0.0)
         rotation = made_by._shown.xmat[frames.mj].reshape(3, 3) @ frames.body_from_frame[:3, :3]
-        position = made_by._shown.xpos[frames.mj] + made_by._shown.xmat[frames.mj].reshape(
-            3, 3
-        ) @ frames.body_from_frame[:3, 3]
+        position = (
+            made_by._shown.xpos[frames.mj]
+            + made_by._shown.xmat[frames.mj].reshape(3, 3) @ frames.body_from_frame[:3, 3]
+        )
         wxyz = np.zeros(4)
         mujoco.mju_mat2Quat(wxyz, np.ascontiguousarray(rotation).ravel())
         poses.append((tuple(position.tolist()), tuple(wxyz.tolist())))
     engine = Engine(model)
     engine.take([heard("arm", -0.01, wave(-0.01)[0])])
     for k, (position, wxyz) in enumerate(poses):
-        engine.take(
-            [PoseSample(source="p", seq=k, t=0.01 * k, target=target, position=position, wxyz=wxyz)]
-        )
+        engine.take([PoseSample(source="p", seq=k, t=0.01 * k, target=target, position=position, wxyz=wxyz)])
         state = engine.tick() if k else engine.start()
     assert not state.doubt("arm")
     assert np.linalg.norm(state.pose(frames)[1] - poses[-1][0]) < 2e-5

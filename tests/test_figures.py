@@ -62,4 +62,4 @@ def test_what_exceeds_by_a_hair_looks_exceeded_and_what_equals_looks_equal():
     assert against(0.99999, 1.0, "m/s", at_most=True) == ("1", "1")
     assert against(1e-26, 2.0, "J", at_most=True) == ("0", "2")
     assert against(0.1 + 0.2, 0.3, "m", at_most=True) == ("0.30000000000000004", "0.3")
-    assert margin(1.0000001, 1.0, "m/s", at_most=True) == "0.001 m/s"
+    assert margin(1.0000001, 1.0, "m/s", at_most=True) == "0.0001 m/s"

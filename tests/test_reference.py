@@ -18,7 +18,9 @@ def through(times, f, df=None, **more):
 
 
 def test_cubic_motion_is_reproduced_with_its_derivatives():
-    f, df, ddf = (np.poly1d([0.7, -1.3, 0.4, 2.0]).deriv(k) if k else np.poly1d([0.7, -1.3, 0.4, 2.0]) for k in range(3))
+    f, df, ddf = (
+        np.poly1d([0.7, -1.3, 0.4, 2.0]).deriv(k) if k else np.poly1d([0.7, -1.3, 0.4, 2.0]) for k in range(3)
+    )
     reference = through([0.0, 0.3, 0.5, 1.1], f, df)
     for t in np.linspace(0, 1.0999, 57):
         np.testing.assert_allclose(np.ravel(reference.at(t)), [f(t), df(t), ddf(t)], atol=1e-9)

@@ -145,7 +145,8 @@ class _Compiler:
         name = robot.tool if "/" in robot.tool else f"{robot.name}/{robot.tool}"
         if not self.mounting.has(name):
             links = [f"{robot.name}/{link.name}" for link in self.chains[robot.name].description.links]
-            raise UnknownName("link or tool", robot.tool, links + [t.name for t in self.station.tools])
+            wrong = UnknownName("link or tool", robot.tool, links + [t.name for t in self.station.tools])
+            raise InputError.at(self.file, "tool", str(wrong))
         return Frame(name, -1, np.eye(4))
 
     def _by_hand(self, description: Description, robot: Robot) -> Description:
@@ -173,7 +174,8 @@ class _Compiler:
         known = {link.name for link in description.links}
         for name in robot.masses:
             if name not in known:
-                raise UnknownName(f"link of {robot.name}", name, known)
+                wrong = UnknownName(f"link of {robot.name}", name, known)
+                raise InputError.at(self.file, f"masses.{name}", str(wrong))
         links = []
         for link in description.links:
             joints = tuple(replace(j, **changes[j.name]) if changes.get(j.name) else j for j in link.joints)

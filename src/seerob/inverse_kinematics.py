@@ -82,5 +82,7 @@ def _rotation_vector(rotation: Array) -> Array:
         return np.asarray(sine * (np.arctan2(s, c) / s))
     if c > 0:
         return sine
-    axis = np.sqrt(np.maximum((np.diag(rotation) + 1) / 2, 0))
-    return np.asarray(np.pi * axis / max(float(np.linalg.norm(axis)), 1e-12))
+    # Half a turn: (R + I)/2 is the axis times itself, either sign will do.
+    outer = 0.5 * (rotation + np.eye(3))
+    axis = outer[:, int(np.diag(outer).argmax())]
+    return np.asarray(np.pi * axis / float(np.linalg.norm(axis)))

@@ -74,21 +74,21 @@ def zero_moment(J_v: Array, low: Array, high: Array) -> Polytope:
         ValueError: Bounds that are not finite or are inverted.
     """
     J_v, low, high = _checked(J_v, low, high)
-    possible, N, l, h = kernel.unit_slabs(np.ascontiguousarray(J_v), low, high)
+    possible, N, below, above = kernel.unit_slabs(np.ascontiguousarray(J_v), low, high)
     free = _undriven(N)
     if not possible:
         return _nothing()
     # Across the free directions it is a polygon, a stretch or a point: one plane more for each.
     planes = free.shape[1]
     N = np.vstack([N, free.T])
-    l, h = np.append(l, np.zeros(planes)), np.append(h, np.zeros(planes))
+    below, above = np.append(below, np.zeros(planes)), np.append(above, np.zeros(planes))
     n = len(N)
     if planes == 3:
         V = np.zeros((1, 3))
     else:
         room = 4 * n * (n - 1)
         V, W, quality = np.empty((room, 3)), np.empty((room, 3), np.int64), np.empty(room)
-        V = V[: max(kernel.corners(N, l, h, V, W, quality), 0)]
+        V = V[: max(kernel.corners(N, below, above, V, W, quality), 0)]
     if not len(V):
         return _nothing()
     size = float(np.abs(V).max())
@@ -96,9 +96,9 @@ def zero_moment(J_v: Array, low: Array, high: Array) -> Polytope:
     driven = n - planes
     return Polytope(
         corners=V,
-        triangles=kernel.faces(N, l, h, V, 10 * SAME * size),
+        triangles=kernel.faces(N, below, above, V, 10 * SAME * size),
         free=free,
-        inscribed=float(kernel.inscribed(l[:driven], h[:driven])),
+        inscribed=float(kernel.inscribed(below[:driven], above[:driven])),
     )
 
 
@@ -170,7 +170,6 @@ def _undriven(N: Array) -> Array:
     """Orthonormal columns perpendicular to every normal, shape (3, d)."""
     if not len(N):
         return np.eye(3)
-    # Three normals of the sines' product 1 are the rule; only a doubtful set needs the decomposition.
     axes, sigma, _ = np.linalg.svd(N.T, full_matrices=True)
     return np.asarray(axes[:, int((sigma > SINGULAR * sigma[0]).sum()) :])
 

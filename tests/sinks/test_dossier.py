@@ -150,7 +150,7 @@ def test_progress_is_told(tmp_path):
     with Dossier().open(made_run.scene(), made_run.MESHES, {}, tmp_path) as writer:
         writer.progress = lambda done, total: told.append((done, total))
         writer.write(made_run.snapshot(50), ())
-    assert told == [(1, 2), (2, 2)]
+    assert told == [(1, 3), (2, 3), (3, 3)]
 
 
 def test_a_mesh_that_cannot_be_read_is_a_finding_not_a_failure(tmp_path):

@@ -8,9 +8,10 @@ import openpyxl
 import pytest
 
 from seerob.errors import InputError
+from seerob.figures import DECIMALS
 from seerob.results import log_of
 from seerob.series import CODES
-from seerob.sinks import excel as excel_module
+from seerob.sinks import _sheets as sheets_module
 from seerob.sinks.excel import Excel
 from seerob.snapshot import Verdict
 
@@ -110,7 +111,7 @@ def test_text_from_files_never_becomes_a_formula(tmp_path, text):
 
 
 def test_a_long_run_goes_on_in_further_sheets(tmp_path, monkeypatch):
-    monkeypatch.setattr(excel_module, "EXCEL_ROWS", 51)
+    monkeypatch.setattr(sheets_module, "EXCEL_ROWS", 51)
     book = write(tmp_path)
     names = ["separation", "separation (2)", "separation (3)"]
     assert [book[n].max_row for n in names] == [51, 51, 21]
@@ -161,3 +162,33 @@ def test_a_folder_that_is_not_there_is_one_clear_error(tmp_path):
         write(tmp_path / "none")
     with pytest.raises(InputError, match="not a file name"):
         Excel(file="../x.xlsx").open(made_run.scene(), {}, {}, tmp_path)
+
+
+def test_a_reader_finds_units_widths_and_a_header_that_stays(tmp_path):
+    book = write(tmp_path)
+    for sheet in book:
+        assert sheet.freeze_panes == "B2"
+        for cell in sheet[1]:
+            assert cell.font.bold
+            assert sheet.column_dimensions[cell.column_letter].width >= min(len(str(cell.value)), 60)
+    summary = book["Summary"]
+    head = [c.value for c in summary[1]]
+    for row in summary.iter_rows(min_row=2, max_row=1 + len(made_run.scene().criteria)):
+        cells = dict(zip(head, row, strict=False))
+        if cells["worst value"].value is not None and cells["unit"].value in DECIMALS:
+            places = len(cells["worst value"].number_format.partition(".")[2])
+            assert places > DECIMALS[cells["unit"].value]
+    # Colour is the second channel: the word is there, and only what is judged has it.
+    colors = {
+        c.value: c.font.color.rgb for c in summary["B"] if c.value in ("within", "exceeded", "undecided")
+    }
+    assert len(set(colors.values())) == len(colors) >= 2
+    assert all(c.number_format == "0.000" for c in book["separation"]["A"][1:])
+
+
+def test_progress_is_told_sheet_by_sheet(tmp_path):
+    told = []
+    with Excel().open(made_run.scene(), {}, {}, tmp_path) as writer:
+        writer.progress = lambda done, total: told.append((done, total))
+        writer.write(made_run.snapshot(50), ())
+    assert told == [(k + 1, 6) for k in range(6)]

@@ -13,9 +13,11 @@ from seerob.geometry import Mesh
 from seerob.kernels.raster import raster
 from seerob.model_io.glb import glb_bytes
 from seerob.sinks._camera import look_along
+from seerob.sinks._canvas import in_front
 from seerob.sinks._glb_reader import read_glb
 from seerob.sinks._palette import FILL
 from seerob.sinks._picture import Stage
+from seerob.sinks._stage_bodies import creases, tone
 from seerob.snapshot import Arrow, Box, Highlight, Label, Node, Result, Segment, Snapshot, Sphere, Verdict
 
 RED, GREEN = (0.8, 0.1, 0.1, 1), (0.1, 0.7, 0.1, 1)
@@ -218,3 +220,89 @@ def test_every_marker_and_every_odd_pose_gives_a_picture():
         assert image.shape == (150, 200, 3)
     empty = Stage(made_run.scene(nodes=()), {})
     assert pixels(empty.picture(Snapshot(seq=0, t=0.0, poses=b""), size=SIZE)).shape == (150, 200, 3)
+
+
+def area(alpha=0.25, size=(1, 1, 1)):
+    vertices, faces = made_run.box(size)
+    return glb_bytes([Mesh(vertices, faces.astype(np.int32), (0.9, 0.9, 0.1, alpha))])
+
+
+def test_an_area_tints_what_is_behind_it_and_hides_nothing():
+    made, snapshot = stage(("cube", CUBE, (0, 0, 1)), ("area", area(), (1.5, 0, 1)))
+    alone, _ = stage(("cube", CUBE, (0, 0, 1)))
+    camera = view()
+    center = (0.5, 0.1, 1.1)
+    tinted = at(pixels(made.picture(snapshot, camera=camera, size=SIZE)), camera, center)
+    plain = at(
+        pixels(alone.picture(Snapshot(seq=0, t=0.0, poses=snapshot.poses[:28]), camera=camera, size=SIZE)),
+        camera,
+        center,
+    )
+    assert tinted.argmax() == plain.argmax() == 0  # still the red of the cube
+    assert 0.02 < np.abs(tinted - plain).max() < 0.3
+    lit = Result(name="r", markers=(Highlight(body="area", verdict=Verdict.EXCEEDED),))
+    highlighted = at(pixels(made.picture(snapshot, lit, camera=camera, size=SIZE)), camera, center)
+    assert hue(highlighted).argmax() == 0
+    assert np.abs(highlighted - tinted).max() > 0.02
+
+
+def test_an_area_moves_the_camera_only_when_it_is_a_subject():
+    bodies = (("ball", BALL, (0, 0, 1)), ("area", area(size=(6, 6, 3)), (5, 0, 1)))
+    made, snapshot = stage(*bodies)
+    alone, only = stage(bodies[0])
+    line = Result(name="r", markers=(Segment(start=(0.4, 0, 1), end=(0.6, 0, 1)),))
+
+    def eye(made, snapshot, subjects):
+        return made._view(made._bodies.placed(snapshot)[0], snapshot, line, subjects, SIZE).eye
+
+    np.testing.assert_allclose(eye(made, snapshot, ()), eye(alone, only, ()))
+    far = np.linalg.norm(eye(made, snapshot, ("ball", "area")) - [0, 0, 1])
+    assert far > 2 * np.linalg.norm(eye(made, snapshot, ("ball",)) - [0, 0, 1])
+
+
+def test_creases_of_a_box_are_its_twelve_edges_and_a_ball_has_none():
+    vertices, faces = made_run.box((1, 2, 3))
+    for v, f in ((vertices, faces), (vertices[faces].reshape(-1, 3), np.arange(36).reshape(-1, 3))):
+        edges = v[creases(v, f.astype(np.int32))]
+        lengths = np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1)
+        assert sorted(np.round(lengths, 9)) == [1.0] * 4 + [2.0] * 4 + [3.0] * 4
+    ball, around = made_run.ball(0.4, 24)
+    assert len(creases(ball, around.astype(np.int32))) == 0
+    assert len(creases(vertices, faces[:1].astype(np.int32))) == 3  # an open end is an edge
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_triangles_are_cut_where_the_camera_is(seed):
+    rng = np.random.default_rng(seed)
+    camera = view()
+    corners = camera.eye + rng.normal(size=(200, 3, 3))
+
+    def area_in_front(triangles):
+        fine = np.concatenate(list(subdivided(triangles, 4)))
+        normal = np.cross(fine[:, 1] - fine[:, 0], fine[:, 2] - fine[:, 0])
+        inside = camera.local(fine.mean(axis=1))[:, 2] > 0.04
+        return np.linalg.norm(normal, axis=1)[inside].sum() / 2
+
+    def subdivided(triangles, depth):
+        if depth == 0:
+            yield triangles
+            return
+        a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)):
+            yield from subdivided(np.stack(part, 1), depth - 1)
+
+    cut = in_front(camera, corners)
+    assert (camera.local(cut)[:, 2] >= 0.04 - 1e-9).all()
+    whole = np.linalg.norm(np.cross(cut[:, 1] - cut[:, 0], cut[:, 2] - cut[:, 0]), axis=1).sum() / 2
+    assert whole == pytest.approx(area_in_front(corners), rel=0.01)
+
+
+def test_people_look_unlike_robots_and_neighbours_unlike_each_other():
+    grey = np.array([0.7, 0.72, 0.75])
+    person, robot = tone("human", grey, 0), tone("robot", grey, 0)
+    assert person[0] > person[1] > person[2]  # warm
+    assert np.abs(person - robot).max() > 0.08
+    for role in ("human", "robot"):
+        assert np.abs(tone(role, grey, 0) - tone(role, grey, 1)).max() > 0.04
+    np.testing.assert_array_equal(tone("tool", grey, 3), grey)

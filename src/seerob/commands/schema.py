@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
 
 from seerob import units
 from seerob.commands import OUT, Exit, line
-from seerob.workstation import PLUGINS, Workstation
+from seerob.expectations import is_struct, members, unit_of
+from seerob.workstation import PLUGINS, TABLES, Workstation
 
 HELP = "write the JSON schema of the workstation file, for editors"
 EXAMPLE = "seerob schema -o workstation.schema.json"
@@ -39,50 +41,89 @@ def schema() -> dict[str, Any]:
     from seerob.reading import BASES
 
     classes = {(g, kind): plugin.load(g, kind, base) for g, base in BASES.items() for kind in plugin.kinds(g)}
-    order = [Workstation, *classes.values()]
-    (top, *refs), definitions = msgspec.json.schema_components(order, ref_template="#/$defs/{name}")
-    by_class = dict(zip(classes, refs, strict=True))
-    station = definitions[top["$ref"].rsplit("/", 1)[-1]]
+    order = [Workstation, *TABLES.values(), *classes.values()]
+    refs, definitions = msgspec.json.schema_components(order, ref_template="#/$defs/{name}")
+    found = {kind: definitions[_name(ref)] for kind, ref in zip(order, refs, strict=True)}
+    for kind in _tables_in(order):
+        _add_suffixes(found.get(kind) or definitions[kind.__name__], kind)
+    station = found[Workstation]
     for hidden in ("folder", "files"):
         station["properties"].pop(hidden)
     for group in PLUGINS:
-        options = []
-        for (owner, kind), ref in by_class.items():
-            if owner != group:
-                continue
-            body = dict(definitions[ref["$ref"].rsplit("/", 1)[-1]])
-            body["properties"] = {"kind": {"const": kind}, **body["properties"]}
-            body["required"] = ["kind", *body.get("required", [])]
-            options.append(body)
+        bodies = [_with_kind(found[c], kind) for (owner, kind), c in classes.items() if owner == group]
         other = {"type": "object", "required": ["kind"], "properties": {"kind": {"pattern": r"\."}}}
-        station["properties"][group] = {"type": "array", "items": {"anyOf": [*options, other]}}
-    for definition in [*definitions.values(), *_bodies(station)]:
-        _add_suffixes(definition)
-    return {
+        station["properties"][group] = {"type": "array", "items": {"anyOf": [*bodies, other]}}
+    whole = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "seerob workstation",
         **station,
         "$defs": definitions,
     }
+    # As a reader of the file sees it: plain lists, no tuples.
+    plain: dict[str, Any] = json.loads(json.dumps(whole))
+    return plain
 
 
-def _bodies(station: dict[str, Any]) -> list[dict[str, Any]]:
-    return [body for group in PLUGINS for body in station["properties"][group]["items"]["anyOf"]]
+def _name(ref: dict[str, Any]) -> str:
+    return str(ref["$ref"]).rsplit("/", 1)[-1]
 
 
-def _add_suffixes(definition: dict[str, Any]) -> None:
+def _with_kind(body: dict[str, Any], kind: str) -> dict[str, Any]:
+    properties = {"kind": {"const": kind}, **body["properties"]}
+    return {**body, "properties": properties, "required": ["kind", *body.get("required", [])]}
+
+
+def _tables_in(kinds: Sequence[Any]) -> list[type[msgspec.Struct]]:
+    """Every struct type that is reachable from some types, each once."""
+    found: dict[type[msgspec.Struct], None] = {}
+
+    def visit(wanted: Any) -> None:
+        for member in members(wanted):
+            if is_struct(member) and member not in found:
+                found[member] = None
+                for field in msgspec.structs.fields(member):
+                    visit(field.type)
+            for inner in get_args(member):
+                visit(inner)
+
+    for kind in kinds:
+        visit(kind)
+    return list(found)
+
+
+def _add_suffixes(definition: dict[str, Any], kind: type[msgspec.Struct]) -> None:
     """``rpy_deg`` beside ``rpy``: the same shape without the limits, which are in SI."""
-    properties = definition.get("properties", {})
-    for name, entry in list(properties.items()):
-        unit = _unit(entry)
-        for suffix, (si, _) in units.SUFFIXES.items():
-            if unit == si:
-                properties.setdefault(
-                    f"{name}_{suffix}", {"description": f"{name} in {suffix.replace('_', '/')}"}
-                )
+    properties = definition["properties"]
+    required = definition.pop("required", [])
+    either, replaced = [], set()
+    for field in msgspec.structs.fields(kind):
+        unit = unit_of(field.type)
+        suffixes = [suffix for suffix, (si, _) in units.SUFFIXES.items() if si == unit]
+        for suffix in suffixes:
+            shape = _without_limits(properties[field.name])
+            shape["description"] = f"{field.name} in {suffix.replace('_', '/')}"
+            properties[f"{field.name}_{suffix}"] = shape
+        if field.name in required and suffixes:
+            keys = [field.name, *(f"{field.name}_{suffix}" for suffix in suffixes)]
+            replaced.add(field.name)
+            either.append({"oneOf": [{"required": [key]} for key in keys]})
+    definition["required"] = [name for name in required if name not in replaced]
+    if either:
+        definition["allOf"] = either
 
 
-def _unit(entry: dict[str, Any]) -> str | None:
-    if "x-unit" in entry:
-        return str(entry["x-unit"])
-    return next((str(o["x-unit"]) for o in entry.get("anyOf", []) if "x-unit" in o), None)
+def _without_limits(entry: Any) -> Any:
+    limits = (
+        "minimum",
+        "maximum",
+        "exclusiveMinimum",
+        "exclusiveMaximum",
+        "default",
+        "x-unit",
+        "description",
+    )
+    if isinstance(entry, dict):
+        return {key: _without_limits(value) for key, value in entry.items() if key not in limits}
+    if isinstance(entry, list | tuple):
+        return [_without_limits(item) for item in entry]
+    return entry

@@ -1,7 +1,7 @@
-"""Colours onto pixels, after `seerob.kernels.raster` has said what is where.
+r"""Colours onto pixels, after `seerob.kernels.raster` has said what is where.
 
-Over is :math:`c \\leftarrow (1 - \\alpha) c + \\alpha c_{new}`. A line of half width :math:`h` covers the
-pixel centre at distance :math:`d` from it by :math:`\\mathrm{clip}(h + 1/2 - d, 0, 1)`. Depth is kept as
+Over is :math:`c \leftarrow (1 - \alpha) c + \alpha c_{new}`. A line of half width :math:`h` covers the
+pixel centre at distance :math:`d` from it by :math:`\mathrm{clip}(h + 1/2 - d, 0, 1)`. Depth is kept as
 1/z, which is linear on the screen.
 """
 

@@ -92,6 +92,10 @@ def corners(N: Array, l: Array, h: Array, V: Array, W: Indices, quality: Array) 
         if math.isfinite(h[i]):
             scale = max(scale, abs(h[i]))
     slack = ROUNDING * scale
+    G, per_length = np.empty((n, n)), np.empty(n)
+    for i in range(n):
+        for j in range(n):
+            G[i, j] = N[i, 0] * N[j, 0] + N[i, 1] * N[j, 1] + N[i, 2] * N[j, 2]
     count = 0
     for i in range(n):
         ax, ay, az = N[i, 0], N[i, 1], N[i, 2]
@@ -103,7 +107,10 @@ def corners(N: Array, l: Array, h: Array, V: Array, W: Indices, quality: Array) 
                 continue
             s = math.sqrt(s2)
             dx, dy, dz = dx / s, dy / s, dz / s
-            c = ax * bx + ay * by + az * bz
+            c = G[i, j]
+            for k in range(n):
+                ad = N[k, 0] * dx + N[k, 1] * dy + N[k, 2] * dz
+                per_length[k] = 1.0 / ad if abs(ad) >= PARALLEL else 0.0
             for side_i in range(2 if l[i] < h[i] else 1):
                 bi = h[i] if side_i else l[i]
                 if not math.isfinite(bi):
@@ -113,20 +120,24 @@ def corners(N: Array, l: Array, h: Array, V: Array, W: Indices, quality: Array) 
                     if not math.isfinite(bj):
                         continue
                     u, v = (bi - c * bj) / s2, (bj - c * bi) / s2
-                    px, py, pz = u * ax + v * bx, u * ay + v * by, u * az + v * bz
                     t0, t1, k0, k1 = -np.inf, np.inf, -1, -1
                     for k in range(n):
-                        if k == i or k == j:
+                        if k in (i, j):
                             continue
-                        ad = N[k, 0] * dx + N[k, 1] * dy + N[k, 2] * dz
-                        ap = N[k, 0] * px + N[k, 1] * py + N[k, 2] * pz
-                        if abs(ad) < PARALLEL:
+                        # a_k of the line's point p = u a_i + v a_j.
+                        ap = u * G[i, k] + v * G[j, k]
+                        if per_length[k] == 0.0:
                             if ap > h[k] + slack or ap < l[k] - slack:
                                 t0, t1 = 1.0, 0.0
                                 break
                             continue
-                        ta, tb, ka, kb = (l[k] - ap) / ad, (h[k] - ap) / ad, 2 * k, 2 * k + 1
-                        if ad < 0.0:
+                        ta, tb, ka, kb = (
+                            (l[k] - ap) * per_length[k],
+                            (h[k] - ap) * per_length[k],
+                            2 * k,
+                            2 * k + 1,
+                        )
+                        if per_length[k] < 0.0:
                             ta, tb, ka, kb = tb, ta, kb, ka
                         if ta > t0:
                             t0, k0 = ta, ka
@@ -156,7 +167,9 @@ def corners(N: Array, l: Array, h: Array, V: Array, W: Indices, quality: Array) 
                             continue
                         # Of the three lines through a corner the one between the steepest planes is exact.
                         W[place, 0], W[place, 1], W[place, 2], quality[place] = a, b, k, s2
-                        V[place, 0], V[place, 1], V[place, 2] = px + t * dx, py + t * dy, pz + t * dz
+                        V[place, 0] = u * ax + v * bx + t * dx
+                        V[place, 1] = u * ay + v * by + t * dy
+                        V[place, 2] = u * az + v * bz + t * dz
                         if place == count:
                             count += 1
     return count if count else _without_corners(N, l, h)
@@ -169,9 +182,9 @@ def _without_corners(N: Array, l: Array, h: Array) -> int:
     low, high = -np.inf, np.inf
     for i in range(n):
         across = np.cross(N[0], N[i])
-        if across @ across >= PARALLEL * PARALLEL:
+        if (across * across).sum() >= PARALLEL * PARALLEL:
             return EMPTY
-        if N[0] @ N[i] > 0:
+        if (N[0] * N[i]).sum() > 0:
             low, high = max(low, l[i]), min(high, h[i])
         else:
             low, high = max(low, -h[i]), min(high, -l[i])
@@ -289,11 +302,11 @@ def faces(N: Array, l: Array, h: Array, V: Array, tolerance: float) -> Indices:
         center /= m
         normal = sign * N[i]
         first = V[on[0]] - center
-        first = first - (first @ normal) * normal
+        first = first - (first * normal).sum() * normal
         second = np.cross(normal, first)
         for p in range(m):
             arm = V[on[p]] - center
-            angle[p] = math.atan2(arm @ second, arm @ first)
+            angle[p] = math.atan2((arm * second).sum(), (arm * first).sum())
         order = np.argsort(angle[:m])
         for p in range(1, m - 1):
             triangles[count, 0] = on[order[0]]

@@ -27,7 +27,9 @@ from foxglove_schemas_protobuf.TriangleListPrimitive_pb2 import TriangleListPrim
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from seerob.errors import InputError
 from seerob.recording_format import nanoseconds
+from seerob.sinks._glb_reader import read_glb
 from seerob.snapshot import (
     Arrow,
     Box,
@@ -81,12 +83,30 @@ def scene_update(scene: Scene, meshes: dict[str, bytes]) -> SceneUpdate:
             media_type="model/gltf-binary",
             data=data,
         )
+        color = clear_color(data)
+        if color is not None:
+            # Not every viewer reads the material's blending.
+            model.override_color = True
+            model.color.CopyFrom(color)
         entities.append(
             SceneEntity(
                 timestamp=timestamp(0), frame_id=node.name, id=node.name, frame_locked=True, models=[model]
             )
         )
     return SceneUpdate(entities=entities)
+
+
+def clear_color(data: bytes) -> Color | None:
+    """Colour of a translucent mesh, such as a safety area; None for an opaque or unreadable one."""
+    try:
+        primitives = read_glb(data, "mesh")
+    except InputError:
+        return None
+    clear = [p for p in primitives if p.alpha < 1]
+    if not clear or len(clear) < len(primitives):
+        return None
+    r, g, b = clear[0].color
+    return Color(r=r, g=g, b=b, a=clear[0].alpha)
 
 
 def frame_transforms(scene: Scene, snapshot: Snapshot) -> FrameTransforms:

@@ -12,7 +12,8 @@ body {{ margin: 0 auto; max-width: 64rem; padding: 2.5rem 1.5rem 4rem; color: va
   font: 16px/1.55 system-ui, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif;
   overflow-wrap: anywhere; }}
 h1 {{ font-size: 1.9rem; line-height: 1.2; margin: 0 0 .3rem; }}
-h2 {{ font-size: 1.3rem; margin: 2.8rem 0 .8rem; padding-bottom: .3rem; border-bottom: 2px solid var(--ink); }}
+h2 {{ font-size: 1.3rem; margin: 2.8rem 0 .8rem; padding-bottom: .3rem;
+  border-bottom: 2px solid var(--ink); }}
 h3 {{ font-size: 1.1rem; margin: 2.2rem 0 .5rem; }}
 h4 {{ font-size: .95rem; margin: 1.2rem 0 .3rem; color: var(--soft); }}
 p, ul {{ margin: .5rem 0; }}
@@ -21,7 +22,8 @@ p, ul {{ margin: .5rem 0; }}
 table {{ border-collapse: collapse; width: 100%; margin: .6rem 0; font-size: .88rem; line-height: 1.4; }}
 th, td {{ text-align: left; vertical-align: top; padding: .32rem .6rem; border-bottom: 1px solid var(--rule);
   font-variant-numeric: tabular-nums; font-weight: normal; }}
-thead th {{ font-weight: 600; color: var(--soft); border-bottom: 1.5px solid var(--ink); white-space: nowrap; }}
+thead th {{ font-weight: 600; color: var(--soft); border-bottom: 1.5px solid var(--ink);
+  white-space: nowrap; }}
 tbody th {{ font-weight: 600; }}
 .overview tbody th {{ min-width: 9.5rem; }}
 .overview td:last-child {{ min-width: 9rem; }}
@@ -30,12 +32,12 @@ code {{ font-family: ui-monospace, Consolas, "DejaVu Sans Mono", monospace; font
 .whole {{ white-space: nowrap; }}
 .formula {{ background: var(--wash); padding: .5rem .8rem; font-family: ui-monospace, Consolas, monospace;
   font-size: .88rem; white-space: pre-wrap; }}
-.badge {{ display: inline-block; padding: .08rem .55rem; border-radius: .8rem; font-size: .82rem; font-weight: 650;
-  border: 1.5px solid; white-space: nowrap; }}
+.badge {{ display: inline-block; padding: .08rem .55rem; border-radius: .8rem; font-size: .82rem;
+  font-weight: 650; border: 1.5px solid; white-space: nowrap; }}
 .within {{ background: {HEX[Verdict.WITHIN]}22; border-color: {DARK_HEX[Verdict.WITHIN]};
   color: {DARK_HEX[Verdict.WITHIN]}; }}
-.undecided {{ background: {HEX[Verdict.UNDECIDED]}; border-color: {DARK_HEX[Verdict.UNDECIDED]}; color: #3b3000;
-  border-style: dashed; }}
+.undecided {{ background: {HEX[Verdict.UNDECIDED]}; border-color: {DARK_HEX[Verdict.UNDECIDED]};
+  color: #3b3000; border-style: dashed; }}
 .exceeded {{ background: {HEX[Verdict.EXCEEDED]}; border-color: {HEX[Verdict.EXCEEDED]}; color: #fff; }}
 .none {{ background: #fff; border-color: {HEX[None]}; color: {DARK_HEX[None]}; }}
 .verdict {{ padding: .9rem 1.1rem; border: 2px solid; border-radius: .5rem; margin: 1.2rem 0; }}

@@ -32,7 +32,7 @@ WORD = {
 
 
 def rgb(code: str) -> Color:
-    """SRGB 0…1 of ``#rrggbb``."""
+    """Colour as sRGB 0…1 of ``#rrggbb``."""
     r, g, b = (int(code[i : i + 2], 16) / 255 for i in (1, 3, 5))
     return r, g, b
 

@@ -50,7 +50,7 @@ def curve(series: Series, *, salt: str) -> Html:
 
     i = series.thinned(POINTS)
     t, values, limits = series.t[i], series.values[i], series.limits[i]
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": salt}):
+    with mpl.rc_context(_style(salt)):
         # Margins by hand: finding them takes as long as drawing.
         figure = Figure(figsize=(7.4, 2.5))
         figure.subplots_adjust(left=0.1, right=0.985, bottom=0.19, top=0.88)
@@ -91,7 +91,7 @@ def lanes(series: Sequence[Series], *, salt: str) -> Html:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": salt}):
+    with mpl.rc_context(_style(salt)):
         figure = Figure(figsize=(7.4, 0.55 + 0.3 * len(series)), layout="constrained")
         axes = figure.add_subplot()
         names = []
@@ -159,6 +159,10 @@ def _bands(axes: Axes, series: Series, verdict: Verdict, span: float) -> None:
             linewidth=0,
             label=label,
         )
+
+
+def _style(salt: str) -> Any:
+    return {**_STYLE, "svg.hashsalt": salt}
 
 
 def _step(series: Series) -> float:

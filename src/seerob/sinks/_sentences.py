@@ -90,8 +90,8 @@ def summary(log: ResultLog) -> list[str]:
         )
     if names := by[Verdict.UNDECIDED]:
         said.append(
-            f"{counted(len(names), 'criterion', 'criteria').capitalize()} could not be decided for at least a part "
-            f"of the run: {listed(names)}. Undecided is not a pass; what is missing is said below."
+            f"{counted(len(names), 'criterion', 'criteria').capitalize()} could not be decided for at least "
+            f"a part of the run: {listed(names)}. Undecided is not a pass; what is missing is said below."
         )
     if names := by[Verdict.WITHIN]:
         said.append(
@@ -108,8 +108,8 @@ def about(series: Series) -> list[str]:
     """What the paragraph of one criterion says."""
     if not series.known:
         return [
-            "This criterion was set up but never gave a result, so nothing can be said. It is not a pass: find "
-            "out why it was silent."
+            "This criterion was set up but never gave a result, so nothing can be said. It is not a pass: "
+            "find out why it was silent."
         ]
     worst, shares = series.worst(), series.shares()
     said = []

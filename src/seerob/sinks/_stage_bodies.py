@@ -132,6 +132,8 @@ def creases(vertices: Array, faces: Ints) -> NDArray[np.int64]:
     """
     _, first, place = np.unique(np.round(vertices, 6), axis=0, return_index=True, return_inverse=True)
     corner = place.reshape(-1)[faces.astype(np.int64)]
+    # A triangle without area bends nothing; poles of spheres are made of them.
+    corner = corner[(corner != np.roll(corner, -1, axis=1)).all(axis=1)]
     at = vertices[first][corner]
     normal = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
@@ -141,4 +143,4 @@ def creases(vertices: Array, faces: Ints) -> NDArray[np.int64]:
     np.add.at(total, which.reshape(-1), np.repeat(normal, 3, axis=0))
     # |a + b|² = 2 + 2 cos of the bend, for two unit normals.
     smooth = (times == 2) & ((total**2).sum(axis=1) > 2 + 2 * _CREASE)
-    return np.asarray(first[pairs[~smooth & (pairs[:, 0] != pairs[:, 1])]], np.int64).reshape(-1, 2)
+    return np.asarray(first[pairs[~smooth]], np.int64).reshape(-1, 2)

@@ -16,7 +16,7 @@ from seerob.transforms import Array
 
 PREFERRED = (float(np.deg2rad(-60)), float(np.deg2rad(22)))
 """Azimuth and elevation taken when nothing speaks for others [rad]."""
-_VIEWS = [(np.deg2rad(a), np.deg2rad(e)) for e in (18, 35) for a in range(-150, 210, 30)]
+_VIEWS = [(float(np.deg2rad(a)), float(np.deg2rad(e))) for e in (18, 35) for a in range(-150, 210, 30)]
 _GRID_WIDTH = 100
 
 
@@ -55,7 +55,10 @@ def best_view(
         return look_along(*PREFERRED, focus, size)
     grid = (_GRID_WIDTH, max(1, round(_GRID_WIDTH * size[1] / size[0])))
     azimuth, elevation = max(
-        _VIEWS, key=lambda view: _worth(look_along(*view, focus, grid), view, surface, owner, markers, names)
+        _VIEWS,
+        key=lambda view: _worth(
+            look_along(view[0], view[1], focus, grid), view, surface, owner, markers, names
+        ),
     )
     return look_along(azimuth, elevation, focus, size)
 

@@ -58,6 +58,7 @@ class DossierWriter:
         """Use `Dossier.open`."""
         self.path = path
         self.progress: Progress | None = None
+        """Called while `close` works; every picture is a step, and so is the page."""
         self.findings: list[Finding] = list(scene.findings)
         """What the report lists as found; the run may add to it."""
         self._scene, self._meshes, self._files, self._pictures = scene, meshes, files, pictures
@@ -75,7 +76,8 @@ class DossierWriter:
         Raises:
             InputError: It cannot be written.
         """
-        from seerob.sinks._page import Report, page
+        from seerob.sinks._page import page
+        from seerob.sinks._report import Report
         from seerob.sinks._setup import command, setup
         from seerob.sinks._versions import versions
 
@@ -93,6 +95,7 @@ class DossierWriter:
             command=command(),
         )
         write_whole(self.path, page(report).encode())
+        self._tell(len(pictures) + 1, len(pictures) + 1)
 
     def __enter__(self) -> Self:
         return self
@@ -103,6 +106,10 @@ class DossierWriter:
         # Whoever interrupts a run a second time does not want to wait for this.
         if kind is None or not issubclass(kind, KeyboardInterrupt):
             self.close()
+
+    def _tell(self, done: int, total: int) -> None:
+        if self.progress is not None:
+            self.progress(done, total)
 
     def _drawn(self) -> dict[str, bytes]:
         from seerob.sinks._picture import Stage
@@ -124,8 +131,7 @@ class DossierWriter:
         drawn = {}
         for k, (snapshot, result) in enumerate(chosen):
             drawn[result.name] = stage.picture(snapshot, result, subjects=subjects.get(result.name, ()))
-            if self.progress is not None:
-                self.progress(k + 1, len(chosen))
+            self._tell(k + 1, len(chosen) + 1)
         return drawn
 
     def _bases(self) -> dict[str, Basis]:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from tempfile import mkstemp
 from types import TracebackType
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import Annotated, Self
 
 from msgspec import Meta
 
@@ -19,19 +18,10 @@ from seerob.results import ResultLog, result_named
 from seerob.samples import Sample
 from seerob.series import CODES, Series
 from seerob.sink import Sink
+from seerob.sinks._sheets import Cell, Sheets
 from seerob.snapshot import Basis, Scene, Snapshot
 
-if TYPE_CHECKING:
-    from openpyxl import Workbook
-
-EXCEL_ROWS = 1_048_576
-"""Rows of a sheet, header included; longer data goes on in a further sheet."""
-_LONGEST_TEXT = 32_767
-_NOT_TEXT = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
-_NOT_IN_SHEET_NAME = re.compile(r"[\[\]:*?/\\\x00-\x1f']")
 _VERDICT_OF = {code: verdict for verdict, code in CODES.items()}
-
-Cell = str | float | int | None
 
 
 class Excel(Sink, frozen=True, kw_only=True):
@@ -68,6 +58,8 @@ class ExcelWriter:
     def __init__(self, scene: Scene, path: Path, *, rows: int) -> None:
         """Use `Excel.open`."""
         self.path = path
+        self.progress: Callable[[int, int], None] | None = None
+        """Called while `close` works with how many of how many sheets are done."""
         self.log = ResultLog(scene.criteria)
         self._scene, self._rows = scene, rows
         self._bases: dict[str, Basis] = {i.name: i.basis for i in scene.criteria if i.basis is not None}
@@ -119,20 +111,24 @@ class ExcelWriter:
         from openpyxl import Workbook
 
         book = Workbook(write_only=True)
-        sheets = _Sheets(book)
+        sheets = Sheets(book)
         try:
-            sheets.add("Summary", _SUMMARY, self._summary())
-            for series in self.log.values():
+            steps = len(self.log) + len(self._joints) + 1
+            sheets.add("Summary", _SUMMARY, list(self._summary()), fit=True)
+            for k, series in enumerate(self.log.values()):
                 sheets.add(series.name, _head(series), _rows(series, self._rows))
-            for name, columns in self._joints.items():
+                self._tell(k + 1, steps)
+            for k, (name, columns) in enumerate(self._joints.items()):
                 sheets.add(f"joints {name}", self._joint_head(name, len(columns)), self._joint_rows(name))
-            sheets.add("Inputs", ["criterion", "input", "value", "unit", "origin", "source"], self._inputs())
-            found = ([f.level, f.subject, f.text] for f in self._scene.findings)
-            sheets.add("Findings", ["level", "about", "text"], found)
+                self._tell(len(self.log) + k + 1, steps)
+            sheets.add("Inputs", _INPUTS, list(self._inputs()), fit=True)
+            found = [[f.level, f.subject, f.text] for f in self._scene.findings]
+            sheets.add("Findings", ["level", "about", "text"], found, fit=True)
         finally:
             # A sheet that is left open complains when it is collected.
             sheets.close()
         book.save(path)
+        self._tell(steps, steps)
 
     def __enter__(self) -> Self:
         return self
@@ -143,6 +139,10 @@ class ExcelWriter:
         # Whoever interrupts a run a second time does not want to wait for this.
         if kind is None or not issubclass(kind, KeyboardInterrupt):
             self.close()
+
+    def _tell(self, done: int, total: int) -> None:
+        if self.progress is not None:
+            self.progress(done, total)
 
     def _summary(self) -> Iterator[list[Cell]]:
         for series in self.log.ranked():
@@ -206,6 +206,9 @@ _SUMMARY: list[Cell] = [
 ]  # fmt: skip
 
 
+_INPUTS: list[Cell] = ["criterion", "input", "value", "unit", "origin", "source"]
+
+
 def _head(series: Series) -> list[Cell]:
     unit = f" [{series.unit}]" if series.unit else ""
     parts = (
@@ -239,74 +242,3 @@ def _rows(series: Series, most: int) -> Iterator[list[Cell]]:
 def _word(code: int) -> str:
     verdict = _VERDICT_OF[code]
     return "" if verdict is None else verdict.value
-
-
-class _Sheets:
-    """Adds sheets to a workbook; text from files stays text, whatever it begins with."""
-
-    def __init__(self, book: Workbook) -> None:
-        self._book = book
-        self._names: set[str] = set()
-
-    def add(self, name: str, head: Sequence[Cell], rows: Iterable[Sequence[Cell]]) -> None:
-        sheet: Any = None
-        written = EXCEL_ROWS
-        for row in rows:
-            if written >= EXCEL_ROWS:
-                sheet = self._begin(name, head)
-                written = 1
-            sheet.append([self._cell(sheet, value) for value in row])
-            written += 1
-        if sheet is None:
-            self._begin(name, head)
-
-    def close(self) -> None:
-        for sheet in self._book.worksheets:
-            sheet.close()
-
-    def _begin(self, name: str, head: Sequence[Cell]) -> Any:
-        from openpyxl.styles import Font
-
-        sheet = self._book.create_sheet(self._unique(name))
-        sheet.freeze_panes = "B2"
-        for k, title in enumerate(head):
-            width = max(12, min(len(str(title)) + 3, 48))
-            sheet.column_dimensions[_letters(k)].width = width
-        cells = [self._cell(sheet, title) for title in head]
-        for cell in cells:
-            cell.font = Font(bold=True)
-        sheet.append(cells)
-        return sheet
-
-    def _unique(self, name: str) -> str:
-        stem = _NOT_IN_SHEET_NAME.sub("_", name).strip() or "sheet"
-        stem = stem if stem.casefold() != "history" else "history_"
-        for k in range(1, 10_000):
-            tail = "" if k == 1 else f" ({k})"
-            unique = stem[: 31 - len(tail)] + tail
-            if unique.casefold() not in self._names:
-                self._names.add(unique.casefold())
-                return unique
-        raise ValueError(f"too many sheets named {stem!r}")
-
-    def _cell(self, sheet: Any, value: Cell) -> Any:
-        from openpyxl.cell import WriteOnlyCell
-
-        if isinstance(value, float) and not math.isfinite(value):
-            value = None if math.isnan(value) else str(value)
-        if not isinstance(value, str):
-            return WriteOnlyCell(sheet, value)
-        value = _NOT_TEXT.sub("\ufffd", value)
-        if len(value) > _LONGEST_TEXT:
-            value = value[: _LONGEST_TEXT - 1] + "…"
-        cell: Any = WriteOnlyCell(sheet, value)
-        # openpyxl takes a leading = for a formula and error names for errors.
-        cell.data_type = "s"
-        cell.quotePrefix = value[:1] in ("=", "+", "-", "@", "\t", "\r")
-        return cell
-
-
-def _letters(k: int) -> str:
-    from openpyxl.utils import get_column_letter
-
-    return str(get_column_letter(k + 1))

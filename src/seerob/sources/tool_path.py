@@ -86,9 +86,10 @@ class ToolPath(Source, frozen=True, kw_only=True):
             f"{path.speeds().max():.3g} m/s",
         )
         text = (
-            f"joint positions are solved from the tool poses of {self.file}: the branch, and what a "
-            "redundant robot does beside its tool, are chosen by seerob and may differ from the "
-            "controller's; joint speeds are not checked; what depends on them is preliminary"
+            f"joint positions are solved from the tool poses of {self.file}: the branch (the one nearest to "
+            f"q of {target.name}), and what a redundant robot does beside its tool, are chosen by seerob "
+            "and may differ from the controller's; joint speeds are not checked; what depends on them is "
+            "preliminary"
         )
         return Opened(
             samples=PoseSamples(path, self.name or f"tool_path {target.name}", self.at or target.name),

@@ -1,0 +1,41 @@
+"""Rule of a company: no part of a robot above eye height. One file, one class, one ``kind``."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from seerob.criterion import Criterion, Evaluate, judge
+from seerob.model import Model
+from seerob.snapshot import Basis, Result
+from seerob.state import State
+
+
+class WorkHeight(Criterion, frozen=True, kw_only=True):
+    """Height of a robot's tool above the floor."""
+
+    unit: ClassVar[str] = "m"
+
+    at: str
+    """A robot, or the full name of a link."""
+    limit: float
+    """Largest admissible height [m]."""
+
+    def subjects(self) -> tuple[str, ...]:
+        """What it speaks of."""
+        return (self.at,)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        frame = model.frame(self.at)  # a name that does not exist fails here, not in the loop
+
+        def evaluate(state: State) -> Result:
+            _, position = state.pose(frame)
+            height = float(position[2])
+            verdict = judge(height, self.limit)
+            return Result(name=self.name, value=height, unit=self.unit, limit=self.limit, verdict=verdict)
+
+        return evaluate
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        return Basis(formula="z of the point", source="ACME works standard 12")

@@ -1,0 +1,223 @@
+"""Sets of bodies that move with joints, as the voxel kernels want them: boxes, fields and chains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.errors import InputError
+from seerob.geometry import Solid
+from seerob.kernels.fields import Field, mesh_field
+from seerob.kernels.tree_file import tree_of
+from seerob.model import Model
+from seerob.transforms import Array
+
+Indices = NDArray[np.int64]
+Progress = Callable[[float], None]
+"""Told what share is done, 0 to 1."""
+
+MOST_NODES = 20_000_000
+"""Of the field of one solid; a larger one is coarser, which marks more, never less."""
+EMPTY: Field = np.zeros((0, 0, 0), np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Core:
+    """One solid, in a frame in which a box contains it tightly."""
+
+    body: int
+    """Index in `Model.bodies`."""
+    rotation: Array
+    """body_from_core, shape (3, 3)."""
+    position: Array
+    """Likewise [m], shape (3,)."""
+    low: Array
+    """Corner of the box around it [m], shape (3,)."""
+    high: Array
+    radius: float
+    """It is dilated by this [m]: its own radius, and how far the real surface may lie outside."""
+    field: Field = EMPTY
+    """See `seerob.kernels.fields`; empty when it is the box."""
+    start: Array = np.zeros(3)
+    spacing: float = 1.0
+
+    @property
+    def corners(self) -> Array:
+        """Of the box, shape (8, 3) [m]."""
+        return np.where(np.indices((2, 2, 2)).reshape(3, 8).T, self.high, self.low)
+
+
+def core_of(body: int, solid: Solid, *, spacing: float, band: float) -> Core:
+    """A solid as the voxel kernels want it.
+
+    Args:
+        body: Index in `Model.bodies`.
+        solid: In the body's frame.
+        spacing: Of the nodes of a mesh's field [m].
+        band: Distance from the solid's surface up to which the field is exact [m].
+    """
+    radius = solid.radius + solid.deviation
+    if solid.mesh is None:
+        assert solid.points is not None
+        origin, edges = solid.points[0], solid.points[1:] - solid.points[0]
+        rotation = _along(edges)
+        ends = np.vstack([np.zeros(3), edges, edges.sum(axis=0)]) @ rotation
+        return Core(body, rotation, origin.astype(float), ends.min(axis=0), ends.max(axis=0), radius)
+    vertices = np.ascontiguousarray(solid.mesh.vertices, float)
+    faces = np.ascontiguousarray(solid.mesh.faces, np.int32)
+    used = vertices[np.unique(faces)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    pad = band + solid.radius + solid.deviation
+    spacing = max(spacing, float(np.prod((high - low) + 2 * pad) / MOST_NODES) ** (1 / 3))
+    shape = np.ceil((high - low + 2 * pad) / spacing).astype(np.int64) + 1
+    tree = tree_of(vertices, faces)
+    start = low - pad
+    field = mesh_field(tree.nodes, tree.links, tree.triangles, tree.closed, start, spacing, shape, pad)
+    return Core(body, np.eye(3), np.zeros(3), low, high, radius, field, start, spacing)
+
+
+def _along(edges: Array) -> Array:
+    """Right-handed axes as columns, along edges that are at right angles, shape (k, 3) → (3, 3)."""
+    axes: list[Array] = []
+    for candidate in (*edges, *np.eye(3)[np.abs(edges[0]).argsort()]):
+        beside = candidate - sum((axis * (axis @ candidate) for axis in axes), np.zeros(3))
+        length = np.linalg.norm(beside)
+        if length > 1e-9 * max(float(np.linalg.norm(candidate)), 1e-300) and length > 0:
+            axes.append(beside / length)
+        if len(axes) == 2:
+            break
+    return np.column_stack([*axes, np.cross(axes[0], axes[1])])
+
+
+@dataclass(frozen=True, eq=False)
+class Joints:
+    """The joints of the whole workstation, in `mujoco`'s order: from base to tip in each chain."""
+
+    slides: NDArray[np.bool_]
+    """Whether prismatic, shape (nj,)."""
+    q_address: Indices
+    """In ``MjData.qpos``, shape (nj,)."""
+    v_address: Indices
+    """In ``MjData.qvel``, shape (nj,)."""
+
+    @classmethod
+    def of(cls, mj: Any) -> Joints:
+        """Those of a compiled model.
+
+        Raises:
+            InputError: A joint that is neither revolute nor prismatic.
+        """
+        if not np.isin(mj.jnt_type, (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)).all():
+            raise InputError.at("swept volume", "of", "free and ball joints are not swept", "use hinges")
+        return cls(
+            mj.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE,
+            mj.jnt_qposadr.astype(np.int64),
+            mj.jnt_dofadr.astype(np.int64),
+        )
+
+
+class Moving:
+    """The solids of some bodies, the joints that move each, and where they are for joint positions."""
+
+    def __init__(self, model: Model, bodies: Sequence[int], *, spacing: float, band: float) -> None:
+        """Prepare.
+
+        Args:
+            model: The compiled workstation.
+            bodies: Indices in `Model.bodies`.
+            spacing: See `core_of`.
+            band: Likewise.
+        """
+        self.model, self.bodies = model, tuple(bodies)
+        self.cores = tuple(
+            core_of(i, solid, spacing=spacing, band=band) for i in self.bodies for solid in model.bodies[i].solids
+        )
+        self.joints = Joints.of(model.mj)
+        chains = {i: chain_of(model, i) for i in self.bodies}
+        self.chains = tuple(chains[core.body] for core in self.cores)
+        self.chain_start = np.cumsum([0, *map(len, self.chains)], dtype=np.int64)
+        self.chain = np.array([j for chain in self.chains for j in chain], np.int64)
+        self.corners = np.array([core.corners for core in self.cores]).reshape(-1, 8, 3)
+        self.radius = np.array([core.radius for core in self.cores], float)
+        self._turn = np.array([core.rotation for core in self.cores]).reshape(-1, 3, 3)
+        self._shift = np.array([core.position for core in self.cores]).reshape(-1, 3)
+        self._mj = np.array([model.bodies[core.body].mj for core in self.cores], np.int64)
+        self._data = mujoco.MjData(model.mj)
+        if not self.cores:
+            raise InputError.at("swept volume", "of", "nothing in it has a shape", "name bodies with shapes")
+
+    def place(self, qpos: Array) -> tuple[Array, Array]:
+        """world_from_core of every core, (ns, 3, 3) and (ns, 3) [m]; the axes are found on the way."""
+        self._data.qpos[:] = qpos
+        mujoco.mj_kinematics(self.model.mj, self._data)
+        world = self._data.xmat[self._mj].reshape(-1, 3, 3)
+        return world @ self._turn, self._data.xpos[self._mj] + np.einsum("nij,nj->ni", world, self._shift)
+
+    @property
+    def anchors(self) -> Array:
+        """A point of each joint's axis at the last `place`, in the world [m], shape (nj, 3)."""
+        return np.asarray(self._data.xanchor)
+
+    @property
+    def axes(self) -> Array:
+        """Each joint's axis at the last `place`, in the world, shape (nj, 3)."""
+        return np.asarray(self._data.xaxis)
+
+    def box(self, rotations: Array, positions: Array, reach: Array) -> tuple[Array, Array]:
+        """The upright box that holds all cores at poses, dilated: two corners (3,) [m].
+
+        Args:
+            rotations: From `place`.
+            positions: Likewise.
+            reach: How far each is dilated beyond its own radius [m], shape (ns,).
+        """
+        points = np.einsum("nij,nkj->nki", rotations, self.corners) + positions[:, None]
+        beyond = (reach + self.radius)[:, None, None]
+        return (points - beyond).min(axis=(0, 1)), (points + beyond).max(axis=(0, 1))
+
+
+def chain_of(model: Model, body: int) -> tuple[int, ...]:
+    """Joints that move a body, from base to tip."""
+    mj, at, chain = model.mj, model.bodies[body].mj, list[int]()
+    while at > 0:
+        first = int(mj.body_jntadr[at])
+        chain = [*range(first, first + int(mj.body_jntnum[at])), *chain] if first >= 0 else chain
+        at = int(mj.body_parentid[at])
+    return tuple(chain)
+
+
+def posed(model: Model, motion: Mapping[str, Array]) -> Array:
+    """Positions of all joints of the workstation; who is not named stands where the file puts it.
+
+    Args:
+        motion: Joint positions of robots and humans by name [rad or m], shape (N, n) each.
+
+    Returns:
+        Shape (N, nq).
+
+    Raises:
+        UnknownName: No such robot or human.
+        InputError: Shapes that do not fit, or a position that is not finite.
+    """
+    lengths = {len(q) for q in motion.values()}
+    if len(lengths) != 1 or 0 in lengths:
+        raise InputError.at("motion", "", f"{sorted(lengths)} samples", "give each the same number, 1 or more")
+    out = np.tile(np.asarray(model.mj.qpos0, float), (lengths.pop(), 1))
+    for name, mechanism in model.mechanisms.items():
+        q = np.asarray(motion.get(name, mechanism.home[None]), float)
+        if q.ndim != 2 or q.shape[1] != len(mechanism.joints):
+            what = f"{q.shape} joint positions"
+            raise InputError.at("motion", name, what, f"give {len(mechanism.joints)} per sample")
+        if not np.isfinite(q).all():
+            row, column = np.argwhere(~np.isfinite(q))[0]
+            what = f"sample {row}, joint {mechanism.joints[column].name} is {q[row, column]}"
+            raise InputError.at("motion", name, what, "every position must be a finite number")
+        out[:, mechanism.q_address] = q @ mechanism.coupling.T + mechanism.offset
+    for name in motion:
+        model.mechanism(name)
+    return out

@@ -1,0 +1,223 @@
+r"""Forces that a robot's torque limits allow at a point, [Weistroffer2022]_ section 2.2.2.4, [Chiacchio1997]_.
+
+The sets themselves are in `seerob.polytope`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from msgspec import Meta
+
+from seerob import joint_torques, provenance
+from seerob.criterion import Criterion, Evaluate, judge
+from seerob.errors import InputError, Undecided
+from seerob.model import Mechanism, Model
+from seerob.polytope import Polytope, free_moment, torque_box, zero_moment
+from seerob.snapshot import Arrow, Basis, Hull, Input, Marker, Origin, Result, Sphere, Verdict
+from seerob.state import State
+from seerob.transforms import Array
+from seerob.workstation import Metres3
+
+DRAWN = 0.001
+"""Length drawn for 1 N [m]."""
+LARGEST_DRAWN = 2.0
+"""Corners farther than this are drawn here [m]."""
+
+FORMULA = {
+    "zero_moment": "{f : τ_min ≤ J_vᵀ f + b ≤ τ_max}: a point contact, without moment",
+    "free_moment": "{f : some m with τ_min ≤ J_vᵀ f + J_ωᵀ m + b ≤ τ_max}: a contact that bears a moment",
+    "torque_box": "{(J_vᵀ)⁺ (τ − b) : τ_min ≤ τ ≤ τ_max}: image of the 2ⁿ extreme torques",
+}
+LOAD = {
+    "gravity": "b = g(q): gravity, tools and workpieces included",
+    "motion": "b = c(q, q̇) + g(q): gravity and the velocity products",
+    "none": "b = 0: gravity is balanced by something else",
+}
+
+
+class ForcePolytope(Criterion, frozen=True, kw_only=True):
+    """Largest force that the robot's torque limits allow at a point, in any direction."""
+
+    unit: ClassVar[str] = "N"
+
+    at: str
+    """Point: a robot (its tool's working point) or the full name of a link."""
+    offset: Metres3 = (0.0, 0.0, 0.0)
+    """The point in that frame [m]."""
+    limit: Annotated[float, Meta(gt=0, extra={"unit": "N"})] | None = None
+    """Largest admissible force [N]: the radius of the sphere that the polytope is compared with."""
+    definition: Literal["zero_moment", "free_moment", "torque_box"] = "zero_moment"
+    """Which set: forces at a point contact, forces of a contact that also bears a moment, or the image of
+    all extreme torques under the pseudo-inverse. Each of the last two contains the first."""
+    load: Literal["gravity", "motion", "none"] = "gravity"
+    """What the torques must hold beside the force."""
+    torque_limits: tuple[tuple[float, float], ...] | None = None
+    """Least and largest torque of each joint [N·m or N] instead of the robot's own limits."""
+
+    def subjects(self) -> tuple[str, ...]:
+        """The point."""
+        return (self.at,)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        frame = model.frame(self.at)
+        robot = model.carrier(frame)
+        offset = np.array(self.offset)
+        lower, upper, unknown = self._torques(model, robot)
+
+        def evaluate(state: State) -> Result:
+            state.require(robot.name)
+            if unknown:
+                raise Undecided(unknown)
+            held = self._held(state, robot)
+            J = state.jacobian(frame, robot, offset)
+            polytope = self._polytope(J, lower - held, upper - held)
+            if polytope.empty:
+                raise Undecided(f"{robot.name}: the torque limits cannot hold it in this pose, with any force")
+            rotation, position = state.pose(frame)
+            return self._result(polytope, position + rotation @ offset)
+
+        return evaluate
+
+    def _held(self, state: State, robot: Mechanism) -> Array:
+        if self.load == "gravity":
+            return joint_torques.gravity(state, robot)
+        return joint_torques.bias(state, robot) if self.load == "motion" else np.zeros(len(robot.joints))
+
+    def _polytope(self, J: Array, low: Array, high: Array) -> Polytope:
+        if self.definition == "zero_moment":
+            return zero_moment(J[:3], low, high)
+        return free_moment(J, low, high) if self.definition == "free_moment" else torque_box(J[:3], low, high)
+
+    def _result(self, polytope: Polytope, at: Array) -> Result:
+        unbounded = polytope.free.shape[1] > 0
+        across = float(np.linalg.norm(polytope.farthest))
+        if unbounded:
+            # No force is too large for the structure here, so every limit is exceeded.
+            value, verdict = None, None if self.limit is None else Verdict.EXCEEDED
+            direction = polytope.free[:, 0]
+            reason = f"singular: no torque limits the force along ±{_vector(direction)}, only the structure does"
+        else:
+            value, verdict = across, judge(across, self.limit)
+            direction = polytope.farthest / across if across > 0 else np.zeros(3)
+            reason = f"largest along {_vector(direction)}"
+            if polytope.inscribed < 0:
+                reason += "; without any force the torque limits cannot hold the robot"
+        inscribed = polytope.inscribed if np.isfinite(polytope.inscribed) else None
+        return Result(
+            name=self.name,
+            value=value,
+            unit=self.unit,
+            limit=self.limit,
+            verdict=verdict,
+            reason=reason,
+            parts=(
+                Result(name="in every direction", value=inscribed, unit="N"),
+                *((Result(name="across that direction", value=across, unit="N"),) if unbounded else ()),
+                *(
+                    Result(name=f"direction {axis}", value=float(u), unit="")
+                    for axis, u in zip("xyz", direction, strict=True)
+                ),
+            ),
+            markers=self._markers(polytope, at, direction, value, verdict),
+        )
+
+    def _markers(
+        self, polytope: Polytope, at: Array, direction: Array, value: float | None, verdict: Verdict | None
+    ) -> tuple[Marker, ...]:
+        center = tuple(at.tolist())
+        markers: list[Marker] = []
+        if len(polytope.triangles):
+            lengths = DRAWN * np.linalg.norm(polytope.corners, axis=1)
+            shorter = np.minimum(1.0, LARGEST_DRAWN / np.maximum(lengths, 1e-12))
+            drawn = at + DRAWN * polytope.corners * shorter[:, None]
+            markers.append(
+                Hull(
+                    vertices=tuple(map(tuple, drawn.tolist())),
+                    faces=tuple(map(tuple, polytope.triangles.tolist())),
+                    label="" if (lengths <= LARGEST_DRAWN).all() else "cut off where it is drawn too large",
+                    verdict=verdict,
+                )
+            )
+        if self.limit is not None:
+            radius = min(DRAWN * self.limit, LARGEST_DRAWN)
+            markers.append(Sphere(center=center, radius=radius, label=f"{self.limit:g} N"))
+        length = LARGEST_DRAWN if value is None else min(DRAWN * value, LARGEST_DRAWN)
+        label = "unbounded" if value is None else f"{value:.0f} N"
+        arrow = tuple((length * direction).tolist())
+        markers.append(Arrow(origin=center, vector=arrow, label=label, verdict=verdict))
+        return tuple(markers)
+
+    def _torques(self, model: Model, robot: Mechanism) -> tuple[Array, Array, str]:
+        """Lower and upper torque limits, and what of them is unknown."""
+        names = [joint.name for joint in robot.joints]
+        if self.torque_limits is not None:
+            file = next(iter(model.workstation.files), "workstation")
+            pairs = np.array(self.torque_limits, float).reshape(-1, 2)
+            if len(pairs) != len(names) or not np.isfinite(pairs).all() or (pairs[:, 0] > pairs[:, 1]).any():
+                raise InputError.at(
+                    file,
+                    "torque_limits",
+                    f"{[list(pair) for pair in self.torque_limits]} does not fit",
+                    f"give [least, largest] in N·m or N for each of {', '.join(names)}",
+                )
+            return pairs[:, 0], pairs[:, 1], ""
+        unknown = [
+            name
+            for name, limit in zip(names, robot.effort_limits, strict=True)
+            # A limit of 0 in a description means that nobody filled it in.
+            if limit is None or limit.value <= 0 or limit.origin in (Origin.ASSUMED, Origin.MISSING)
+        ]
+        upper = np.array([0.0 if limit is None else limit.value for limit in robot.effort_limits])
+        text = f"{robot.name}: nobody gave the torque limit of {', '.join(unknown)}" if unknown else ""
+        return -upper, upper, text
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        robot = model.carrier(model.frame(self.at))
+        return Basis(
+            formula=f"largest |f| of {FORMULA[self.definition]}; {LOAD[self.load]}",
+            source="Weistroffer et al. 2022, section 2.2.2.4; Chiacchio et al. 1997",
+            inputs=provenance.motion(model, robot.name)
+            + self._limits_given(robot)
+            + (() if self.load == "none" else provenance.masses(model, robot))
+            + provenance.limit(self.limit, "N"),
+            not_modelled=(
+                "static: no force of an impact, no inertia of the moving robot",
+                "friction in joints and gears, which a pushing robot must overcome and a pushed one adds",
+                "torques beyond the stated limits, and force monitoring of the controller below them",
+            ),
+        )
+
+    def _limits_given(self, robot: Mechanism) -> tuple[Input, ...]:
+        if self.torque_limits is not None:
+            return tuple(
+                Input(
+                    name=f"torque limits of {joint.name}",
+                    value=f"{low:g} … {high:g}",
+                    unit="N·m" if unit == "rad" else "N",
+                    origin=Origin.GIVEN,
+                    source="workstation file",
+                )
+                for joint, unit, (low, high) in zip(
+                    robot.joints, robot.units, self.torque_limits, strict=True
+                )
+            )
+        return tuple(
+            Input(name=f"torque limit of {joint.name}", origin=Origin.MISSING)
+            if limit is None or limit.value <= 0
+            else Input(
+                name=f"torque limit of {joint.name}, either way",
+                value=limit.value,
+                unit="N·m" if unit == "rad" else "N",
+                origin=limit.origin,
+                source=limit.source,
+            )
+            for joint, unit, limit in zip(robot.joints, robot.units, robot.effort_limits, strict=True)
+        )
+
+
+def _vector(u: Array) -> str:
+    return "(" + ", ".join(f"{0.0 if abs(x) < 5e-3 else x:.2f}" for x in u) + ")"

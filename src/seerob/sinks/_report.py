@@ -1,0 +1,59 @@
+"""What a report is made from, and the words and cells that all of its sections share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from seerob.results import ResultLog
+from seerob.sinks._html import Html, tag
+from seerob.sinks._palette import MARK, WORD
+from seerob.sinks._sentences import number
+from seerob.sinks._setup import Setup
+from seerob.snapshot import Basis, Finding, Input, Origin, Scene, Verdict
+
+DOUBTFUL = (Origin.ASSUMED, Origin.MISSING, Origin.ESTIMATED)
+WHO = {
+    Origin.MEASURED: "measured",
+    Origin.STATED: "stated by its source",
+    Origin.GIVEN: "given by the user",
+    Origin.COMPUTED: "computed",
+    Origin.ESTIMATED: "estimated",
+    Origin.ASSUMED: "assumed, nobody gave it",
+    Origin.MISSING: "missing",
+}
+
+
+@dataclass(frozen=True)
+class Report:
+    """Everything the page says."""
+
+    scene: Scene
+    log: ResultLog
+    files: dict[str, bytes]
+    bases: dict[str, Basis]
+    """Per criterion, the one that its worst instant rests on."""
+    pictures: dict[str, bytes]
+    """PNG of the worst instant per criterion."""
+    versions: dict[str, str]
+    date: str
+    """When the report was written."""
+    findings: tuple[Finding, ...]
+    """Of the model and of the run."""
+    setup: Setup
+    """Engine and sources."""
+    command: str
+    """What wrote the report."""
+
+
+def badge(verdict: Verdict | None) -> Html:
+    """Mark and word; colour comes third."""
+    name = "none" if verdict is None else verdict.value
+    return tag("span", f"{MARK[verdict]} {WORD[verdict]}", class_=f"badge {name}")
+
+
+def input_row(item: Input) -> list[str | Html]:
+    value = item.value if isinstance(item.value, str) else number(item.value, item.unit)
+    origin = (
+        tag("span", f"! {WHO[item.origin]}", class_="doubt") if item.origin in DOUBTFUL else WHO[item.origin]
+    )
+    return [item.name, value, origin, item.source or "–"]

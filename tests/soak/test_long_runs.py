@@ -1,0 +1,69 @@
+"""Hours of run time: memory holds the results and nothing else.
+
+Results are kept, 29 bytes per tick for each criterion and each of its parts (time, value, limit,
+reason, verdict); the rest of the road must not grow. ``SEEROB_SOAK_HOURS`` scales the long form.
+"""
+
+import gc
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import seerob as sr
+from seerob.recording import Recording
+from seerob.sinks.recorder import Recorder
+from soak.cut_short import workstation
+
+PER_TICK = 8 + 8 + 8 + 4 + 1
+"""Bytes of one tick of one series."""
+SPARE = 48 * 2**20
+"""What allocators, arrays that grow by an eighth, and the recorder's index may take."""
+
+
+def resident():
+    """Memory of this process [byte]."""
+    gc.collect()
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmRSS:"):
+            return int(line.split()[1]) * 1024
+    raise AssertionError("no VmRSS")
+
+
+class Watched(Iterator):
+    """Ticks without samples, and the memory at the first tenth."""
+
+    def __init__(self, ticks):
+        self.left, self.total, self.early = ticks, ticks, None
+
+    def __next__(self):
+        if self.left == 0:
+            raise StopIteration
+        if self.early is None and self.left <= 0.9 * self.total:
+            self.early = resident()
+        self.left -= 1
+        return ()
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="resident memory is read from /proc")
+@pytest.mark.parametrize(
+    "hours",
+    [
+        pytest.param(0.01, id="short"),
+        pytest.param(float(os.environ.get("SEEROB_SOAK_HOURS", "8")), id="long", marks=pytest.mark.soak),
+    ],
+)
+def test_memory_grows_by_the_results_and_no_more(tmp_path, hours):
+    station = sr.load(workstation(tmp_path / "cell"))
+    feed = Watched(round(hours * 3600 / station.workstation.engine.tick))
+    summary = station.run(feed=feed, folder=tmp_path, sinks=[Recorder(lossless=True)])
+    grown = resident() - feed.early
+    assert summary.ticks == feed.total
+    kept = sum(len(s) for one in summary.results.values() for s in (one, *one.parts.values()))
+    assert grown < 1.125 * PER_TICK * kept + SPARE
+    recording = Recording.open(tmp_path / "run.mcap")
+    assert recording.complete
+    assert recording.findings == ()
+    assert recording.end == pytest.approx((feed.total - 1) * station.workstation.engine.tick)
+    assert recording.snapshot_at(recording.end / 2).seq == (feed.total - 1) // 2

@@ -3,7 +3,7 @@
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from msgspec.structs import replace
+import numpy as np
 
 import seerob as sr
 from seerob.safety.velocity import Velocity
@@ -19,13 +19,11 @@ with TemporaryDirectory() as folder:
     instant = recording.snapshot_at(5.0)
 
 print(
-    f"{recording.duration:.2f} s recorded; the arm stood at {[round(q, 3) for q in instant.joints['ur10']]}"
+    f"{recording.duration:.2f} s recorded; at 5 s the shoulder stood at {instant.joints['ur10'][0]:.3f} rad"
 )
 for name, series in run.results.items():
-    assert (again.results[name].values == series.values).tolist().count(False) == sum(
-        series.values != series.values
-    )
-    assert (again.results[name].verdicts == series.verdicts).all()
+    np.testing.assert_array_equal(again.results[name].values, series.values)
+    assert again.results[name].verdict == series.verdict
 assert strict.results["slow"].verdict == sr.Verdict.EXCEEDED
 assert strict.results["slow"].max() == run.results["tcp speed"].max()
-assert replace(instant, results=()).t == 5.0
+assert instant.t == 5.0

@@ -11,6 +11,7 @@ from seerob.engine import Engine
 from seerob.run import Bound, Judge
 from seerob.samples import JointSample
 from seerob.snapshot import Result
+from seerob.source import Opened
 from seerob.state import State
 from seerob.station import Station, load
 
@@ -24,7 +25,8 @@ def two_r(*, mimic: str = "", masses: tuple[float, float] = (1.0, 1.0), effort: 
         links.append(
             f'<link name="l{i}"><inertial><origin xyz="1 0 0"/><mass value="{mass}"/>'
             '<inertia ixx="1e-12" iyy="1e-12" izz="1e-12" ixy="0" ixz="0" iyz="0"/></inertial>'
-            '<collision><origin xyz="0.5 0 0"/><geometry><box size="1 0.1 0.1"/></geometry></collision></link>'
+            '<collision><origin xyz="0.5 0 0"/><geometry><box size="1 0.1 0.1"/></geometry>'
+            "</collision></link>"
         )
         parent, x = ("base", 0) if i == 1 else (f"l{i - 1}", 1)
         joints.append(
@@ -41,6 +43,24 @@ def two_r(*, mimic: str = "", masses: tuple[float, float] = (1.0, 1.0), effort: 
 
 TWO_R = '[[robots]]\nname = "arm"\nmodel = "arm.urdf"\n'
 
+UR10 = """
+[[robots]]
+name = "arm"
+model = "library:ur10"
+[[tools]]
+name = "load"
+on = "arm/tool0"
+shape = { box = [0.1, 0.1, 0.1] }
+mass = 3
+tcp = { position = [0, 0, 0.1] }
+"""
+Q0, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([1, 0.5, -0.6, 0.8, -0.7, 1.0])
+
+
+def wave(t):
+    """Peak 2 rad/s, in full motion from the first sample on."""
+    return Q0 + AMPLITUDE * np.sin(2 * t), 2 * AMPLITUDE * np.cos(2 * t)
+
 
 def made(folder: Path, text: str, files: Mapping[str, str | bytes] | None = None) -> Station:
     """Write a workstation and the files it names, and load it."""
@@ -56,9 +76,7 @@ def heard(
 ) -> JointSample:
     """A sample."""
     speeds = None if qd is None else tuple(map(float, qd))
-    return JointSample(
-        source="test", seq=0, target=target, t=t, q=tuple(map(float, q)), qd=speeds, **more
-    )
+    return JointSample(source="test", seq=0, target=target, t=t, q=tuple(map(float, q)), qd=speeds, **more)
 
 
 def state_at(station: Station, **motion: tuple[Sequence[float], Sequence[float]]) -> State:
@@ -84,3 +102,11 @@ def hinge_limits(station: Station, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Position limits, those that are missing replaced by ±π."""
     mechanism = station.model.mechanism(name)
     return np.clip(mechanism.lower, -np.pi, np.pi), np.clip(mechanism.upper, -np.pi, np.pi)
+
+
+def recorded(name, motion, rate, duration, *, velocities=True):
+    samples = []
+    for t in np.arange(0, duration + 1e-9, 1 / rate).tolist():
+        q, qd = motion(t)
+        samples.append(heard(name, t, q, qd if velocities else None))
+    return Opened(samples=tuple(samples), duration=samples[-1].t)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from made_cell import FLOATING, TWO_R, made, state_at, two_r
 
+from made_cell import FLOATING, TWO_R, made, state_at, two_r
 from seerob.errors import InputError
 from seerob.filing import filed
 from seerob.geometry import capsule
@@ -44,7 +44,9 @@ def test_order_of_the_tables_does_not_matter(tmp_path):
     assert {b.name for b in first.bodies} == {b.name for b in other.bodies}
     assert first.mj.body_mass.sum() == pytest.approx(other.mj.body_mass.sum())
     robot = other.robot("arm")
-    assert [other.bodies[i].name for i in robot.carried] == ["finger", "grip", "part"] or len(robot.carried) == 3
+    assert [other.bodies[i].name for i in robot.carried] == ["finger", "grip", "part"] or len(
+        robot.carried
+    ) == 3
 
 
 def test_masses_are_in_the_twin(tmp_path):
@@ -171,7 +173,10 @@ def test_extreme_points_bound_every_point_of_the_solids():
     from seerob.geometry import Solid
     from seerob.model_io.shapes import box_mesh
 
-    solids = [capsule(np.zeros(3), np.array([0, 0, 1.0]), 0.1), Solid(mesh=box_mesh(np.ones(3), 2 * np.ones(3)))]
+    solids = [
+        capsule(np.zeros(3), np.array([0, 0, 1.0]), 0.1),
+        Solid(mesh=box_mesh(np.ones(3), 2 * np.ones(3))),
+    ]
     points, radius = extreme_points(solids)
     assert radius == 0.1
     for direction in np.random.default_rng(0).normal(size=(50, 3)):
@@ -216,7 +221,9 @@ def test_files_travel_under_the_name_the_workstation_finds_them_by(tmp_path, ref
     folder.mkdir()
     written(folder, disk)
     content = disk.encode() if disk != "x" else b"other"
-    placed = filed("r", {name: content}, folder=folder, references=(reference, None), packages={"named": "vendor"})
+    placed = filed(
+        "r", {name: content}, folder=folder, references=(reference, None), packages={"named": "vendor"}
+    )
     assert placed == {wanted: content}
 
 

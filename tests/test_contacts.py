@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from made_cell import TWO_R, heard, made, two_r
 
+from made_cell import TWO_R, heard, made, two_r
 from seerob.engine import Engine
 from seerob.errors import InputError
 
 DROP = """<robot name="d"><link name="base"/>
-<link name="ball"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+<link name="ball"><inertial><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
 </inertial><collision><geometry>{shape}</geometry></collision></link>
 <joint name="fall" type="prismatic"><parent link="base"/><child link="ball"/><axis xyz="0 0 1"/>
 <limit lower="-9" upper="9" effort="20" velocity="9"/></joint></robot>"""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from seerob import cli
+from seerob import cli, plugin
 from seerob.human import keyframes, manikin
 from seerob.reading import convert_workstation
 
@@ -115,6 +115,16 @@ def test_tests_named_as_evidence_exist() -> None:
         f"{file}::{test}"
         for file, test in named
         if not (ROOT / file).is_file() or f"def {test}(" not in (ROOT / file).read_text(encoding="utf-8")
+    ]
+    assert not missing
+
+
+@pytest.mark.parametrize(("group", "page"), [("sources", "sources.md"), ("safety", "safety.md")])
+def test_every_kind_is_explained_with_its_options(group: str, page: str) -> None:
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    alike = {"csv": "excel"}  # the same options, printed once
+    missing = [
+        k for k in plugin.kinds(group) if f"<!-- write-docs: {group}/{alike.get(k, k)} -->" not in text
     ]
     assert not missing
 

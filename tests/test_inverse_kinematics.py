@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from made_cell import FLOATING, TWO_R, hinge_limits, made, two_r
 
+from made_cell import FLOATING, TWO_R, hinge_limits, made, two_r
 from seerob.inverse_kinematics import _rotation_vector, solve_pose
 from seerob.transforms import rotation_from_rpy
 

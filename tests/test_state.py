@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+
 from made_cell import FLOATING, TWO_R, hinge_limits, made, state_at, two_r
 from oracles import pinocchio_oracle as oracle
-
 from seerob.errors import Undecided
 from seerob.model_io import library
 from seerob.safety.kinetic_energy import kinetic_energy
@@ -178,7 +178,8 @@ def test_mimic_joint_moves_with_its_factor_and_offset(tmp_path):
 
 
 SLIDER = """<robot name="s"><link name="base"/>
-<link name="cart"><inertial><mass value="4"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<link name="cart"><inertial><mass value="4"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
+</inertial>
 <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
 <link name="pole"><inertial><origin xyz="0 0 0.5"/><mass value="2"/>
 <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>

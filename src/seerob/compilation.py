@@ -10,24 +10,20 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from seerob.by_hand import by_hand
+from seerob.chains import assumed, couple, placeholder, unknown_masses
 from seerob.contacts import add_contacts
 from seerob.distance import Shapes
 from seerob.errors import InputError, Problem, UnknownName
 from seerob.filing import filed
-from seerob.geometry import Solid
 from seerob.human import manikin, posture
 from seerob.model import Body, Frame, Mechanism, Model
-from seerob.model_io.description import Description, Inertial, Joint, Link, Quantity
+from seerob.model_io.description import Description, Link, Quantity
 from seerob.model_io.loader import load_robot
 from seerob.mounting import Mounting, extreme_points
-from seerob.snapshot import Finding, Origin
-from seerob.things import AREA_COLOR, PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, link_by_hand, load_thing
+from seerob.things import AREA_COLOR, PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, load_thing
 from seerob.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
 from seerob.workstation import Area, Human, Mounted, Pose, Robot, Tool, Workstation
-
-PLACEHOLDER_DENSITY = 500.0
-"""Of the box around a moving link that nobody gave a mass [kg/m³]: it lets the twin move, and no
-criterion may use it."""
 
 Progress = Callable[[str], None]
 
@@ -118,7 +114,7 @@ class _Compiler:
         description = load_robot(
             robot.model, folder=self.folder, packages=robot.packages, meshes=robot.meshes, name=robot.name
         )
-        description = self._by_hand(description, robot)
+        description = by_hand(description, robot, self.file)
         n = len(description.joints())
         home = np.zeros(n)
         if robot.q is not None:
@@ -148,42 +144,6 @@ class _Compiler:
             wrong = UnknownName("link or tool", robot.tool, links + [t.name for t in self.station.tools])
             raise InputError.at(self.file, "tool", str(wrong))
         return Frame(name, -1, np.eye(4))
-
-    def _by_hand(self, description: Description, robot: Robot) -> Description:
-        """The description with what the workstation file says instead."""
-        names = [joint.name for joint in description.joints()]
-        changes: dict[str, dict[str, Any]] = {name: {} for name in names}
-        for key, values in (
-            ("armature", robot.rotor_inertia),
-            ("effort", robot.torque_limits),
-            ("velocity", robot.velocity_limits),
-        ):
-            if values is None:
-                continue
-            if len(values) != len(names) or min(values) < 0:
-                raise InputError.at(
-                    self.file,
-                    {"armature": "rotor_inertia", "effort": "torque_limits", "velocity": "velocity_limits"}[
-                        key
-                    ],
-                    f"{list(values)} does not fit",
-                    f"give one value of 0 or more for each of {', '.join(names)}",
-                )
-            for name, value in zip(names, values, strict=True):
-                changes[name][key] = Quantity(float(value), Origin.GIVEN, "workstation file")
-        known = {link.name for link in description.links}
-        for name in robot.masses:
-            if name not in known:
-                wrong = UnknownName(f"link of {robot.name}", name, known)
-                raise InputError.at(self.file, f"masses.{name}", str(wrong))
-        links = []
-        for link in description.links:
-            joints = tuple(replace(j, **changes[j.name]) if changes.get(j.name) else j for j in link.joints)
-            inertial = link.inertial
-            if link.name in robot.masses:
-                inertial = link_by_hand(robot.masses[link.name], link.solids, f"{robot.name}/{link.name}")
-            links.append(replace(link, joints=joints, inertial=inertial))
-        return replace(description, links=tuple(links))
 
     def _human(self, human: Human) -> None:
         self.progress(f"making {human.name}")
@@ -219,7 +179,7 @@ class _Compiler:
             self.mounting.inertial(body, link.inertial)
             mass = Quantity(link.inertial.mass, link.inertial.origin, link.inertial.source)
         elif link.joints and link.solids:
-            self.mounting.inertial(body, _placeholder(link.solids))
+            self.mounting.inertial(body, placeholder(link.solids))
         elif link.joints:
             self.mounting.massless(body)
         if link.solids or link.visual:
@@ -277,9 +237,7 @@ class _Compiler:
         self.progress(f"reading {thing.name}")
         loaded = load_thing(thing, self.folder, color, needs_mass=role in ("tool", "workpiece"))
         self.mounting.findings += loaded.findings
-        self.mounting.files |= filed(
-            thing.name, loaded.files, folder=self.folder, references=(thing.mesh,)
-        )
+        self.mounting.files |= filed(thing.name, loaded.files, folder=self.folder, references=(thing.mesh,))
         carrier = "" if parent is None else self.carriers[parent]
         body = self.mounting.body(thing.name, parent, parent_from_thing)
         if carrier:
@@ -359,7 +317,10 @@ class _Compiler:
             mechanisms=mechanisms,
             shapes=shapes,
             meshes=self.mounting.meshes,
-            findings=tuple(self.mounting.findings + self._unknowns(mechanisms)),
+            findings=(
+                *self.mounting.findings,
+                *(f for m in mechanisms.values() if m.role == "robot" for f in assumed(m)),
+            ),
             files={**self.station.files, **self.mounting.files},
         )
 
@@ -367,7 +328,7 @@ class _Compiler:
         chain = self.chains[name]
         every = [joint for link in chain.description.links for joint in link.joints]
         commanded = [joint for joint in every if joint.mimic is None]
-        coupling, offset = _coupling(every, commanded)
+        coupling, offset = couple(every, commanded)
         ids = [mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_JOINT, f"{name}/{joint.name}") for joint in every]
         own = {full for full, carrier in self.carriers.items() if carrier == name}
         mj_bodies = np.array(
@@ -401,52 +362,13 @@ class _Compiler:
         )
 
     def _unknown_masses(self, name: str) -> tuple[str, ...]:
-        links = self.chains[name].description.links
         mounted = {thing.on for thing in (*self.station.tools, *self.station.workpieces)}
-        heavy = {link.name for link in links if link.inertial is not None or f"{name}/{link.name}" in mounted}
-        for link in reversed(links):
-            if link.name in heavy and link.parent is not None:
-                heavy.add(link.parent)
-        # A frame between two joints has no mass of its own; a joint that moves nothing heavy has no mass matrix.
-        unknown = [
-            f"nobody gave the mass of {name}/{link.name}"
-            for link in links
-            if link.joints and link.inertial is None and (link.solids or link.name not in heavy)
-        ]
-        by_name: dict[str, list[Quantity | None]] = {}
+        on = {full.partition("/")[2] for full in mounted if full.startswith(f"{name}/")}
+        things: dict[str, bool] = {}
         for entry in self.mounting.entries:
             if entry.carrier == name and entry.role in ("tool", "workpiece"):
-                by_name.setdefault(entry.owner, []).append(entry.mass)
-        unknown += [
-            f"nobody gave the mass or the density of {owner}"
-            for owner, masses in by_name.items()
-            if all(mass is None for mass in masses)
-        ]
-        return tuple(unknown)
-
-    def _unknowns(self, mechanisms: dict[str, Mechanism]) -> list[Finding]:
-        findings = []
-        for mechanism in mechanisms.values():
-            if mechanism.role != "robot":
-                continue
-            findings += [
-                Finding(
-                    level="assumed",
-                    subject=mechanism.name,
-                    text=f"{text}: energies and effective masses are UNDECIDED; a placeholder moves the twin",
-                )
-                for text in mechanism.unknown_masses
-            ]
-            if not mechanism.rotor_inertia_known:
-                findings.append(
-                    Finding(
-                        level="assumed",
-                        subject=mechanism.name,
-                        text="rotor inertia not given for every joint: mass matrix and effective mass are "
-                        "link-side only (give rotor_inertia)",
-                    )
-                )
-        return findings
+                things[entry.owner] = things.get(entry.owner, False) or entry.mass is not None
+        return unknown_masses(name, self.chains[name].description, loaded=on, things=things)
 
 
 def pose_matrix(pose: Pose) -> Array:
@@ -458,28 +380,3 @@ def pose_matrix(pose: Pose) -> Array:
 
 def _body_id(mj: Any, name: str) -> int:
     return int(mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name))
-
-
-def _coupling(every: Sequence[Joint], commanded: Sequence[Joint]) -> tuple[Array, Array]:
-    """All joints as an affine function of the commanded ones; mimics of mimics are followed."""
-    column = {joint.name: i for i, joint in enumerate(commanded)}
-    by_name = {joint.name: joint for joint in every}
-    coupling, offset = np.zeros((len(every), len(commanded))), np.zeros(len(every))
-    for row, joint in enumerate(every):
-        factor, shift, at = 1.0, 0.0, joint
-        while at.mimic is not None:
-            shift += factor * at.mimic.offset
-            factor *= at.mimic.multiplier
-            at = by_name[at.mimic.joint]
-        coupling[row, column[at.name]] = factor
-        offset[row] = shift
-    return coupling, offset
-
-
-def _placeholder(solids: Sequence[Solid]) -> Inertial:
-    points, radius = extreme_points(solids)
-    size = np.ptp(points, axis=0) + 2 * radius + 1e-3
-    mass = float(PLACEHOLDER_DENSITY * size.prod())
-    inertia = np.diag([size[1] ** 2 + size[2] ** 2, size[0] ** 2 + size[2] ** 2, size[0] ** 2 + size[1] ** 2])
-    center = (points.min(axis=0) + points.max(axis=0)) / 2
-    return Inertial(mass, center, inertia * mass / 12, Origin.ASSUMED, "placeholder")

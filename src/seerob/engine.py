@@ -122,7 +122,9 @@ class Engine:
                 taken = reference.take(sample.t, np.array(sample.q), qd)
             else:
                 taken, reached = self._take_pose(mechanism, sample)
-                reason = reason or ("" if reached else f"{sample.target} cannot reach the pose that was heard")
+                reason = reason or (
+                    "" if reached else f"{sample.target} cannot reach the pose that was heard"
+                )
             hearing = self._hearings[mechanism.name]
             hearing.driven = self.controllers
             if taken and (not hearing.heard or sample.t > hearing.heard[-1][0]):
@@ -141,7 +143,9 @@ class Engine:
         mechanism = self.model.mechanism(sample.target)
         n = len(mechanism.joints)
         if {len(sample.q), n if sample.qd is None else len(sample.qd)} != {n}:
-            heard = f"{len(sample.q)} joint values" + ("" if sample.qd is None else f", {len(sample.qd)} speeds")
+            heard = f"{len(sample.q)} joint values" + (
+                "" if sample.qd is None else f", {len(sample.qd)} speeds"
+            )
             raise InputError.at(sample.source, sample.target, heard, f"{sample.target} has {n} joints")
         return mechanism
 

@@ -83,5 +83,9 @@ def _kept(owner: str, name: str, *, inside: bool) -> str:
         beside = _inside(PurePosixPath(rest))
         if beside is not None:
             return beside
-    parts = [part for part in (rest if separator else name).replace("\\", "/").split("/") if part not in ("", ".", "..")]
+    parts = [
+        part
+        for part in (rest if separator else name).replace("\\", "/").split("/")
+        if part not in ("", ".", "..")
+    ]
     return "/".join([OUTSIDE, owner, *(part.replace(":", "_") for part in parts)])

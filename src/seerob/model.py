@@ -220,8 +220,7 @@ class Model:
                 for body in self.bodies
                 if name in (body.name, body.owner)
                 or (
-                    body.role != "area"
-                    and (body.name.startswith(name + "/") or fnmatchcase(body.name, name))
+                    body.role != "area" and (body.name.startswith(name + "/") or fnmatchcase(body.name, name))
                 )
             )
         if not found:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import mujoco
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.errors import InputError
-from seerob.geometry import Solid
+from seerob.geometry import Mesh, Solid
 from seerob.kernels.fields import Field, mesh_field
 from seerob.kernels.tree_file import tree_of
 from seerob.model import Model
@@ -21,7 +21,7 @@ Indices = NDArray[np.int64]
 Progress = Callable[[float], None]
 """Told what share is done, 0 to 1."""
 
-MOST_NODES = 20_000_000
+MOST_NODES = 4_000_000
 """Of the field of one solid; a larger one is coarser, which marks more, never less."""
 EMPTY: Field = np.zeros((0, 0, 0), np.float32)
 
@@ -41,9 +41,11 @@ class Core:
     high: Array
     radius: float
     """It is dilated by this [m]: its own radius, and how far the real surface may lie outside."""
-    field: Field = EMPTY
-    """See `seerob.kernels.fields`; empty when it is the box."""
-    start: Array = np.zeros(3)
+    mesh: Mesh | None = None
+    """None when it is the box itself."""
+    nodes: Field = field(default_factory=lambda: EMPTY)
+    """Its field: see `seerob.kernels.fields`; empty for the box, and before `with_field`."""
+    start: Array = field(default_factory=lambda: np.zeros(3))
     spacing: float = 1.0
 
     @property
@@ -52,15 +54,8 @@ class Core:
         return np.where(np.indices((2, 2, 2)).reshape(3, 8).T, self.high, self.low)
 
 
-def core_of(body: int, solid: Solid, *, spacing: float, band: float) -> Core:
-    """A solid as the voxel kernels want it.
-
-    Args:
-        body: Index in `Model.bodies`.
-        solid: In the body's frame.
-        spacing: Of the nodes of a mesh's field [m].
-        band: Distance from the solid's surface up to which the field is exact [m].
-    """
+def core_of(body: int, solid: Solid) -> Core:
+    """A solid (in the frame of body ``body`` of the model) and the box around it."""
     radius = solid.radius + solid.deviation
     if solid.mesh is None:
         assert solid.points is not None
@@ -68,17 +63,29 @@ def core_of(body: int, solid: Solid, *, spacing: float, band: float) -> Core:
         rotation = _along(edges)
         ends = np.vstack([np.zeros(3), edges, edges.sum(axis=0)]) @ rotation
         return Core(body, rotation, origin.astype(float), ends.min(axis=0), ends.max(axis=0), radius)
-    vertices = np.ascontiguousarray(solid.mesh.vertices, float)
-    faces = np.ascontiguousarray(solid.mesh.faces, np.int32)
-    used = vertices[np.unique(faces)]
-    low, high = used.min(axis=0), used.max(axis=0)
-    pad = band + solid.radius + solid.deviation
-    spacing = max(spacing, float(np.prod((high - low) + 2 * pad) / MOST_NODES) ** (1 / 3))
-    shape = np.ceil((high - low + 2 * pad) / spacing).astype(np.int64) + 1
-    tree = tree_of(vertices, faces)
-    start = low - pad
-    field = mesh_field(tree.nodes, tree.links, tree.triangles, tree.closed, start, spacing, shape, pad)
-    return Core(body, np.eye(3), np.zeros(3), low, high, radius, field, start, spacing)
+    used = solid.mesh.vertices[np.unique(solid.mesh.faces)].astype(float)
+    return Core(body, np.eye(3), np.zeros(3), used.min(axis=0), used.max(axis=0), radius, solid.mesh)
+
+
+def with_field(core: Core, *, spacing: float, band: float) -> Core:
+    """The core of a mesh with its field; any other as it is.
+
+    Args:
+        core: From `core_of`.
+        spacing: Of the nodes [m].
+        band: Distance from the solid's surface up to which the field is exact [m].
+    """
+    if core.mesh is None:
+        return core
+    pad = band + core.radius
+    size = core.high - core.low + 2 * pad
+    spacing = max(spacing, float(np.prod(size) / MOST_NODES) ** (1 / 3))
+    tree = tree_of(
+        np.ascontiguousarray(core.mesh.vertices, float), np.ascontiguousarray(core.mesh.faces, np.int32)
+    )
+    start, shape = core.low - pad, np.ceil(size / spacing).astype(np.int64) + 1
+    nodes = mesh_field(tree.nodes, tree.links, tree.triangles, tree.closed, start, spacing, shape, pad)
+    return replace(core, nodes=nodes, start=start, spacing=spacing)
 
 
 def _along(edges: Array) -> Array:
@@ -124,19 +131,10 @@ class Joints:
 class Moving:
     """The solids of some bodies, the joints that move each, and where they are for joint positions."""
 
-    def __init__(self, model: Model, bodies: Sequence[int], *, spacing: float, band: float) -> None:
-        """Prepare.
-
-        Args:
-            model: The compiled workstation.
-            bodies: Indices in `Model.bodies`.
-            spacing: See `core_of`.
-            band: Likewise.
-        """
+    def __init__(self, model: Model, bodies: Sequence[int]) -> None:
+        """Of a compiled workstation, and indices in `Model.bodies`."""
         self.model, self.bodies = model, tuple(bodies)
-        self.cores = tuple(
-            core_of(i, solid, spacing=spacing, band=band) for i in self.bodies for solid in model.bodies[i].solids
-        )
+        self.cores = tuple(core_of(i, solid) for i in self.bodies for solid in model.bodies[i].solids)
         self.joints = Joints.of(model.mj)
         chains = {i: chain_of(model, i) for i in self.bodies}
         self.chains = tuple(chains[core.body] for core in self.cores)
@@ -189,6 +187,42 @@ def chain_of(model: Model, body: int) -> tuple[int, ...]:
         chain = [*range(first, first + int(mj.body_jntnum[at])), *chain] if first >= 0 else chain
         at = int(mj.body_parentid[at])
     return tuple(chain)
+
+
+def reach_box(model: Model, bodies: Sequence[int]) -> tuple[Array, Array]:
+    """A box that the bodies cannot leave, whatever the joints do: two corners (3,) [m].
+
+    From the first joint's axis on, each joint's anchor and at last the body's points stay within the sum
+    of the distances from anchor to anchor. Infinite with a slide that has no limits.
+    """
+    mj, data = model.mj, mujoco.MjData(model.mj)
+    mujoco.mj_kinematics(mj, data)
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    limits = {
+        f"{name}/{joint.name}": (joint.lower, joint.upper)
+        for name, mechanism in model.mechanisms.items()
+        for link in mechanism.description.links
+        for joint in link.joints
+    }
+    for index in bodies:
+        body = model.bodies[index]
+        if not len(body.corners):
+            continue
+        corners = body.corners @ data.xmat[body.mj].reshape(3, 3).T + data.xpos[body.mj]
+        beyond = body.radius + body.deviation
+        chain = chain_of(model, index)
+        if not chain:
+            low, high = np.minimum(low, (corners - beyond).min(axis=0)), np.maximum(high, (corners + beyond).max(axis=0))
+            continue
+        anchors = data.xanchor[list(chain)]
+        length = float(np.linalg.norm(np.diff(anchors, axis=0), axis=1).sum())
+        length += float(np.linalg.norm(corners - anchors[-1], axis=1).max()) + beyond
+        for joint in chain:
+            if mj.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
+                ends = limits.get(mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_JOINT, joint), (None, None))
+                length += np.inf if None in ends else max(abs(end) for end in ends if end is not None)
+        low, high = np.minimum(low, anchors[0] - length), np.maximum(high, anchors[0] + length)
+    return low, high
 
 
 def posed(model: Model, motion: Mapping[str, Array]) -> Array:

@@ -67,8 +67,8 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     timeout: Annotated[float, _seconds] = 0.2
     """Age at which what it said no longer counts [s]: dependent verdicts turn UNDECIDED."""
     loop: bool = False
-    """Start again at the end. If the ends differ, the way back takes ``loop_pause`` and is UNDECIDED:
-    nobody drove it."""
+    """Start again at the end. Where the ends are the same place, it stands still for ``loop_pause``;
+    where they differ, the way back takes as long and is UNDECIDED: nobody drove it."""
     loop_pause: Annotated[float, _seconds] = 1.0
     """[s]"""
 
@@ -93,31 +93,17 @@ SAME_PLACE = 1e-3
 """A loop whose ends differ by no more than this [rad or m] is closed."""
 
 
+HOLD = 0.05
+"""Period at which a loop that is closed says, during its pause, that it stands still [s]."""
+
+
 class Pump:
     """Feeds the samples of one recorded source to the loop as run time passes."""
 
     def __init__(self, opened: Opened, *, loop: bool = False, pause: float = 1.0) -> None:
-        self._opened = opened
-        self._loop, self._pause = loop, pause
-        self._offset = 0.0
-        self._iterator: Iterator[Sample] = iter(opened.samples)
-        self._last: Sample | None = None
+        self._iterator = _rounds(opened, pause) if loop and opened.duration > 0 else iter(opened.samples)
         self._reached = -math.inf
-        self._next = self._fetch()
-
-    def _fetch(self) -> Sample | None:
-        sample = next(self._iterator, None)
-        if sample is None and self._loop and self._opened.duration > 0:
-            self._offset += self._opened.duration + self._pause
-            self._iterator = iter(self._opened.samples)
-            sample = next(self._iterator, None)
-            if sample is not None and _apart(self._last, sample):
-                # Nobody drove this way back: it may be looked at, not judged.
-                sample = replace(sample, quality=Quality.DEGRADED)
-        self._last = sample
-        if sample is None or not self._offset:
-            return sample
-        return replace(sample, t=sample.t + self._offset)
+        self._next = next(self._iterator, None)
 
     @property
     def finished(self) -> bool:
@@ -127,9 +113,40 @@ class Pump:
     def until(self, t: float) -> Iterator[Sample]:
         """Samples up to ``t`` [s] and the first one after it, each once."""
         while self._next is not None and self._reached <= t:
-            sample, self._next = self._next, self._fetch()
+            sample, self._next = self._next, next(self._iterator, None)
             self._reached = sample.t
             yield sample
+
+
+def _rounds(opened: Opened, pause: float) -> Iterator[Sample]:
+    """The samples again and again, counted through, each round later than the one before."""
+    seq, start = 0, 0.0
+    last: Sample | None = None
+    while True:
+        for k, sample in enumerate(opened.samples):
+            quality = sample.quality
+            if k == 0 and last is not None and _apart(last, sample):
+                # Nobody drove this way back: it may be looked at, not judged.
+                quality = Quality.DEGRADED
+            elif k == 0 and last is not None:
+                for held in _held(last, start, pause):
+                    yield replace(held, seq=seq)
+                    seq += 1
+            last = sample
+            yield replace(sample, seq=seq, t=sample.t + start, quality=quality)
+            seq += 1
+        if last is None:
+            return
+        start += opened.duration + pause
+
+
+def _held(last: Sample, start: float, pause: float) -> Iterator[Sample]:
+    """What a closed loop says before a round that begins at ``start``: it stands where it ended."""
+    if not isinstance(last, JointSample):
+        return
+    still = None if last.qd is None else (0.0,) * len(last.qd)
+    for k in range(1, math.ceil(pause / HOLD)):
+        yield replace(last, t=start - pause + k * HOLD, qd=still)
 
 
 def _apart(last: Sample | None, first: Sample) -> bool:

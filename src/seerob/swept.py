@@ -23,14 +23,16 @@ from seerob.errors import InputError
 from seerob.geometry import Mesh
 from seerob.kernels.voxels import motion_bounds, stamp
 from seerob.model import Model
-from seerob.moving import Moving, Progress, posed
+from seerob.moving import Core, Moving, Progress, posed, with_field
 from seerob.transforms import Array
 from seerob.voxels import SHARE, VoxelGrid, available_memory, check_room
 
-SLACK = 0.25
+SLACK = 0.5
 """Dilation for the motion between stamps that pieces are made small for [voxels]."""
 FINEST = 64
 """Pieces between two samples, at most; a power of 2. Beyond it the dilation grows instead."""
+SPACING = 0.5
+"""Of the nodes of a mesh's field [voxels]."""
 CUBIC = 4.0 / 27.0
 
 
@@ -84,7 +86,8 @@ class Sweep:
         """
         self.grid = VoxelGrid(voxel, memory=memory)
         self.slack = slack
-        self.moving = Moving(model, bodies, spacing=voxel / 2, band=(1.5 + slack) * voxel)
+        self.moving = Moving(model, bodies)
+        self._cores: tuple[Core, ...] | None = None
         self.dilation = 0.0
         self.stamps = 0
         self._total = 0.0
@@ -92,6 +95,17 @@ class Sweep:
         self._joints = self.moving.joints
         count = len(self.moving.cores)
         self._queue: list[list[tuple[Array, Array, float]]] = [[] for _ in range(count)]
+
+    @property
+    def cores(self) -> tuple[Core, ...]:
+        """What is stamped, with its fields: made when first needed, after the memory has been checked."""
+        if self._cores is None:
+            pitch = self.grid.pitch
+            band = (1.5 + min(self.slack, 1.0)) * pitch
+            self._cores = tuple(
+                with_field(core, spacing=pitch * SPACING, band=band) for core in self.moving.cores
+            )
+        return self._cores
 
     def start(self, qpos: Array, qvel: Array | None = None) -> None:
         """Mark the bodies where they are now; what they did before is not known."""
@@ -146,12 +160,12 @@ class Sweep:
     def flush(self) -> None:
         """Mark what was enqueued."""
         grid = self.grid
-        for core, queue in zip(self.moving.cores, self._queue, strict=True):
+        for core, queue in zip(self.cores, self._queue, strict=True):
             if not queue:
                 continue
             reach = np.array([entry[2] for entry in queue])
             grid.count += stamp(
-                grid.cells, grid.origin, grid.pitch, core.field, core.start, core.spacing, core.low, core.high,
+                grid.cells, grid.full, grid.origin, grid.pitch, core.nodes, core.start, core.spacing, core.low, core.high,
                 np.array([entry[0] for entry in queue]), np.array([entry[1] for entry in queue]),
                 reach + core.radius,
             )  # fmt: skip
@@ -159,6 +173,11 @@ class Sweep:
             self._total += float(reach.sum())
             self.stamps += len(queue)
             queue.clear()
+
+    def clear(self) -> None:
+        """Forget everything that was marked."""
+        self.grid.clear()
+        self.dilation, self.stamps, self._total, self._last = 0.0, 0, 0.0, None
 
     def _bounded(self, a: Array, b: Array, share: float, widths: Array) -> tuple[Array, Array, Array]:
         """Poses at a share of the way, and how far points can be from there [m], shape (ns,)."""
@@ -212,7 +231,9 @@ def swept_volume(
     """
     qpos = posed(model, motion)
     sweep = Sweep(model, bodies, voxel=voxel, slack=slack, memory=memory)
-    check_room(*_box(sweep, qpos), voxel, memory)
+    box = _box(sweep, qpos)
+    check_room(*box, voxel, memory)
+    sweep.grid.cover(*box)
     sweep.start(qpos[0])
     for i in range(1, len(qpos)):
         sweep.enqueue(qpos[i])

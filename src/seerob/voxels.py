@@ -13,6 +13,7 @@ from seerob.errors import InputError
 from seerob.geometry import Faces, Mesh
 from seerob.kernels import surface_nets as nets
 from seerob.kernels.fields import Cells
+from seerob.kernels.voxels import TOP
 from seerob.transforms import Array
 
 SMOOTHING = 20
@@ -45,6 +46,8 @@ class VoxelGrid:
         """Index of the first voxel: it begins at ``first * pitch``."""
         self.cells: Cells = np.zeros((0, 0, 0), np.uint8)
         """1 where marked, shape (nx, ny, nz)."""
+        self.full = np.zeros((0, 0, 0), np.int16)
+        """How many are marked in each block of `TOP`³."""
         self.count = 0
         """How many are marked."""
 
@@ -71,13 +74,22 @@ class VoxelGrid:
                 return
             spare = np.ceil(GROWTH * np.array(self.cells.shape)).astype(np.int64)
             first = np.where(first < self.first, np.minimum(first, self.first - spare), self.first)
+            first = self.first - -(-(self.first - first) // TOP) * TOP
             last = np.where(last >= end, np.maximum(last, end + spare), end - 1)
         check_memory(last - first + 1, self.pitch, self.memory - self.cells.nbytes)
         cells: Cells = np.zeros(last - first + 1, np.uint8)
-        i, j, k = self.first - first
-        nx, ny, nz = self.cells.shape
-        cells[i : i + nx, j : j + ny, k : k + nz] = self.cells
-        self.first, self.cells = first, cells
+        full = np.zeros(-(-np.array(cells.shape) // TOP), np.int16)
+        if self.cells.size:
+            # Whole blocks, so that the counts stay right.
+            for old, new, at in ((self.cells, cells, self.first - first), (self.full, full, (self.first - first) // TOP)):
+                i, j, k = at
+                nx, ny, nz = old.shape
+                new[i : i + nx, j : j + ny, k : k + nz] = old
+        self.first, self.cells, self.full = first, cells, full
+
+    def clear(self) -> None:
+        """Mark none."""
+        self.cells[:], self.full[:], self.count = 0, 0, 0
 
     def contains(self, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Whether each point (n, 3) [m] lies in a marked voxel."""
@@ -144,11 +156,15 @@ def check_pitch(pitch: float, *, file: str = "swept volume", key: str = "voxel")
 def check_room(low: Array, high: Array, pitch: float, memory: float | None = None) -> None:
     """Refuse a grid between two corners (3,) [m] that would take more memory than it may.
 
+    Corners that are not finite (a slide without limits) cannot be checked before.
+
     Raises:
         InputError: It would; says how much, and which voxel size fits.
     """
     check_pitch(pitch)
     span = (np.asarray(high, float) - np.asarray(low, float)) / pitch
+    if not np.isfinite(span).all():
+        return
     check_memory(span + 2 * MARGIN + 1, pitch, available_memory() * SHARE if memory is None else memory)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import coal
 import numpy as np
 import pytest
-from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 
+from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.errors import InputError
 from seerob.run import Judge, bind
 
@@ -59,7 +59,12 @@ def test_distance_of_boxes_is_coals(tmp_path):
                 box = coal.Transform3s(np.eye(3), np.array(at))
                 expected.append(
                     coal.distance(
-                        coal.Box(1, 0.1, 0.1), link, coal.Box(0.2, 0.2, 0.2), box, coal.DistanceRequest(), result
+                        coal.Box(1, 0.1, 0.1),
+                        link,
+                        coal.Box(0.2, 0.2, 0.2),
+                        box,
+                        coal.DistanceRequest(),
+                        result,
                     )
                 )
         if min(expected) > 0:
@@ -133,7 +138,11 @@ def test_area_on_a_link_moves_with_it_and_is_not_part_of_the_robot(tmp_path):
 def test_area_that_moves_with_an_unheard_robot_is_undecided(tmp_path):
     from seerob.engine import Engine
 
-    tables = AREA.format(x=1.5, on='on = "arm/l2"\n') + BOX.format(name="box", at=[9, 9, 9]) + WATCH.format(of="box")
+    tables = (
+        AREA.format(x=1.5, on='on = "arm/l2"\n')
+        + BOX.format(name="box", at=[9, 9, 9])
+        + WATCH.format(of="box")
+    )
     station = made(tmp_path, FLOATING + TWO_R + tables, {"arm.urdf": two_r()})
     result = Judge(bind(station.model))(Engine(station.model).start())[0]
     assert (result.verdict, result.value) == ("undecided", None)
@@ -152,7 +161,12 @@ def test_surface_that_may_stick_out_leaves_a_band_of_undecided(tmp_path):
         return results["d"], results["a"]
 
     for k, (x, verdict, area) in enumerate(
-        [(2.25, "within", "within"), (2.21, "undecided", "within"), (2.19, "exceeded", "within"), (2.11, "exceeded", "undecided")]
+        [
+            (2.25, "within", "within"),
+            (2.21, "undecided", "within"),
+            (2.19, "exceeded", "within"),
+            (2.11, "exceeded", "undecided"),
+        ]
     ):
         d, a = at(tmp_path / str(k), x)
         assert (d.verdict, a.verdict) == (verdict, area), x

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_cell import FLOATING, TWO_R, made, results_at, two_r
 
+from made_cell import FLOATING, TWO_R, made, results_at, two_r
 from seerob.errors import InputError, UnknownName
 from seerob.safety.effective_mass import inverse_effective_mass, principal_masses, projected_mass
 from seerob.safety.kinetic_energy import kinetic_energy
@@ -85,6 +85,24 @@ def test_fastest_point_of_the_arm_is_a_corner_of_its_last_link(tmp_path):
     assert (result.verdict, result.reason) == ("exceeded", "arm/l2")
 
 
+@pytest.mark.parametrize(
+    "table",
+    [
+        'kind = "velocity"\nat = "arm"\n',
+        'kind = "velocity"\nof = "arm"\n',
+        'kind = "kinetic_energy"\nrobot = "arm"\n',
+        'kind = "effective_mass"\nat = "arm"\n',
+        'kind = "minimum_distance"\nbetween = ["arm", "wall"]\n',
+    ],
+)
+def test_on_the_limit_is_within_and_the_next_number_is_not(tmp_path, table):
+    (result,) = judged(tmp_path / "free", [table], more=PLATE)
+    beyond = np.nextafter(result.value, 0 if result.at_most else np.inf)
+    (on,) = judged(tmp_path / "on", [f"{table}limit = {result.value!r}"], more=PLATE)
+    (over,) = judged(tmp_path / "over", [f"{table}limit = {float(beyond)!r}"], more=PLATE)
+    assert (result.verdict, on.verdict, over.verdict) == (None, "within", "exceeded")
+
+
 @pytest.mark.parametrize(("limit", "verdict"), [(0.1, "exceeded"), (0.0, "within")])
 def test_planar_arm_cannot_move_out_of_its_plane(tmp_path, limit, verdict):
     (result,) = judged(tmp_path, [f'kind = "manipulability"\nat = "arm"\nlimit = {limit}'])
@@ -117,14 +135,14 @@ def test_effective_mass_along_the_motion(tmp_path, limit, verdict):
 def test_simplified_mass_counts_the_load_in_full_and_links_by_half(tmp_path):
     load = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = { sphere = 0.02 }\nmass = 0.7\n'
     load += '[[workpieces]]\nname = "part"\non = "grip"\nshape = { sphere = 0.02 }\nmass = 0.4\n'
-    (result,) = judged(tmp_path, ['kind = "effective_mass"\nat = "arm"'], more=load, urdf=two_r(masses=(3, 5)))
+    (result,) = judged(
+        tmp_path, ['kind = "effective_mass"\nat = "arm"'], more=load, urdf=two_r(masses=(3, 5))
+    )
     assert result.parts[-1].value == pytest.approx((3 + 5) / 2 + 0.7 + 0.4)
 
 
 def test_effective_mass_has_no_direction_at_standstill(tmp_path):
-    (result,) = judged(
-        tmp_path, ['kind = "effective_mass"\nat = "arm"\nlimit = 1'], pose=((0, 1.5), (0, 0))
-    )
+    (result,) = judged(tmp_path, ['kind = "effective_mass"\nat = "arm"\nlimit = 1'], pose=((0, 1.5), (0, 0)))
     assert result.value is None
     assert result.verdict is None
     assert "stands still" in result.reason
@@ -141,7 +159,7 @@ PLATE = '[[parts]]\nname = "wall"\nshape = { box = [0.1, 9, 9] }\nat = { positio
 
 
 def test_effective_mass_toward_something(tmp_path):
-    """Toward a wall the line is along x: 1 kg at q = (0, 90°), 3/2 kg of link 1's end … both in closed form."""
+    """Toward a wall across x: 1 kg."""
     (result,) = judged(tmp_path, ['kind = "effective_mass"\nat = "arm"\ntoward = "wall"'], more=PLATE)
     assert result.value == pytest.approx(1.0)
     assert {"stated", "missing"} <= {str(i.origin) for i in result.basis.inputs}
@@ -191,7 +209,8 @@ def test_mass_by_hand_makes_it_known(tmp_path):
 
     nobody = re.sub(r"<inertial>.*?</inertial>", "", two_r(), count=1)
     hand = (
-        TWO_R + "[robots.masses]\nl1 = { mass = 1, com = [1, 0, 0], inertia = [1e-12, 1e-12, 1e-12, 0, 0, 0] }\n"
+        TWO_R
+        + "[robots.masses]\nl1 = { mass = 1, com = [1, 0, 0], inertia = [1e-12, 1e-12, 1e-12, 0, 0, 0] }\n"
     )
     (result,) = judged(tmp_path, ['kind = "kinetic_energy"\nrobot = "arm"'], robot=hand, urdf=nobody)
     assert result.value == pytest.approx(1.5)

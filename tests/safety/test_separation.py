@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_cell import FLOATING, TWO_R, made, results_at, two_r
 
+from made_cell import FLOATING, TWO_R, made, results_at, two_r
 from seerob.errors import InputError
 from seerob.safety.separation import separation_bound
 
@@ -113,7 +113,6 @@ def test_it_takes_one_robot_and_one_human(tmp_path):
 
 def test_unheard_person_is_undecided_even_close_by(tmp_path):
     from made_cell import heard
-
     from seerob.engine import Engine
     from seerob.run import Judge, bind
 

@@ -1,13 +1,18 @@
 """The page is one file, says everything, and lets nothing from a file become markup."""
 
+import hashlib
 import re
+import sys
 from html.parser import HTMLParser
 
 import made_run
 import pytest
+from msgspec.structs import replace
 
 from seerob.errors import InputError
+from seerob.results import ResultLog
 from seerob.sinks.dossier import Dossier
+from seerob.snapshot import Result, Verdict
 
 VOID = {"meta", "img", "br", "col", "link", "input", "hr", "base"}
 
@@ -166,3 +171,70 @@ def test_options_are_checked(tmp_path):
             Dossier(**options).open(made_run.scene(), {}, {}, tmp_path)
     with pytest.raises(InputError, match="cannot be written"):
         write(tmp_path / "none", 0)
+
+
+CELL = b"""
+title = "Cell"
+[engine]
+timestep = 0.001
+bandwidth = 25.0
+[[robots]]
+name = "arm"
+model = "library:ur10"
+[[sources]]
+kind = "csv"
+robot = "arm"
+file = "motion/cycle.csv"
+origin = "controller"
+timeout = 0.35
+loop = true
+[[sources]]
+kind = "this"
+robot = "<b>arm</b>"
+"""
+
+
+def test_rates_controllers_and_sources_are_named_from_the_file_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["/some/where/seerob", "assess", "my cell"])
+    files = {"workstation.toml": CELL}
+    with Dossier().open(made_run.scene(), {}, files, tmp_path):
+        pass
+    text = Page((tmp_path / "report.html").read_text()).text
+    for said in (
+        "steps of 0.001 s (1000 Hz)",
+        "every 0.01 s (100 Hz)",
+        "bandwidth 25 Hz for robots, 10 Hz for people",
+        "csv motion/cycle.csv",
+        "measured: the real robot's controller",
+        "0.35 s",
+        "starts again after 1 s",
+        "<b>arm</b>",
+        "seerob assess 'my cell'",
+        hashlib.sha256(CELL).hexdigest(),
+    ):
+        assert said in text
+
+
+def test_a_report_imports_nothing_that_a_file_names_and_says_what_it_cannot_read(tmp_path):
+    # `this` prints when it is imported; it is a module of the standard library that nobody needs.
+    assert "this" not in sys.modules
+    files = {"workstation.toml": b'[[sources]]\nkind = "this"\nrobot = "a"\n'}
+    for k, content in enumerate((files, {}, {"workstation.toml": b"\xff[["})):
+        with Dossier(file=f"{k}.html").open(made_run.scene(), {}, content, tmp_path):
+            pass
+    assert "this" not in sys.modules
+    assert "unknown" in Page((tmp_path / "0.html").read_text()).text
+    for k in (1, 2):
+        assert "the workstation file is not at hand" in Page((tmp_path / f"{k}.html").read_text()).text
+
+
+def test_a_part_without_the_verdict_governs_nothing(tmp_path):
+    informs = Result(name="sigma_1", value=9.0, unit="m")
+    result = Result(name="separation", value=1.0, unit="m", limit=0.5, at_most=False, verdict=Verdict.WITHIN)
+    others = replace(result, name="elbow"), replace(result, name="wrist", value=0.7)
+    result = replace(result, parts=(informs, *others))
+    log = ResultLog()
+    log.add(replace(made_run.snapshot(0), results=(result,)))
+    assert log["separation"].worst().part == "wrist"
+    log.add(replace(made_run.snapshot(1), results=(replace(result, value=0.6, parts=(informs,)),)))
+    assert log["separation"].worst().part == ""

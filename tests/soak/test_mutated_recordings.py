@@ -2,12 +2,12 @@
 
 import random
 
-import made_run
 import pytest
 
 from seerob.errors import InputError
 from seerob.recording import Recording
 from seerob.sinks.recorder import Recorder
+from sinks import made_run
 
 N = 60
 

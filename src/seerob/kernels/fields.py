@@ -159,7 +159,15 @@ def _out(value: float) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def square_at_least(
-    field: Field, start: Array, spacing: float, low: Array, high: Array, x: float, y: float, z: float
+    field: Field,
+    start: Array,
+    spacing: float,
+    low: Array,
+    high: Array,
+    x: float,
+    y: float,
+    z: float,
+    enough: float,
 ) -> float:
     """Lower bound of the squared distance of a point to a set [m²]; 0 or less when it may be inside.
 
@@ -170,10 +178,11 @@ def square_at_least(
         low: A box that contains the set [m], shape (3,).
         high: Likewise.
         x: The point [m]; ``y`` and ``z`` likewise.
+        enough: A bound above this need not be a better one [m²].
     """
     least = box_square(low, high, x, y, z)
     nx, ny, nz = field.shape
-    if nx == 0:
+    if nx == 0 or least > enough:
         return least
     u = (x - start[0]) / spacing
     v = (y - start[1]) / spacing

@@ -1,7 +1,7 @@
-"""Triangles onto pixels with a depth buffer.
+r"""Triangles onto pixels with a depth buffer.
 
 A triangle with screen corners :math:`p_0, p_1, p_2` covers the pixel centre :math:`p` when the three
-edge functions :math:`e_i(p) = (p_{i+1} - p_i) \\times (p - p_i)` have the sign of its area
+edge functions :math:`e_i(p) = (p_{i+1} - p_i) \times (p - p_i)` have the sign of its area
 :math:`A = e_0 + e_1 + e_2`; the barycentric weights are :math:`e_i / A`. What is linear in space over
 depth is linear on the screen, so :math:`1/z` is interpolated there and the largest wins.
 """

@@ -4,7 +4,8 @@ A set S (a box or a field, see `seerob.kernels.fields`) stands at a pose and is 
 covers its own radius and all motion that the pose stands for. A cube of half diagonal
 :math:`\rho` around x misses the dilated set when :math:`f(x) > \text{reach} + \rho`; it touches it when
 :math:`f(x) \le \text{reach} + \rho/\sqrt 3`. Blocks of 8³ voxels are split down to voxels by the first rule,
-and a voxel that neither rule settles is split once more. What is still open counts as touched.
+and a voxel that neither rule settles is split twice more. What is still open counts as touched: the
+reach grows by less than a tenth of a voxel that way, and by what the field's bound gives away.
 """
 
 from __future__ import annotations
@@ -34,9 +35,63 @@ def _in_set(R: Array, x: float, y: float, z: float) -> tuple[float, float, float
     )
 
 
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _all_marked(cells: Cells, i: int, j: int, k: int) -> bool:
+    """Whether all 2³ voxels from (i, j, k) on are marked; False at the end of the grid."""
+    if i + 1 >= cells.shape[0] or j + 1 >= cells.shape[1] or k + 1 >= cells.shape[2]:
+        return False
+    for p in range(2):
+        for q in range(2):
+            if cells[i + p, j + q, k] == 0 or cells[i + p, j + q, k + 1] == 0:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _part_touched(
+    field: Field,
+    start: Array,
+    spacing: float,
+    low: Array,
+    high: Array,
+    R: Array,
+    wx: float,
+    wy: float,
+    wz: float,
+    part: int,
+    pitch: float,
+    reach: float,
+) -> bool:
+    """Whether an eighth of the voxel around ``w`` may be touched; itself cut into eighths where in doubt."""
+    half = pitch / 4.0
+    wx += half if part & 1 else -half
+    wy += half if part & 2 else -half
+    wz += half if part & 4 else -half
+    x, y, z = _in_set(R, wx, wy, wz)
+    out = (reach + HALF_DIAGONAL * 2.0 * half) ** 2
+    square = square_at_least(field, start, spacing, low, high, x, y, z, out)
+    if square > out:
+        return False
+    if square <= (reach + half) ** 2:
+        return True
+    half /= 2.0
+    out = (reach + HALF_DIAGONAL * 2.0 * half) ** 2
+    for e in range(8):
+        x, y, z = _in_set(
+            R,
+            wx + (half if e & 1 else -half),
+            wy + (half if e & 2 else -half),
+            wz + (half if e & 4 else -half),
+        )
+        if square_at_least(field, start, spacing, low, high, x, y, z, out) <= out:
+            return True
+    return False
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def stamp(
     cells: Cells,
+    full: NDArray[np.int16],
     origin: Array,
     pitch: float,
     field: Field,
@@ -52,6 +107,7 @@ def stamp(
 
     Args:
         cells: 1 where marked, shape (nx, ny, nz). What lies outside of it is not marked.
+        full: How many are marked in each block of `TOP`³, shape (⌈nx / TOP⌉, …).
         origin: Lower corner of the first voxel [m], shape (3,).
         pitch: Edge of a voxel [m].
         field: Field of the set, empty when it is the box itself.
@@ -71,7 +127,6 @@ def stamp(
     first = np.empty(3, np.int64)
     last = np.empty(3, np.int64)
     anew = 0
-    quarter = pitch / 4.0
     for n in range(len(rotations)):
         R = rotations[n]
         P = positions[n]
@@ -84,9 +139,6 @@ def stamp(
                 extent += abs(R[r, s]) * (high[s] - low[s]) / 2.0
             first[r] = max(0, int(math.floor((middle - extent) / pitch))) // TOP * TOP
             last[r] = min(cells.shape[r] - 1, int(math.floor((middle + extent) / pitch)))
-        out_leaf = (reach + HALF_DIAGONAL * pitch) ** 2
-        in_leaf = (reach + 0.5 * pitch) ** 2
-        out_part = (reach + 0.5 * HALF_DIAGONAL * pitch) ** 2
         for I in range(first[0], last[0] + 1, TOP):
             for J in range(first[1], last[1] + 1, TOP):
                 for K in range(first[2], last[2] + 1, TOP):
@@ -103,22 +155,29 @@ def stamp(
                         b = stack[depth, 3]
                         if i >= nx or j >= ny or k >= nz or (b == 1 and cells[i, j, k]):
                             continue
+                        if b == TOP and full[i // TOP, j // TOP, k // TOP] == TOP**3:
+                            continue
+                        if b == 2 and _all_marked(cells, i, j, k):
+                            continue
                         wx = origin[0] + (i + 0.5 * b) * pitch - P[0]
                         wy = origin[1] + (j + 0.5 * b) * pitch - P[1]
                         wz = origin[2] + (k + 0.5 * b) * pitch - P[2]
                         x, y, z = _in_set(R, wx, wy, wz)
-                        square = square_at_least(field, start, spacing, low, high, x, y, z)
+                        ball = HALF_DIAGONAL * pitch * b
+                        out = (reach + ball) ** 2
+                        square = square_at_least(field, start, spacing, low, high, x, y, z, out)
+                        if square > out:
+                            continue
                         if b > 1:
-                            ball = HALF_DIAGONAL * pitch * b
-                            if square > (reach + ball) ** 2:
-                                continue
-                            # A block of two voxels is done sooner than it is looked up.
+                            # A block of two is done sooner than it is looked up.
                             if b > 2 and signed_at_most(field, start, spacing, low, high, x, y, z) + ball <= reach:
                                 for p in range(i, min(i + b, nx)):
                                     for q in range(j, min(j + b, ny)):
                                         for s in range(k, min(k + b, nz)):
-                                            anew += 1 - cells[p, q, s]
-                                            cells[p, q, s] = 1
+                                            if cells[p, q, s] == 0:
+                                                cells[p, q, s] = 1
+                                                full[p // TOP, q // TOP, s // TOP] += 1
+                                                anew += 1
                                 continue
                             h = b // 2
                             for p in range(0, b, h):
@@ -130,22 +189,16 @@ def stamp(
                                         stack[depth, 3] = h
                                         depth += 1
                             continue
-                        if square > out_leaf:
-                            continue
-                        touched = square <= in_leaf
-                        if not touched:
-                            for part in range(8):
-                                x, y, z = _in_set(
-                                    R,
-                                    wx + (quarter if part & 1 else -quarter),
-                                    wy + (quarter if part & 2 else -quarter),
-                                    wz + (quarter if part & 4 else -quarter),
-                                )
-                                if square_at_least(field, start, spacing, low, high, x, y, z) <= out_part:
-                                    touched = True
-                                    break
+                        touched = square <= (reach + 0.5 * pitch) ** 2
+                        for part in range(0 if touched else 8):
+                            if _part_touched(
+                                field, start, spacing, low, high, R, wx, wy, wz, part, pitch, reach
+                            ):
+                                touched = True
+                                break
                         if touched:
                             cells[i, j, k] = 1
+                            full[i // TOP, j // TOP, k // TOP] += 1
                             anew += 1
     return anew
 

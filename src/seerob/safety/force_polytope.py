@@ -1,4 +1,4 @@
-r"""Forces that a robot's torque limits allow at a point, [Weistroffer2022]_ section 2.2.2.4, [Chiacchio1997]_.
+r"""Forces that torque limits allow at a point, [Weistroffer2022]_ section 2.2.2.4, [Chiacchio1997]_.
 
 The sets themselves are in `seerob.polytope`.
 """
@@ -75,7 +75,9 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             J = state.jacobian(frame, robot, offset)
             polytope = self._polytope(J, lower - held, upper - held)
             if polytope.empty:
-                raise Undecided(f"{robot.name}: the torque limits cannot hold it in this pose, with any force")
+                raise Undecided(
+                    f"{robot.name}: the torque limits cannot hold it in this pose, with any force"
+                )
             rotation, position = state.pose(frame)
             return self._result(polytope, position + rotation @ offset)
 
@@ -98,7 +100,9 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             # No force is too large for the structure here, so every limit is exceeded.
             value, verdict = None, None if self.limit is None else Verdict.EXCEEDED
             direction = polytope.free[:, 0]
-            reason = f"singular: no torque limits the force along ±{_vector(direction)}, only the structure does"
+            reason = (
+                f"singular: no torque limits the force along ±{_vector(direction)}, only the structure does"
+            )
         else:
             value, verdict = across, judge(across, self.limit)
             direction = polytope.farthest / across if across > 0 else np.zeros(3)

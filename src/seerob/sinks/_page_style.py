@@ -25,6 +25,7 @@ th, td {{ text-align: left; vertical-align: top; padding: .32rem .6rem; border-b
 thead th {{ font-weight: 600; color: var(--soft); border-bottom: 1.5px solid var(--ink);
   white-space: nowrap; }}
 tbody th {{ font-weight: 600; }}
+td {{ min-width: 4.6rem; }}
 .overview tbody th {{ min-width: 9.5rem; }}
 .overview td:last-child {{ min-width: 9rem; }}
 .overview a {{ color: var(--ink); text-decoration-color: var(--rule); text-underline-offset: .2em; }}
@@ -51,15 +52,24 @@ figure img {{ border: 1px solid var(--rule); border-radius: .3rem; }}
 figcaption {{ font-size: .84rem; color: var(--soft); margin-top: .3rem; }}
 section.criterion {{ border-top: 1px solid var(--rule); padding-top: .2rem; margin-top: 1.6rem; }}
 h2 + section.criterion {{ border-top: none; margin-top: 0; }}
-@page {{ size: A4; margin: 18mm 16mm; }}
+@media screen and (max-width: 56rem) {{
+  table {{ display: block; overflow-x: auto; }}
+}}
+@page {{ size: A4; margin: 16mm 14mm; }}
 @media print {{
   body {{ max-width: none; padding: 0; font-size: 10.5pt; }}
   h2, h3, h4 {{ break-after: avoid; }}
   table {{ font-size: 8.5pt; }}
   th, td {{ padding: .2rem .4rem; }}
   .badge {{ font-size: 7.5pt; padding: .05rem .4rem; }}
-  .overview tbody th {{ min-width: 7.5rem; }}
-  .overview td:last-child {{ min-width: 7rem; }}
+  thead th {{ white-space: normal; overflow-wrap: normal; }}
+  td {{ min-width: 3.4rem; }}
+  .overview {{ font-size: 7.5pt; }}
+  .overview th, .overview td {{ padding: .15rem .25rem; }}
+  .overview .badge {{ font-size: 6.5pt; padding: .02rem .3rem; }}
+  .overview tbody th {{ min-width: 6rem; }}
+  .overview td {{ min-width: 0; }}
+  .overview td:last-child {{ min-width: 6.5rem; }}
   figure, tr, .verdict {{ break-inside: avoid; }}
   thead {{ display: table-header-group; }}
   * {{ print-color-adjust: exact; -webkit-print-color-adjust: exact; }}

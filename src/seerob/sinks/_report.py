@@ -52,7 +52,11 @@ def badge(verdict: Verdict | None) -> Html:
 
 
 def input_row(item: Input) -> list[str | Html]:
-    value = item.value if isinstance(item.value, str) else number(item.value, item.unit)
+    value: str | Html = (
+        item.value
+        if isinstance(item.value, str)
+        else tag("span", number(item.value, item.unit), class_="whole")
+    )
     origin = (
         tag("span", f"! {WHO[item.origin]}", class_="doubt") if item.origin in DOUBTFUL else WHO[item.origin]
     )

@@ -1,0 +1,93 @@
+"""What follows from a chain of links alone: coupled joints, and masses that nobody gave."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+
+from seerob.geometry import Solid
+from seerob.model import Mechanism
+from seerob.model_io.description import Description, Inertial, Joint
+from seerob.mounting import extreme_points
+from seerob.snapshot import Finding, Origin
+from seerob.transforms import Array
+
+PLACEHOLDER_DENSITY = 500.0
+"""Of the box around a moving link that nobody gave a mass [kg/m³]: it lets the twin move, and no
+criterion may use it."""
+
+
+def couple(every: Sequence[Joint], commanded: Sequence[Joint]) -> tuple[Array, Array]:
+    """All joints as an affine function of the commanded ones; mimics of mimics are followed.
+
+    Args:
+        every: All m joints.
+        commanded: The n of them that mimic no other.
+
+    Returns:
+        ``coupling`` (m, n) and ``offset`` (m,) of ``q_all = coupling @ q + offset``.
+    """
+    column = {joint.name: i for i, joint in enumerate(commanded)}
+    by_name = {joint.name: joint for joint in every}
+    coupling, offset = np.zeros((len(every), len(commanded))), np.zeros(len(every))
+    for row, joint in enumerate(every):
+        factor, shift, at = 1.0, 0.0, joint
+        while at.mimic is not None:
+            shift += factor * at.mimic.offset
+            factor *= at.mimic.multiplier
+            at = by_name[at.mimic.joint]
+        coupling[row, column[at.name]] = factor
+        offset[row] = shift
+    return coupling, offset
+
+
+def unknown_masses(
+    name: str, description: Description, *, loaded: Collection[str], things: Mapping[str, bool]
+) -> tuple[str, ...]:
+    """What of a robot's moving bodies has a mass that nobody gave, one sentence each.
+
+    A frame between two joints has no mass of its own; a joint that moves nothing heavy has no
+    mass matrix.
+
+    Args:
+        name: The robot.
+        description: Its links.
+        loaded: Links that something is mounted on.
+        things: Tools and workpieces mounted on it, and whether their mass is known.
+    """
+    heavy = {link.name for link in description.links if link.inertial is not None or link.name in loaded}
+    for link in reversed(description.links):
+        if link.name in heavy and link.parent is not None:
+            heavy.add(link.parent)
+    links = [
+        f"nobody gave the mass of {name}/{link.name}"
+        for link in description.links
+        if link.joints and link.inertial is None and (link.solids or link.name not in heavy)
+    ]
+    unweighed = [thing for thing, known in things.items() if not known]
+    return (*links, *(f"nobody gave the mass or the density of {thing}" for thing in unweighed))
+
+
+def assumed(robot: Mechanism) -> list[Finding]:
+    """What is assumed of a robot because nobody gave it."""
+    texts = [
+        f"{text}: energies and effective masses are UNDECIDED; a placeholder moves the twin"
+        for text in robot.unknown_masses
+    ]
+    if not robot.rotor_inertia_known:
+        texts.append(
+            "rotor inertia not given for every joint: mass matrix and effective mass are link-side only "
+            "(give rotor_inertia)"
+        )
+    return [Finding(level="assumed", subject=robot.name, text=text) for text in texts]
+
+
+def placeholder(solids: Sequence[Solid]) -> Inertial:
+    """Mass properties of the box around solids, so that what nobody weighed can be moved."""
+    points, radius = extreme_points(solids)
+    size = np.ptp(points, axis=0) + 2 * radius + 1e-3
+    mass = float(PLACEHOLDER_DENSITY * size.prod())
+    inertia = np.diag([size[1] ** 2 + size[2] ** 2, size[0] ** 2 + size[2] ** 2, size[0] ** 2 + size[1] ** 2])
+    center = (points.min(axis=0) + points.max(axis=0)) / 2
+    return Inertial(mass, center, inertia * mass / 12, Origin.ASSUMED, "placeholder")

@@ -1,0 +1,163 @@
+r"""Where a part of a person could be clamped: a gap that closes below the body part's thickness.
+
+A gap :math:`g` between a moving part of a robot and another surface clamps a body part of the
+thickness :math:`D` while it closes and is, or by the next instant may be, no wider than it:
+
+.. math:: \dot g < 0, \qquad g_n + \min(0, g_n - g_{n-1}) \le D
+
+Causal, so that a live run and a recording say the same. What was before the first instant is not
+known: a gap that is narrow there counts as closing. Gaps of one robot's own parts are counted only
+after they were once as wide as the body part: nothing gets between links that are always near.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.distance import Per, Query
+from seerob.kernels.shapes import Shapes
+from seerob.transforms import Array
+
+STILL = 1e-3
+"""A gap that closes more slowly than this stays as it is [m/s]."""
+
+
+def clamps(
+    gaps: Array,
+    t: Array,
+    thickness: Array,
+    *,
+    opened: Array,
+    before: tuple[float, Array, Array] | None = None,
+) -> NDArray[np.bool_]:
+    """Which gaps clamp which body parts, and when.
+
+    Args:
+        gaps: Distances of pairs of surfaces [m], shape (N, g); not above a cap that exceeds every thickness.
+        t: Instants, increasing [s], shape (N,).
+        thickness: Of body parts [m], shape (r,).
+        before: Instant [s], gaps and widest gaps so far [m] just before the first instant, shape (g,) each;
+            None when nothing is known of it.
+        opened: Whether a pair counts from the start on (True) or only after it was as wide as the body
+            part (False), shape (g,).
+
+    Returns:
+        Shape (N, g, r).
+    """
+    gaps = np.asarray(gaps, float)
+    earlier, when, widest = np.full_like(gaps[:1], np.inf), -np.inf, gaps[:1]
+    if before is not None:
+        when, earlier, widest = before[0], before[1][None], np.maximum(before[2], gaps[0])[None]
+    previous = np.concatenate([earlier, gaps[:-1]])
+    elapsed = np.diff(np.concatenate([[when], t]))[:, None]
+    change = gaps - previous
+    closing = change < -STILL * np.minimum(elapsed, 1e6)
+    closing[np.isinf(previous)] = True
+    ahead = gaps + np.where(np.isfinite(change), np.minimum(change, 0.0), 0.0)
+    seen = np.maximum.accumulate(np.concatenate([widest, gaps]), axis=0)[1:]
+    wide = opened[None, :, None] | (seen[..., None] >= thickness)
+    return np.asarray(closing[..., None] & (ahead[..., None] <= thickness) & wide)
+
+
+@dataclass
+class Memory:
+    """The last gaps of a live run."""
+
+    last: tuple[float, Array, Array] | None = None
+
+    def step(self, t: float, gaps: Array, thickness: Array, opened: Array) -> NDArray[np.bool_]:
+        """Which gaps clamp which body parts now; see `clamps`. Shape (g, r).
+
+        Asked for an instant that is not later than the last one (a replay was set back), it forgets.
+        """
+        if self.last is not None and t <= self.last[0]:
+            self.last = None
+        found = clamps(gaps[None], np.array([t]), thickness, before=self.last, opened=opened)[0]
+        widest = gaps if self.last is None else np.maximum(gaps, self.last[2])
+        self.last = t, gaps.copy(), widest
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class PinchPairs:
+    """The gaps in which the moving parts of a robot could clamp somebody, bound once."""
+
+    moving: tuple[int, ...]
+    """Bodies of the robot that its joints move."""
+    queries: tuple[tuple[Query, Per], ...]
+    first: NDArray[np.int64]
+    """Row in ``moving`` of each gap, shape (g,)."""
+    second: NDArray[np.int64]
+    """Row in ``moving`` of the other side, -1 when it is a surface, shape (g,)."""
+    opened: NDArray[np.bool_]
+    """See `clamps`."""
+
+    def gaps(self, rotations: Array, positions: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Gaps [m] and the body on the other side (-1 beyond the cap), shape (g,).
+
+        Args:
+            rotations: world_from_body of every body, shape (n, 3, 3).
+            positions: Likewise [m], shape (n, 3).
+        """
+        distances, others = [np.zeros(0)], [np.zeros(0, np.int64)]
+        for query, per in self.queries:
+            ask = query.per_body if per is Per.BODY else query.per_pair
+            found = ask(rotations, positions)
+            distances.append(found.distance)
+            others.append(found.body_a)
+        return np.concatenate(distances), np.concatenate(others)
+
+    def batch(self, rotations: Array, positions: Array) -> Array:
+        """Gaps of many samples [m], shape (N, g). Poses as of `Query.batch`."""
+        found = [query.batch(rotations, positions, per).distance for query, per in self.queries]
+        return np.concatenate([np.zeros((len(rotations), 0)), *found], axis=1)
+
+    def per_body(self, clamped: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Of gaps (..., g, r), which moving bodies clamp: shape (..., b, r)."""
+        found = np.zeros((*clamped.shape[:-2], len(self.moving), clamped.shape[-1]), bool)
+        for side in (self.first, self.second):
+            for gap in np.flatnonzero(side >= 0):
+                found[..., side[gap], :] |= clamped[..., gap, :]
+        return found
+
+
+def pinch_pairs(
+    shapes: Shapes,
+    moving: Sequence[int],
+    surfaces: Sequence[int],
+    neighbours: frozenset[tuple[int, int]],
+    *,
+    cap: float,
+) -> PinchPairs:
+    """Bind the gaps of a robot.
+
+    Args:
+        shapes: Of the model.
+        moving: Bodies that the robot's joints move.
+        surfaces: Bodies of the environment and of other robots.
+        neighbours: Pairs of the robot's own moving bodies that a joint or a weld connects.
+        cap: Largest gap that matters [m].
+    """
+    queries: list[tuple[Query, Per]] = []
+    first: list[int] = []
+    second: list[int] = []
+    if moving and surfaces:
+        queries.append((Query(shapes, surfaces, moving, cap=cap), Per.BODY))
+        first += range(len(moving))
+        second += [-1] * len(moving)
+    for row, body in enumerate(moving):
+        others = [
+            k
+            for k in range(row + 1, len(moving))
+            if (body, moving[k]) not in neighbours and (moving[k], body) not in neighbours
+        ]
+        if others:
+            queries.append((Query(shapes, [moving[k] for k in others], [body], cap=cap), Per.PAIR))
+            first += [row] * len(others)
+            second += others
+    sides = np.array(second, np.int64)
+    return PinchPairs(tuple(moving), tuple(queries), np.array(first, np.int64), sides, sides < 0)

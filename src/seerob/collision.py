@@ -1,0 +1,135 @@
+r"""Speed, force, pressure and energy of an impact on a person, ISO/TS 15066:2016 Annex A.3.
+
+A body region is a spring :math:`k` with an effective mass :math:`m_H`; the robot is a mass
+:math:`m_R`; all kinetic energy of the relative motion goes into the spring:
+
+.. math::
+    E = \frac{F^2}{2k} = \frac{A^2 p^2}{2k} = \tfrac12 \mu v_{rel}^2 \quad (A.1, A.2)
+
+    \mu = \left(\frac{1}{m_H} + \frac{1}{m_R}\right)^{-1} \quad (A.3) \qquad
+    m_R = \frac{M}{2} + m_L \quad (A.4)
+
+    v = \frac{F}{\sqrt{\mu k}} \quad (A.5) \qquad v = \frac{p A}{\sqrt{\mu k}} \quad (A.6)
+
+A clamped part cannot recoil: :math:`m_H \to \infty`, :math:`\mu = m_R`. Everything is SI and
+broadcasts. What is unknown is NaN and stays so.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seerob.transforms import Array
+
+
+class Governing(IntEnum):
+    """Which limit is reached first."""
+
+    FORCE = 0
+    PRESSURE = 1
+    ENERGY = 2
+
+
+def robot_mass(M: ArrayLike, m_L: ArrayLike) -> Array:
+    """Effective mass of a robot, A.4: half of its moving parts and all of the load [kg].
+
+    Args:
+        M: Mass of the moving parts of the robot [kg].
+        m_L: Mass of tool and workpiece [kg].
+    """
+    return np.asarray(M, float) / 2 + np.asarray(m_L, float)
+
+
+def reduced_mass(m_H: ArrayLike, m_R: ArrayLike) -> Array:
+    """Reduced mass μ of two bodies, A.3 [kg]; an infinite ``m_H`` is a clamped body part.
+
+    Args:
+        m_H: Effective mass of the body region [kg].
+        m_R: Effective mass of the robot [kg].
+    """
+    m_H, m_R = np.asarray(m_H, float), np.asarray(m_R, float)
+    return np.asarray(1.0 / (1.0 / m_H + 1.0 / m_R))
+
+
+def mass_along(J_v: Array, M: Array, u: Array) -> Array:
+    r"""Mass of an articulated robot felt at points, :math:`1/m_u = u^T J_v M^{-1} J_v^T u` [kg].
+
+    Args:
+        J_v: Linear Jacobians of the points, shape (b, 3, n).
+        M: Joint-space mass matrix, shape (n, n).
+        u: Unit directions, shape (b, 3).
+
+    Returns:
+        Shape (b,); inf where a point cannot be pushed that way.
+    """
+    w = np.einsum("bij,bi->bj", J_v, u)
+    mobility = np.einsum("bj,bj->b", w, np.linalg.solve(M, w.T).T)
+    with np.errstate(divide="ignore"):
+        return np.asarray(1.0 / np.maximum(mobility, 0.0))
+
+
+def impact_energy(mu: ArrayLike, v: ArrayLike) -> Array:
+    """Energy of the relative motion, ½ μ v² [J]; not the kinetic energy of the robot."""
+    return np.asarray(0.5 * np.asarray(mu) * np.square(v))
+
+
+def spring_energy(F: ArrayLike, k: ArrayLike) -> Array:
+    """Energy in the spring at a force, A.1 [J]. F [N], k [N/m]."""
+    return np.asarray(np.square(F) / (2 * np.asarray(k)))
+
+
+def peak_force(v: ArrayLike, mu: ArrayLike, k: ArrayLike) -> Array:
+    """Force of an impact, A.5 the other way round [N]. v [m/s], μ [kg], k [N/m]."""
+    return np.asarray(np.asarray(v) * np.sqrt(np.asarray(mu) * k))
+
+
+def speed_at_force(F: ArrayLike, mu: ArrayLike, k: ArrayLike) -> Array:
+    """Relative speed at which an impact reaches a force, A.5 [m/s]. F [N], μ [kg], k [N/m]."""
+    return np.asarray(np.asarray(F) / np.sqrt(np.asarray(mu) * k))
+
+
+def speed_at_pressure(p: ArrayLike, A: ArrayLike, mu: ArrayLike, k: ArrayLike) -> Array:
+    """Relative speed at which an impact reaches a pressure, A.6 [m/s]. p [Pa], A [m²], μ [kg], k [N/m]."""
+    return np.asarray(np.asarray(p) * A / np.sqrt(np.asarray(mu) * k))
+
+
+def speed_at_energy(E: ArrayLike, mu: ArrayLike) -> Array:
+    """Relative speed of an energy [m/s]. E [J], μ [kg]."""
+    return np.asarray(np.sqrt(2 * np.asarray(E) / mu))
+
+
+def free_force(F_fixed: ArrayLike, m_H: ArrayLike, m_R: ArrayLike) -> Array:
+    r"""Force on a body that can recoil, from the force on a sensor that cannot [N].
+
+    Same speed, same spring: :math:`F_{free} = F_{fixed} \sqrt{m_H / (m_H + m_R)}`. Forces [N], masses [kg].
+    """
+    m_H, m_R = np.asarray(m_H, float), np.asarray(m_R, float)
+    return np.asarray(F_fixed * np.sqrt(1.0 / (1.0 + m_R / m_H)))
+
+
+def energy_limit(F: ArrayLike, k: ArrayLike, printed: ArrayLike) -> Array:
+    """The smaller of the energy at the force limit and the printed one [J]; NaN means not printed."""
+    return np.fmin(spring_energy(F, k), printed)
+
+
+def contact_area(robot: ArrayLike, body: ArrayLike, cap: float) -> Array:
+    """Area that carries the force, the smaller of robot and body, never above ``cap`` [m²].
+
+    Stiffness k belongs to a contact of about 1 cm²: a larger area would promise too much.
+    An area that is NaN is unknown, not large.
+    """
+    return np.minimum(np.minimum(robot, body), cap)
+
+
+def permissible_speed(v_F: ArrayLike, v_P: ArrayLike, v_E: ArrayLike) -> tuple[Array, NDArray[np.int64]]:
+    """The least of the three speeds [m/s] and which limit it is (`Governing`).
+
+    A speed at pressure that is NaN (unknown area) is left out: the result is then an upper bound, and
+    whoever asks must not call a speed below it within.
+    """
+    speeds = np.stack(np.broadcast_arrays(v_F, v_P, v_E))
+    which = np.nanargmin(speeds, axis=0)
+    return np.take_along_axis(speeds, which[None], axis=0)[0], which

@@ -1,0 +1,199 @@
+"""What is not heard, or cannot be followed, is UNDECIDED: torque limits, silence, gaps, doubts, jumps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, heard, made, recorded, two_r
+from seerob.engine import Engine
+from seerob.errors import InputError, UnknownName
+from seerob.run import Judge, bind, pump, ticks
+from seerob.samples import Quality, SignalSample
+from seerob.source import Opened, Source
+
+PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
+ENERGY = '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = 1e9\n'
+
+
+def judged_run(station, name, opened, *, timeout=0.2):
+    """Time, verdict and reason of the first criterion at each tick."""
+    engine = Engine(station.model, driven={name: timeout})
+    feed = pump([(Source(), opened)], station.workstation.engine.tick)
+    for snapshot, _ in ticks(engine, Judge(bind(station.model)), feed):
+        result = snapshot.results[0]
+        yield snapshot.t, result.verdict, result.reason, result.value
+
+
+def test_torque_limit_makes_the_twin_lag_and_verdicts_undecided(tmp_path):
+    def fast(t):
+        return np.array([1.5 * np.sin(3 * t), 0.0]), np.array([4.5 * np.cos(3 * t), 0.0])
+
+    opened = recorded("arm", fast, 100, 1.0)
+    strong = made(tmp_path / "strong", FLOATING + TWO_R + ENERGY, {"arm.urdf": two_r(effort=1000)})
+    assert {v for _, v, _, _ in judged_run(strong, "arm", opened)} == {"within"}
+    weak = made(tmp_path / "weak", FLOATING + TWO_R + ENERGY, {"arm.urdf": two_r(effort=5)})
+    said = list(judged_run(weak, "arm", opened))
+    reasons = [reason for t, verdict, reason, _ in said if verdict == "undecided"]
+    assert len(reasons) > 50
+    assert all("twin is off by" in r for r in reasons)
+    assert any("torque limit" in r for r in reasons)
+    assert all(value is None for _, verdict, _, value in said if verdict == "undecided")
+    wide = made(
+        tmp_path / "wide",
+        "engine = { gravity = [0, 0, 0], tracking_limit = 10 }\n" + TWO_R + ENERGY,
+        {"arm.urdf": two_r(effort=5)},
+    )
+    assert {v for _, v, _, _ in judged_run(wide, "arm", opened)} == {"within"}
+
+
+def test_torque_is_never_beyond_its_limit(tmp_path):
+    station = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r(effort=5)})
+    engine = Engine(station.model)
+    largest = 0.0
+    for k in range(60):
+        engine.take([heard("arm", k * 0.01, (np.sin(k), 0.2))])
+        engine.tick()
+        largest = max(largest, np.abs(engine._data.actuator_force).max())
+    assert largest == pytest.approx(5.0)
+
+
+def still(_):
+    return np.array([0.1, 0.2]), np.zeros(2)
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    text = FLOATING + TWO_R + ENERGY
+    return made(tmp_path_factory.mktemp("arm"), text, {"arm.urdf": two_r()})
+
+
+@pytest.mark.parametrize("timeout", [0.2, 0.05])
+def test_silence_is_undecided_after_the_time_out_and_not_before(arm, timeout):
+    engine = Engine(arm.model, driven={"arm": timeout})
+    judge = Judge(bind(arm.model))
+    engine.take([heard("arm", 0.0, (0.1, 0.2))])
+    engine.start()
+    for _ in range(60):
+        state = engine.tick()
+        verdict = judge(state)[0].verdict
+        assert verdict == ("undecided" if state.t > timeout + 1e-9 else "within"), state.t
+    engine.take([heard("arm", state.t, (0.1, 0.2))])
+    assert judge(engine.tick())[0].verdict == "within"
+
+
+def test_a_feed_without_a_source_goes_stale_too(arm):
+    engine = Engine(arm.model)
+    engine.take([heard("arm", 0.0, (0.1, 0.2))])
+    for _ in range(22):
+        state = engine.tick()
+    assert "not heard for" in state.doubt("arm")
+
+
+def test_gap_in_a_recording_is_undecided_though_its_end_is_known(arm):
+    samples = [s for s in recorded("arm", still, 100, 2.0).samples if not 0.5 < s.t < 1.4999]
+    for t, verdict, reason, _ in judged_run(arm, "arm", Opened(samples=tuple(samples), duration=2.0)):
+        silent = 0.7 + 1e-6 < t < 1.5 - 1e-6
+        assert verdict == ("undecided" if silent else "within"), (t, reason)
+        assert ("not heard for" in reason) == silent
+
+
+def test_never_heard_is_undecided(arm):
+    engine = Engine(arm.model, driven={"arm": 0.2})
+    judge = Judge(bind(arm.model))
+    for k in range(30):
+        result = judge(engine.tick() if k else engine.start())[0]
+        assert (result.verdict, result.reason, result.value) == ("undecided", "arm: nothing heard yet", None)
+
+
+def test_no_source_and_no_position_is_undecided_and_a_given_one_is_not(arm, tmp_path):
+    assert results_without_source(arm)[0].verdict == "undecided"
+    given = made(tmp_path, FLOATING + TWO_R + "q = [0.3, 0.4]\n" + ENERGY, {"arm.urdf": two_r()})
+    result = results_without_source(given)[0]
+    assert (result.verdict, result.value) == ("within", pytest.approx(0.0, abs=1e-12))
+
+
+def results_without_source(station):
+    return Judge(bind(station.model))(Engine(station.model).start())
+
+
+@pytest.mark.parametrize("quality", [Quality.DEGRADED, Quality.INVALID])
+def test_bad_quality_is_undecided_on_both_sides_of_the_sample(arm, quality):
+    def one_bad(k):
+        return quality if k == 50 else Quality.GOOD
+
+    samples = tuple(heard("arm", 0.01 * k, (0.1, 0.2), (0.0, 0.0), quality=one_bad(k)) for k in range(101))
+    for t, verdict, reason, _ in judged_run(arm, "arm", Opened(samples=samples, duration=1.0)):
+        near = 0.485 < t < 0.505
+        assert verdict == ("undecided" if near else "within"), (t, reason)
+        assert (quality.value in reason) == near
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_values_that_are_not_finite_move_nothing_and_are_undecided(arm, bad):
+    engine = Engine(arm.model)
+    engine.take([heard("arm", 0.0, (0.1, 0.2))])
+    engine.start()
+    engine.take([heard("arm", 0.01, (bad, 0.2))])
+    state = engine.tick()
+    assert "not finite" in state.doubt("arm")
+    np.testing.assert_allclose(state.joint_positions(arm.model.robot("arm")), [0.1, 0.2], atol=1e-9)
+    engine.take([heard("arm", 0.02, (0.1, 0.2), (0.0, bad))])
+    assert "not finite" in engine.tick().doubt("arm")
+
+
+def test_sample_with_another_number_of_joints_is_refused(arm):
+    engine = Engine(arm.model)
+    with pytest.raises(InputError, match="3 joint values; arm has 2 joints"):
+        engine.take([heard("arm", 0.0, (1, 2, 3))])
+    with pytest.raises(InputError, match="1 speeds"):
+        engine.take([heard("arm", 0.0, (1, 2), (3,))])
+    with pytest.raises(UnknownName, match="amr"):
+        engine.take([heard("amr", 0.0, (1, 2))])
+
+
+def test_old_samples_do_not_turn_back_time(arm):
+    engine = Engine(arm.model)
+    engine.take([heard("arm", 0.5, (0.1, 0.2)), heard("arm", 0.1, (3.0, 3.0), quality=Quality.INVALID)])
+    for _ in range(60):
+        state = engine.tick()
+    assert not state.doubt("arm")
+    np.testing.assert_allclose(state.joint_positions(arm.model.robot("arm")), [0.1, 0.2], atol=1e-6)
+
+
+def test_signals_are_kept_by_source(arm):
+    engine = Engine(arm.model)
+    engine.take([SignalSample(source="plc", seq=0, t=0.0, values={"lamp": True})])
+    assert engine.signals == {"plc": {"lamp": True}}
+
+
+@pytest.mark.parametrize("size", [(4.0, 3.0), (0.05, 0.29), (0.03, 0.15), (100.0, 100.0)])
+def test_jumps_of_a_whole_person_do_not_explode(tmp_path, size):
+    """Every joint at once, back and forth; what is shown stays finite and settles."""
+    station = made(tmp_path, PERSON)
+    person = station.model.human("op")
+    step = np.array([size[0] if unit == "m" else size[1] for unit in person.units])
+    engine = Engine(station.model)
+    doubted = 0
+    for k in range(90):
+        q = person.home + (step if (k // 20) % 2 else 0)
+        engine.take([heard("op", 0.01 * k + 0.01, q)])
+        state = engine.tick()
+        doubted += bool(state.doubt("op"))
+        assert np.isfinite(state.positions).all()
+        assert np.abs(state.joint_positions(person)).max() < max(size) + 50
+    assert doubted >= 4
+    for k in range(90, 180):
+        engine.take([heard("op", 0.01 * k + 0.01, q)])
+        state = engine.tick()
+    assert not state.doubt("op")
+    np.testing.assert_allclose(state.joint_positions(person), q, atol=0.01)
+
+
+def test_jump_of_a_robot_is_undecided_while_it_happens_and_decided_after(arm):
+    samples = tuple(heard("arm", 0.02 * k, (0.0 if k < 25 else 3.0, 0.2)) for k in range(51))
+    for t, verdict, reason, value in judged_run(arm, "arm", Opened(samples=samples, duration=1.0)):
+        jumping = 0.479 < t < 0.519
+        assert verdict == ("undecided" if jumping else "within"), (t, reason)
+        assert jumping or value < 1e-6
+        assert ("jump" in reason) == jumping

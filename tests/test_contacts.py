@@ -62,6 +62,15 @@ def test_other_pairs_stay_without_contact(tmp_path):
     assert height == pytest.approx(-1.8, abs=2e-3)
 
 
+def test_pairs_do_not_mix(tmp_path):
+    """The arm may touch the lower floor and a post the upper one: the arm falls through the upper one."""
+    lower = FLOOR.replace('"floor"', '"lower"').replace("-1]", "-2]")
+    post = FLOOR.replace('"floor"', '"post"').replace("-1]", "9]")
+    pairs = TOUCH.format(a="arm", b="lower") + TOUCH.format(a="post", b="floor")
+    height, _ = fallen(tmp_path, FLOOR + lower + post + pairs)
+    assert height == pytest.approx(-1.8, abs=2e-3)
+
+
 def u_shape():
     """A slot 0.3 m wide along y, 0.5 m deep."""
     solid = trimesh.creation.box((1, 1, 1))

@@ -75,6 +75,21 @@ def test_a_tick_late_would_fail_that_test(ur10):
     assert np.sqrt((errors**2).mean()) > 5e-4
 
 
+def test_rotors_and_dampers_do_not_hold_the_twin_back(tmp_path):
+    damped = two_r().replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><dynamics damping="8"/>')
+    station = made(tmp_path, FLOATING + TWO_R + "rotor_inertia = [2.0, 3.0]\n", {"arm.urdf": damped})
+    assert (station.model.mj.dof_damping == 8).all()
+
+    def motion(t):
+        return np.array([np.sin(2 * t), 0.5 * np.cos(3 * t)]), np.array(
+            [2 * np.cos(2 * t), -1.5 * np.sin(3 * t)]
+        )
+
+    errors, speeds = tracking(station, "arm", motion, recorded("arm", motion, 100, 1.0))
+    assert errors.max() < 3e-7
+    assert speeds.max() < 1e-4
+
+
 def test_person_follows_60_hz_keyframes(tmp_path):
     station = made(tmp_path, PERSON)
     person = station.model.human("op")

@@ -81,13 +81,15 @@ def test_cubic_way_with_given_velocities_is_covered(planar):
     assert missed(planar, bodies, {"arm": cubic}, straight.grid.contains, 60_000, rng) > 0
 
 
-@pytest.mark.parametrize(("voxel", "excess"), [(0.02, 0.25), (0.01, 0.12)])
-def test_volume_of_a_full_turn_is_a_disc_and_falls_towards_it_with_the_voxel(planar, voxel, excess):
+@pytest.mark.parametrize("voxel", [0.03, 0.02, 0.01])
+def test_full_turn_is_a_disc_and_no_more_than_its_voxels(planar, voxel):
     """A bar of 1 m × 0.1 m × 0.1 m about its end; the farthest corner draws the rim."""
     turn = np.column_stack([np.linspace(0, 2 * np.pi, 60), np.zeros(60)])
     swept = swept_volume(planar, planar.select("arm/l1"), {"arm": turn}, voxel=voxel)
-    disc = np.pi * (1.0**2 + 0.05**2) * 0.1
-    assert disc < swept.volume < disc * (1 + excess)
+    rim, half = np.hypot(1, 0.05), 0.05
+    layers = 2 * np.ceil((half + swept.dilation + 0.1 * voxel) / voxel)
+    assert np.pi * rim**2 * 2 * half < swept.volume
+    assert swept.volume < np.pi * (rim + swept.dilation + 1.5 * voxel) ** 2 * layers * voxel
 
 
 def test_standing_still_marks_exactly_the_voxels_that_are_touched(planar):

@@ -25,7 +25,7 @@ def test_poses_drive_the_robot_exactly(ur10, target, frame):
     frames = model.frame(frame)
     poses = []
     for k in range(31):
-        made_by._put(model.robot("arm"), wave(0.01 * k)[0], np.zeros(6))
+        made_by._put(model.robot("arm"), wave(0.01 * k)[0], np.zeros(6), np.zeros(6))
         made_by._show(0.0)
         rotation = made_by._shown.xmat[frames.mj].reshape(3, 3) @ frames.body_from_frame[:3, :3]
         position = (
@@ -43,7 +43,7 @@ def test_poses_drive_the_robot_exactly(ur10, target, frame):
     assert not state.doubt("arm")
     assert np.linalg.norm(state.pose(frames)[1] - poses[-1][0]) < 2e-5
     reached = engine._references["arm"].newest
-    made_by._put(model.robot("arm"), reached, np.zeros(6))
+    made_by._put(model.robot("arm"), reached, np.zeros(6), np.zeros(6))
     made_by._show(0.0)
     body = made_by._shown.xmat[frames.mj].reshape(3, 3)
     at = made_by._shown.xpos[frames.mj] + body @ frames.body_from_frame[:3, 3]

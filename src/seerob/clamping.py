@@ -6,8 +6,9 @@ thickness :math:`D` while it closes and is, or by the next instant may be, no wi
 .. math:: \dot g < 0, \qquad g_n + \min(0, g_n - g_{n-1}) \le D
 
 Causal, so that a live run and a recording say the same. What was before the first instant is not
-known: a gap that is narrow there counts as closing. Gaps of one robot's own parts are counted only
-after they were once as wide as the body part: nothing gets between links that are always near.
+known: a gap that is narrow there counts as closing, unless nothing is left of it. Gaps of
+one robot's own parts are counted only after they were once as wide as the body part: nothing gets
+between links that are always near.
 """
 
 from __future__ import annotations
@@ -20,7 +21,11 @@ from numpy.typing import NDArray
 
 from seerob.distance import Per, Query
 from seerob.kernels.shapes import Shapes
+from seerob.model import Mechanism, Model
 from seerob.transforms import Array
+
+Flags = NDArray[np.bool_]
+Before = tuple[float, Array, Array]
 
 STILL = 1e-3
 """A gap that closes more slowly than this stays as it is [m/s]."""
@@ -31,9 +36,9 @@ def clamps(
     t: Array,
     thickness: Array,
     *,
-    opened: Array,
+    opened: Flags,
     before: tuple[float, Array, Array] | None = None,
-) -> NDArray[np.bool_]:
+) -> Flags:
     """Which gaps clamp which body parts, and when.
 
     Args:
@@ -56,7 +61,7 @@ def clamps(
     elapsed = np.diff(np.concatenate([[when], t]))[:, None]
     change = gaps - previous
     closing = change < -STILL * np.minimum(elapsed, 1e6)
-    closing[np.isinf(previous)] = True
+    closing = np.logical_or(closing, np.isinf(previous) & (gaps > 0))
     ahead = gaps + np.where(np.isfinite(change), np.minimum(change, 0.0), 0.0)
     seen = np.maximum.accumulate(np.concatenate([widest, gaps]), axis=0)[1:]
     wide = opened[None, :, None] | (seen[..., None] >= thickness)
@@ -67,19 +72,24 @@ def clamps(
 class Memory:
     """The last gaps of a live run."""
 
-    last: tuple[float, Array, Array] | None = None
+    last: Before | None = None
+    before: Before | None = None
+    """What it was when ``last`` was judged."""
 
-    def step(self, t: float, gaps: Array, thickness: Array, opened: Array) -> NDArray[np.bool_]:
+    def step(self, t: float, gaps: Array, thickness: Array, opened: Flags) -> Flags:
         """Which gaps clamp which body parts now; see `clamps`. Shape (g, r).
 
-        Asked for an instant that is not later than the last one (a replay was set back), it forgets.
+        Asked again for the last instant it says the same; asked for an earlier one (a replay was set back),
+        it forgets.
         """
-        if self.last is not None and t <= self.last[0]:
+        if self.last is not None and t < self.last[0]:
             self.last = None
-        found = clamps(gaps[None], np.array([t]), thickness, before=self.last, opened=opened)[0]
-        widest = gaps if self.last is None else np.maximum(gaps, self.last[2])
+        if self.last is None or t > self.last[0]:
+            self.before = self.last
+        found = clamps(gaps[None], np.array([t]), thickness, before=self.before, opened=opened)
+        widest = gaps if self.before is None else np.maximum(gaps, self.before[2])
         self.last = t, gaps.copy(), widest
-        return found
+        return np.asarray(found[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +103,7 @@ class PinchPairs:
     """Row in ``moving`` of each gap, shape (g,)."""
     second: NDArray[np.int64]
     """Row in ``moving`` of the other side, -1 when it is a surface, shape (g,)."""
-    opened: NDArray[np.bool_]
+    opened: Flags
     """See `clamps`."""
 
     def gaps(self, rotations: Array, positions: Array) -> tuple[Array, NDArray[np.int64]]:
@@ -116,7 +126,7 @@ class PinchPairs:
         found = [query.batch(rotations, positions, per).distance for query, per in self.queries]
         return np.concatenate([np.zeros((len(rotations), 0)), *found], axis=1)
 
-    def per_body(self, clamped: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def per_body(self, clamped: Flags) -> Flags:
         """Of gaps (..., g, r), which moving bodies clamp: shape (..., b, r)."""
         found = np.zeros((*clamped.shape[:-2], len(self.moving), clamped.shape[-1]), bool)
         for side in (self.first, self.second):
@@ -131,6 +141,7 @@ def pinch_pairs(
     surfaces: Sequence[int],
     neighbours: frozenset[tuple[int, int]],
     *,
+    still: Sequence[int] = (),
     cap: float,
 ) -> PinchPairs:
     """Bind the gaps of a robot.
@@ -139,7 +150,8 @@ def pinch_pairs(
         shapes: Of the model.
         moving: Bodies that the robot's joints move.
         surfaces: Bodies of the environment and of other robots.
-        neighbours: Pairs of the robot's own moving bodies that a joint or a weld connects.
+        neighbours: Pairs of the robot's own bodies that a joint or a weld connects.
+        still: The robot's own bodies that its joints do not move.
         cap: Largest gap that matters [m].
     """
     queries: list[tuple[Query, Per]] = []
@@ -149,15 +161,42 @@ def pinch_pairs(
         queries.append((Query(shapes, surfaces, moving, cap=cap), Per.BODY))
         first += range(len(moving))
         second += [-1] * len(moving)
+    outside = len(first)
+    own = [*moving, *still]
     for row, body in enumerate(moving):
         others = [
             k
-            for k in range(row + 1, len(moving))
-            if (body, moving[k]) not in neighbours and (moving[k], body) not in neighbours
+            for k in range(row + 1, len(own))
+            if (body, own[k]) not in neighbours and (own[k], body) not in neighbours
         ]
         if others:
-            queries.append((Query(shapes, [moving[k] for k in others], [body], cap=cap), Per.PAIR))
+            queries.append((Query(shapes, [own[k] for k in others], [body], cap=cap), Per.PAIR))
             first += [row] * len(others)
-            second += others
-    sides = np.array(second, np.int64)
-    return PinchPairs(tuple(moving), tuple(queries), np.array(first, np.int64), sides, sides < 0)
+            second += [k if k < len(moving) else -1 for k in others]
+    opened = np.arange(len(first)) < outside
+    return PinchPairs(
+        tuple(moving), tuple(queries), np.array(first, np.int64), np.array(second, np.int64), opened
+    )
+
+
+def robot_pinch_pairs(model: Model, robot: Mechanism, *, cap: float) -> PinchPairs:
+    """The gaps of a robot to parts, other robots and its own links that no joint connects.
+
+    Args:
+        model: The compiled workstation.
+        robot: The robot.
+        cap: Largest gap that matters [m].
+    """
+    own = (*robot.bodies, *robot.carried)
+    still = [i for i in own if i not in robot.moving]
+    surfaces = [b.index for b in model.bodies if b.role not in ("human", "area") and b.index not in own]
+    weld, parent = model.mj.body_weldid, model.mj.body_parentid
+    group = {i: int(weld[model.bodies[i].mj]) for i in own}
+    above = {i: int(weld[parent[group[i]]]) for i in own}
+    neighbours = frozenset(
+        (i, j)
+        for i in own
+        for j in own
+        if group[i] == group[j] or above[i] == group[j] or above[j] == group[i]
+    )
+    return pinch_pairs(model.shapes, robot.moving, surfaces, neighbours, still=still, cap=cap)

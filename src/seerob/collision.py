@@ -40,7 +40,7 @@ def robot_mass(M: ArrayLike, m_L: ArrayLike) -> Array:
         M: Mass of the moving parts of the robot [kg].
         m_L: Mass of tool and workpiece [kg].
     """
-    return np.asarray(M, float) / 2 + np.asarray(m_L, float)
+    return np.asarray(np.asarray(M, float) / 2 + np.asarray(m_L, float))
 
 
 def reduced_mass(m_H: ArrayLike, m_R: ArrayLike) -> Array:
@@ -130,6 +130,10 @@ def permissible_speed(v_F: ArrayLike, v_P: ArrayLike, v_E: ArrayLike) -> tuple[A
     A speed at pressure that is NaN (unknown area) is left out: the result is then an upper bound, and
     whoever asks must not call a speed below it within.
     """
-    speeds = np.stack(np.broadcast_arrays(v_F, v_P, v_E))
-    which = np.nanargmin(speeds, axis=0)
-    return np.take_along_axis(speeds, which[None], axis=0)[0], which
+    # Where the energy limit is that of the force, rounding must not say that energy governs.
+    v_E = np.where(np.asarray(v_E) < np.asarray(v_F) * (1 - 1e-12), v_E, v_F)
+    least = np.fmin(np.fmin(v_F, v_P), v_E)
+    which = np.where(
+        least == v_F, Governing.FORCE, np.where(least == v_P, Governing.PRESSURE, Governing.ENERGY)
+    )
+    return least, which

@@ -75,6 +75,11 @@ def patch_area(radii: ArrayLike, indentation: ArrayLike, cap: float) -> Array:
     return np.asarray(math.pi * half[..., 0] * half[..., 1])
 
 
+def round_shape(radius: float) -> ContactShape:
+    """A patch with the same radius in all directions [m]."""
+    return ContactShape(np.zeros((1, 3)), np.full((1, 2), radius))
+
+
 def mesh_shape(mesh: Mesh, *, dilation: float = 0.0) -> ContactShape:
     """Patches of a mesh.
 
@@ -231,7 +236,7 @@ def _facets(vertices: Array, faces: Indices, normals: Array, edges: _Edges, turn
     )
     bent = np.zeros(count, bool)
     np.logical_or.at(bent, label, np.abs(offset).max(axis=1) > 4 * FLAT)
-    return np.where(bent[label], count + np.arange(n), label)
+    return np.asarray(np.where(bent[label], count + np.arange(n), label))
 
 
 def _reach(

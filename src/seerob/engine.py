@@ -203,7 +203,7 @@ class Engine:
             reference = self._references[mechanism.name]
             q, v, a = reference.at(t)
             if reference.lands(t):
-                self._put(mechanism, q, v)
+                self._put(mechanism, q, v, a)
             wanted.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
             # mj_step moves positions with the velocity at the end of the step, so its velocities
             # belong half a step earlier than its positions.
@@ -223,22 +223,21 @@ class Engine:
 
     def _place(self, t: float) -> None:
         for mechanism in self._mechanisms:
-            q, v, _ = self._references[mechanism.name].at(t)
-            self._put(mechanism, q, v)
+            self._put(mechanism, *self._references[mechanism.name].at(t))
         mujoco.mj_forward(self._mj, self._data)
-        self._before[:] = self._data.qvel
         self._show(t)
 
-    def _put(self, mechanism: Mechanism, q: Array, v: Array) -> None:
+    def _put(self, mechanism: Mechanism, q: Array, v: Array, a: Array) -> None:
+        late = 0.5 * self._dt * a if self.controllers else np.zeros_like(a)
         self._data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
-        self._data.qvel[mechanism.v_address] = mechanism.coupling @ v
+        self._data.qvel[mechanism.v_address] = mechanism.coupling @ (v - late)
+        self._before[mechanism.v_address] = mechanism.coupling @ (v - 3 * late)
 
     def _put_back(self, t: float) -> None:
         """Put what the physics has lost back to where it should be; its verdicts wait until it follows."""
         for mechanism in self._mechanisms:
             if not np.abs(self._data.qvel[mechanism.v_address]).max(initial=0.0) < WILD:
-                q, v, _ = self._references[mechanism.name].at(t)
-                self._put(mechanism, q, v)
+                self._put(mechanism, *self._references[mechanism.name].at(t))
                 self._data.qacc_warmstart[mechanism.v_address] = 0.0
                 self._hearings[mechanism.name].lost = t
 

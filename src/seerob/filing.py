@@ -47,7 +47,7 @@ def filed(
 def _candidates(
     name: str, bases: list[PurePosixPath], packages: Mapping[str, str], folder: Path
 ) -> Iterable[str | None]:
-    scheme, separator, rest = name.partition("://")
+    _, separator, rest = name.partition("://")
     if separator:
         package, _, inner = rest.partition("/")
         yield _inside(PurePosixPath(packages.get(package, package)) / inner)

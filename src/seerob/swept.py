@@ -13,19 +13,20 @@ value of :math:`s (1-s)^2`), which is added to :math:`w_i`.
 
 from __future__ import annotations
 
-import math
+import os
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from seerob.errors import InputError
 from seerob.geometry import Mesh
 from seerob.kernels.voxels import motion_bounds, stamp
 from seerob.model import Model
 from seerob.moving import Core, Moving, Progress, posed, with_field
 from seerob.transforms import Array
-from seerob.voxels import SHARE, VoxelGrid, available_memory, check_room
+from seerob.voxels import VoxelGrid, check_room
 
 SLACK = 0.5
 """Dilation for the motion between stamps that pieces are made small for [voxels]."""
@@ -33,6 +34,8 @@ FINEST = 64
 """Pieces between two samples, at most; a power of 2. Beyond it the dilation grows instead."""
 SPACING = 0.5
 """Of the nodes of a mesh's field [voxels]."""
+BAND = 0.9
+"""Up to where fields are exact, beyond the slack: a little more than half of half a diagonal [voxels]."""
 CUBIC = 4.0 / 27.0
 
 
@@ -101,10 +104,10 @@ class Sweep:
         """What is stamped, with its fields: made when first needed, after the memory has been checked."""
         if self._cores is None:
             pitch = self.grid.pitch
-            band = (1.5 + min(self.slack, 1.0)) * pitch
-            self._cores = tuple(
-                with_field(core, spacing=pitch * SPACING, band=band) for core in self.moving.cores
-            )
+            band = (BAND + min(self.slack, 1.0)) * pitch
+            make = partial(with_field, spacing=pitch * SPACING, band=band)
+            with ThreadPoolExecutor(os.cpu_count()) as pool:
+                self._cores = tuple(pool.map(make, self.moving.cores))
         return self._cores
 
     def start(self, qpos: Array, qvel: Array | None = None) -> None:

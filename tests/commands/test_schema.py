@@ -72,6 +72,7 @@ REFUSED = [
     (("humans", 0, "sex"), "other"),
     (("humans", 0, "stature"), "tall"),
     (("humans", 0, "mass_mm"), 75),
+    (("humans", 0, "stature_mm"), 1750),  # beside stature
     (("humans", 0, "mass_g"), "heavy"),
     (("tools", 0, "at", "position_mm"), [1, 2]),
     (("sources", 0, "fil"), "x"),

@@ -6,6 +6,7 @@ from itertools import combinations, product
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from seerob.kernels.polytope import largest
@@ -29,8 +30,13 @@ def brute_force(A: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def qhull(A: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    inside = np.linalg.lstsq(A.T, (low + high) / 2, rcond=None)[0]
     slabs = np.block([[A.T, -high[:, None]], [-A.T, low[:, None]]])
+    # The centre of the largest ball inside.
+    lengths = np.linalg.norm(slabs[:, :3], axis=1, keepdims=True)
+    ball = np.hstack([slabs[:, :3], lengths])
+    inside = linprog([0, 0, 0, -1], A_ub=ball, b_ub=-slabs[:, 3], bounds=[(None, None)] * 3 + [(0, None)]).x[
+        :3
+    ]
     return HalfspaceIntersection(slabs, inside).intersections
 
 
@@ -192,8 +198,6 @@ def test_numbers_that_are_none_are_refused(bad: float) -> None:
 
 def support(A_ub: np.ndarray, b_ub: np.ndarray, u: np.ndarray) -> float:
     """Largest u·f over wrenches that satisfy the bounds, by linear programming."""
-    from scipy.optimize import linprog
-
     cost = np.concatenate([-u, np.zeros(A_ub.shape[1] - 3)])
     done = linprog(cost, A_ub=A_ub, b_ub=b_ub, bounds=(None, None))
     return -done.fun if done.status == 0 else np.inf

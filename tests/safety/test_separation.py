@@ -46,7 +46,7 @@ def test_v_r_zero_keeps_the_whole_way_of_the_person():
     assert separation_bound(np.array(0.0), 1.6, 0.1, 0.3, 0.0) == pytest.approx(1.6 * 0.4)
 
 
-def separation(folder, *, x=6.0, options=FULL, qd=(1.0, 0.0), between='["arm", "op"]'):
+def separation(folder, *, x=6.0, options=FULL, qd=(1.0, 0.0), between='["arm", "op"]', urdf=None):
     text = (
         FLOATING
         + TWO_R
@@ -56,7 +56,7 @@ def separation(folder, *, x=6.0, options=FULL, qd=(1.0, 0.0), between='["arm", "
         + '[[safety]]\nkind = "minimum_distance"\nname = "d"\nbetween = ["arm", "op"]\n'
         + '[[safety]]\nkind = "velocity"\nname = "v"\nof = "arm"\n'
     )
-    station = made(folder, text, {"arm.urdf": two_r()})
+    station = made(folder, text, {"arm.urdf": urdf or two_r()})
     results = results_at(station, arm=((0.0, 0.0), qd))
     return results["S"], results["d"], results["v"]
 
@@ -124,3 +124,15 @@ def test_unheard_person_is_undecided_even_close_by(tmp_path):
     engine.take([heard("arm", 0.0, (0, 0))])
     result = Judge(bind(station.model))(engine.start())[0]
     assert (result.verdict, result.value, result.reason) == ("undecided", None, "op: nothing heard yet")
+
+
+def test_what_the_surface_may_stick_out_is_added(tmp_path):
+    """A display mesh 20 mm larger than the collision box on every side: nearer, and faster."""
+    visual = '<visual><origin xyz="0.5 0 0"/><geometry><box size="1.04 0.14 0.14"/></geometry></visual>'
+    S, _, v = separation(
+        tmp_path, urdf=two_r().replace("</collision></link>", f"</collision>{visual}</link>")
+    )
+    out = next(i.value for i in S.basis.inputs if i.name == "surfaces may be nearer by")
+    assert 0.02 - 1e-9 <= out <= 0.02 * np.sqrt(3) + 1e-9
+    assert v.value == pytest.approx(np.hypot(2, 0.05) + out)
+    assert S.limit == pytest.approx((v.value + 1.6) * 0.4 + 0.35 + out)

@@ -38,12 +38,12 @@ UNBOUNDED = -2
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def unit_slabs(A: Array, low: Array, high: Array) -> tuple[bool, Array, Array, Array]:
-    """The same polytope with unit normals, without columns that are zero or not bounded.
+    """The same polytope with unit normals, without the columns that are zero.
 
     Args:
         A: Normals as columns, shape (3, n).
-        low: Lower bounds, -inf for none, shape (n,).
-        high: Upper bounds, inf for none, shape (n,).
+        low: Lower bounds, shape (n,).
+        high: Upper bounds, shape (n,).
 
     Returns:
         Whether the zero columns leave anything, unit normals (m, 3), bounds (m,) and (m,).
@@ -60,8 +60,6 @@ def unit_slabs(A: Array, low: Array, high: Array) -> tuple[bool, Array, Array, A
         if length <= INERT * longest:
             possible = possible and low[i] <= 0.0 <= high[i]
             continue
-        if low[i] == -np.inf and high[i] == np.inf:
-            continue
         for r in range(3):
             N[m, r] = A[r, i] / length
         l[m], h[m] = low[i] / length, high[i] / length
@@ -70,35 +68,31 @@ def unit_slabs(A: Array, low: Array, high: Array) -> tuple[bool, Array, Array, A
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def corners(N: Array, l: Array, h: Array, V: Array, W: Indices, quality: Array) -> int:
+def corners(N: Array, l: Array, h: Array, V: Array, planes: Indices, quality: Array) -> int:
     """Write the corners of a polytope into ``V``.
 
     Args:
         N: Unit normals, shape (n, 3).
-        l: Lower bounds, shape (n,).
-        h: Upper bounds, shape (n,); equal to the lower one for a plane.
+        l: Lower bounds, finite, shape (n,).
+        h: Upper bounds, finite, shape (n,); equal to the lower one for a plane.
         V: Room for corners, shape (m, 3) with m >= 4 n (n - 1).
-        W: Room for the three planes of each corner, shape (m, 3): ``2 i`` is the lower of constraint i.
+        planes: Room, shape (m,).
         quality: Room, shape (m,).
 
     Returns:
         Number of corners, some of them equal where more than three planes meet; `EMPTY` or `UNBOUNDED`.
     """
     n = len(N)
+    # For each pair, of the lines' range within slab k: its middle base ± by_i ± by_j, half its length.
+    base, by_i, by_j, half = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     scale = 0.0
     for i in range(n):
-        if math.isfinite(l[i]):
-            scale = max(scale, abs(l[i]))
-        if math.isfinite(h[i]):
-            scale = max(scale, abs(h[i]))
+        scale = max(scale, abs(l[i]), abs(h[i]))
     slack = ROUNDING * scale
-    G, per_length = np.empty((n, n)), np.empty(n)
-    for i in range(n):
-        for j in range(n):
-            G[i, j] = N[i, 0] * N[j, 0] + N[i, 1] * N[j, 1] + N[i, 2] * N[j, 2]
     count = 0
     for i in range(n):
         ax, ay, az = N[i, 0], N[i, 1], N[i, 2]
+        mi, ri = 0.5 * (l[i] + h[i]), 0.5 * (h[i] - l[i])
         for j in range(i + 1, n):
             bx, by, bz = N[j, 0], N[j, 1], N[j, 2]
             dx, dy, dz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
@@ -107,72 +101,78 @@ def corners(N: Array, l: Array, h: Array, V: Array, W: Indices, quality: Array) 
                 continue
             s = math.sqrt(s2)
             dx, dy, dz = dx / s, dy / s, dz / s
-            c = G[i, j]
+            c = ax * bx + ay * by + az * bz
+            mj, rj = 0.5 * (l[j] + h[j]), 0.5 * (h[j] - l[j])
+            u0, v0 = (mi - c * mj) / s2, (mj - c * mi) / s2
+            ui, uj = ri / s2, rj / s2
             for k in range(n):
-                ad = N[k, 0] * dx + N[k, 1] * dy + N[k, 2] * dz
-                per_length[k] = 1.0 / ad if abs(ad) >= PARALLEL else 0.0
-            for side_i in range(2 if l[i] < h[i] else 1):
-                bi = h[i] if side_i else l[i]
-                if not math.isfinite(bi):
+                if k in (i, j):
+                    base[k], by_i[k], by_j[k], half[k] = 0.0, 0.0, 0.0, np.inf
                     continue
-                for side_j in range(2 if l[j] < h[j] else 1):
-                    bj = h[j] if side_j else l[j]
-                    if not math.isfinite(bj):
-                        continue
-                    u, v = (bi - c * bj) / s2, (bj - c * bi) / s2
-                    t0, t1, k0, k1 = -np.inf, np.inf, -1, -1
+                gi = N[k, 0] * ax + N[k, 1] * ay + N[k, 2] * az
+                gj = N[k, 0] * bx + N[k, 1] * by + N[k, 2] * bz
+                along = N[k, 0] * dx + N[k, 1] * dy + N[k, 2] * dz
+                # A parallel line is within or without, whole; its middle is measured across the slab.
+                per = 1.0 / along if abs(along) >= PARALLEL else np.nan
+                weight = per if per == per else 1.0
+                base[k] = (0.5 * (l[k] + h[k]) - (u0 * gi + v0 * gj)) * weight
+                by_i[k] = -ui * (gi - c * gj) * weight
+                by_j[k] = -uj * (gj - c * gi) * weight
+                half[k] = 0.5 * (h[k] - l[k]) * abs(per)
+            for side_i in range(2 if ri > 0.0 else 1):
+                si = 2.0 * side_i - 1.0
+                for side_j in range(2 if rj > 0.0 else 1):
+                    sj = 2.0 * side_j - 1.0
+                    t0, t1 = -np.inf, np.inf
                     for k in range(n):
-                        if k in (i, j):
-                            continue
-                        # a_k of the line's point p = u a_i + v a_j.
-                        ap = u * G[i, k] + v * G[j, k]
-                        if per_length[k] == 0.0:
-                            if ap > h[k] + slack or ap < l[k] - slack:
-                                t0, t1 = 1.0, 0.0
-                                break
-                            continue
-                        ta, tb, ka, kb = (
-                            (l[k] - ap) * per_length[k],
-                            (h[k] - ap) * per_length[k],
-                            2 * k,
-                            2 * k + 1,
-                        )
-                        if per_length[k] < 0.0:
-                            ta, tb, ka, kb = tb, ta, kb, ka
-                        if ta > t0:
-                            t0, k0 = ta, ka
-                        if tb < t1:
-                            t1, k1 = tb, kb
+                        middle = base[k] + si * by_i[k] + sj * by_j[k]
+                        if half[k] == half[k]:
+                            t0, t1 = max(t0, middle - half[k]), min(t1, middle + half[k])
+                        elif abs(middle) > 0.5 * (h[k] - l[k]) + slack:
+                            t0, t1 = np.inf, -np.inf
                         if t0 > t1:
                             break
                     if t0 > t1:
                         continue
-                    if not (math.isfinite(t0) and math.isfinite(t1)):
+                    if t0 == -np.inf:
                         return UNBOUNDED
+                    u, v = u0 + si * ui - sj * c * uj, v0 + sj * uj - si * c * ui
+                    px, py, pz = u * ax + v * bx, u * ay + v * by, u * az + v * bz
                     for end in range(2):
-                        t, k = (t1, k1) if end else (t0, k0)
-                        if l[k // 2] == h[k // 2]:
-                            k -= k % 2
-                        a, b = 2 * i + side_i, 2 * j + side_j
-                        if k < a:
-                            a, b, k = k, a, b
-                        elif k < b:
-                            b, k = k, b
+                        t = t1 if end else t0
+                        third = -1
+                        for k in range(n):
+                            middle = base[k] + si * by_i[k] + sj * by_j[k]
+                            if t == (middle + half[k] if end else middle - half[k]):
+                                upper = (N[k, 0] * dx + N[k, 1] * dy + N[k, 2] * dz > 0.0) == (
+                                    end == 1
+                                ) and l[k] < h[k]
+                                third = 2 * k + (1 if upper else 0)
+                                break
+                        key = _key(2 * i + side_i, 2 * j + side_j, third)
                         place = count
                         for known in range(count):
-                            if W[known, 0] == a and W[known, 1] == b and W[known, 2] == k:
+                            if planes[known] == key:
                                 place = known
                                 break
                         if place < count and quality[place] >= s2:
                             continue
                         # Of the three lines through a corner the one between the steepest planes is exact.
-                        W[place, 0], W[place, 1], W[place, 2], quality[place] = a, b, k, s2
-                        V[place, 0] = u * ax + v * bx + t * dx
-                        V[place, 1] = u * ay + v * by + t * dy
-                        V[place, 2] = u * az + v * bz + t * dz
+                        planes[place], quality[place] = key, s2
+                        V[place, 0], V[place, 1], V[place, 2] = px + t * dx, py + t * dy, pz + t * dz
                         if place == count:
                             count += 1
     return count if count else _without_corners(N, l, h)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _key(a: int, b: int, c: int) -> int:
+    """One number for three planes in any order, the first below the second."""
+    if c < a:
+        a, b, c = c, a, b
+    elif c < b:
+        b, c = c, b
+    return (a << 40) | (b << 20) | c
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -208,8 +208,8 @@ def largest(A: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
 
     Args:
         A: Normals as columns, shape (N, 3, n).
-        low: Shape (N, n).
-        high: Shape (N, n).
+        low: Lower bounds, finite, shape (N, n).
+        high: Upper bounds, finite, shape (N, n).
 
     Returns:
         Norm of the farthest point (N,): inf when unbounded, nan when empty. The point (N, 3), nan when
@@ -218,13 +218,13 @@ def largest(A: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
     """
     N, _, n = A.shape
     room = max(4 * n * (n - 1), 1)
-    V, W, quality = np.empty((room, 3)), np.empty((room, 3), np.int64), np.empty(room)
+    V, planes, quality = np.empty((room, 3)), np.empty(room, np.int64), np.empty(room)
     norm, point, radius = np.full(N, np.nan), np.full((N, 3), np.nan), np.full(N, np.nan)
     for s in range(N):
         possible, normals, l, h = unit_slabs(A[s], low[s], high[s])
         count = EMPTY
         if possible:
-            count = corners(normals, l, h, V, W, quality) if len(l) else UNBOUNDED
+            count = corners(normals, l, h, V, planes, quality) if len(l) else UNBOUNDED
         if count != EMPTY:
             radius[s] = inscribed(l, h)
         if count == UNBOUNDED:

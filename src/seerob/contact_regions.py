@@ -1,0 +1,76 @@
+"""Which body regions of a person each moving part of a robot could hit in the present posture."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.distance import Query
+from seerob.human.skeleton import without_side
+from seerob.human.skin import BODY_REGION
+from seerob.model import Mechanism, Model
+from seerob.norms import body_limits
+from seerob.state import State
+from seerob.transforms import Array
+
+SENSITIVE = "Larynx, eyes and ears"
+"""In no row of the table; contact is not permitted."""
+FEET = "Feet"
+"""In no row of the table; no limit is available."""
+REGIONS = (*body_limits.REGIONS, SENSITIVE, FEET)
+FORBIDDEN = frozenset({*body_limits.FORBIDDEN, SENSITIVE})
+
+
+class Person:
+    """The bones of a person by body region, bound once.
+
+    A bone counts for its region in front and for that behind: a person can turn. Head and neck count
+    for larynx, eyes and ears too.
+    """
+
+    def __init__(self, model: Model, robot: Mechanism, human: str, *, horizon: float) -> None:
+        """Bind.
+
+        Args:
+            model: The compiled workstation.
+            robot: A robot with moving bodies that have shapes.
+            human: A human's name.
+            horizon: Distance within which a part could hit a bone [m].
+
+        Raises:
+            UnknownName: No such human.
+        """
+        self.bodies = model.human(human).bodies
+        self._gap = model.gap(robot.moving, self.bodies)
+        # Not the gap's own query: that measures pairs however far they are.
+        self._reach = horizon + self._gap.deviation
+        self._query = Query(model.shapes, robot.moving, self.bodies, cap=self._reach + 1e-6)
+        self._shape = len(robot.moving), len(self.bodies)
+        self._member = np.zeros((len(self.bodies), len(REGIONS)), bool)
+        for i, body in enumerate(self.bodies):
+            bone = without_side(model.bodies[body].name.rsplit("/", 1)[-1])
+            for region in BODY_REGION[bone]:
+                self._member[i, REGIONS.index(FEET if region is None else region)] = True
+            if bone in ("head", "neck"):
+                self._member[i, REGIONS.index(SENSITIVE)] = True
+
+    def near(self, state: State, speed: float | None) -> tuple[NDArray[np.bool_], Array]:
+        """What could be hit.
+
+        Args:
+            state: The twin.
+            speed: Of every region, instead of the observed one [m/s].
+
+        Returns:
+            Per moving body and region, shape (b, len(REGIONS)), and bounds on the regions' speeds [m/s].
+        """
+        state.require(*self._gap.carriers)
+        found = self._query.per_pair(state.rotations, state.positions)
+        close: NDArray[np.bool_] = np.less_equal(found.distance.reshape(self._shape), self._reach)
+        near: NDArray[np.bool_] = np.any(close[:, :, None] & self._member[None], axis=1)
+        if speed is not None:
+            return near, np.full(len(REGIONS), speed)
+        reached = np.flatnonzero(close.any(axis=0))
+        v = np.zeros(len(self.bodies))
+        v[reached] = [state.fastest_point(self.bodies[i])[0] for i in reached]
+        return near, np.asarray(np.max(v[:, None] * self._member, axis=0))

@@ -1,0 +1,50 @@
+"""A table of limits as the inputs of a `Basis`: every figure with edition, clause and confidence."""
+
+from __future__ import annotations
+
+from seerob.norms.body_limits import BodyLimits, Figure
+from seerob.snapshot import Input, Origin
+
+_ORIGIN = {"M": Origin.ESTIMATED, "D": Origin.COMPUTED, "own": Origin.GIVEN}
+
+
+def limit_inputs(limits: BodyLimits, *, own: bool) -> tuple[Input, ...]:
+    """Every figure of a table.
+
+    Args:
+        limits: The table.
+        own: Whether it is the user's own file.
+    """
+    found = []
+    for region in limits.regions.values():
+        if not region.permitted:
+            source = region.permission_source
+            value = "contact not permitted"
+            found.append(Input(name=region.name, value=value, origin=_origin(None, own=own), source=source))
+            continue
+        figures = {
+            "F_s": region.force,
+            "transient multiplier": region.multiplier,
+            "k": region.stiffness,
+            "m_H": region.mass,
+            "transient energy": region.energy,
+            **{f"p_s {area.name}": area.pressure for area in region.areas},
+        }
+        for name, figure in figures.items():
+            if figure is not None:
+                found.append(
+                    Input(
+                        name=f"{region.name}: {name}",
+                        value=figure.value,
+                        unit=figure.unit,
+                        origin=_origin(figure, own=own),
+                        source=figure.source,
+                    )
+                )
+    return tuple(found)
+
+
+def _origin(figure: Figure | None, *, own: bool) -> Origin:
+    if own:
+        return Origin.GIVEN
+    return Origin.STATED if figure is None else _ORIGIN.get(figure.confidence, Origin.STATED)

@@ -1,0 +1,413 @@
+r"""Power and force limiting: permissible speed of contact, ISO/TS 15066:2016 5.5.5 and Annex A."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from msgspec import Meta, field
+from numpy.typing import NDArray
+
+from seerob import clamping, collision, contact_limits, contact_shape, provenance
+from seerob.contact_regions import FEET, FORBIDDEN, REGIONS, Person
+from seerob.criterion import Criterion, Evaluate, worst
+from seerob.errors import Undecided, UnknownName
+from seerob.impact_mass import masses_along_motion, simplified_mass
+from seerob.model import Body, Frame, Model
+from seerob.norms import body_limits
+from seerob.norms.crushing_gaps import crushing_gaps
+from seerob.norms.limit_inputs import limit_inputs
+from seerob.snapshot import Arrow, Basis, Highlight, Input, Origin, Result, Verdict
+from seerob.state import State
+from seerob.transforms import Array
+
+Flags = NDArray[np.bool_]
+STANDSTILL = 1e-3
+"""Speed below which a part of the robot hits nobody [m/s]."""
+CAP = 1e-4
+"""Contact area that the stiffness of the table is good for [m²] (STIMBA PFL calculator, 1S)."""
+
+_Positive = Annotated[float, Meta(gt=0, extra={"unit": "m"})]
+_Area = Annotated[float, Meta(gt=0, extra={"unit": "m²"})]
+
+
+class PowerAndForce(Criterion, frozen=True, kw_only=True):
+    """Power and force limiting: speed of every moving part against what each body region may be hit with."""
+
+    unit: ClassVar[str] = "m/s"
+
+    robot: str
+    """The robot, with its tools and workpieces."""
+    human: str | None = None
+    """A person: regions within ``horizon`` of a part can be hit by it. Without one, anyone could stand
+    anywhere."""
+    horizon: _Positive = 0.5
+    """Distance within which a part of the robot could hit a body part [m]."""
+    person_speed: Annotated[float, Meta(ge=0, extra={"unit": "m/s"})] | None = None
+    """Speed of the body part, added to the robot's [m/s]; without it as observed, 0 without a person."""
+    excluded: tuple[str, ...] = ()
+    """Body regions that other measures keep from any contact; named in every report."""
+    limits: str | None = None
+    """File with other limits, of the form of the one that ships."""
+    multiplier: Annotated[float, Meta(ge=1, le=2)] | None = None
+    """Transient over quasi-static limits; lowers the table's, which is 2."""
+    mass: Literal["larger", "simplified", "projected"] = "larger"
+    """Mass of the robot: M/2 + m_L, the effective mass along the motion, or the larger of both."""
+    contact_radius: dict[str, _Positive] = field(default_factory=dict)
+    """Radius of the sharpest edge of parts by name [m], instead of what their meshes tell."""
+    contact_area: dict[str, _Area] = field(default_factory=dict)
+    """Smallest contact area of parts by name [m²], instead of what their meshes tell."""
+    largest_area: _Area = CAP
+    """Area above which a contact is not credited [m²]."""
+    thickness: dict[str, _Positive] = field(default_factory=dict)
+    """Gap in which a body region can be clamped [m], instead of the gaps of ISO 13854."""
+
+    def subjects(self) -> tuple[str, ...]:
+        """The robot and the human."""
+        return (self.robot,) if self.human is None else (self.robot, self.human)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        return _Bound(self, model).evaluate
+
+    def table(self, model: Model) -> body_limits.BodyLimits:
+        """The limits that apply."""
+        return (
+            body_limits.shipped()
+            if self.limits is None
+            else body_limits.read(Path(model.folder, self.limits))
+        )
+
+    def shapes(self, model: Model) -> list[contact_shape.ContactShape]:
+        """How sharp each moving body of the robot is, by its mesh or by the file.
+
+        Raises:
+            UnknownName: A part that the robot does not move.
+        """
+        moving = model.robot(self.robot).moving
+        radii = self._by_body(model, self.contact_radius)
+        return [
+            contact_shape.round_shape(radii[i]) if i in radii else _shape(model.bodies[i]) for i in moving
+        ]
+
+    def areas(self, model: Model, arrays: contact_limits.RegionArrays) -> Array:
+        """Contact area of each moving body with each region, free and clamped [m²], shape (b, 2, r)."""
+        moving = model.robot(self.robot).moving
+        given = self._by_body(model, self.contact_area)
+        found = [arrays.contact_area(shape, self.largest_area) for shape in self.shapes(model)]
+        for row, body in enumerate(moving):
+            if body in given:
+                found[row] = np.full_like(found[row], min(given[body], self.largest_area))
+        return np.array(found).reshape(len(moving), 2, len(arrays.regions))
+
+    def _by_body(self, model: Model, given: dict[str, float]) -> dict[int, float]:
+        moving = model.robot(self.robot).moving
+        found: dict[int, float] = {}
+        for name, value in given.items():
+            bodies = [i for i in model.select(name) if i in moving]
+            if not bodies:
+                known = [model.bodies[i].name for i in moving]
+                raise UnknownName(f"moving part of {self.robot}", name, known)
+            found |= dict.fromkeys(bodies, value)
+        return found
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        robot, limits = model.robot(self.robot), self.table(model)
+        names = (self.robot,) if self.human is None else (self.robot, self.human)
+        edition = model.workstation.edition
+        doubts: list[str] = []
+        label = f"{limits.edition}; {limits.title}"
+        if edition != limits.edition:
+            label += f"; used for {edition}"
+            doubts.append(
+                f"{edition}: whether any figure of its Annex M differs is not known row by row; "
+                f"the figures are those of {limits.edition}"
+            )
+        if limits.reviewed_by:
+            label += f"; figures outside the usual ranges: {limits.reviewed_by}"
+        gap_source = crushing_gaps()[1]
+        return Basis(
+            formula="v = min(F/√(μk), pA/√(μk), √(2E/μ)), μ = 1/(1/m_H + 1/m_R), m_R = M/2 + m_L; "
+            "clamped: m_H → ∞ and quasi-static limits; "
+            + {
+                "larger": "m_R at least the effective mass along the motion",
+                "simplified": "the effective mass along the motion is shown, not used",
+                "projected": "m_R replaced by the effective mass along the motion (chosen in the file)",
+            }[self.mass],
+            source="ISO/TS 15066:2016 Annex A.3, A.1 to A.6 (public sources that agree, 2S; A.1, A.2: M)",
+            inputs=(
+                *provenance.motion(model, *names),
+                *provenance.masses(model, robot),
+                Input(name="limits", value=limits.file, origin=Origin.STATED, source=label),
+                *limit_inputs(limits, own=self.limits is not None),
+                *self._contact_inputs(model),
+                Input(
+                    name="largest contact area",
+                    value=self.largest_area,
+                    unit="m²",
+                    origin=Origin.STATED if self.largest_area == CAP else Origin.GIVEN,
+                    source="k belongs to about 1 cm² (1S)"
+                    if self.largest_area == CAP
+                    else "workstation file",
+                ),
+                Input(
+                    name="gaps that clamp",
+                    value=", ".join(f"{r} {self.thickness[r]:g} m" for r in self.thickness) or None,
+                    origin=Origin.ESTIMATED,
+                    source=gap_source + (", otherwise workstation file" if self.thickness else ""),
+                ),
+                *(
+                    Input(
+                        name=f"{region}: kept from contact",
+                        origin=Origin.GIVEN,
+                        source="workstation file; by measures that are not evaluated here",
+                    )
+                    for region in self.excluded
+                ),
+            ),
+            not_modelled=(
+                "a design estimate: power and force limiting needs measurement at the real robot",
+                *doubts,
+                "larynx, eyes, ears and feet have no row in the table",
+                "people other than adults, protective padding, clothing",
+                "the contact area is that at the largest indentation the force limit allows; less is carried "
+                "at a lower force",
+                "duration of the contact: what is free counts as transient, what is clamped as quasi-static",
+                "forces that drives keep up after the impact, detection and stop of the robot",
+                *(
+                    ()
+                    if robot.rotor_inertia_known
+                    else ("rotor inertia: the effective mass along the motion is link side only",)
+                ),
+                *(() if self.human is not None or self.person_speed else ("the person's own motion",)),
+            ),
+        )
+
+    def _contact_inputs(self, model: Model) -> tuple[Input, ...]:
+        moving = model.robot(self.robot).moving
+        radii, areas = self._by_body(model, self.contact_radius), self._by_body(model, self.contact_area)
+        found = []
+        for body, shape in zip(moving, self.shapes(model), strict=True):
+            name = model.bodies[body].name
+            if body in areas:
+                found.append(provenance.given(f"contact area of {name}", areas[body], "m²"))
+            elif body in radii:
+                found.append(provenance.given(f"contact radius of {name}", radii[body], "m"))
+            elif shape.unknown:
+                what = f"contact radius of {name}"
+                found.append(Input(name=what, origin=Origin.MISSING, source=shape.unknown))
+            else:
+                radius = shape.sharpest[0]
+                value: float | str = radius if np.isfinite(radius) else "flat"
+                what, unit = f"contact radius of {name}", "m" if np.isfinite(radius) else ""
+                found.append(
+                    Input(name=what, value=value, unit=unit, origin=Origin.COMPUTED, source="its mesh")
+                )
+        return tuple(found)
+
+
+class _Bound:
+    """What is resolved once, and the judgement of a state."""
+
+    def __init__(self, spec: PowerAndForce, model: Model) -> None:
+        self.spec, self.model = spec, model
+        self.robot = model.robot(spec.robot)
+        self.moving = self.robot.moving
+        self.frames = [Frame(model.bodies[i].name, model.bodies[i].mj, np.eye(4)) for i in self.moving]
+        for key, names in (("excluded", spec.excluded), ("thickness", spec.thickness)):
+            for name in names:
+                if name not in REGIONS:
+                    raise UnknownName(f"body region ({key})", name, REGIONS)
+        self.limits = spec.table(model)
+        self.arrays = contact_limits.RegionArrays.of(self.limits, multiplier=spec.multiplier)
+        self.columns = {region.name: k for k, region in enumerate(self.arrays.regions)}
+        shapes = spec.shapes(model)
+        self.areas = spec.areas(model, self.arrays)
+        self.unknown = [
+            shape.unknown if np.isnan(area).any() else ""
+            for shape, area in zip(shapes, self.areas, strict=True)
+        ]
+        self.simplified = simplified_mass(model, self.robot)
+        gaps = {**crushing_gaps()[0], **spec.thickness}
+        self.thickness = np.array([gaps[region.name] for region in self.arrays.regions])
+        self.pinch = clamping.robot_pinch_pairs(
+            model, self.robot, cap=float(self.thickness.max(initial=0.0)) + 0.1
+        )
+        self.memory = clamping.Memory()
+        if spec.human is not None:
+            model.human(spec.human)
+        self.people = (
+            None
+            if spec.human is None or not self.moving
+            else Person(model, self.robot, spec.human, horizon=spec.horizon)
+        )
+
+    def evaluate(self, state: State) -> Result:
+        """The result at a state."""
+        spec, robot = self.spec, self.robot
+        if not self.moving:
+            raise Undecided(f"{robot.name} has no moving part with a shape")
+        projected = masses_along_motion(state, robot, self.frames, self.moving, standstill=STANDSTILL)
+        fastest = [state.fastest_point(i) for i in self.moving]
+        v_r = np.array([f[0] for f in fastest])
+        masses = np.full(len(v_r), self.simplified)
+        if spec.mass != "simplified":
+            # A part that stands still has no direction of motion, and hits nobody.
+            either = np.fmax if spec.mass == "larger" else (lambda m, m_u: np.where(np.isnan(m_u), m, m_u))
+            masses = either(masses, projected)
+        clamped = self._clamped(state)
+        speeds = self.arrays.speeds(masses, self.areas, clamped)
+        moves = v_r > STANDSTILL
+        if self.people is None:
+            near: Flags = np.ones((len(v_r), len(REGIONS)), bool)
+            v_h = np.full(len(REGIONS), spec.person_speed or 0.0)
+        else:
+            near, v_h = self.people.near(state, spec.person_speed)
+        near &= moves[:, None]
+        found = [
+            self._region(k, near[:, k], v_r, float(v_h[k]), speeds, clamped)
+            for k in range(len(REGIONS))
+            if near[:, k].any()
+        ]
+        known = projected[np.isfinite(projected)]
+        heaviest = float(known.max()) if len(known) else None
+        mass_parts = (
+            Result(name="M/2 + m_L", value=self.simplified, unit="kg"),
+            Result(name="m_u along the motion, heaviest part", value=heaviest, unit="kg"),
+        )
+        if not found:
+            reason = f"nobody within {spec.horizon:g} m of a moving part"
+            if not moves.any():
+                reason = "no part moves"
+            return Result(name=spec.name, unit="m/s", reason=reason, parts=mass_parts)
+        verdict = worst([part.verdict for part, _ in found])
+        chosen = [entry for entry in found if entry[0].verdict is verdict]
+        part, row = min(chosen, key=_margin)
+        body = self.model.bodies[self.moving[row]]
+        _, point, velocity = fastest[row]
+        label = f"{part.name}: {part.value:.2f} m/s" + (f" of {part.limit:.2f}" if part.limit else "")
+        arrow = Arrow(
+            origin=tuple(point.tolist()),
+            vector=tuple((0.3 * velocity).tolist()),
+            label=label,
+            verdict=verdict,
+        )
+        return Result(
+            name=spec.name,
+            value=part.value,
+            unit=spec.unit,
+            limit=part.limit,
+            verdict=verdict,
+            reason=f"{part.name}: {part.reason}",
+            parts=(*(part for part, _ in found), *mass_parts),
+            markers=(arrow, Highlight(body=body.name, verdict=verdict)),
+        )
+
+    def _clamped(self, state: State) -> Flags:
+        """Which moving body clamps which region, shape (b, r)."""
+        state.require(*self.pinch_carriers())
+        gaps, _ = self.pinch.gaps(state.rotations, state.positions)
+        return self.pinch.per_body(self.memory.step(state.t, gaps, self.thickness, self.pinch.opened))
+
+    def pinch_carriers(self) -> tuple[str, ...]:
+        """Robots whose pose the gaps depend on."""
+        return tuple(name for name, m in self.model.mechanisms.items() if m.role == "robot")
+
+    def _region(
+        self,
+        k: int,
+        near: Flags,
+        v_r: Array,
+        v_h: float,
+        speeds: contact_limits.Speeds,
+        clamped: Flags,
+    ) -> tuple[Result, int]:
+        """The result of one body region, and the row of the moving body that governs it."""
+        name = REGIONS[k]
+        v = v_r + v_h
+        rows = np.flatnonzero(near)
+        row = int(rows[v[rows].argmax()])
+        body = self.model.bodies[self.moving[row]].name
+        if name in self.spec.excluded:
+            reason = "kept from contact by the workstation file"
+            return Result(name=name, value=float(v[row]), unit="m/s", reason=reason), row
+        region = self.limits.region(name)
+        if name in FORBIDDEN or (region is not None and not region.permitted):
+            verdict = Verdict.EXCEEDED
+            reason = f"contact not permitted, {body} moves within {self.spec.horizon:g} m"
+            if self.people is None:
+                verdict = Verdict.UNDECIDED
+                reason = (
+                    "contact not permitted, and whether it can occur is open without a person: "
+                    "name one, or exclude the region if other measures keep it out"
+                )
+            return Result(name=name, value=float(v[row]), unit="m/s", verdict=verdict, reason=reason), row
+        if region is None:
+            reason = "no limit available" if name == FEET else f"no limit in {self.limits.file}"
+            value = float(v[row])
+            return Result(name=name, value=value, unit="m/s", verdict=Verdict.UNDECIDED, reason=reason), row
+        column = self.columns[name]
+        limit = speeds.permissible[:, column]
+        margin = limit - v
+        open_ = np.isnan(speeds.pressure[:, column])
+        rank = np.where(margin < 0, 2, np.where(open_, 1, 0))
+        row = int(min(rows, key=lambda i: (-rank[i], margin[i])))
+        verdict = (Verdict.WITHIN, Verdict.UNDECIDED, Verdict.EXCEEDED)[rank[row]]
+        how = "clamped" if clamped[row, column] else "free"
+        which = collision.Governing(speeds.governing[row, column]).name.lower()
+        body = self.model.bodies[self.moving[row]].name
+        reason = f"{which}, {how}, {body}"
+        if verdict is Verdict.UNDECIDED:
+            reason = f"contact pressure of {body} ({how}): {self.unknown[row]}"
+        return Result(
+            name=name,
+            value=float(v[row]),
+            unit="m/s",
+            limit=float(limit[row]),
+            verdict=verdict,
+            reason=reason,
+            parts=self._area_results(region, row, column, float(v[row]), speeds),
+        ), row
+
+    def _area_results(
+        self,
+        region: body_limits.BodyRegion,
+        row: int,
+        column: int,
+        v: float,
+        speeds: contact_limits.Speeds,
+    ) -> tuple[Result, ...]:
+        """The same for each specific area: force belongs to the region, pressure to the area."""
+        others = float(min(speeds.force[row, column], speeds.energy[row, column]))
+        pressed = float(speeds.pressure[row, column]) / self.arrays.pressure[column]
+        found = []
+        for area in region.areas:
+            v_P = pressed * area.pressure.value
+            limit = others if np.isnan(v_P) else min(others, v_P)
+            verdict = Verdict.WITHIN if v <= limit else Verdict.EXCEEDED
+            if np.isnan(v_P) and verdict is Verdict.WITHIN:
+                verdict = Verdict.UNDECIDED
+            reason = self.unknown[row] if verdict is Verdict.UNDECIDED else ""
+            found.append(
+                Result(name=area.name, value=v, unit="m/s", limit=limit, verdict=verdict, reason=reason)
+            )
+        return tuple(found)
+
+
+def _margin(entry: tuple[Result, int]) -> float:
+    """Without a limit it is the worst: nothing is permitted or known."""
+    part = entry[0]
+    return -np.inf if part.limit is None or part.value is None else part.limit - part.value
+
+
+_shapes: WeakKeyDictionary[Body, contact_shape.ContactShape] = WeakKeyDictionary()
+
+
+def _shape(body: Body) -> contact_shape.ContactShape:
+    """Of one body; meshes are looked at once per model."""
+    if body not in _shapes:
+        _shapes[body] = contact_shape.body_shape(body.solids)
+    return _shapes[body]

@@ -38,7 +38,7 @@ def test_constant_brake_torque_without_gravity(tmp_path, omega):
     B = 12.0
     stopped, _, _ = stop(tmp_path, ONE, [0.3], [omega], [B], gravity=False)
     a = B / INERTIA
-    assert stopped.T_s == pytest.approx(abs(omega) / a, abs=STEP)
+    assert stopped.T_s == pytest.approx(abs(omega) / a, abs=1.01 * STEP)
     assert stopped.T_s >= abs(omega) / a - 1e-12
     turned = np.sign(omega) * (abs(omega) * 0.1 + omega**2 / (2 * a))
     assert stopped.q[-1, 0] - 0.3 == pytest.approx(turned, abs=a * STEP**2)
@@ -60,27 +60,25 @@ def test_constant_brake_torque_with_gravity(tmp_path, q0, omega):
 
 
 def test_gravity_lengthens_a_stop_downward(tmp_path):
-    ways = [
-        abs(stop(tmp_path / str(i), ONE, [0.0], [w], [30.0])[0].q[-1, 0]) for i, w in enumerate((-2.0, 2.0))
+    ends = [
+        abs(stop(tmp_path / str(i), ONE, [0.0], [w], [30.0], reaction=1e-9)[0].q[-1, 0])
+        for i, w in enumerate((-2.0, 2.0))
     ]
-    assert ways[0] > 1.5 * ways[1]
+    assert ends[0] > 2 * ends[1]
 
 
-def test_brakes_that_cannot_hold_the_arm_are_undecided(tmp_path):
+def test_brakes_that_are_too_weak_are_undecided(tmp_path):
     with pytest.raises(Undecided, match="do not bring it to a stand"):
-        stop(tmp_path, ONE, [0.0], [-0.1], [M * G * L * 0.98])
+        stop(tmp_path, ONE, [0.0], [-0.1], [M * G * L * 0.02])
 
 
-@pytest.mark.parametrize("share", [0.98, 1.02])
-def test_standing_arm_stays_exactly_when_its_brake_can_hold_it(tmp_path, share):
-    brakes = [M * G * L * share]
-    if share > 1:
-        stopped, _, _ = stop(tmp_path, ONE, [0.0], [0.0], brakes)
-        assert stopped.T_s == 0
-        assert (stopped.q == 0).all()
-    else:
-        with pytest.raises(Undecided):
-            stop(tmp_path, ONE, [0.0], [0.0], brakes)
+def test_standing_arm_stays_exactly_when_its_brake_can_hold_it_and_sinks_otherwise(tmp_path):
+    """A brake 2 % too weak lets it sink to where B |q| = m g L sin |q|."""
+    held, _, _ = stop(tmp_path / "held", ONE, [0.0], [0.0], [M * G * L * 1.02])
+    assert held.T_s == 0
+    assert (held.q == 0).all()
+    sinks, _, _ = stop(tmp_path / "sinks", ONE, [0.0], [0.0], [M * G * L * 0.98])
+    assert sinks.q[-1, 0] == pytest.approx(-brentq(lambda x: np.sin(x) / x - 0.98, 0.1, 1), abs=2e-3)
 
 
 def test_energy_balance_of_two_joints(tmp_path):

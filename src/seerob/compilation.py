@@ -112,7 +112,12 @@ class _Compiler:
     def _robot(self, robot: Robot) -> None:
         self.progress(f"reading {robot.name} ({robot.model})")
         description = load_robot(
-            robot.model, folder=self.folder, packages=robot.packages, meshes=robot.meshes, name=robot.name
+            robot.model,
+            folder=self.folder,
+            packages=robot.packages,
+            meshes=robot.meshes,
+            arguments=robot.arguments,
+            name=robot.name,
         )
         description = by_hand(description, robot, self.file)
         n = len(description.joints())

@@ -44,6 +44,29 @@ def filed(
     return placed
 
 
+SOURCES = f"{OUTSIDE}/sources/"
+"""Below it, files of sources that lie outside the folder: replaying needs samples, not these."""
+
+
+def source_files(references: Iterable[str], *, folder: Path) -> dict[str, bytes]:
+    """Trajectories and motions that the sources of a workstation name, as far as they are files.
+
+    Args:
+        references: What the workstation file calls them; ``library:walk`` is no file.
+        folder: Folder of the workstation file.
+    """
+    found: dict[str, bytes] = {}
+    for reference in references:
+        path = folder / reference
+        try:
+            content = path.read_bytes()
+        except OSError:
+            continue  # opening the source has said so, or says so better
+        name = _inside(PurePosixPath(os.path.relpath(path, folder).replace(os.sep, "/")))
+        found[name if name is not None else SOURCES + path.name] = content
+    return found
+
+
 def _candidates(
     name: str, bases: list[PurePosixPath], packages: Mapping[str, str], folder: Path
 ) -> Iterable[str | None]:

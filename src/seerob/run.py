@@ -120,14 +120,16 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
     return tuple(opened)
 
 
-def scene(model: Model, bound: Sequence[Bound], findings: Iterable[Finding] = ()) -> Scene:
-    """What sinks and the page need to know once."""
+def scene(
+    model: Model, bound: Sequence[Bound], findings: Iterable[Finding] = (), *, files: dict[str, bytes]
+) -> Scene:
+    """What sinks and the page need to know once; ``files`` are what the hash is of."""
     station = model.workstation
     return Scene(
         title=station.title,
         edition=station.edition,
         version=version("seerob"),
-        workstation_hash=content_hash(model.files),
+        workstation_hash=content_hash(files),
         period=station.engine.tick,
         nodes=tuple(
             Node(

@@ -212,7 +212,7 @@ class Node(Struct, frozen=True, kw_only=True):
     name: str
     """Unique full name, such as ``ur10/forearm_link`` or ``line/fixture/pin_2``."""
     role: str
-    """``robot``, ``tool``, ``workpiece``, ``part`` or ``human``."""
+    """``robot``, ``tool``, ``workpiece``, ``part``, ``area`` or ``human``."""
     owner: str
     """The robot, tool, part or human of the workstation file it belongs to."""
     mesh: str | None = None

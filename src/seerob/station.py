@@ -13,6 +13,7 @@ from seerob import run as road
 from seerob.compilation import Progress, compile_workstation
 from seerob.criterion import Criterion
 from seerob.errors import InputError, Problem
+from seerob.filing import SOURCES, source_files
 from seerob.model import Model
 from seerob.reading import read
 from seerob.recording import Recording
@@ -60,7 +61,14 @@ class Station:
     def scene(self, *, with_sources: bool = True) -> Scene:
         """What sinks and the page need to know once."""
         opened = self.sources if with_sources else ()
-        return road.scene(self.model, self.bound, [f for _, o in opened for f in o.findings])
+        return road.scene(self.model, self.bound, [f for _, o in opened for f in o.findings], files=self.files)
+
+    @cached_property
+    def files(self) -> dict[str, bytes]:
+        """The workstation file and every file it names, those of its sources included."""
+        named = [getattr(source, "file", None) for source in self.workstation.sources]
+        references = [name for name in named if isinstance(name, str)]
+        return {**self.model.files, **source_files(references, folder=self.model.folder)}
 
     def with_criteria(self, *criteria: Criterion) -> Station:
         """The same compiled workstation with more safety criteria."""
@@ -88,7 +96,7 @@ class Station:
             raise InputError.at(folder, "", what, "give a folder that may be written") from error
         try:
             for sink in sinks:
-                opened.append(sink.open(scene, self.model.meshes, self.model.files, folder))
+                opened.append(sink.open(scene, self.model.meshes, self.files, folder))
         except BaseException:
             for writer in opened:
                 writer.close()
@@ -169,7 +177,7 @@ class Station:
                 f"set engine.tick = {recording.scene.period} in the workstation file",
             )
         findings = [f for f in recording.scene.findings if f not in self.model.findings]
-        scene = road.scene(self.model, self.bound, findings)
+        scene = road.scene(self.model, self.bound, findings, files=self.files)
         feed = (tuple(tick.samples) for tick in recording.ticks())
         return self.run(folder=folder, sinks=sinks, feed=feed, scene=scene, stop=stop, progress=progress)
 
@@ -202,8 +210,10 @@ def load_recorded(recording: Recording, *, cache: Path | None = None) -> Station
             raise InputError(
                 [*problems, Problem(str(recording.path), "", "cannot be computed from itself", _REMEDY)]
             ) from error
-    now, then = station.model.files, recording.files
-    changed = sorted(name for name in {*now, *then} if now.get(name) != then.get(name))
+        # Read while the folder is there.
+        now, then = station.files, recording.files
+    compared = (name for name in {*now, *then} if not name.startswith(SOURCES))
+    changed = sorted(name for name in compared if now.get(name) != then.get(name))
     if changed:
         what = f"was made with other files than are found now: {', '.join(changed[:6])}"
         raise InputError.at(recording.path, "", what, _REMEDY)

@@ -106,11 +106,10 @@ class VoxelGrid:
             smoothing: Rounds of relaxation; 0 for the faces of the voxels.
             most: Triangles, about; voxels are merged until there are no more. All of them stay inside.
         """
-        cells, pitch = self._marked()
-        origin = cells[1] * self.pitch
-        marked, factor = cells[0], 1
+        (marked, first), pitch, factor = self.marked(), self.pitch, 1
+        origin = first * pitch
         while True:
-            made = marked if factor == 1 else nets.coarser(marked, factor)
+            made = marked.copy() if factor == 1 else nets.coarser(marked, factor)
             corner = origin - (0.0 if factor == 1 else factor * pitch)
             nets.fill_pinches(made)
             points, quads, normals = nets.boundary(made)
@@ -121,13 +120,17 @@ class VoxelGrid:
         faces: Faces = nets.triangles(relaxed, quads)
         return Mesh(relaxed * (pitch * factor) + corner, faces)
 
-    def _marked(self) -> tuple[tuple[Cells, Array], float]:
-        """A copy of the part that is marked, one free layer around it, and the index where it begins."""
+    def marked(self, layers: int = 1) -> tuple[Cells, Array]:
+        """A copy of the part that is marked, free layers around it, and the index where it begins (3,)."""
         low, high = self.bounds()
-        cells = np.zeros(high - low + 3, np.uint8)
+        cells: Cells = np.zeros(high - low + 1 + 2 * layers, np.uint8)
         a, b = low - self.first, high - self.first + 1
-        cells[1:-1, 1:-1, 1:-1] = self.cells[a[0] : b[0], a[1] : b[1], a[2] : b[2]]
-        return (cells, (low - 1).astype(float)), self.pitch
+        cells[layers:-layers, layers:-layers, layers:-layers] = self.cells[a[0] : b[0], a[1] : b[1], a[2] : b[2]]
+        return cells, (low - layers).astype(float)
+
+    def centres(self) -> Array:
+        """Of the marked voxels [m], shape (n, 3)."""
+        return (np.argwhere(self.cells) + (self.first + 0.5)) * self.pitch
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest index of a marked voxel, shape (3,) each.

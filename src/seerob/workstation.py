@@ -104,9 +104,11 @@ class Robot(_Table, frozen=True, kw_only=True):
     base: Pose = Pose()
     """Pose of its root link in the world."""
     meshes: str | None = None
-    """URDF or folder with the maker's meshes, to use instead of the library's envelope."""
+    """The maker's description (as ``model``) whose shapes replace the library's envelope."""
     packages: dict[str, str] = {}
     """Folders of ROS packages that ``package://`` may name."""
+    arguments: dict[str, str] = {}
+    """Values of the arguments of a xacro file."""
     tool: str | None = None
     """Link that is its point of interest; its last mounted tool's ``tcp`` when not given."""
     q: Radians | None = None
@@ -156,7 +158,7 @@ class Thing(_Table, frozen=True, kw_only=True):
 
     name: PathName
     mesh: str | None = None
-    """STL, OBJ, PLY, glTF, COLLADA or 3MF file."""
+    """STL, OBJ, PLY, OFF, glTF, COLLADA or 3MF file."""
     shape: Shape | None = None
     units: str | None = None
     """Unit of the mesh file (``mm``, ``m``, ``inch`` …) when the format does not say."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from itertools import combinations, product
 
 import numpy as np
@@ -167,6 +168,42 @@ def test_singular_polytope_is_unbounded_exactly_across_its_driven_directions(ran
     assert (torques > -10 - 1e-9).all()
     assert (torques < 20 + 1e-9).all()
     assert (np.isclose(torques, -10) | np.isclose(torques, 20)).sum(axis=1).min(initial=9) >= rank
+
+
+def exactly_farthest(A: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
+    """Norm of the farthest corner in rational arithmetic, Cramer's rule on every three planes."""
+    columns = [[Fraction(x) for x in column] for column in A.T.tolist()]
+    bounds = [(Fraction(lo), Fraction(hi)) for lo, hi in zip(low.tolist(), high.tolist(), strict=True)]
+
+    def cross(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
+        return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+    def dot(a: list[Fraction], b: list[Fraction]) -> Fraction:
+        return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
+
+    best = Fraction(0)
+    for i, j, k in combinations(range(len(columns)), 3):
+        a, b, c = columns[i], columns[j], columns[k]
+        volume, across = dot(a, cross(b, c)), (cross(b, c), cross(c, a), cross(a, b))
+        if volume == 0:
+            continue
+        for sides in product(bounds[i], bounds[j], bounds[k]):
+            f = [dot([v[r] for v in across], list(sides)) / volume for r in range(3)]
+            if all(lo <= dot(n, f) <= hi for n, (lo, hi) in zip(columns, bounds, strict=True)):
+                best = max(best, dot(f, f))
+    return float(best) ** 0.5
+
+
+@pytest.mark.parametrize("angle", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_nearly_parallel_planes_lose_no_digits_beyond_their_condition(angle: float) -> None:
+    rng = np.random.default_rng(12)
+    for _ in range(3):
+        A = rng.normal(size=(3, 6))
+        A[:, 1] = A[:, 0] + angle * rng.normal(size=3)
+        A[:, 2] = A[:, 0] - angle * rng.normal(size=3)
+        low, high = -rng.uniform(5, 200, 6), rng.uniform(5, 200, 6)
+        p = zero_moment(A, low, high)
+        assert p.largest == pytest.approx(exactly_farthest(A, low, high), rel=1e-14 / angle)
 
 
 def test_nearly_singular_force_grows_like_one_over_the_singular_value() -> None:

@@ -195,7 +195,7 @@ export interface Snapshot {
 export interface Node {
   /** Unique full name, such as `ur10/forearm_link` or `line/fixture/pin_2`. */
   name: string;
-  /** `robot`, `tool`, `workpiece`, `part` or `human`. */
+  /** `robot`, `tool`, `workpiece`, `part`, `area` or `human`. */
   role: string;
   /** The robot, tool, part or human of the workstation file it belongs to. */
   owner: string;

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console as RichConsole
 
 from seerob.errors import InputError, Problem
+from seerob.figures import against, with_unit
 from seerob.snapshot import Finding, Verdict
 
 if TYPE_CHECKING:
@@ -197,9 +198,10 @@ def extreme(series: Series) -> str:
     if worst.value is None:
         return "no value"
     what = "max" if series.at_most else "min"
-    text = f"{what} {worst.value:.3g} {series.unit} at {worst.t:.2f} s"
+    shown = against(worst.value, worst.limit, series.unit, at_most=series.at_most)
+    text = f"{what} {with_unit(shown.value, series.unit)} at {worst.t:.2f} s"
     if worst.limit is not None:
-        text += f", limit {worst.limit:.3g}"
+        text += f", limit {shown.limit}"
     return text + (f" ({worst.reason})" if worst.reason else "")
 
 

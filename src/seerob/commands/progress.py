@@ -74,7 +74,7 @@ class Announced:
 
     def close(self) -> None:
         """See `Writer.close`."""
-        self._say(f"writing {self._file}")
+        self._announce()
         self._writer.close()
 
     def __enter__(self) -> Self:
@@ -84,8 +84,13 @@ class Announced:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._say(f"writing {self._file}")
+        self._announce()
         self._writer.__exit__(kind, error, trace)
+
+    def _announce(self) -> None:
+        self._say(f"writing {self._file}")
+        if hasattr(self._writer, "progress"):
+            self._writer.progress = lambda done, total: self._say(f"writing {self._file}: {done} of {total}")
 
 
 def announced(writers: Sequence[Writer], files: Sequence[str], say: Callable[[str], None]) -> list[Writer]:

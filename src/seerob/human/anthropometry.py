@@ -1,6 +1,6 @@
 """A body from stature, body mass and sex: where the joints are and what every segment weighs.
 
-Lengths: Drillis and Contini 1966 (fractions of stature; what the paper cites) or de Leva 1996
+Lengths: Drillis and Contini 1966 (fractions of stature; the paper cites Drillis et al. 1964) or de Leva 1996
 (distances of joint centres). Masses, centres and radii of gyration: de Leva 1996, Table 4, or for men the
 regressions of Zatsiorsky and Seluyanov 1979 (what the paper cites). The tables
 with their sources are ``data/*.toml``. What has no published source is a choice that the findings name.

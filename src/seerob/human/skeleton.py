@@ -3,7 +3,7 @@
 Twenty-one bones, 47 joint axes and six of the waist, as many as the paper's digital human has
 [Weistroffer2022]_ §2.3.1; which axes those are is our proposal, the paper does not say.
 
-Frames follow the ISB (Wu and Cappozzo 1995; Wu et al. 2002, 2005): X forward, Y up, Z to the right, in
+Frames follow the ISB (Wu and Cavanagh 1995; Wu et al. 2002, 2005): X forward, Y up, Z to the right, in
 the anatomical position: upright, arms hanging, elbows straight, **palms forward, thumbs outward**. A
 bone's frame lies in its proximal joint; with every joint at 0 all bone frames are parallel. The root
 frame has the workstation's axes (x forward, y left, z up, the floor at 0); the one rotation between the

@@ -2,8 +2,8 @@ r"""Corners and faces of :math:`\{f \in R^3 : l_i \le a_i^T f \le h_i,\ i = 1 \d
 
 Each pair of planes that are not parallel meets in a line
 
-.. math:: p + t\,d,\quad d = a_i \times a_j,\quad
-          p = \frac{(b_i - c\,b_j)\,a_i + (b_j - c\,b_i)\,a_j}{1 - c^2},\quad c = a_i^T a_j
+.. math:: p + t\,d,\quad d = \frac{a_i \times a_j}{s},\quad s = |a_i \times a_j|,\quad
+          p = b_i\,a_i + \frac{b_j - c\,b_i}{s}\; d \times a_i,\quad c = a_i^T a_j
 
 with unit normals, :math:`b` one of the two offsets of each. The other slabs clip the line; what is left
 of it is an edge. A bounded polytope in three dimensions has no corner that is not the end of an edge, so
@@ -103,22 +103,22 @@ def corners(N: Array, l: Array, h: Array, V: Array, planes: Indices, quality: Ar
             dx, dy, dz = dx / s, dy / s, dz / s
             c = ax * bx + ay * by + az * bz
             mj, rj = 0.5 * (l[j] + h[j]), 0.5 * (h[j] - l[j])
-            u0, v0 = (mi - c * mj) / s2, (mj - c * mi) / s2
-            ui, uj = ri / s2, rj / s2
+            ex, ey, ez = dy * az - dz * ay, dz * ax - dx * az, dx * ay - dy * ax
+            w0, wi, wj = (mj - c * mi) / s, -c * ri / s, rj / s
             for k in range(n):
                 if k in (i, j):
                     base[k], by_i[k], by_j[k], half[k] = 0.0, 0.0, 0.0, np.inf
                     continue
                 gi = N[k, 0] * ax + N[k, 1] * ay + N[k, 2] * az
-                gj = N[k, 0] * bx + N[k, 1] * by + N[k, 2] * bz
+                ge = N[k, 0] * ex + N[k, 1] * ey + N[k, 2] * ez
                 along = N[k, 0] * dx + N[k, 1] * dy + N[k, 2] * dz
                 # A parallel line is within or without, whole; its middle is measured across the slab.
-                per = 1.0 / along if abs(along) >= PARALLEL else np.nan
-                weight = per if per == per else 1.0
-                base[k] = (0.5 * (l[k] + h[k]) - (u0 * gi + v0 * gj)) * weight
-                by_i[k] = -ui * (gi - c * gj) * weight
-                by_j[k] = -uj * (gj - c * gi) * weight
-                half[k] = 0.5 * (h[k] - l[k]) * abs(per)
+                lies = abs(along) < PARALLEL
+                per = 1.0 if lies else 1.0 / along
+                base[k] = (0.5 * (l[k] + h[k]) - (mi * gi + w0 * ge)) * per
+                by_i[k] = -(ri * gi + wi * ge) * per
+                by_j[k] = -wj * ge * per
+                half[k] = np.nan if lies else 0.5 * (h[k] - l[k]) * abs(per)
             for side_i in range(2 if ri > 0.0 else 1):
                 si = 2.0 * side_i - 1.0
                 for side_j in range(2 if rj > 0.0 else 1):
@@ -126,7 +126,7 @@ def corners(N: Array, l: Array, h: Array, V: Array, planes: Indices, quality: Ar
                     t0, t1 = -np.inf, np.inf
                     for k in range(n):
                         middle = base[k] + si * by_i[k] + sj * by_j[k]
-                        if half[k] == half[k]:
+                        if not math.isnan(half[k]):
                             t0, t1 = max(t0, middle - half[k]), min(t1, middle + half[k])
                         elif abs(middle) > 0.5 * (h[k] - l[k]) + slack:
                             t0, t1 = np.inf, -np.inf
@@ -136,8 +136,8 @@ def corners(N: Array, l: Array, h: Array, V: Array, planes: Indices, quality: Ar
                         continue
                     if t0 == -np.inf:
                         return UNBOUNDED
-                    u, v = u0 + si * ui - sj * c * uj, v0 + sj * uj - si * c * ui
-                    px, py, pz = u * ax + v * bx, u * ay + v * by, u * az + v * bz
+                    u, w = mi + si * ri, w0 + si * wi + sj * wj
+                    px, py, pz = u * ax + w * ex, u * ay + w * ey, u * az + w * ez
                     for end in range(2):
                         t = t1 if end else t0
                         third = -1

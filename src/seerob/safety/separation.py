@@ -1,7 +1,9 @@
-r"""Protective separation distance, [Weistroffer2022]_ Eq. 2; ISO/TS 15066:2016 5.5.4.2.3."""
+r"""Protective separation distance, ISO/TS 15066:2016 5.5.4.2.3; upper bound: [Weistroffer2022]_ Eq. 2."""
 
 from __future__ import annotations
 
+import weakref
+from collections.abc import Callable
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -9,14 +11,22 @@ from msgspec import Meta, Struct
 
 from seerob import provenance
 from seerob.criterion import Criterion, Evaluate, judge
-from seerob.errors import InputError
-from seerob.model import Model
+from seerob.errors import InputError, Undecided
+from seerob.model import Gap, Model
+from seerob.norms import iso_13855
+from seerob.norms.iso_13855 import WALKING
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.state import State
+from seerob.stop_models import MOVING, Stop, StopModel, bind_stop
+from seerob.stopping import Course, largest_scale, separation_distance, way_of_person, worst_case
 from seerob.transforms import Array
 
-WALKING = 1.6
-"""Speed of a person whose speed is not monitored [m/s], ISO/TS 15066:2016 5.5.4.2.3 (ISO 13855)."""
+__all__ = ["Detection", "Separation", "Stop", "separation_bound"]
+
+TOP = 10.0
+"""Factor on the present speeds beyond which a larger permissible speed is not searched for."""
+HALVINGS, COSTLY_HALVINGS = 14, 6
+"""Of the search for the largest permissible speed."""
 
 
 def separation_bound(v_r: Array, v_h: float, T_r: float, T_s: float, xi: float) -> Array:
@@ -37,15 +47,19 @@ def separation_bound(v_r: Array, v_h: float, T_r: float, T_s: float, xi: float) 
     return (np.maximum(v_r, 0.0) + v_h) * (T_r + T_s) + xi
 
 
-class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How the robot stops."""
+class Detection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the person is detected, for C by ISO 13855."""
 
-    reaction: Annotated[float, Meta(gt=0, extra={"unit": "s"})]
-    """T_r: from the event to the onset of braking, detection and processing included [s]."""
-    stopping: Annotated[float, Meta(gt=0, extra={"unit": "s"})]
-    """T_s: from the onset of braking to standstill [s]."""
-    model: Literal["bound"] = "bound"
-    """``bound``: full speed during the whole stop, Eq. 2."""
+    edition: Literal["2010", "2024"] = "2024"
+    """Of ISO 13855."""
+    approach: Literal["orthogonal", "parallel"] = "parallel"
+    """Across the field, or along it over the floor."""
+    capability: Annotated[float, Meta(gt=0, extra={"unit": "m"})] | None = None
+    """Smallest object that is always seen [m]; when none was demonstrated, the largest C holds."""
+    height: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
+    """Of a field along the floor [m]."""
+    supplement: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
+    """Z of the 2024 edition [m]."""
 
 
 class Separation(Criterion, frozen=True, kw_only=True):
@@ -57,26 +71,27 @@ class Separation(Criterion, frozen=True, kw_only=True):
     between: tuple[str, str]
     """A robot and a human."""
     stop: Stop
-    human_speed: Annotated[float, Meta(gt=0, extra={"unit": "m/s"})] = WALKING
-    """v_h [m/s]; 1.6 m/s is the norm's value for a person whose speed is not monitored."""
+    mode: Literal["dynamic", "fixed"] = "dynamic"
+    """S_p of the present speeds, or the largest that occurred so far."""
+    human_speed: Annotated[float, Meta(gt=0, extra={"unit": "m/s"})] | None = None
+    """v_h [m/s]; when not given, that of ISO 13855 for a person whose speed is not monitored:
+    2 m/s where that leads to S_p of 0.5 m or less, above 1.6 m/s but S_p not below 0.5 m."""
     intrusion: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
     """C: how far a person may reach in before being detected [m], ISO 13855."""
+    detection: Detection | None = None
+    """Instead of ``intrusion``: what C follows from."""
     human_uncertainty: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
     """Z_d: uncertainty of the person's position [m]."""
     robot_uncertainty: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
     """Z_r: uncertainty of the robot's position [m]."""
 
+    def __post_init__(self) -> None:
+        if self.intrusion is not None and self.detection is not None:
+            raise ValueError("give either intrusion or detection")
+
     def subjects(self) -> tuple[str, ...]:
         """The robot and the human."""
         return self.between
-
-    def _missing(self) -> list[str]:
-        named = {
-            "intrusion (C)": self.intrusion,
-            "human_uncertainty (Z_d)": self.human_uncertainty,
-            "robot_uncertainty (Z_r)": self.robot_uncertainty,
-        }
-        return [name for name, value in named.items() if value is None]
 
     def _sides(self, model: Model) -> tuple[str, str]:
         """Robot and human, in that order."""
@@ -88,45 +103,85 @@ class Separation(Criterion, frozen=True, kw_only=True):
         first, second = self.between
         return (first, second) if roles[first] == "robot" else (second, first)
 
+    def _gap(self, model: Model) -> Gap:
+        robot, human = self._sides(model)
+        return model.gap(model.select(human), model.robot(robot).moving)
+
+    def _stop(self, model: Model) -> StopModel:
+        return bind_stop(self.stop, model, model.robot(self._sides(model)[0]), self._gap(model))
+
+    def _intrusion(self) -> tuple[float | None, str, str]:
+        """C [m] when known, why it is not complete, and its source."""
+        if self.detection is None:
+            return self.intrusion, "" if self.intrusion is not None else "intrusion (C)", "workstation file"
+        d = self.detection
+        try:
+            found = iso_13855.intrusion(
+                iso_13855.Approach(d.approach),
+                iso_13855.Edition(d.edition),
+                capability=d.capability,
+                height=d.height,
+            )
+        except Undecided as unknown:
+            return None, str(unknown), ""
+        source = f"{found.source}; {found.note}" if found.note else found.source
+        if d.edition == "2024" and d.supplement is None:
+            return found.value, "detection.supplement (Z of ISO 13855:2024)", source
+        return found.value + (d.supplement or 0.0), "", source
+
+    def _terms(self) -> tuple[tuple[float, float, float], list[str]]:
+        """C, Z_d and Z_r [m], 0 where not known, and what is not known."""
+        C, missing_C, _ = self._intrusion()
+        missing = [missing_C] if missing_C else []
+        if self.human_uncertainty is None:
+            missing.append("human_uncertainty (Z_d)")
+        if self.robot_uncertainty is None:
+            missing.append("robot_uncertainty (Z_r)")
+        return (C or 0.0, self.human_uncertainty or 0.0, self.robot_uncertainty or 0.0), missing
+
+    def _distance(self, course: Course, K: float) -> Array:
+        """S_p of each part [m]."""
+        if self.human_speed is not None:
+            return separation_distance(course, self.human_speed, self.stop.reaction, K)
+        return iso_13855.least_distance(lambda v_h: separation_distance(course, v_h, self.stop.reaction, K))
+
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
-        robot_name, human_name = self._sides(model)
-        robot = model.robot(robot_name)
-        gap = model.gap(model.select(human_name), robot.moving)
-        known = [x for x in (self.intrusion, self.human_uncertainty, self.robot_uncertainty) if x is not None]
-        xi = sum(known) + gap.deviation
-        missing = self._missing()
-        unknown = "" if not missing else f"not given: {', '.join(missing)}; S_p is at least the figure shown"
-        T_r, T_s = self.stop.reaction, self.stop.stopping
+        gap, stop = self._gap(model), self._stop(model)
+        (C, Z_d, Z_r), missing = self._terms()
+        K = C + Z_d + Z_r + gap.deviation
+        reasons = [f"not given: {', '.join(missing)}"] if missing else []
+        unknown = "; ".join([*reasons, *stop.doubts])
+        unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
+        largest = _Largest()
 
         def evaluate(state: State) -> Result:
             found = state.closest_per_body(gap)
-            v_r = np.array([state.fastest_point(i)[0] for i in gap.b])
-            S_p = separation_bound(v_r, self.human_speed, T_r, T_s, xi)
-            margins = found.distance - S_p
-            parts = []
-            for i, body in enumerate(gap.b):
-                verdict = self._verdict(float(found.distance[i]), float(S_p[i]), bool(missing))
-                parts.append(
-                    Result(
-                        name=model.bodies[body].name,
-                        value=float(found.distance[i]),
-                        unit="m",
-                        limit=float(S_p[i]),
-                        at_most=False,
-                        verdict=verdict,
-                        reason=model.bodies[int(found.body_a[i])].name,
-                    )
+            now = stop.courses(state, 1.0)
+            S_p = self._distance(now, K)
+            if self.mode == "fixed":
+                S_p = largest.including(state, S_p)
+            parts = tuple(
+                Result(
+                    name=model.bodies[body].name,
+                    value=float(found.distance[i]),
+                    unit="m",
+                    limit=float(S_p[i]),
+                    at_most=False,
+                    verdict=self._verdict(float(found.distance[i]), float(S_p[i]), bool(unknown)),
+                    reason=model.bodies[int(found.body_a[i])].name,
                 )
-            k = int(margins.argmin())
+                for i, body in enumerate(gap.b)
+            )
+            k = int((found.distance - S_p).argmin())
             verdict = parts[k].verdict
+            where = f"{parts[k].name} ↔ {parts[k].reason}"
             segment = Segment(
                 start=tuple(found.point_b[k].tolist()),
                 end=tuple(found.point_a[k].tolist()),
                 label=f"{found.distance[k]:.2f} m, S_p {S_p[k]:.2f} m",
                 verdict=verdict,
             )
-            where = f"{parts[k].name} ↔ {parts[k].reason}"
             return Result(
                 name=self.name,
                 value=float(found.distance[k]),
@@ -135,11 +190,50 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 at_most=False,
                 verdict=verdict,
                 reason=f"{where}: {unknown}" if verdict is Verdict.UNDECIDED else where,
-                parts=tuple(parts),
+                parts=(
+                    *parts,
+                    *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r)),
+                    *self._permissible(state, stop, now, found.distance, K),
+                ),
                 markers=(segment,),
             )
 
         return evaluate
+
+    def _shown(self, now: Course, k: int, S_p: float, rest: tuple[float, float, float]) -> tuple[Result, ...]:
+        """The terms of S_p of the part that governs; S_h is what the others leave."""
+        S_h = S_p - float(now.S_r[k] + now.S_s[k]) - sum(rest)
+        if self.mode == "dynamic" and self.human_speed is not None:
+            S_h = float(way_of_person(self.human_speed, self.stop.reaction, now.T_s))
+        terms = {
+            "S_h": S_h,
+            "S_r": float(now.S_r[k]),
+            "S_s": float(now.S_s[k]),
+            "C": rest[0],
+            "Z_d": rest[1],
+            "Z_r": rest[2],
+        }
+        return tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
+
+    def _permissible(
+        self, state: State, stop: StopModel, now: Course, distance: Array, K: float
+    ) -> tuple[Result, ...]:
+        """Largest speed of the robot's fastest point for which no part is nearer than its S_p."""
+        speed, factor, reason = None, None, ""
+        if stop.inverse is not None:
+            given = self.human_speed
+            v_h = iso_13855.speed_at(distance) if given is None else np.full(len(distance), given)
+            speed, factor = stop.inverse(now.v_r, distance, v_h, K)
+        elif now.v_r.max() > MOVING:
+            factor = _factor(lambda s: self._distance(stop.courses(state, s), K), distance, stop.costly)
+            speed = factor * float(now.v_r.max())
+            reason = "or more" if factor == (1.0 if stop.costly else TOP) else ""
+        else:
+            reason = "stands still: no motion to scale"
+        return (
+            Result(name="largest permissible speed", value=speed, unit="m/s", reason=reason),
+            Result(name="share of the present speed", value=factor, unit="", reason=reason),
+        )
 
     @staticmethod
     def _verdict(distance: float, S_p: float, incomplete: bool) -> Verdict | None:
@@ -150,41 +244,98 @@ class Separation(Criterion, frozen=True, kw_only=True):
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
         robot, human = self._sides(model)
-        gap = model.gap(model.select(human), model.robot(robot).moving)
-        walking = self.human_speed == WALKING
+        stop = self._stop(model)
         inputs = [
             *provenance.motion(model, robot, human),
-            *provenance.shapes(gap),
+            *provenance.shapes(self._gap(model)),
             provenance.given("T_r", self.stop.reaction, "s"),
-            provenance.given("T_s", self.stop.stopping, "s"),
-            Input(
-                name="v_h",
-                value=self.human_speed,
-                unit="m/s",
-                origin=Origin.STATED if walking else Origin.GIVEN,
-                source="ISO/TS 15066:2016 5.5.4.2.3, from public sources that agree (2S)"
-                if walking
-                else "workstation file",
-            ),
+            *stop.inputs,
         ]
-        for name, value in (
-            ("C", self.intrusion),
-            ("Z_d", self.human_uncertainty),
-            ("Z_r", self.robot_uncertainty),
-        ):
+        if self.stop.model == "simulated":
+            inputs += provenance.masses(model, model.robot(robot))
+        inputs += [self._approach_speed(), self._intrusion_input()]
+        for name, value in (("Z_d", self.human_uncertainty), ("Z_r", self.robot_uncertainty)):
             inputs.append(
                 Input(name=name, unit="m", origin=Origin.MISSING)
                 if value is None
                 else provenance.given(name, value, "m")
             )
+        bound = self.stop.model == "bound"
+        formula = (
+            "S_p = (v_r + v_h)(T_r + T_s) + C + Z_d + Z_r"
+            if bound
+            else f"S_p = v_h (T_r + T_s) + S_r + S_s + C + Z_d + Z_r; {stop.formula}"
+        )
+        fixed = ", the largest so far" if self.mode == "fixed" else ""
+        toward = self.stop.direction == "toward"
         return Basis(
-            formula="S_p = (v_r + v_h)(T_r + T_s) + C + Z_d + Z_r; the distance must not fall below it",
-            source="Weistroffer et al. 2022, Eq. 2 (upper bound of ISO/TS 15066:2016 5.5.4.2.3; "
-            "structure from public sources that agree, no licensed text was opened)",
+            formula=f"{formula}{fixed}; the distance must not fall below it",
+            source=("Weistroffer et al. 2022, Eq. 2 (upper bound of " if bound else "(")
+            + "ISO/TS 15066:2016 5.5.4.2.3; structure from public sources that agree, no licensed text was opened)",
             inputs=tuple(inputs),
             not_modelled=(
-                "deceleration during the stop: full speed is assumed until standstill",
-                "direction: the speed counts in full, also of parts that move away",
+                *stop.not_modelled,
+                *(() if toward else ("direction: the speed counts in full, also of parts that move away",)),
                 "a person whose own speed exceeds v_h",
             ),
         )
+
+    def _approach_speed(self) -> Input:
+        if self.human_speed is None:
+            return Input(
+                name="v_h",
+                value=f"{WALKING} m/s, {iso_13855.REACHING:g} m/s up to S_p = {iso_13855.ARM_REACH} m",
+                unit="",
+                origin=Origin.STATED,
+                source="ISO/TS 15066:2016 5.5.4.2.3 and ISO 13855, from public sources that agree (2S)",
+            )
+        if self.human_speed == WALKING:
+            return Input(
+                name="v_h",
+                value=self.human_speed,
+                unit="m/s",
+                origin=Origin.STATED,
+                source="ISO/TS 15066:2016 5.5.4.2.3, from public sources that agree (2S)",
+            )
+        return provenance.given("v_h", self.human_speed, "m/s")
+
+    def _intrusion_input(self) -> Input:
+        C, missing, source = self._intrusion()
+        if self.detection is None:
+            return (
+                Input(name="C", unit="m", origin=Origin.MISSING)
+                if C is None
+                else provenance.given("C", C, "m")
+            )
+        origin = Origin.MISSING if missing else Origin.STATED
+        note = f"{source}; not known: {missing}" if missing else source
+        return Input(name="C", value=C, unit="m", origin=origin, source=note)
+
+
+class _Largest:
+    """Largest S_p of each part since a run began."""
+
+    def __init__(self) -> None:
+        self._run: Callable[[], State | None] = lambda: None
+        self._t = -np.inf
+        self._S_p = np.zeros(0)
+
+    def including(self, state: State, S_p: Array) -> Array:
+        """The largest, with that of this tick."""
+        if self._run() is not state or state.t < self._t:
+            self._run, self._S_p = weakref.ref(state), S_p
+        self._t = state.t
+        self._S_p = worst_case(np.stack([self._S_p, S_p]))
+        return self._S_p
+
+
+def _factor(S_p: Callable[[float], Array], distance: Array, costly: bool) -> float:
+    """Largest factor of all speeds, found by search, for which no part is nearer than its S_p."""
+
+    def holds(factor: float) -> bool:
+        try:
+            return bool(np.all(S_p(factor) <= distance))
+        except Undecided:
+            return False
+
+    return largest_scale(holds, 1.0, COSTLY_HALVINGS) if costly else largest_scale(holds, TOP, HALVINGS)

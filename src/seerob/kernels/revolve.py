@@ -1,0 +1,103 @@
+"""A set of voxels turned a whole turn about an axis, by way of its profile of radius and height."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from seerob.kernels.fields import Cells
+from seerob.kernels.voxels import HALF_DIAGONAL, MARGIN, TOP
+from seerob.transforms import Array
+
+Sums = NDArray[np.int64]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def profile(radii: Array, heights: Array, pitch: float, half: float, fine: float, rim: float, height: float) -> Sums:
+    """Cells of the half-plane that any of some voxels meets while it turns, summed up over both axes.
+
+    Args:
+        radii: Of the voxels' centres from the axis [m], shape (n,).
+        heights: Likewise along it, 0 and more [m].
+        pitch: Edge of a voxel [m].
+        half: Half of a voxel's extent along the axis [m].
+        fine: Edge of a cell of the half-plane [m].
+        rim: Radius that none passes [m].
+        height: Likewise.
+
+    Returns:
+        How many cells are met below and left of each corner: a box is free when its sum is 0.
+    """
+    nr = int(rim / fine) + 2
+    nz = int(height / fine) + 2
+    met = np.zeros((nr, nz), np.bool_)
+    across = HALF_DIAGONAL * pitch + MARGIN
+    for n in range(len(radii)):
+        r0 = max(0, int(math.floor((radii[n] - across) / fine)))
+        r1 = min(nr - 1, int(math.floor((radii[n] + across) / fine)))
+        z0 = max(0, int(math.floor((heights[n] - half - MARGIN) / fine)))
+        z1 = min(nz - 1, int(math.floor((heights[n] + half + MARGIN) / fine)))
+        for r in range(r0, r1 + 1):
+            for z in range(z0, z1 + 1):
+                met[r, z] = True
+    sums = np.zeros((nr + 1, nz + 1), np.int64)
+    for r in range(nr):
+        for z in range(nz):
+            sums[r + 1, z + 1] = met[r, z] + sums[r, z + 1] + sums[r + 1, z] - sums[r, z]
+    return sums
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def revolve(
+    cells: Cells,
+    full: NDArray[np.int16],
+    origin: Array,
+    pitch: float,
+    sums: Sums,
+    fine: float,
+    anchor: Array,
+    axis: Array,
+    low: float,
+    half: float,
+) -> int:
+    """Mark every voxel that meets the turned profile; returns how many.
+
+    Args:
+        cells: See `seerob.kernels.voxels.stamp`.
+        full: Likewise.
+        origin: Likewise.
+        pitch: Likewise.
+        sums: From `profile`.
+        fine: Likewise.
+        anchor: A point of the axis [m], shape (3,).
+        axis: Unit, shape (3,).
+        low: Height at which the profile begins [m].
+        half: As for `profile`.
+    """
+    nr = sums.shape[0] - 1
+    nz = sums.shape[1] - 1
+    across = HALF_DIAGONAL * pitch
+    marked = 0
+    for i in range(cells.shape[0]):
+        for j in range(cells.shape[1]):
+            for k in range(cells.shape[2]):
+                x = origin[0] + (i + 0.5) * pitch - anchor[0]
+                y = origin[1] + (j + 0.5) * pitch - anchor[1]
+                z = origin[2] + (k + 0.5) * pitch - anchor[2]
+                h = x * axis[0] + y * axis[1] + z * axis[2]
+                r = math.sqrt(max(x * x + y * y + z * z - h * h, 0.0))
+                h -= low
+                r0 = max(0, int(math.floor((r - across) / fine)))
+                r1 = min(nr - 1, int(math.floor((r + across) / fine)))
+                z0 = max(0, int(math.floor((h - half) / fine)))
+                z1 = min(nz - 1, int(math.floor((h + half) / fine)))
+                if r0 > r1 or z0 > z1:
+                    continue
+                if sums[r1 + 1, z1 + 1] - sums[r0, z1 + 1] - sums[r1 + 1, z0] + sums[r0, z0] > 0:
+                    cells[i, j, k] = 1
+                    full[i // TOP, j // TOP, k // TOP] += 1
+                    marked += 1
+    return marked

@@ -1,0 +1,9 @@
+"""Protocols of controllers and machines: codecs as pure functions, and the clients that speak them."""
+
+from __future__ import annotations
+
+from seerob.errors import SeerobError
+
+
+class ProtocolError(SeerobError):
+    """What the other end sent cannot be understood; the connection has to begin anew."""

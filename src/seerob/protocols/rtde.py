@@ -1,0 +1,382 @@
+"""The real-time data exchange (RTDE) of Universal Robots, versions 1 and 2: bytes to messages and back.
+
+A package is big-endian: u16 size of the whole package, u8 kind (an ASCII letter), payload. The client
+names the outputs it wants (``O``), the controller answers with their types, and after ``S`` it sends
+their values (``U``) at a steady rate. Pure functions, for both ends; no input or output here.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+
+from seerob.protocols import ProtocolError
+
+PORT = 30004
+LARGEST = 0xFFFF
+"""Size of a package at most [B]: the field is 16 bits wide."""
+MAX_FIELD_NAMES = 2048
+"""Length of the list of names at most [B]; the controller's own limit."""
+
+_HEADER = struct.Struct(">HB")
+_FORMATS = {
+    "BOOL": "?",
+    "UINT8": "B",
+    "UINT32": "I",
+    "UINT64": "Q",
+    "INT32": "i",
+    "DOUBLE": "d",
+    "VECTOR3D": "3d",
+    "VECTOR6D": "6d",
+    "VECTOR6INT32": "6i",
+    "VECTOR6UINT32": "6I",
+}
+NOT_FOUND = "NOT_FOUND"
+"""Instead of a type: this controller has no such field."""
+
+
+class Kind(IntEnum):
+    """Kind of a package."""
+
+    VERSION = ord("V")
+    CONTROLLER = ord("v")
+    TEXT = ord("M")
+    OUTPUTS = ord("O")
+    INPUTS = ord("I")
+    START = ord("S")
+    PAUSE = ord("P")
+    DATA = ord("U")
+
+
+class Level(IntEnum):
+    """Level of a text message."""
+
+    EXCEPTION = 0
+    ERROR = 1
+    WARNING = 2
+    INFO = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Package:
+    """A whole package, not yet understood."""
+
+    kind: int
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class VersionRequest:
+    """The client would speak this version of the protocol."""
+
+    version: int
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerRequest:
+    """The client asks for the version of the controller's software."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutputsRequest:
+    """The client wants these outputs."""
+
+    fields: tuple[str, ...]
+    frequency: float | None = None
+    """[Hz]; version 1 has none and sends at the controller's own rate."""
+
+
+@dataclass(frozen=True, slots=True)
+class InputsRequest:
+    """A client wants to write these inputs. Never sent by this package; an emulator must understand it."""
+
+    fields: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StartRequest:
+    """The client wants data from now on."""
+
+
+@dataclass(frozen=True, slots=True)
+class PauseRequest:
+    """The client wants no data for now."""
+
+
+@dataclass(frozen=True, slots=True)
+class Accepted:
+    """Answer to a request that is granted or not: version, start or pause."""
+
+    kind: Kind
+    accepted: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerVersion:
+    """Version of the controller's software; CB3 before 5, e-Series and later from 5 on."""
+
+    major: int
+    minor: int
+    bugfix: int
+    build: int
+
+    def __str__(self) -> str:
+        return f"{self.major}.{self.minor}.{self.bugfix}.{self.build}"
+
+
+@dataclass(frozen=True, slots=True)
+class OutputsReply:
+    """Types of the outputs that were asked for, `NOT_FOUND` for one that there is not."""
+
+    recipe: int
+    """Number that the data will carry; version 1 has none: 0."""
+    types: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TextMessage:
+    """The controller says something, at any time."""
+
+    text: str
+    source: str = ""
+    level: int = Level.INFO
+
+
+@dataclass(frozen=True, slots=True)
+class Data:
+    """Values of the outputs, still packed; see `Recipe.unpack`."""
+
+    recipe: int
+    values: bytes
+
+
+Request = VersionRequest | ControllerRequest | OutputsRequest | InputsRequest | StartRequest | PauseRequest
+Reply = Accepted | ControllerVersion | OutputsReply | TextMessage | Data
+Value = bool | int | float | tuple[int, ...] | tuple[float, ...]
+
+
+# -- packages out of a stream -------------------------------------------------------------------
+
+
+class Splitter:
+    """Cuts a stream of bytes into packages, however it was cut on the way. Holds one package at most."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+
+    def feed(self, data: bytes) -> Iterator[Package]:
+        """The packages that are complete now.
+
+        Raises:
+            ProtocolError: A size that cannot be; what follows in the stream means nothing any more.
+        """
+        data = self._rest + data
+        start = 0
+        while len(data) - start >= _HEADER.size:
+            size, kind = _HEADER.unpack_from(data, start)
+            if size < _HEADER.size:
+                raise ProtocolError(f"a package of {size} bytes; the least is {_HEADER.size}")
+            if len(data) - start < size:
+                break
+            package = Package(kind, data[start + _HEADER.size : start + size])
+            start += size
+            self._rest = data[start:]
+            yield package
+        self._rest = data[start:]
+
+
+def pack(kind: int, payload: bytes = b"") -> bytes:
+    """A package with its header.
+
+    Raises:
+        ProtocolError: Larger than a package may be.
+    """
+    size = _HEADER.size + len(payload)
+    if size > LARGEST:
+        raise ProtocolError(f"a package of {size} bytes; the most is {LARGEST}")
+    return _HEADER.pack(size, kind) + payload
+
+
+# -- what the client says -----------------------------------------------------------------------
+
+
+def encode_request(message: Request, version: int) -> bytes:
+    """Bytes of a request in a version (1 or 2) of the protocol."""
+    match message:
+        case VersionRequest():
+            return pack(Kind.VERSION, struct.pack(">H", message.version))
+        case ControllerRequest():
+            return pack(Kind.CONTROLLER)
+        case OutputsRequest():
+            names = ",".join(message.fields).encode("ascii")
+            if version == 1:
+                return pack(Kind.OUTPUTS, names)
+            if message.frequency is None:
+                raise ProtocolError("version 2 needs a frequency")
+            return pack(Kind.OUTPUTS, struct.pack(">d", message.frequency) + names)
+        case InputsRequest():
+            return pack(Kind.INPUTS, ",".join(message.fields).encode("ascii"))
+        case StartRequest():
+            return pack(Kind.START)
+        case PauseRequest():
+            return pack(Kind.PAUSE)
+
+
+def decode_request(package: Package, version: int) -> Request:
+    """What a client asks.
+
+    Raises:
+        ProtocolError: Not a request, or one of the wrong length.
+    """
+    payload = package.payload
+    match package.kind:
+        case Kind.VERSION:
+            return VersionRequest(*_unpack(">H", payload, "version request"))
+        case Kind.CONTROLLER:
+            return ControllerRequest()
+        case Kind.OUTPUTS:
+            if version == 1:
+                return OutputsRequest(_names(payload))
+            if len(payload) < 8:
+                raise ProtocolError(f"an output request of {len(payload)} bytes; it begins with 8 of frequency")
+            return OutputsRequest(_names(payload[8:]), struct.unpack_from(">d", payload)[0])
+        case Kind.INPUTS:
+            return InputsRequest(_names(payload))
+        case Kind.START:
+            return StartRequest()
+        case Kind.PAUSE:
+            return PauseRequest()
+    raise ProtocolError(f"package of kind {package.kind} is no request")
+
+
+def _names(payload: bytes) -> tuple[str, ...]:
+    """Names between commas; ur_rtde ends its list with a comma, so that empty names mean nothing."""
+    return tuple(name for name in payload.decode("latin-1").split(",") if name)
+
+
+# -- what the controller says -------------------------------------------------------------------
+
+
+def encode_reply(message: Reply, version: int) -> bytes:
+    """Bytes of what a controller says in a version (1 or 2) of the protocol."""
+    match message:
+        case Accepted():
+            return pack(message.kind, bytes([message.accepted]))
+        case ControllerVersion():
+            numbers = message.major, message.minor, message.bugfix, message.build
+            return pack(Kind.CONTROLLER, struct.pack(">4I", *numbers))
+        case OutputsReply():
+            types = ",".join(message.types).encode("ascii")
+            return pack(Kind.OUTPUTS, types if version == 1 else bytes([message.recipe]) + types)
+        case TextMessage():
+            text = message.text.encode("utf-8")
+            if version == 1:
+                return pack(Kind.TEXT, bytes([message.level]) + text)
+            text, source = text[:255], message.source.encode("utf-8")[:255]
+            body = bytes([len(text)]) + text + bytes([len(source)]) + source + bytes([message.level])
+            return pack(Kind.TEXT, body)
+        case Data():
+            return pack(Kind.DATA, message.values if version == 1 else bytes([message.recipe]) + message.values)
+
+
+def decode_reply(package: Package, version: int) -> Reply:
+    """What the controller says.
+
+    Raises:
+        ProtocolError: Nothing that it may say, or of the wrong length.
+    """
+    payload = package.payload
+    match package.kind:
+        case Kind.VERSION | Kind.START | Kind.PAUSE:
+            (accepted,) = _unpack(">B", payload, "answer")
+            return Accepted(Kind(package.kind), bool(accepted))
+        case Kind.CONTROLLER:
+            return ControllerVersion(*_unpack(">4I", payload, "controller version"))
+        case Kind.OUTPUTS:
+            recipe, types = (0, payload) if version == 1 else (_first(payload), payload[1:])
+            return OutputsReply(recipe, tuple(types.decode("latin-1").split(",")) if types else ())
+        case Kind.TEXT:
+            return _text(payload, version)
+        case Kind.DATA:
+            return Data(0, payload) if version == 1 else Data(_first(payload), payload[1:])
+    raise ProtocolError(f"package of unknown kind {package.kind}")
+
+
+def _text(payload: bytes, version: int) -> TextMessage:
+    if version == 1:
+        return TextMessage(payload[1:].decode("utf-8", "replace"), level=_first(payload))
+    end = 1 + _first(payload)
+    text, rest = payload[1:end], payload[end:]
+    source, level = rest[1 : 1 + _first(rest)], rest[1 + _first(rest) :]
+    if len(level) != 1:
+        raise ProtocolError("a text message whose lengths do not fit")
+    return TextMessage(text.decode("utf-8", "replace"), source.decode("utf-8", "replace"), level[0])
+
+
+def _first(payload: bytes) -> int:
+    if not payload:
+        raise ProtocolError("a package that ends too early")
+    return payload[0]
+
+
+def _unpack(form: str, payload: bytes, what: str) -> tuple[int, ...]:
+    if len(payload) != struct.calcsize(form):
+        raise ProtocolError(f"{what} of {len(payload)} bytes; it has {struct.calcsize(form)}")
+    return struct.unpack(form, payload)
+
+
+# -- values -------------------------------------------------------------------------------------
+
+
+class Recipe:
+    """How the values of a data package are laid out.
+
+    Args:
+        fields: Names in order.
+        types: Their types.
+        number: The recipe's number; data of another one is not for it.
+
+    Raises:
+        ProtocolError: Another number of types than of fields, or a type that is none.
+    """
+
+    def __init__(self, fields: tuple[str, ...], types: tuple[str, ...], number: int) -> None:
+        if len(fields) != len(types):
+            raise ProtocolError(f"{len(types)} types for {len(fields)} fields")
+        wrong = [f"{t[:40]!r} of {f}" for f, t in zip(fields, types, strict=True) if t not in _FORMATS]
+        if wrong:
+            raise ProtocolError(f"types that are none: {', '.join(wrong[:4])}")
+        self.fields, self.types, self.number = fields, types, number
+        self._struct = struct.Struct(">" + "".join(_FORMATS[t] for t in types))
+        self._slices: list[tuple[str, int, int]] = []
+        at = 0
+        for field, kind in zip(fields, types, strict=True):
+            width = int(_FORMATS[kind][0]) if kind.startswith("VECTOR") else 1
+            self._slices.append((field, at, width if kind.startswith("VECTOR") else 0))
+            at += width
+
+    @property
+    def size(self) -> int:
+        """Length of the values [B]."""
+        return self._struct.size
+
+    def unpack(self, values: bytes) -> dict[str, Value]:
+        """Values by field.
+
+        Raises:
+            ProtocolError: Of another length than this recipe's.
+        """
+        if len(values) != self._struct.size:
+            raise ProtocolError(f"data of {len(values)} bytes; the recipe has {self._struct.size}")
+        flat = self._struct.unpack(values)
+        return {name: flat[at : at + width] if width else flat[at] for name, at, width in self._slices}
+
+    def pack(self, values: dict[str, Value]) -> bytes:
+        """The values of every field, packed."""
+        flat: list[bool | int | float] = []
+        for name, _, width in self._slices:
+            value = values[name]
+            flat.extend(value if width and isinstance(value, tuple) else (value,))  # type: ignore[arg-type]
+        return self._struct.pack(*flat)

@@ -1,0 +1,98 @@
+"""Reachable volumes: nothing in the limits is missed, closed forms."""
+
+import mujoco
+import numpy as np
+import pytest
+from made_cell import TWO_R, made, two_r
+from made_sweep import inside, points_of
+
+from seerob.errors import InputError
+from seerob.reachable import reachable_volume
+
+LIMITED = """<robot name="arm"><link name="base"/>
+<link name="a"><collision><origin xyz="0.3 0 0"/><geometry><box size="0.6 0.08 0.08"/></geometry></collision></link>
+<link name="b"><collision><origin xyz="0.2 0 0" rpy="0 1.5708 0"/><geometry><cylinder radius="0.05" length="0.4"/>
+</geometry></collision></link>
+<link name="c"><collision><origin xyz="0.1 0 0.03"/><geometry><sphere radius="0.06"/></geometry></collision></link>
+<joint name="j1" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
+<limit lower="-0.6" upper="1.1" effort="1" velocity="1"/></joint>
+<joint name="j2" type="{kind}"><parent link="a"/><child link="b"/><origin xyz="0.6 0 0" rpy="0 0.2 0"/>
+<axis xyz="0 1 0"/>{range}</joint>
+<joint name="j3" type="prismatic"><parent link="b"/><child link="c"/><origin xyz="0.4 0 0"/><axis xyz="1 0 0"/>
+<limit lower="-0.05" upper="0.15" effort="1" velocity="1"/></joint></robot>"""
+
+
+def limited(folder, kind="revolute", limits='<limit lower="-1" upper="0.7" effort="1" velocity="1"/>'):
+    text = LIMITED.replace("{kind}", kind).replace("{range}", limits)
+    return made(folder, TWO_R, {"arm.urdf": text}).model
+
+
+def outside(model, contained, count, rng, turns=np.pi):
+    """How many random points of the moving bodies, at random joint positions within the limits, are outside."""
+    mechanism = model.mechanism("arm")
+    data, wrong = mujoco.MjData(model.mj), 0
+    low, high = np.maximum(mechanism.lower, -turns), np.minimum(mechanism.upper, turns)
+    for _ in range(count):
+        q = rng.uniform(low, high)
+        ends = rng.random(len(q)) < 0.3
+        q[ends] = np.where(rng.random(len(q)) < 0.5, low, high)[ends]
+        data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
+        mujoco.mj_kinematics(model.mj, data)
+        for i in model.select("arm"):
+            body = model.bodies[i]
+            for solid in body.solids:
+                points = points_of(solid, 20, rng) @ data.xmat[body.mj].reshape(3, 3).T + data.xpos[body.mj]
+                wrong += int((~contained(points)).sum())
+    return wrong
+
+
+@pytest.mark.parametrize(
+    "more", [(), ("continuous", '<limit effort="1" velocity="1"/>')], ids=["limits", "whole turn"]
+)
+def test_nothing_within_the_limits_is_outside(tmp_path, more):
+    model = limited(tmp_path, *more)
+    reach = reachable_volume(model, model.select("arm"), voxel=0.04)
+    rng = np.random.default_rng(0)
+    assert outside(model, reach.grid.contains, 2000, rng) == 0
+    mesh = reach.mesh()
+    assert outside(model, lambda p: inside(mesh, p), 30, rng) == 0
+
+
+def test_joint_that_is_not_there_yet_is_not_reached(tmp_path):
+    """Behind the base, opposite to the limits of the first joint, is free."""
+    model = limited(tmp_path)
+    reach = reachable_volume(model, model.select("arm"), voxel=0.02)
+    behind = np.column_stack([np.full(50, -0.3), np.linspace(-1, 1, 50), np.zeros(50)])
+    assert not reach.grid.contains(behind).any()
+
+
+def test_planar_arm_reaches_a_disc_and_finer_voxels_come_nearer(tmp_path):
+    """Two links of 1 m × 0.1 m × 0.1 m that turn freely: a disc of 2 m, and the rims of the corners."""
+    model = made(tmp_path, TWO_R, {"arm.urdf": two_r()}).model
+    disc = np.pi * (1 + np.hypot(1, 0.05)) ** 2 * 0.1
+    volumes = [reachable_volume(model, model.select("arm"), voxel=v).volume for v in (0.06, 0.03)]
+    assert disc < volumes[1] < volumes[0]
+    assert volumes[1] < np.pi * (2 + 5 * 0.03) ** 2 * (0.1 + 5 * 0.03)
+
+
+def test_whole_ur10_with_its_tool_is_within_the_sum_of_its_lengths(tmp_path):
+    model = made(tmp_path, '[[robots]]\nname = "arm"\nmodel = "library:ur10"\n').model
+    shares = []
+    reach = reachable_volume(model, model.select("arm"), voxel=0.06, progress=shares.append)
+    assert outside(model, reach.grid.contains, 300, np.random.default_rng(2)) == 0
+    low, high = reach.grid.bounds()
+    assert 1.1 < (high[0] + 1) * 0.06 < 2.2
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+
+
+def test_slide_without_limits_is_refused(tmp_path):
+    text = two_r().replace('type="continuous"', 'type="prismatic"', 1)
+    with pytest.raises(InputError):
+        model = made(tmp_path, TWO_R, {"arm.urdf": text}).model
+        reachable_volume(model, model.select("arm"), voxel=0.05)
+
+
+def test_stopped_is_nothing(tmp_path):
+    model = limited(tmp_path)
+    assert reachable_volume(model, model.select("arm"), voxel=0.05, stop=lambda: True) is None

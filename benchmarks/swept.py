@@ -19,8 +19,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import coal
-from made_sweep import missed
 
+from made_sweep import missed
 from seerob.model import Model
 from seerob.station import load
 from seerob.swept import swept_volume
@@ -78,9 +78,7 @@ def main() -> int:
                 f"   volume {swept.volume:.4f} m³, dilated for motion by {swept.mean_dilation * 1e3:.1f} mm "
                 f"(at most {swept.dilation * 1e3:.1f} mm), {swept.stamps} stamps"
             )
-            wrong = missed(
-                model, bodies, {"ur10": q}, swept.grid.contains, points, np.random.default_rng(1)
-            )
+            wrong = missed(model, bodies, {"ur10": q}, swept.grid.contains, points, np.random.default_rng(1))
             failed |= wrong > 0
             print(f"   {points} random points of the moving meshes at random times: {wrong} outside")
         if not options.smoke:

@@ -37,7 +37,8 @@ def missed(model, bodies, motion, contained, count, rng):
         data.qpos[:] = (1 - share) * qpos[i] + share * qpos[i + 1]
         mujoco.mj_kinematics(model.mj, data)
         points = [
-            points_of(solid, 64, rng) @ data.xmat[body].reshape(3, 3).T + data.xpos[body] for body, solid in solids
+            points_of(solid, 64, rng) @ data.xmat[body].reshape(3, 3).T + data.xpos[body]
+            for body, solid in solids
         ]
         wrong += int((~contained(np.vstack(points))).sum())
     return wrong

@@ -3,9 +3,9 @@
 import mujoco
 import numpy as np
 import pytest
+
 from made_cell import TWO_R, made, two_r
 from made_sweep import inside, points_of
-
 from seerob.errors import InputError
 from seerob.reachable import reachable_volume
 

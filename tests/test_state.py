@@ -14,6 +14,7 @@ from oracles import pinocchio_oracle as oracle
 from seerob.errors import Undecided
 from seerob.model_io import library
 from seerob.safety.kinetic_energy import kinetic_energy
+from seerob.state import State
 from seerob.transforms import rotation_from_rpy
 
 LIBRARY = library.names()
@@ -331,10 +332,10 @@ def test_a_shape_that_may_be_off_is_faster_by_that_much(cell):
     body = next(b for b in cell.model.bodies if b.name == "grip")
     plain = state.fastest_point(body.index)[0]
     thick = replace(body, solids=tuple(replace(s, deviation=0.01) for s in body.solids))
-    other = moved(cell, 0.0)
     bodies = list(cell.model.bodies)
     bodies[body.index] = thick
-    other.model = replace(cell.model, bodies=tuple(bodies))
+    other = State(replace(cell.model, bodies=tuple(bodies)), state.data, state.hearings)
+    other.refresh(state.t)
     omega = np.linalg.norm(state.body_velocity(body.index)[1])
     assert other.fastest_point(body.index)[0] == pytest.approx(plain + 0.01 * omega)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_cell import FLOATING, TWO_R, made, state_at, two_r
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from made_cell import FLOATING, TWO_R, made, state_at, two_r
 from seerob.errors import Undecided
 from seerob.kernels.braking import braked
 from seerob.stop_simulation import STEP, StopSimulation
@@ -15,12 +15,12 @@ from seerob.stop_simulation import STEP, StopSimulation
 M, L, G = 2.0, 0.8, 9.81
 INERTIA = M * L**2
 ONE = (
-    '<robot name="one"><link name="base"/><link name="l1"><inertial><origin xyz="{L} 0 0"/><mass value="{M}"/>'
+    f'<robot name="one"><link name="base"/><link name="l1"><inertial><origin xyz="{L} 0 0"/><mass value="{M}"/>'
     '<inertia ixx="1e-12" iyy="1e-12" izz="1e-12" ixy="0" ixz="0" iyz="0"/></inertial>'
     '<collision><origin xyz="0.4 0 0"/><geometry><box size="0.8 0.1 0.1"/></geometry></collision></link>'
     '<joint name="j1" type="continuous"><parent link="base"/><child link="l1"/><axis xyz="0 -1 0"/>'
     '<limit effort="100" velocity="10"/></joint></robot>'
-).format(L=L, M=M)
+)
 """A point mass on a rod; the joint angle is the rod's elevation."""
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+
 from made_cell import TWO_R, made, two_r
 from made_sweep import inside, missed
-
 from seerob.errors import InputError
 from seerob.swept import Sweep, swept_volume
 
@@ -116,9 +116,7 @@ def test_parts_of_a_trajectory_unite_to_the_whole(ur10):
 def test_memory_is_asked_for_before_anything_is_swept(ur10):
     told = []
     with pytest.raises(InputError, match=r"voxel: 1e-05 m needs .* MB .*; use voxels of .* m or more"):
-        swept_volume(
-            ur10, ur10.select("arm"), {"arm": np.zeros((5, 6))}, voxel=1e-5, progress=told.append
-        )
+        swept_volume(ur10, ur10.select("arm"), {"arm": np.zeros((5, 6))}, voxel=1e-5, progress=told.append)
     assert told == []
 
 
@@ -138,7 +136,8 @@ def test_voxel_must_be_a_length(ur10, voxel):
 
 
 @pytest.mark.parametrize(
-    ("q", "says"), [(np.full((2, 6), np.nan), "is nan"), (np.zeros((2, 5)), "give 6"), (np.zeros((0, 6)), "1 or more")]
+    ("q", "says"),
+    [(np.full((2, 6), np.nan), "is nan"), (np.zeros((2, 5)), "give 6"), (np.zeros((0, 6)), "1 or more")],
 )
 def test_motion_that_does_not_fit_is_refused(ur10, q, says):
     with pytest.raises(InputError, match=says):
@@ -146,7 +145,7 @@ def test_motion_that_does_not_fit_is_refused(ur10, q, says):
 
 
 def test_progress_rises_to_one_and_stop_stops(ur10):
-    motion = {"arm": wander(100, np.random.default_rng(6), 0.02)}
+    motion = {"arm": wander(200, np.random.default_rng(6), 0.02)}
     shares = []
     whole = swept_volume(ur10, ur10.select("ball"), motion, voxel=0.05, progress=shares.append)
     assert shares == sorted(shares)

@@ -212,7 +212,10 @@ def reach_box(model: Model, bodies: Sequence[int]) -> tuple[Array, Array]:
         beyond = body.radius + body.deviation
         chain = chain_of(model, index)
         if not chain:
-            low, high = np.minimum(low, (corners - beyond).min(axis=0)), np.maximum(high, (corners + beyond).max(axis=0))
+            low, high = (
+                np.minimum(low, (corners - beyond).min(axis=0)),
+                np.maximum(high, (corners + beyond).max(axis=0)),
+            )
             continue
         anchors = data.xanchor[list(chain)]
         length = float(np.linalg.norm(np.diff(anchors, axis=0), axis=1).sum())
@@ -240,7 +243,9 @@ def posed(model: Model, motion: Mapping[str, Array]) -> Array:
     """
     lengths = {len(q) for q in motion.values()}
     if len(lengths) != 1 or 0 in lengths:
-        raise InputError.at("motion", "", f"{sorted(lengths)} samples", "give each the same number, 1 or more")
+        raise InputError.at(
+            "motion", "", f"{sorted(lengths)} samples", "give each the same number, 1 or more"
+        )
     out = np.tile(np.asarray(model.mj.qpos0, float), (lengths.pop(), 1))
     for name, mechanism in model.mechanisms.items():
         q = np.asarray(motion.get(name, mechanism.home[None]), float)

@@ -172,7 +172,7 @@ class _Work:
             some = slice(k, k + 16)
             grid.count += stamp(
                 grid.cells, grid.full, grid.origin, grid.pitch, core.nodes, core.start, core.spacing,
-                core.low, core.high, R[some], x[some], np.full(len(R[some]), reach),
+                core.low, core.high, R[some], x[some], np.full(len(R[some]), reach), 0, grid.full.shape[0],
             )  # fmt: skip
         self.stamps += count
         return True
@@ -194,9 +194,20 @@ class _Work:
         turned.cover(ends.min(axis=0) - side, ends.max(axis=0) + side)
         pitch = self.voxel / 4
         half = self.voxel / 2 * float(np.abs(screw.axis).sum())
-        plane = profile(np.concatenate(radii), np.concatenate(heights) - low, self.voxel, half, pitch, rim, high - low)
+        plane = profile(
+            np.concatenate(radii), np.concatenate(heights) - low, self.voxel, half, pitch, rim, high - low
+        )
         turned.count = revolve(
-            turned.cells, turned.full, turned.origin, self.voxel, plane, pitch, screw.anchor, screw.axis, low, half
+            turned.cells,
+            turned.full,
+            turned.origin,
+            self.voxel,
+            plane,
+            pitch,
+            screw.anchor,
+            screw.axis,
+            low,
+            half,
         )
         return turned
 

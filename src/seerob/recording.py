@@ -276,7 +276,9 @@ class Recording:
         listed = [self._topics.get(channel) for channel in chunk.channels]
         # Message indexes have no checksum: what no recorder would write is looked up in the chunk.
         plausible = len(set(listed)) == len(listed) and None not in listed
-        if not plausible or (listed not in ([SCENE], [VIEW_SCENE]) and not _TICK <= set(listed) <= _TICK_VIEWS):
+        if not plausible or (
+            listed not in ([SCENE], [VIEW_SCENE]) and not _TICK <= set(listed) <= _TICK_VIEWS
+        ):
             listed = [self._topics.get(m.channel) for m in self._chunk(chunk)]
         return any(topic in topics for topic in listed)
 

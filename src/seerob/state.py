@@ -15,6 +15,7 @@ import numpy as np
 
 from seerob.distance import Closest, Closests
 from seerob.errors import Undecided
+from seerob.kernels.speed import fastest, stacked
 from seerob.model import Frame, Gap, Mechanism, Model
 from seerob.transforms import Array
 
@@ -87,7 +88,9 @@ class State:
         self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
         self._cache: dict[Any, Any] = {}
         self._jacp, self._jacr = np.zeros((3, model.mj.nv)), np.zeros((3, model.mj.nv))
-        self._velocity = np.zeros(6)
+        self._mj_roots = model.mj.body_rootid[self._mj_ids]
+        self._corners = stacked([body.corners for body in model.bodies])
+        self._reach = np.array([body.radius + body.deviation for body in model.bodies])
 
     def refresh(self, t: float) -> None:
         """Take the engine's new positions and velocities; called once per tick by the engine."""
@@ -199,46 +202,46 @@ class State:
 
     def body_velocity(self, index: int) -> tuple[Array, Array]:
         """Linear velocity at its origin [m/s] and angular velocity [rad/s] of a body, world axes."""
-        body = self.model.bodies[index]
-        if body.carrier:
-            self.require(body.carrier)
-        key = ("v", index)
-        if key not in self._cache:
-            mujoco.mj_objectVelocity(
-                self.model.mj, self.data, mujoco.mjtObj.mjOBJ_XBODY, body.mj, self._velocity, 0
-            )
-            # mj_objectVelocity puts rotation first.
-            self._cache[key] = self._velocity[3:].copy(), self._velocity[:3].copy()
-        linear, angular = self._cache[key]
+        self._require_carrier(index)
+        linear, angular = self._velocities()
+        return linear[index], angular[index]
+
+    def _require_carrier(self, index: int) -> None:
+        carrier = self.model.bodies[index].carrier
+        if carrier:
+            self.require(carrier)
+
+    def _velocities(self) -> tuple[Array, Array]:
+        """Linear and angular velocities of all bodies at their origins, shape (n, 3) each."""
+        if "v" not in self._cache:
+            twist = self.data.cvel[self._mj_ids]
+            # MuJoCo's twists are rotation first, and at the centre of mass of the whole tree.
+            arm = self.positions - self.data.subtree_com[self._mj_roots]
+            angular = np.ascontiguousarray(twist[:, :3])
+            self._cache["v"] = twist[:, 3:] + np.cross(angular, arm), angular
+        linear, angular = self._cache["v"]
         return linear, angular
 
     def fastest_point(self, index: int) -> tuple[float, Array, Array]:
         """Bound on the speed of any point of a body, and the point where it is largest.
 
-        The speed of a rigid body is a convex function of the point, so over a convex hull it is
-        largest at a corner; a dilation by r adds at most ``|ω| r``. So does a real surface that lies
-        outside the shape.
+        Its real surface may lie `Body.deviation` outside its shape; that is in the bound.
 
         Returns:
             Speed [m/s], the corner in the world [m] (3,), its velocity [m/s] (3,).
         """
-        body = self.model.bodies[index]
-        if body.carrier:
-            self.require(body.carrier)
-        key = ("fastest", index)
-        if key not in self._cache:
-            linear, angular = self.body_velocity(index)
-            arms = body.corners @ self.rotations[index].T
-            x, y, z = angular.tolist()
-            # numpy.cross costs five times as much.
-            velocities = linear + arms @ np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-            squares = np.einsum("ij,ij->i", velocities, velocities)
-            k = int(squares.argmax())
-            reach = body.radius + body.deviation
-            speed = float(np.sqrt(squares[k]) + np.linalg.norm(angular) * reach)
-            self._cache[key] = speed, self.positions[index] + arms[k], velocities[k]
-        speed, point, velocity = self._cache[key]
-        return speed, point, velocity
+        self._require_carrier(index)
+        if "fastest" not in self._cache:
+            n = len(self.positions)
+            speed, point, velocity = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
+            corners, start = self._corners
+            fastest(
+                self.rotations, self.positions, *self._velocities(), corners, start, self._reach,
+                speed, point, velocity,
+            )  # fmt: skip
+            self._cache["fastest"] = speed, point, velocity
+        speed, point, velocity = self._cache["fastest"]
+        return float(speed[index]), point[index], velocity[index]
 
     # -- distances --------------------------------------------------------------------------
 

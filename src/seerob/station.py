@@ -61,7 +61,9 @@ class Station:
     def scene(self, *, with_sources: bool = True) -> Scene:
         """What sinks and the page need to know once."""
         opened = self.sources if with_sources else ()
-        return road.scene(self.model, self.bound, [f for _, o in opened for f in o.findings], files=self.files)
+        return road.scene(
+            self.model, self.bound, [f for _, o in opened for f in o.findings], files=self.files
+        )
 
     @cached_property
     def files(self) -> dict[str, bytes]:

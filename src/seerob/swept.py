@@ -32,8 +32,14 @@ SLACK = 0.5
 """Dilation for the motion between stamps that pieces are made small for [voxels]."""
 FINEST = 64
 """Pieces between two samples, at most; a power of 2. Beyond it the dilation grows instead."""
-SPACING = 0.5
+SPACING = 0.75
 """Of the nodes of a mesh's field [voxels]."""
+MANY = 100
+"""Stamps from which on threads share them."""
+SLAB = 3
+"""Blocks of the grid that a thread takes at a time."""
+BATCH = 64
+"""Samples between two reports of progress."""
 BAND = 0.9
 """Up to where fields are exact, beyond the slack: a little more than half of half a diagonal [voxels]."""
 CUBIC = 4.0 / 27.0
@@ -162,19 +168,39 @@ class Sweep:
 
     def flush(self) -> None:
         """Mark what was enqueued."""
-        grid = self.grid
-        for core, queue in zip(self.cores, self._queue, strict=True):
-            if not queue:
-                continue
-            reach = np.array([entry[2] for entry in queue])
-            grid.count += stamp(
-                grid.cells, grid.full, grid.origin, grid.pitch, core.nodes, core.start, core.spacing, core.low, core.high,
-                np.array([entry[0] for entry in queue]), np.array([entry[1] for entry in queue]),
-                reach + core.radius,
+        grid, blocks = self.grid, self.grid.full.shape[0]
+        work = [
+            (
+                core,
+                np.array([e[0] for e in queue]),
+                np.array([e[1] for e in queue]),
+                np.array([e[2] for e in queue]),
+            )
+            for core, queue in zip(self.cores, self._queue, strict=True)
+            if queue
+        ]
+
+        def mark(begin: int, end: int) -> int:
+            return sum(
+                stamp(
+                    grid.cells, grid.full, grid.origin, grid.pitch, core.nodes, core.start, core.spacing,
+                    core.low, core.high, R, x, reach + core.radius, begin, end,
+                )
+                for core, R, x, reach in work
             )  # fmt: skip
+
+        stamps = sum(len(reach) for *_, reach in work)
+        if stamps < MANY:
+            grid.count += mark(0, blocks)
+        else:
+            edges = range(0, blocks + SLAB, SLAB)
+            with ThreadPoolExecutor(os.cpu_count()) as pool:
+                grid.count += sum(pool.map(mark, edges[:-1], edges[1:]))
+        for *_, reach in work:
             self.dilation = max(self.dilation, float(reach.max()))
             self._total += float(reach.sum())
-            self.stamps += len(queue)
+        self.stamps += stamps
+        for queue in self._queue:
             queue.clear()
 
     def clear(self) -> None:
@@ -240,7 +266,7 @@ def swept_volume(
     sweep.start(qpos[0])
     for i in range(1, len(qpos)):
         sweep.enqueue(qpos[i])
-        if i % 16 == 0 or i == len(qpos) - 1:
+        if i % BATCH == 0 or i == len(qpos) - 1:
             sweep.flush()
             progress(i / (len(qpos) - 1))
             if stop():

@@ -81,7 +81,10 @@ class VoxelGrid:
         full = np.zeros(-(-np.array(cells.shape) // TOP), np.int16)
         if self.cells.size:
             # Whole blocks, so that the counts stay right.
-            for old, new, at in ((self.cells, cells, self.first - first), (self.full, full, (self.first - first) // TOP)):
+            for old, new, at in (
+                (self.cells, cells, self.first - first),
+                (self.full, full, (self.first - first) // TOP),
+            ):
                 i, j, k = at
                 nx, ny, nz = old.shape
                 new[i : i + nx, j : j + ny, k : k + nz] = old
@@ -125,7 +128,9 @@ class VoxelGrid:
         low, high = self.bounds()
         cells: Cells = np.zeros(high - low + 1 + 2 * layers, np.uint8)
         a, b = low - self.first, high - self.first + 1
-        cells[layers:-layers, layers:-layers, layers:-layers] = self.cells[a[0] : b[0], a[1] : b[1], a[2] : b[2]]
+        cells[layers:-layers, layers:-layers, layers:-layers] = self.cells[
+            a[0] : b[0], a[1] : b[1], a[2] : b[2]
+        ]
         return cells, (low - layers).astype(float)
 
     def centres(self) -> Array:
@@ -153,7 +158,9 @@ class VoxelGrid:
 def check_pitch(pitch: float, *, file: str = "swept volume", key: str = "voxel") -> None:
     """Refuse what is no edge of a voxel [m]."""
     if not (math.isfinite(pitch) and pitch > 0):
-        raise InputError.at(file, key, f"{pitch} is not a length", "give the edge of a voxel in m, such as 0.01")
+        raise InputError.at(
+            file, key, f"{pitch} is not a length", "give the edge of a voxel in m, such as 0.01"
+        )
 
 
 def check_room(low: Array, high: Array, pitch: float, memory: float | None = None) -> None:

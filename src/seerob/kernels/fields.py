@@ -35,7 +35,14 @@ DOWN = 1.0 - 1e-6
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def mesh_field(
-    nodes: Array, links: Links, T: Array, closed: bool, start: Array, spacing: float, shape: Indices, band: float
+    nodes: Array,
+    links: Links,
+    T: Array,
+    closed: bool,
+    start: Array,
+    spacing: float,
+    shape: Indices,
+    band: float,
 ) -> Field:
     """Field of a mesh and its inside.
 

@@ -16,7 +16,9 @@ Sums = NDArray[np.int64]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def profile(radii: Array, heights: Array, pitch: float, half: float, fine: float, rim: float, height: float) -> Sums:
+def profile(
+    radii: Array, heights: Array, pitch: float, half: float, fine: float, rim: float, height: float
+) -> Sums:
     """Cells of the half-plane that any of some voxels meets while it turns, summed up over both axes.
 
     Args:

@@ -102,6 +102,8 @@ def stamp(
     rotations: Array,
     positions: Array,
     reaches: Array,
+    begin: int,
+    end: int,
 ) -> int:
     """Mark the voxels that a set touches at each of its poses.
 
@@ -118,6 +120,8 @@ def stamp(
         rotations: world_from_set, shape (N, 3, 3).
         positions: Likewise [m], shape (N, 3).
         reaches: How far the set is dilated at each pose [m], shape (N,).
+        begin: First block along x that is marked; threads that mark different blocks do not meet.
+        end: Block that is no longer marked.
 
     Returns:
         How many voxels were marked anew.
@@ -139,7 +143,7 @@ def stamp(
                 extent += abs(R[r, s]) * (high[s] - low[s]) / 2.0
             first[r] = max(0, int(math.floor((middle - extent) / pitch))) // TOP * TOP
             last[r] = min(cells.shape[r] - 1, int(math.floor((middle + extent) / pitch)))
-        for I in range(first[0], last[0] + 1, TOP):
+        for I in range(max(first[0], begin * TOP), min(last[0] + 1, end * TOP), TOP):
             for J in range(first[1], last[1] + 1, TOP):
                 for K in range(first[2], last[2] + 1, TOP):
                     stack[0, 0] = I
@@ -170,7 +174,10 @@ def stamp(
                             continue
                         if b > 1:
                             # A block of two is done sooner than it is looked up.
-                            if b > 2 and signed_at_most(field, start, spacing, low, high, x, y, z) + ball <= reach:
+                            if (
+                                b > 2
+                                and signed_at_most(field, start, spacing, low, high, x, y, z) + ball <= reach
+                            ):
                                 for p in range(i, min(i + b, nx)):
                                     for q in range(j, min(j + b, ny)):
                                         for s in range(k, min(k + b, nz)):

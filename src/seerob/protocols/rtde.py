@@ -8,7 +8,6 @@ their values (``U``) at a steady rate. Pure functions, for both ends; no input o
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -164,27 +163,28 @@ class Splitter:
     """Cuts a stream of bytes into packages, however it was cut on the way. Holds one package at most."""
 
     def __init__(self) -> None:
-        self._rest = b""
+        self._rest = bytearray()
 
-    def feed(self, data: bytes) -> Iterator[Package]:
+    def feed(self, data: bytes) -> list[Package]:
         """The packages that are complete now.
 
         Raises:
             ProtocolError: A size that cannot be; what follows in the stream means nothing any more.
         """
-        data = self._rest + data
+        rest = self._rest
+        rest += data
+        packages: list[Package] = []
         start = 0
-        while len(data) - start >= _HEADER.size:
-            size, kind = _HEADER.unpack_from(data, start)
+        while len(rest) - start >= _HEADER.size:
+            size, kind = _HEADER.unpack_from(rest, start)
             if size < _HEADER.size:
                 raise ProtocolError(f"a package of {size} bytes; the least is {_HEADER.size}")
-            if len(data) - start < size:
+            if len(rest) - start < size:
                 break
-            package = Package(kind, data[start + _HEADER.size : start + size])
+            packages.append(Package(kind, bytes(rest[start + _HEADER.size : start + size])))
             start += size
-            self._rest = data[start:]
-            yield package
-        self._rest = data[start:]
+        del rest[:start]
+        return packages
 
 
 def pack(kind: int, payload: bytes = b"") -> bytes:
@@ -240,7 +240,9 @@ def decode_request(package: Package, version: int) -> Request:
             if version == 1:
                 return OutputsRequest(_names(payload))
             if len(payload) < 8:
-                raise ProtocolError(f"an output request of {len(payload)} bytes; it begins with 8 of frequency")
+                raise ProtocolError(
+                    f"an output request of {len(payload)} bytes; it begins with 8 of frequency"
+                )
             return OutputsRequest(_names(payload[8:]), struct.unpack_from(">d", payload)[0])
         case Kind.INPUTS:
             return InputsRequest(_names(payload))
@@ -278,7 +280,9 @@ def encode_reply(message: Reply, version: int) -> bytes:
             body = bytes([len(text)]) + text + bytes([len(source)]) + source + bytes([message.level])
             return pack(Kind.TEXT, body)
         case Data():
-            return pack(Kind.DATA, message.values if version == 1 else bytes([message.recipe]) + message.values)
+            return pack(
+                Kind.DATA, message.values if version == 1 else bytes([message.recipe]) + message.values
+            )
 
 
 def decode_reply(package: Package, version: int) -> Reply:

@@ -268,10 +268,10 @@ class Separation(Criterion, frozen=True, kw_only=True):
         )
         fixed = ", the largest so far" if self.mode == "fixed" else ""
         toward = self.stop.direction == "toward"
+        norm = "ISO/TS 15066:2016 5.5.4.2.3; structure from public sources that agree, no licensed text was opened"
         return Basis(
             formula=f"{formula}{fixed}; the distance must not fall below it",
-            source=("Weistroffer et al. 2022, Eq. 2 (upper bound of " if bound else "(")
-            + "ISO/TS 15066:2016 5.5.4.2.3; structure from public sources that agree, no licensed text was opened)",
+            source=f"Weistroffer et al. 2022, Eq. 2 (upper bound of {norm})" if bound else norm,
             inputs=tuple(inputs),
             not_modelled=(
                 *stop.not_modelled,

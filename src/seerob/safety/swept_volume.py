@@ -47,7 +47,9 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
             check_room(low, high, self.voxel)
         except InputError as error:
             raise InputError([p._replace(file=self.name or self.of) for p in error.problems]) from None
-        way = _Way(Sweep(model, bodies, voxel=self.voxel), max(model.workstation.engine.tick, self.every or 0.0))
+        way = _Way(
+            Sweep(model, bodies, voxel=self.voxel), max(model.workstation.engine.tick, self.every or 0.0)
+        )
         unseen = self.every is not None and self.every > model.workstation.engine.tick * 1.5
 
         def evaluate(state: State) -> Result:
@@ -59,7 +61,9 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
                 doubts.append(f"seen every {self.every:g} s only: what lies between is not known")
             if doubts and verdict is Verdict.WITHIN:
                 verdict = Verdict.UNDECIDED
-            how = f"not more than this; dilated by up to {swept.dilation * 1e3:.1f} mm for motion between ticks"
+            how = (
+                f"not more than this; dilated by up to {swept.dilation * 1e3:.1f} mm for motion between ticks"
+            )
             return Result(
                 name=self.name,
                 value=swept.volume,
@@ -120,7 +124,11 @@ class _Way:
 
     def hull(self, t: float, redraw: float, verdict: Verdict | None) -> Hull:
         """The surface, made anew when the last one is old."""
-        if self._drawn is None or t - self._drawn[0] >= redraw - 1e-9 or self._drawn[1].verdict is not verdict:
+        if (
+            self._drawn is None
+            or t - self._drawn[0] >= redraw - 1e-9
+            or self._drawn[1].verdict is not verdict
+        ):
             mesh = self.sweep.grid.mesh(most=DRAWN)
             hull = Hull(
                 vertices=tuple((x, y, z) for x, y, z in mesh.vertices.round(4).tolist()),

@@ -1,0 +1,79 @@
+"""Fastest point of every body at once.
+
+The speed of a rigid body is a convex function of the point, so over a convex hull it is largest at
+a corner; what lies up to r outside the corners' hull adds at most ``|ω| r``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from seerob.transforms import Array
+
+Indices = NDArray[np.int64]
+
+
+_ROWS = "f8[:,::1]"
+
+
+@njit(
+    f"void(f8[:,:,::1], {_ROWS}, {_ROWS}, {_ROWS}, {_ROWS}, i8[::1], f8[::1], f8[::1], {_ROWS}, {_ROWS})",
+    cache=True,
+    nogil=True,
+)
+def fastest(
+    rotations: Array,
+    positions: Array,
+    linear: Array,
+    angular: Array,
+    corners: Array,
+    start: Indices,
+    reach: Array,
+    speed: Array,
+    point: Array,
+    velocity: Array,
+) -> None:
+    """Bound on the speed of any point of each body; writes into the last three arguments.
+
+    Args:
+        rotations: World from body, shape (n, 3, 3).
+        positions: World positions of the bodies' origins [m], shape (n, 3).
+        linear: Velocities of the origins, world axes [m/s], shape (n, 3).
+        angular: Angular velocities, world axes [rad/s], shape (n, 3).
+        corners: Points of all bodies in their own frames [m], shape (k, 3).
+        start: Where each body's corners start, shape (n + 1,).
+        reach: How far a body may lie outside its corners' hull [m], shape (n,).
+        speed: Bound [m/s], shape (n,); 0 for a body without corners.
+        point: The corner where it is, in the world [m], shape (n, 3).
+        velocity: The corner's velocity [m/s], shape (n, 3).
+    """
+    for i in range(len(speed)):
+        wx, wy, wz = angular[i, 0], angular[i, 1], angular[i, 2]
+        best = -1.0
+        for k in range(start[i], start[i + 1]):
+            cx, cy, cz = corners[k, 0], corners[k, 1], corners[k, 2]
+            ax = rotations[i, 0, 0] * cx + rotations[i, 0, 1] * cy + rotations[i, 0, 2] * cz
+            ay = rotations[i, 1, 0] * cx + rotations[i, 1, 1] * cy + rotations[i, 1, 2] * cz
+            az = rotations[i, 2, 0] * cx + rotations[i, 2, 1] * cy + rotations[i, 2, 2] * cz
+            vx = linear[i, 0] + wy * az - wz * ay
+            vy = linear[i, 1] + wz * ax - wx * az
+            vz = linear[i, 2] + wx * ay - wy * ax
+            square = vx * vx + vy * vy + vz * vz
+            if square > best:
+                best = square
+                point[i, 0] = positions[i, 0] + ax
+                point[i, 1] = positions[i, 1] + ay
+                point[i, 2] = positions[i, 2] + az
+                velocity[i, 0], velocity[i, 1], velocity[i, 2] = vx, vy, vz
+        turn = math.sqrt(wx * wx + wy * wy + wz * wz)
+        speed[i] = math.sqrt(best) + turn * reach[i] if best >= 0 else 0.0
+
+
+def stacked(parts: list[Array]) -> tuple[Array, Indices]:
+    """Corners of all bodies in one array, and where each body's start."""
+    start = np.concatenate([[0], np.cumsum([len(part) for part in parts])]).astype(np.int64)
+    return np.ascontiguousarray(np.concatenate([np.zeros((0, 3)), *parts])), start

@@ -1,0 +1,187 @@
+"""What a live source is, and everything that live sources share: thread, back-off, stop, time.
+
+A `LiveSource` says in one asynchronous generator what it hears, `LiveSource.listen`. A `Listener` runs
+that in a thread of its own, begins anew when it ends, puts each sample's time on the host's clock and
+posts it to a `Mailbox`, where only the newest waits. `LiveFeed` takes it from there, once per tick.
+
+The twin runs a fixed delay behind the world, one period of the slowest source and a margin, so that
+there is a sample on either side of what is shown and references interpolate.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections.abc import AsyncGenerator, Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from threading import Event, Lock, Thread
+from types import TracebackType
+from typing import Annotated, Self
+
+from msgspec import Meta
+from msgspec.structs import replace
+
+from seerob.arrivals import Arrivals, Statistics
+from seerob.device_clock import DeviceClock
+from seerob.errors import SeerobError
+from seerob.samples import Mailbox, Sample, SignalSample
+from seerob.source import Source, Target
+
+_log = logging.getLogger(__name__)
+
+MARGIN = 0.005
+"""Of the delay behind the world, for what is late on the way [s]."""
+FIRST_PAUSE, LONGEST_PAUSE = 0.1, 2.0
+"""Before it is tried again [s]; doubled from the one to the other."""
+STOP_WITHIN = 1.0
+"""A listener that does not end by then is left behind [s]; its thread keeps no process alive."""
+PATIENCE = 1.0
+"""How long a run waits for the first samples before it begins without them [s]."""
+
+
+class LiveSource(Source, frozen=True, kw_only=True):
+    """Base of the sources whose future nobody knows: controllers, machines, trackers."""
+
+    delay: Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})] | None = None
+    """How far the twin is behind the world [s]; one period of the source and 5 ms when not given."""
+
+    def __post_init__(self) -> None:
+        if self.loop:
+            raise ValueError("a live source has no end to start again from: remove loop")
+        if self.behind() >= self.timeout:
+            raise ValueError(
+                f"a timeout of {self.timeout:g} s is not longer than the delay of {self.behind():g} s: "
+                "give a longer timeout"
+            )
+
+    def period(self) -> float:
+        """Expected interval between its samples [s]."""
+        raise NotImplementedError
+
+    def behind(self) -> float:
+        """Delay behind the world that it needs [s]."""
+        return self.period() + MARGIN if self.delay is None else self.delay
+
+    def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
+        """Connect, and yield what is heard until the connection ends; then it is called again.
+
+        ``t`` of a sample is when it arrived on the host's monotonic clock, ``t_device`` the device's
+        own time. Runs in a thread and loop of its own, and must end promptly when it is cancelled.
+
+        Raises:
+            OSError: There is no connection, or no longer.
+            SeerobError: What the other end says cannot be understood.
+        """
+        raise NotImplementedError
+
+
+def delay_of(sources: Iterable[Source]) -> float:
+    """How far a run of these sources is behind the world [s]; 0 when none is live."""
+    return max((s.behind() for s in sources if isinstance(s, LiveSource)), default=0.0)
+
+
+class Listener:
+    """One live source in a thread of its own.
+
+    Args:
+        source: The source.
+        target: What it drives.
+        post: Called with each sample, on the host's clock; from the listener's thread.
+    """
+
+    def __init__(self, source: LiveSource, target: Target | None, post: Callable[[Sample], None]) -> None:
+        self.name = source.name or f"{type(source).__module__.rpartition('.')[2]} {source.target()}".strip()
+        self.heard = Event()
+        """Set by the first sample."""
+        self._source, self._target, self._post = source, target, post
+        self._clock, self._arrivals = DeviceClock(), Arrivals(source.period())
+        self._lock = Lock()
+        self._thread = Thread(target=self._run, name=f"seerob-{self.name}", daemon=True)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._stopping = False
+        self._up: bool | None = None
+        self._seq = 0
+
+    def start(self) -> None:
+        """Begin to listen; returns at once."""
+        self._thread.start()
+
+    def ask_to_stop(self) -> None:
+        """Ask the thread to end; returns at once."""
+        with self._lock:
+            self._stopping = True
+            if self._loop is not None and self._task is not None:
+                with contextlib.suppress(RuntimeError):  # the loop ended by itself meanwhile
+                    self._loop.call_soon_threadsafe(self._task.cancel)
+
+    def join(self, seconds: float) -> bool:
+        """Wait for the thread to end; whether it has."""
+        self._thread.join(seconds)
+        return not self._thread.is_alive()
+
+    def statistics(self) -> Statistics:
+        """What arrived so far."""
+        return self._arrivals.statistics(self._clock.offset)
+
+    def _run(self) -> None:
+        with contextlib.suppress(asyncio.CancelledError):
+            asyncio.run(self._listen())
+
+    async def _listen(self) -> None:
+        with self._lock:
+            self._loop, self._task = asyncio.get_running_loop(), asyncio.current_task()
+            if self._stopping:
+                return
+        pause = FIRST_PAUSE
+        while True:
+            begun, self._up = time.monotonic(), False if self._up else self._up
+            self._clock.restart()
+            reason = await self._session()
+            self._lost(reason)
+            spoke_long = self._up is not None and time.monotonic() - begun > LONGEST_PAUSE
+            pause = FIRST_PAUSE if spoke_long else pause
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, LONGEST_PAUSE)
+
+    async def _session(self) -> str:
+        """Listen until the connection ends; why it did."""
+        try:
+            async with contextlib.aclosing(self._source.listen(self._target)) as samples:
+                async for sample in samples:
+                    self._take(sample)
+        except TimeoutError as error:
+            return str(error) or "no answer in time"
+        except (OSError, EOFError, SeerobError) as error:
+            return str(error) or type(error).__name__
+        except Exception as error:
+            _log.exception("%s: a mistake in the source itself", self.name)
+            return f"{type(error).__name__}: {error}"
+        return "the other end closed the connection"
+
+    def _take(self, sample: Sample) -> None:
+        host = sample.t
+        instant: float | None = host
+        if sample.t_device is not None and not isinstance(sample, SignalSample):
+            instant = self._clock.instant(sample.t_device, host)
+            if instant is None:
+                self._arrivals.repeat()
+                return
+        if not isinstance(sample, SignalSample):
+            self._arrivals.add(host, sample.t_device)
+        if not self._up:
+            if self._up is False:
+                _log.warning("%s: heard again", self.name)
+            self._up = True
+        self._post(replace(sample, source=self.name, seq=self._seq, t=instant))
+        self._seq += 1
+        self.heard.set()
+
+    def _lost(self, reason: str) -> None:
+        """One line per loss, however often it is tried again."""
+        if self._up is not False:
+            _log.warning("%s: not heard: %s", self.name, reason)
+            self._arrivals.lose()
+            self._up = False

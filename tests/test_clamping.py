@@ -1,0 +1,105 @@
+"""Gaps that close: their rule, live and batch, and on moving shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from seerob.clamping import Memory, clamps, pinch_pairs
+from seerob.distance import Shapes
+from seerob.geometry import Mesh, Solid, capsule
+
+T = np.arange(11) * 0.1
+HAND, BODY = 0.1, 0.5
+THICKNESS = np.array([HAND, BODY])
+
+
+def one(gaps: np.ndarray, *, opened: bool = True) -> np.ndarray:
+    return clamps(gaps[:, None], T[: len(gaps)], THICKNESS, opened=np.array([opened]))[:, 0]
+
+
+def test_closing_gap_clamps_from_the_body_parts_thickness_on() -> None:
+    gaps = np.linspace(0.35, 0.05, 11)
+    found = one(gaps)
+    # One step of 0.03 m ahead of 0.1 m.
+    np.testing.assert_array_equal(found[1:, 0], gaps[1:] - 0.03 <= HAND + 1e-12)
+    assert found[:, 1].all()
+
+
+def test_wide_opening_and_still_gaps_clamp_nobody() -> None:
+    assert not one(np.linspace(0.9, 0.6, 11))[:, 1].any()
+    assert not one(np.linspace(0.05, 0.3, 11))[1:].any()
+    assert not one(np.full(11, 0.05))[1:].any()
+    assert not one(np.linspace(0.05, 0.05 - 0.9e-3, 11))[1:].any()
+
+
+def test_what_happened_before_the_first_instant_is_not_known() -> None:
+    assert one(np.full(3, 0.05))[0].all()
+    assert not one(np.full(3, -0.01))[0].any()
+
+
+def test_parts_of_one_robot_clamp_only_what_once_had_room() -> None:
+    gaps = np.array([0.08, 0.06, 0.04, 0.12, 0.08, 0.04])
+    found = one(gaps, opened=False)
+    assert not found[:3].any()
+    assert found[4:, 0].all()
+    assert not found[:, 1].any()
+
+
+def test_live_says_what_the_batch_says() -> None:
+    rng = np.random.default_rng(5)
+    gaps = np.abs(np.cumsum(rng.normal(0, 0.03, (400, 6)), axis=0))
+    t = np.cumsum(rng.uniform(0.005, 0.02, 400))
+    opened = np.array([True, False] * 3)
+    memory = Memory()
+    live = [memory.step(float(s), g, THICKNESS, opened) for s, g in zip(t, gaps, strict=True)]
+    np.testing.assert_array_equal(live, clamps(gaps, t, THICKNESS, opened=opened))
+
+
+def test_memory_says_the_same_twice_and_forgets_when_set_back() -> None:
+    memory, opened = Memory(), np.array([True])
+    memory.step(0.0, np.array([0.3]), THICKNESS, opened)
+    first = memory.step(0.1, np.array([0.09]), THICKNESS, opened)
+    np.testing.assert_array_equal(memory.step(0.1, np.array([0.09]), THICKNESS, opened), first)
+    assert first.all()
+    assert not memory.step(0.2, np.array([0.09]), THICKNESS, opened).any()
+    assert memory.step(0.0, np.array([0.09]), THICKNESS, opened).all()
+
+
+def slotted() -> Mesh:
+    """A block with a slot 0.2 m wide along y, open on top: its convex hull has none."""
+    walls = [trimesh.creation.box([0.1, 1, 0.4]) for _ in range(2)]
+    walls[0].apply_translation([-0.15, 0, 0])
+    walls[1].apply_translation([0.15, 0, 0])
+    floor = trimesh.creation.box([0.4, 1, 0.1])
+    floor.apply_translation([0, 0, -0.25])
+    made = trimesh.util.concatenate([*walls, floor])
+    return Mesh(np.array(made.vertices), np.array(made.faces, np.int32))
+
+
+def test_gap_in_a_slot_is_found_where_a_hull_has_none() -> None:
+    rod = Solid(points=np.array([[0, 0, 0], [0, 0, 0.5]]), radius=0.02)
+    shapes = Shapes.build([("block", [Solid(mesh=slotted())]), ("rod", [rod])])
+    pairs = pinch_pairs(shapes, [1], [0], frozenset(), cap=0.6)
+    x = np.linspace(0.0, 0.06, 7)
+    positions = np.zeros((7, 2, 3))
+    positions[:, 1, 0] = x
+    rotations = np.broadcast_to(np.eye(3), (7, 2, 3, 3))
+    gaps = pairs.batch(rotations, positions)
+    np.testing.assert_allclose(gaps[:, 0], 0.1 - 0.02 - x, atol=1e-12)
+    live = [pairs.gaps(r, p)[0] for r, p in zip(rotations, positions, strict=True)]
+    np.testing.assert_array_equal(live, gaps)
+    found = clamps(gaps, np.arange(7) * 0.1, np.array([0.05]), opened=pairs.opened)
+    np.testing.assert_array_equal(found[1:, 0, 0], gaps[1:, 0] - 0.01 <= 0.05 + 1e-12)
+
+
+def test_own_links_are_paired_except_neighbours_and_both_sides_clamp() -> None:
+    bodies = [(n, [capsule(np.zeros(3), np.array([0.0, 0, 0.1]), 0.02)]) for n in "abcd"]
+    neighbours = frozenset({(0, 1), (1, 2)})
+    pairs = pinch_pairs(Shapes.build(bodies), [0, 1, 2], [], neighbours, still=[3], cap=1.0)
+    assert sorted(zip(pairs.first.tolist(), pairs.second.tolist(), strict=True)) == [
+        (0, -1), (0, 2), (1, -1), (2, -1),
+    ]  # fmt: skip
+    assert not pairs.opened.any()
+    clamped = ((pairs.first == 0) & (pairs.second == 2))[:, None]
+    assert pairs.per_body(clamped)[:, 0].tolist() == [True, False, True]

@@ -60,8 +60,7 @@ def clamps(
     previous = np.concatenate([earlier, gaps[:-1]])
     elapsed = np.diff(np.concatenate([[when], t]))[:, None]
     change = gaps - previous
-    closing = change < -STILL * np.minimum(elapsed, 1e6)
-    closing = np.logical_or(closing, np.isinf(previous) & (gaps > 0))
+    closing = np.where(np.isinf(previous), gaps > 0, change < -STILL * elapsed)
     ahead = gaps + np.where(np.isfinite(change), np.minimum(change, 0.0), 0.0)
     seen = np.maximum.accumulate(np.concatenate([widest, gaps]), axis=0)[1:]
     wide = opened[None, :, None] | (seen[..., None] >= thickness)

@@ -25,8 +25,12 @@ SMOOTH = math.radians(30.0)
 """Largest turn between neighbouring facets that is taken as the sampling of a rounding [rad]."""
 FLAT = 1e-6
 """Triangles that lie this near to a common plane are one facet [m]; what meshes are simplified by."""
+FLAT_TURN = 1e-3
+"""And whose normals turn by less than this [rad]: a fine tessellation is no plane."""
 NOISE = 5e-6
-"""Roundings less high than this across an edge are noise of the coordinates [m]."""
+"""Facets that are not wider than twice this do not tell a rounding from noise of coordinates [m]."""
+TRUSTED = 1e-3
+"""Radius from which on it does not matter [m]."""
 REFERENCE = 1e-4
 """Largest area that counts when patches are put in order of sharpness [m²]."""
 HIDDEN = 1e-3
@@ -106,10 +110,11 @@ def mesh_shape(mesh: Mesh, *, dilation: float = 0.0) -> ContactShape:
     middle = 0.5 * (vertices[edges.start] + vertices[edges.end])
 
     crease = (facet[edges.left] != facet[edges.right]) & (turn > 0)
-    sharp = crease & (turn > SMOOTH + 1e-6)
-    smooth = crease & ~sharp & (c * np.sin(turn) > NOISE)
     radius = np.full(len(c), np.inf)
-    radius[smooth] = c[smooth] / np.sin(turn[smooth] / 2) + dilation
+    radius[crease] = c[crease] / np.sin(turn[crease] / 2)
+    sharp = crease & ((turn > SMOOTH + 1e-6) | ((c < NOISE) & (radius < TRUSTED)))
+    smooth = crease & ~sharp
+    radius += dilation
     points, radii = _patches(vertices, edges, facet, radius, middle, smooth)
     apexes = _apexes(vertices, faces, edges, turn, sharp)
     lost = np.vstack([middle[sharp], vertices[apexes], edges.open_middles])
@@ -123,7 +128,9 @@ def mesh_shape(mesh: Mesh, *, dilation: float = 0.0) -> ContactShape:
         widths = 2 * c[sharp]
         resolution = float(widths.min()) if len(widths) else 0.0
         what = [
-            f"{int(sharp.sum())} edges turn by more than 30° in one step of the mesh" if sharp.any() else "",
+            f"{int(sharp.sum())} edges turn by more than 30° in one step, or on facets as small as noise"
+            if sharp.any()
+            else "",
             f"{len(apexes)} pointed corners" if len(apexes) and not sharp.any() else "",
             f"{len(edges.open_middles)} open edges" if len(edges.open_middles) else "",
         ]
@@ -226,7 +233,7 @@ def _facets(vertices: Array, faces: Indices, normals: Array, edges: _Edges, turn
     for near, far in ((edges.left, edges.right), (edges.right, edges.left)):
         height = np.einsum("eij,ej->ei", vertices[faces[far]] - base[:, None], normals[near])
         apex = np.maximum(apex, np.abs(height).max(axis=1))
-    same = (apex < FLAT) & (np.abs(turn) < SMOOTH)
+    same = (apex < FLAT) & (np.abs(turn) < FLAT_TURN)
     graph = coo_array((np.ones(int(same.sum())), (edges.left[same], edges.right[same])), shape=(n, n))
     count, label = connected_components(graph, directed=False)
     seed = np.full(count, n)

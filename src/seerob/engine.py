@@ -119,7 +119,10 @@ class Engine:
                 taken, reason = bool(np.isfinite(sample.t)), "its source sends values that are not finite"
             elif isinstance(sample, JointSample):
                 qd = None if sample.qd is None else np.array(sample.qd)
-                taken = reference.take(sample.t, np.array(sample.q), qd)
+                # Only of a live source the newest sample is ever this old: nobody knows what came next.
+                silent = self._tick * self._period - reference.until > self._hearings[mechanism.name].timeout
+                anew = self._tick > 0 and silent
+                taken = reference.take(sample.t, np.array(sample.q), qd, anew=anew)
             else:
                 taken, reached = self._take_pose(mechanism, sample)
                 reason = reason or (

@@ -2,7 +2,7 @@
 
 A `LiveSource` says in one asynchronous generator what it hears, `LiveSource.listen`. A `Listener` runs
 that in a thread of its own, begins anew when it ends, puts each sample's time on the host's clock and
-posts it to a `Mailbox`, where only the newest waits. `LiveFeed` takes it from there, once per tick.
+posts it to a `Mailbox`, where only the newest waits. `Listening` is all of them together; the run takes from it once per tick.
 
 The twin runs a fixed delay behind the world, one period of the slowest source and a margin, so that
 there is a sample on either side of what is shown and references interpolate.
@@ -14,8 +14,8 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import AsyncGenerator, Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import AsyncGenerator, Callable, Iterable, Sequence
+from pathlib import Path
 from threading import Event, Lock, Thread
 from types import TracebackType
 from typing import Annotated, Self
@@ -27,7 +27,8 @@ from seerob.arrivals import Arrivals, Statistics
 from seerob.device_clock import DeviceClock
 from seerob.errors import SeerobError
 from seerob.samples import Mailbox, Sample, SignalSample
-from seerob.source import Source, Target
+from seerob.snapshot import Finding
+from seerob.source import Opened, Source, Target
 
 _log = logging.getLogger(__name__)
 
@@ -63,6 +64,12 @@ class LiveSource(Source, frozen=True, kw_only=True):
     def behind(self) -> float:
         """Delay behind the world that it needs [s]."""
         return self.period() + MARGIN if self.delay is None else self.delay
+
+    def open(self, folder: Path, target: Target | None) -> Opened:
+        """Nothing to read at start; a source may override it to check that it will be understood."""
+        text = f"the twin runs {1e3 * self.behind():.0f} ms behind {self.name or self.target() or 'the world'}"
+        finding = Finding(level="note", subject=self.target() or self.name, text=text)
+        return Opened(samples=(), duration=0.0, findings=(finding,))
 
     def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Connect, and yield what is heard until the connection ends; then it is called again.
@@ -137,12 +144,13 @@ class Listener:
                 return
         pause = FIRST_PAUSE
         while True:
-            begun, self._up = time.monotonic(), False if self._up else self._up
             self._clock.restart()
+            begun = time.monotonic()
             reason = await self._session()
-            self._lost(reason)
-            spoke_long = self._up is not None and time.monotonic() - begun > LONGEST_PAUSE
-            pause = FIRST_PAUSE if spoke_long else pause
+            # Who speaks for less than the last pause and falls silent again is tried less and less often.
+            if self._up and time.monotonic() - begun > pause:
+                pause = FIRST_PAUSE
+            self._lose(reason)
             await asyncio.sleep(pause)
             pause = min(2 * pause, LONGEST_PAUSE)
 
@@ -179,9 +187,57 @@ class Listener:
         self._seq += 1
         self.heard.set()
 
-    def _lost(self, reason: str) -> None:
+    def _lose(self, reason: str) -> None:
         """One line per loss, however often it is tried again."""
         if self._up is not False:
             _log.warning("%s: not heard: %s", self.name, reason)
             self._arrivals.lose()
             self._up = False
+
+
+class Listening:
+    """The live sources of one run: started on entry, stopped on exit.
+
+    Args:
+        sources: With what each drives.
+
+    Attributes:
+        delay: How far the run is behind the world [s].
+        listeners: One per source.
+    """
+
+    def __init__(self, sources: Sequence[tuple[LiveSource, Target | None]]) -> None:
+        self._box = Mailbox()
+        self.delay = delay_of(source for source, _ in sources)
+        self.listeners = tuple(Listener(source, target, self._box.post) for source, target in sources)
+
+    def __enter__(self) -> Self:
+        for listener in self.listeners:
+            listener.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for listener in self.listeners:
+            listener.ask_to_stop()
+        end = time.monotonic() + STOP_WITHIN
+        for listener in self.listeners:
+            if not listener.join(max(0.0, end - time.monotonic())):
+                _log.warning("%s: did not stop within %g s", listener.name, STOP_WITHIN)
+            _log.info("%s: %s", listener.name, listener.statistics())
+
+    def first(self, patience: float = PATIENCE) -> tuple[Sample, ...]:
+        """What has been heard once every source was, or when that takes too long."""
+        end = time.monotonic() + patience
+        for listener in self.listeners:
+            listener.heard.wait(max(0.0, end - time.monotonic()))
+        return self.take()
+
+    def take(self) -> tuple[Sample, ...]:
+        """What was heard since the last call, the newest of each; ``t`` on the host's clock."""
+        return self._box.take()
+
+    def statistics(self) -> dict[str, Statistics]:
+        """What arrived so far, by source."""
+        return {listener.name: listener.statistics() for listener in self.listeners}

@@ -48,8 +48,23 @@ class Reference:
         """Position of the newest sample, or the home position, shape (n,) [rad or m]."""
         return self._points[-1]
 
-    def take(self, t: float, q: Array, qd: Array | None) -> bool:
-        """Make a sample the newest one; False for one that is not newer than the last, which is dropped."""
+    @property
+    def until(self) -> float:
+        """Instant of the newest sample [s]; -inf before the first."""
+        return self._times[-1] if self._times else -np.inf
+
+    def take(self, t: float, q: Array, qd: Array | None, *, anew: bool = False) -> bool:
+        """Make a sample the newest one; False for one that is not newer than the last, which is dropped.
+
+        Args:
+            t: Its instant [s].
+            q: Position [rad or m], shape (n,).
+            qd: Velocity [rad/s or m/s], shape (n,); derived when None.
+            anew: After a silence: nobody knows how it came there, so the twin is put there at once and
+                set in motion when its instant has come.
+        """
+        if anew and t > self.until:
+            self._times, self._jumps, self._landings = [], [], [-np.inf, t]
         if not self._times:
             self._times, self._points = [t], [q]
             self._velocities = [self._zero if qd is None else qd]

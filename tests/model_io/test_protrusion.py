@@ -40,3 +40,19 @@ def test_the_corners_of_a_cube(solids, depth):
     assert made["l"] == pytest.approx(depth, abs=1e-12)
     text = [f.text for f in with_protrusions(robot(cube(1.0), *solids)).findings]
     assert bool(text) == (depth > 1e-4)
+
+
+def test_a_crumb_far_off_is_no_surface_and_is_said():
+    """A stray triangle of 2 mm² 1 m away; one of 50 mm² there counts."""
+    block = cube(1.0)
+
+    def with_triangle(edge):
+        corner = np.array([[3.0, 0, 0], [3.0 + edge, 0, 0], [3.0, edge, 0]])
+        vertices = np.vstack([block.vertices, corner])
+        faces = np.vstack([block.faces, [np.arange(3) + len(block.vertices)]]).astype(np.int32)
+        return robot(Mesh(vertices, faces), Solid(mesh=cube(1.0)))
+
+    small, large = with_triangle(0.002), with_triangle(0.010)
+    assert protrusions(small)["l"] == pytest.approx(0.0, abs=1e-12)
+    assert [f.level for f in with_protrusions(small).findings] == ["note"]
+    assert protrusions(large)["l"] == pytest.approx(2.01, abs=1e-2)

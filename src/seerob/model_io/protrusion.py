@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from seerob.geometry import Solid
+from seerob.geometry import Mesh, Solid
 from seerob.kernels.protrusion import outside
 from seerob.kernels.tree_file import tree_of
 from seerob.model_io.description import Description, Link
@@ -22,6 +22,8 @@ WORTH_SAYING = 1e-4
 """Protrusions below this are not reported [m]."""
 SAMPLES = 2000
 """Vertices looked at per link, besides the extreme ones."""
+CRUMB = 1e-5
+"""A loose piece of one or two triangles of at most this area [m²] is a slip of the export, no surface."""
 
 
 def protrusions(description: Description) -> dict[str, float]:
@@ -37,6 +39,13 @@ def with_protrusions(description: Description) -> Description:
     found = []
     deviating: dict[str, float] = {}
     for link, depths in _depths(description):
+        crumbs = sum(without_crumbs(mesh)[1] for mesh in link.visual)
+        if crumbs:
+            text = (
+                f"{crumbs} loose pieces of one or two triangles and at most {CRUMB * 1e6:.0f} mm² are shown "
+                "but not taken for surface"
+            )
+            found.append(Finding(level="note", subject=f"{description.name}/{link.name}", text=text))
         if depths.max(initial=0.0) > WORTH_SAYING:
             text = (
                 f"the shape shown sticks out of the collision shape by up to {depths.max() * 1e3:.1f} mm "
@@ -63,7 +72,7 @@ def _depths(description: Description) -> Iterator[tuple[Link, Array]]:
 def outside_distances(link: Link) -> Array:
     """Distance [m] of sampled display vertices to the nearest solid, 0 inside, shape (n,)."""
     points = np.concatenate(
-        [_sampled(mesh.vertices, SAMPLES // len(link.visual) + 1) for mesh in link.visual]
+        [_sampled(without_crumbs(mesh)[0], SAMPLES // len(link.visual) + 1) for mesh in link.visual]
     )
     least = np.full(len(points), np.inf)
     for solid in link.solids:
@@ -71,6 +80,30 @@ def outside_distances(link: Link) -> Array:
         rest = least > 0
         least[rest] = np.minimum(least[rest], _from_solid(solid, points[rest]))
     return least
+
+
+def without_crumbs(mesh: Mesh) -> tuple[Array, int]:
+    """Vertices of a mesh without those of loose crumbs, shape (n, 3) [m], and how many crumbs there were.
+
+    Makers' display meshes carry stray triangles far from the surface; one of 5 mm² would otherwise
+    make every distance of its link uncertain by centimetres.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    _, place = np.unique(np.round(mesh.vertices, 7), axis=0, return_inverse=True)
+    faces = place.ravel()[mesh.faces]
+    n = int(place.max()) + 1
+    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
+    graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(n, n))
+    count, piece = connected_components(graph, directed=False)
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
+    area = np.bincount(piece[faces[:, 0]], np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2, count)
+    triangles = np.bincount(piece[faces[:, 0]], minlength=count)
+    crumb = (triangles > 0) & (triangles <= 2) & (area <= CRUMB)
+    if not crumb.any() or crumb.all():
+        return mesh.vertices, 0
+    return mesh.vertices[~crumb[piece[place.ravel()]]], int(crumb.sum())
 
 
 def _from_solid(solid: Solid, points: Array) -> Array:

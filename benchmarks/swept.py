@@ -71,7 +71,8 @@ def main() -> int:
             peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
             print(
                 f"voxel {voxel * 100:.0f} cm: {wall:.2f} s ({cpu:.2f} s of CPU, distance fields included), "
-                f"mesh {meshing:.2f} s, {len(mesh.faces)} triangles; grid {swept.grid.cells.nbytes / 1e6:.1f} MB, "
+                f"mesh {meshing:.2f} s, {len(mesh.faces)} triangles; "
+                f"grid {swept.grid.cells.nbytes / 1e6:.1f} MB, "
                 f"peak of the process {peak:.0f} MB ({before:.0f} MB before)"
             )
             print(

@@ -25,7 +25,7 @@ def points_of(solid, count, rng):
 
 
 def missed(model, bodies, motion, contained, count, rng):
-    """How many of about ``count`` points of bodies, at random times on straight joint ways, are not contained."""
+    """How many of ``count`` points of bodies, at random times on straight joint ways, are not contained."""
     qpos = posed(model, motion)
     data = mujoco.MjData(model.mj)
     solids = [(model.bodies[i].mj, solid) for i in bodies for solid in model.bodies[i].solids]

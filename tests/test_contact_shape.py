@@ -36,7 +36,7 @@ def filleted_bar(radius: float, steps: int, size: float = 0.1) -> Mesh:
     return Mesh(np.vstack([*rings, ends]), faces.astype(np.int32))
 
 
-@pytest.mark.parametrize("radius", [0.0005, 0.003, 0.05])
+@pytest.mark.parametrize("radius", [0.001, 0.003, 0.05])
 @pytest.mark.parametrize("sections", [12, 32, 128])
 def test_cylinder_has_its_radius_and_none_along_it(radius: float, sections: int) -> None:
     shape = mesh_shape(mesh(trimesh.creation.cylinder(radius=radius, height=0.2, sections=sections)))
@@ -165,7 +165,10 @@ def test_sharper_is_never_a_larger_area() -> None:
 
 def test_least_area_of_many_patches_is_brute_force() -> None:
     arrays = RegionArrays.of(shipped())
-    radii = np.random.default_rng(3).lognormal(-5, 1, (500, 2))
+    rng = np.random.default_rng(3)
+    # The sharper one way, the flatter the other: none is the least everywhere.
+    sharp = rng.uniform(5e-4, 4e-3, 500)
+    radii = np.column_stack([sharp, 6e-6 / sharp**0.9 * rng.uniform(1, 2, 500)])
     radii[::7, 1] = np.inf
     found = arrays.contact_area(ContactShape(np.zeros((500, 3)), np.sort(radii, axis=1)), CAP)
     for row, factor in enumerate((arrays.multiplier, np.ones(10))):

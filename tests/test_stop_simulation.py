@@ -15,7 +15,8 @@ from seerob.stop_simulation import STEP, StopSimulation
 M, L, G = 2.0, 0.8, 9.81
 INERTIA = M * L**2
 ONE = (
-    f'<robot name="one"><link name="base"/><link name="l1"><inertial><origin xyz="{L} 0 0"/><mass value="{M}"/>'
+    f'<robot name="one"><link name="base"/><link name="l1"><inertial>'
+    f'<origin xyz="{L} 0 0"/><mass value="{M}"/>'
     '<inertia ixx="1e-12" iyy="1e-12" izz="1e-12" ixy="0" ixz="0" iyz="0"/></inertial>'
     '<collision><origin xyz="0.4 0 0"/><geometry><box size="0.8 0.1 0.1"/></geometry></collision></link>'
     '<joint name="j1" type="continuous"><parent link="base"/><child link="l1"/><axis xyz="0 -1 0"/>'
@@ -82,7 +83,7 @@ def test_standing_arm_stays_exactly_when_its_brake_can_hold_it_and_sinks_otherwi
 
 
 def test_energy_balance_of_two_joints(tmp_path):
-    """What the brakes take up is the kinetic energy: no gravity, coupled joints, one sticks before the other."""
+    """What the brakes take up is the kinetic energy: no gravity, coupled joints, one sticks first."""
     q, qd, B = [0.0, 1.2], np.array([1.4, -2.0]), np.array([9.0, 2.0])
     stopped, state, _ = stop(tmp_path, two_r(), q, qd, B, gravity=False, reaction=1e-9)
     robot = state.model.robot("arm")

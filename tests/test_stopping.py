@@ -31,6 +31,12 @@ from seerob.stopping import (
 )
 
 positive = st.floats(0.01, 5)
+
+
+def three(low, high):
+    return st.lists(st.floats(low, high), min_size=3, max_size=3)
+
+
 ACROSS, ALONG = Approach.ORTHOGONAL, Approach.PARALLEL
 
 
@@ -87,8 +93,7 @@ def test_standing_robot_leaves_the_whole_way_of_the_person(v_r, T_r, T_s):
     assert still == pytest.approx(1.6 * (T_r + T_s))
 
 
-@given(c=st.lists(st.floats(-5, 1), min_size=3, max_size=3), b=st.lists(st.floats(0, 5), min_size=3, max_size=3),
-       a=st.lists(st.floats(0, 5), min_size=3, max_size=3))  # fmt: skip
+@given(c=three(-5, 1), b=three(0, 5), a=three(0, 5))
 def test_largest_factor_is_the_last_that_holds(c, b, a):
     c, b, a = map(np.array, (c, b, a))
     s = largest_factor(c, b, a)
@@ -120,8 +125,7 @@ def test_travel_bounds_the_path_of_a_folded_arm():
     for _ in range(200):
         q = rng.uniform(-3, 3, 3)
         speeds = rng.normal(size=(40, 3)) * 0.1
-        angles = np.cumsum(np.vstack([q, q + np.cumsum(speeds, axis=0)])[:1].repeat(41, 0) * 0, axis=0)
-        angles = q + np.vstack([np.zeros(3), np.cumsum(speeds, axis=0)]) + angles
+        angles = q + np.vstack([np.zeros(3), np.cumsum(speeds, axis=0)])
         turned = np.cumsum(angles, axis=1)
         joints = np.cumsum(np.stack([np.cos(turned), np.sin(turned)], -1), axis=1)
         tip = joints[:, 2]
@@ -210,7 +214,7 @@ def test_a_finer_field_never_needs_more_room(d, finer):
 
 @given(v=st.floats(0, 3), T=st.floats(0.01, 0.5), d=st.floats(0, 2))
 def test_approach_speed_at_a_distance_decides_as_the_distance_itself(v, T, d):
-    """So an inverse may use one speed: d ≥ S_p with the switched speed if and only if d ≥ S_p at that speed."""
+    """So an inverse may use one speed: d ≥ S_p as switched if and only if d ≥ S_p at that speed."""
 
     def S(v_h):
         return np.array(v_h * T + v * T)

@@ -131,7 +131,7 @@ def test_remedy_of_too_fine_voxels_is_one(ur10):
 
 @pytest.mark.parametrize("voxel", [0.0, -0.01, float("nan"), float("inf")])
 def test_voxel_must_be_a_length(ur10, voxel):
-    with pytest.raises(InputError, match="voxel: .* is not a length"):
+    with pytest.raises(InputError, match=r"voxel: .* is not a length"):
         swept_volume(ur10, ur10.select("arm"), {"arm": np.zeros((2, 6))}, voxel=voxel)
 
 

@@ -113,6 +113,7 @@ def mesh_shape(mesh: Mesh, *, dilation: float = 0.0) -> ContactShape:
     radius = np.full(len(c), np.inf)
     radius[crease] = c[crease] / np.sin(turn[crease] / 2)
     sharp = crease & ((turn > SMOOTH + 1e-6) | ((c < NOISE) & (radius < TRUSTED)))
+    # A facet as small as noise leaves the radius as open as a turn in one step does.
     smooth = crease & ~sharp
     radius += dilation
     points, radii = _patches(vertices, edges, facet, radius, middle, smooth)

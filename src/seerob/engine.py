@@ -133,6 +133,7 @@ class Engine:
             if taken and (not hearing.heard or sample.t > hearing.heard[-1][0]):
                 jump = f"its samples jump at {sample.t:.3f} s" if reference.jumped else ""
                 hearing.heard.append((sample.t, reason or jump))
+                hearing.torques.append(_torques(sample))
 
     def _target(self, sample: JointSample | PoseSample) -> Mechanism:
         """Robot or human that a sample drives.
@@ -145,10 +146,11 @@ class Engine:
             return self.model.carrier(self.model.frame(sample.target))
         mechanism = self.model.mechanism(sample.target)
         n = len(mechanism.joints)
-        if {len(sample.q), n if sample.qd is None else len(sample.qd)} != {n}:
+        if any(len(values) != n for values in (sample.q, sample.qd, sample.tau) if values is not None):
             heard = f"{len(sample.q)} joint values" + (
                 "" if sample.qd is None else f", {len(sample.qd)} speeds"
             )
+            heard += "" if sample.tau is None else f", {len(sample.tau)} torques"
             raise InputError.at(sample.source, sample.target, heard, f"{sample.target} has {n} joints")
         return mechanism
 
@@ -330,6 +332,12 @@ class Engine:
 
 def _largest_speed(mechanism: Mechanism) -> Array:
     return np.array([LARGEST_SPEED[unit] for unit in mechanism.units])
+
+
+def _torques(sample: JointSample | PoseSample) -> Array | None:
+    if isinstance(sample, PoseSample) or sample.tau is None or not np.isfinite(sample.tau).all():
+        return None
+    return np.array(sample.tau)
 
 
 def _finite(sample: JointSample | PoseSample) -> bool:

@@ -2,7 +2,8 @@
 
 A `LiveSource` says in one asynchronous generator what it hears, `LiveSource.listen`. A `Listener` runs
 that in a thread of its own, begins anew when it ends, puts each sample's time on the host's clock and
-posts it to a `Mailbox`, where only the newest waits. `Listening` is all of them together; the run takes from it once per tick.
+posts it to a `Mailbox`, where only the newest waits. `Listening` is all of them together, from which a
+run takes once per tick.
 
 The twin runs a fixed delay behind the world, one period of the slowest source and a margin, so that
 there is a sample on either side of what is shown and references interpolate.
@@ -67,7 +68,9 @@ class LiveSource(Source, frozen=True, kw_only=True):
 
     def open(self, folder: Path, target: Target | None) -> Opened:
         """Nothing to read at start; a source may override it to check that it will be understood."""
-        text = f"the twin runs {1e3 * self.behind():.0f} ms behind {self.name or self.target() or 'the world'}"
+        text = (
+            f"the twin runs {1e3 * self.behind():.0f} ms behind {self.name or self.target() or 'the world'}"
+        )
         finding = Finding(level="note", subject=self.target() or self.name, text=text)
         return Opened(samples=(), duration=0.0, findings=(finding,))
 

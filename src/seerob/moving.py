@@ -232,6 +232,7 @@ def posed(model: Model, motion: Mapping[str, Array]) -> Array:
     """Positions of all joints of the workstation; who is not named stands where the file puts it.
 
     Args:
+        model: The compiled workstation.
         motion: Joint positions of robots and humans by name [rad or m], shape (N, n) each.
 
     Returns:

@@ -87,8 +87,8 @@ def zero_moment(J_v: Array, low: Array, high: Array) -> Polytope:
         V = np.zeros((1, 3))
     else:
         room = 4 * n * (n - 1)
-        V, marks, quality = np.empty((room, 3)), np.empty(room, np.int64), np.empty(room)
-        V = V[: max(kernel.corners(N, below, above, V, marks, quality), 0)]
+        V = np.empty((room, 3))
+        V = V[: max(kernel.corners(N, below, above, V), 0)]
     if not len(V):
         return _nothing()
     size = float(np.abs(V).max())

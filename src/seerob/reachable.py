@@ -1,15 +1,16 @@
 r"""The volume that bodies can reach, from kinematics and joint limits, in voxels; nothing is missed.
 
 Every position of a chain is a product of screws about the axes at one reference position,
-:math:`e^{\hat\xi_1 \delta_1} \cdots e^{\hat\xi_n \delta_n} x` ([LynchPark2017]_ section 4.1), and the joints are free of each other
-within their limits. So the reachable set is swept joint by joint, from the tip to the base: what lies beyond
-joint i, as voxels, is turned about the axis of joint i through its whole range, together with the link
-that joint i moves. Each of these n sweeps is conservative as in `seerob.swept`; a sample of joint space could
-never be. A whole turn is made in the half-plane of radius and height: no angle is missed.
+:math:`e^{\hat\xi_1 \delta_1} \cdots e^{\hat\xi_n \delta_n} x` ([LynchPark2017]_ section 4.1), and the joints
+are free of each other within their limits. So the reachable set is swept joint by joint, from the tip to
+the base: what lies beyond joint i, as voxels, is turned about the axis of joint i through its whole range,
+together with the link that joint i moves. Each of these n sweeps is conservative as in `seerob.swept`; a
+sample of joint space could never be. A whole turn is made in the half-plane of radius and height: no angle
+is missed.
 
-Bodies that collide with each other, and mimic joints being tied to others, are not taken into account: both
-make the true set smaller. Voxels add up over the joints: the volume is up to about `EXCESS` voxels per joint too
-thick; smaller voxels bring it nearer to the truth.
+That bodies collide with each other, and that mimic joints are tied to others, is not taken into account:
+both make the true set smaller. Every joint adds the rounding to voxels once more, so the volume is thicker
+than the truth by a few voxels; smaller ones bring it nearer.
 """
 
 from __future__ import annotations
@@ -30,8 +31,6 @@ from seerob.swept import BAND, SLACK, SPACING, Swept
 from seerob.transforms import Array
 from seerob.voxels import VoxelGrid, check_room
 
-EXCESS = 2.5
-"""How much a joint adds to the thickness, at most [voxels]."""
 LAYERS = 4
 """Around a set of voxels, up to which distances from it are exact [voxels]."""
 
@@ -88,8 +87,7 @@ def reachable_volume(
     if not np.isfinite([low, high]).all():
         what = "a joint that slides has no limits"
         raise InputError.at("reachable volume", "of", what, "give lower and upper, or sweep a trajectory")
-    # Five more: fields of voxels are 4 bytes each, made one at a time.
-    check_room(low, high, voxel, None if memory is None else memory)
+    check_room(low, high, voxel, memory)
     rotations, positions = moving.place(np.asarray(model.mj.qpos0, float))
     screws = _screws(model, moving)
     work = _Work(voxel, slack, memory, stop)
@@ -98,8 +96,7 @@ def reachable_volume(
     parent: dict[int, int] = {}
     for i, (core, chain) in enumerate(zip(moving.cores, moving.chains, strict=True)):
         own.setdefault(chain[-1] if chain else -1, []).append((core, rotations[i], positions[i]))
-        for above, joint in zip((-1, *chain), chain, strict=False):
-            parent[joint] = above
+        parent |= dict(zip(chain, (-1, *chain), strict=False))
     order = sorted(parent, reverse=True)
     for done, joint in enumerate(order):
         grid = work.sweep(screws[joint], own.get(joint, []), beyond.pop(joint, []))
@@ -239,14 +236,14 @@ def _screws(model: Model, moving: Moving) -> dict[int, _Screw]:
     limits: dict[str, tuple[float | None, float | None]] = {}
     for name, mechanism in model.mechanisms.items():
         every = [joint for link in mechanism.description.links for joint in link.joints]
-        ends = np.array([mechanism.lower, mechanism.upper])
+        span = np.array([mechanism.lower, mechanism.upper])
         for row, joint in enumerate(every):
             low, high = joint.lower, joint.upper
             if joint.mimic is not None:
                 # As far as the joint that it follows takes it.
                 factor = mechanism.coupling[row]
                 with np.errstate(invalid="ignore"):
-                    reached = np.where(factor == 0, 0.0, factor * ends).sum(axis=1) + mechanism.offset[row]
+                    reached = np.where(factor == 0, 0.0, factor * span).sum(axis=1) + mechanism.offset[row]
                 low, high = float(reached.min()), float(reached.max())
             limits[f"{name}/{joint.name}"] = low, high
     screws = {}
@@ -255,7 +252,8 @@ def _screws(model: Model, moving: Moving) -> dict[int, _Screw]:
         low, high = limits[name]
         now = float(model.mj.qpos0[moving.joints.q_address[j]])
         slide = bool(moving.joints.slides[j])
-        free = None in (low, high) or not np.isfinite([low, high]).all()
-        ends = (-np.pi, np.pi) if free else (float(low or 0.0) - now, float(high or 0.0) - now)
+        ends = (-np.pi, np.pi)
+        if low is not None and high is not None and np.isfinite(high - low):
+            ends = low - now, high - now
         screws[j] = _Screw(slide, moving.anchors[j].copy(), moving.axes[j].copy(), *ends)
     return screws

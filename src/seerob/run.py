@@ -18,7 +18,9 @@ from seerob.compilation import pose_matrix
 from seerob.criterion import Criterion, Evaluate
 from seerob.engine import Engine
 from seerob.errors import InputError, Problem, SeerobError, Undecided
+from seerob.live import LiveSource, delay_of
 from seerob.model import Model
+from seerob.real_time import Clock
 from seerob.results import ResultLog
 from seerob.samples import Sample
 from seerob.sink import Writer
@@ -110,7 +112,14 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
     """
     opened: list[tuple[Source, Opened]] = []
     problems: list[Problem] = []
-    for source in model.workstation.sources:
+    file = next(iter(model.workstation.files), "workstation")
+    delay = delay_of(model.workstation.sources)
+    for i, source in enumerate(model.workstation.sources):
+        if isinstance(source, LiveSource) and source.timeout <= delay:
+            what = (
+                f"{source.timeout:g} s is not longer than the delay of {delay:g} s of the slowest live source"
+            )
+            problems.append(Problem(file, f"sources[{i}].timeout", what, "give a longer one"))
         try:
             opened.append((source, source.open(model.folder, target(model, source.target()))))
         except InputError as error:
@@ -260,27 +269,6 @@ def ticks(engine: Engine, judge: Judge, feed: Feed) -> Iterator[tuple[Snapshot, 
         yield snapshot(state, seq, judge(state)), samples
 
 
-class Clock:
-    """Holds a loop to real time; one that falls behind slips instead of hurrying after it."""
-
-    SLIP = 0.25
-    """Lag that is made up for [s]; beyond it the clock is set back."""
-
-    def __init__(self) -> None:
-        self._start = time.monotonic()
-        self.slipped = 0.0
-        """How much later than real time the run is by now [s]."""
-
-    def wait(self, t: float) -> None:
-        """Sleep until run time ``t`` [s] has come."""
-        ahead = self._start + t - time.monotonic()
-        if ahead > 0:
-            time.sleep(ahead)
-        elif ahead < -self.SLIP:
-            self._start -= ahead
-            self.slipped -= ahead
-
-
 @dataclass(frozen=True)
 class Summary:
     """What a run came to."""
@@ -324,7 +312,13 @@ def run(
         stop: Asked once per tick.
         progress: Told the run time once per tick [s].
     """
-    driven = {source.target(): source.timeout for source in model.workstation.sources if source.target()}
+    # What is shown is a delay old: silence shows that much earlier, so that it shows within the time-out.
+    delay = delay_of(model.workstation.sources)
+    driven = {
+        source.target(): source.timeout - (delay if isinstance(source, LiveSource) else 0.0)
+        for source in model.workstation.sources
+        if source.target()
+    }
     log = ResultLog(scene.criteria)
     begun = time.perf_counter()
     count, t = 0, 0.0

@@ -36,6 +36,8 @@ class Hearing:
     heard: list[tuple[float, str]] = field(default_factory=list)
     """Instant [s] of the newest samples and why one may not be relied on (empty: it may), oldest first;
     some may lie ahead of the tick."""
+    torques: list[Array | None] = field(default_factory=list)
+    """Measured joint torques of the same samples [N·m or N], each (n,); None where there were none."""
     error: float = 0.0
     """Largest joint error between twin and reference [rad or m]."""
     lost: float = -np.inf
@@ -47,6 +49,7 @@ class Hearing:
         """Drop what is older than the last sample at or before ``t`` [s]."""
         while len(self.heard) > 1 and self.heard[1][0] <= t:
             del self.heard[0]
+            del self.torques[:1]
 
     def doubt(self, t: float) -> str:
         """Why what was heard does not tell where it is at ``t`` [s]; empty when it does.
@@ -150,6 +153,22 @@ class State:
         """Joint velocities of the twin [rad/s or m/s], shape (n,)."""
         self.require(mechanism.name)
         return np.asarray(self.data.qvel[mechanism.v_address[mechanism.own]])
+
+    def measured_torques(self, mechanism: Mechanism) -> Array:
+        """Joint torques that its source measured, between samples as positions are [N·m or N], shape (n,).
+
+        Raises:
+            Undecided: Not heard, or heard without torques.
+        """
+        self.require(mechanism.name)
+        hearing = self.hearings[mechanism.name]
+        k = sum(1 for instant, _ in hearing.heard if instant <= self.t + SLACK)
+        times = [instant for instant, _ in hearing.heard[max(k - 1, 0) : k + 1]]
+        around = [torques for torques in hearing.torques[max(k - 1, 0) : k + 1] if torques is not None]
+        if not around or len(around) < len(times):
+            raise Undecided(f"{mechanism.name}: its source measures no joint torques")
+        # Outside its range np.interp holds the last value, as the reference does.
+        return np.array([np.interp(self.t, times, joint) for joint in np.transpose(around)])
 
     # -- dynamics ---------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,10 +15,12 @@ from seerob.compilation import Progress, compile_workstation
 from seerob.criterion import Criterion
 from seerob.errors import InputError, Problem
 from seerob.filing import SOURCES, source_files
+from seerob.live import Listening, LiveSource
 from seerob.model import Model
 from seerob.reading import read
+from seerob.real_time import Clock, hear, require_recorded
 from seerob.recording import Recording
-from seerob.run import Bound, Clock, Feed, Summary
+from seerob.run import Bound, Feed, Summary
 from seerob.sink import Sink, Writer
 from seerob.snapshot import Scene
 from seerob.source import Opened, Source
@@ -135,27 +138,36 @@ class Station:
             The results by criterion, ``summary.results["tcp speed"].max()``, and how it went.
 
         Raises:
-            InputError: A source, a criterion or a sink cannot be used as the file has it.
+            InputError: A source, a criterion or a sink cannot be used as the file has it, or a live
+                source is asked to run in any other than real time.
             SimulationDiverged: The physics produced a number that is not finite.
         """
         if sinks and folder is None:
             raise InputError.at("run", "folder", "missing", "sinks need a folder to write to")
+        heard: tuple[LiveSource, ...] = ()
+        if feed is None and live:
+            heard = tuple(s for s in self.workstation.sources if isinstance(s, LiveSource))
+        elif feed is None:
+            require_recorded(self.workstation)
+        clock = Clock(slip=Clock.LIVE_SLIP if heard else Clock.SLIP) if live else None
+        scene = scene or self.scene(with_sources=feed is None)
         if feed is None:
             feed = road.pump(self.sources, self.workstation.engine.tick, endless=live)
-            scene = scene or self.scene()
-        else:
-            scene = scene or self.scene(with_sources=False)
-        opened = self.open_sinks(sinks, Path(folder or "."), scene) if sinks else []
-        return road.run(
-            self.model,
-            feed,
-            bound=self.bound,
-            scene=scene,
-            writers=[*opened, *writers],
-            clock=Clock() if live else None,
-            stop=stop,
-            progress=progress,
-        )
+        with ExitStack() as until_the_end:
+            if clock and heard:
+                targets = [(source, road.target(self.model, source.target())) for source in heard]
+                feed = hear(feed, until_the_end.enter_context(Listening(targets)), clock)
+            opened = self.open_sinks(sinks, Path(folder or "."), scene) if sinks else []
+            return road.run(
+                self.model,
+                feed,
+                bound=self.bound,
+                scene=scene,
+                writers=[*opened, *writers],
+                clock=clock,
+                stop=stop,
+                progress=progress,
+            )
 
     def replay(
         self,

@@ -19,6 +19,7 @@ from seerob.stop_simulation import Stopped, StopSimulation
 from seerob.stopping import (
     BOUND,
     CONSTANT,
+    At,
     Course,
     course,
     largest_factor,
@@ -87,8 +88,8 @@ class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
                 raise ValueError(f'{name} does nothing with model = "{self.model}" as it is given')
 
 
-Courses = Callable[[State, float], Course]
-"""Course of the moving parts with all speeds multiplied by a factor; may raise `Undecided`."""
+Courses = Callable[[State], At]
+"""Course of the moving parts from where they are now; may raise `Undecided`."""
 
 
 Inverse = Callable[[Array, Array, Array, float], tuple[float, float | None]]
@@ -143,10 +144,16 @@ def fastest(state: State, gap: Gap) -> Array:
 def _timed(stop: Stop, gap: Gap) -> StopModel:
     share = BOUND if stop.model == "bound" else CONSTANT
 
-    def courses(state: State, scale: float) -> Course:
-        v = scale * fastest(state, gap)
-        T_s = float(v.max()) / stop.deceleration if stop.deceleration is not None else stop.stopping or 0.0
-        return course(v, stop.reaction, T_s, share)
+    def courses(state: State) -> At:
+        v = fastest(state, gap)
+        top = float(v.max())
+
+        def at(scale: float) -> Course:
+            a = stop.deceleration
+            T_s = scale * top / a if a is not None else stop.stopping or 0.0
+            return course(scale * v, stop.reaction, T_s, share)
+
+        return at
 
     def inverse(v: Array, d: Array, v_h: Array, K: float) -> tuple[float, float | None]:
         T_r, a, T_s = stop.reaction, stop.deceleration, stop.stopping or 0.0
@@ -215,17 +222,21 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopMode
     unknown = [joint.name for joint, torque in zip(robot.joints, brakes, strict=True) if np.isnan(torque)]
     simulation = StopSimulation(model, robot, brakes, gap.b)
 
-    def courses(state: State, scale: float) -> Course:
+    def courses(state: State) -> At:
         if unknown:
             raise Undecided(f"{robot.name}: nobody gave the torque limit of {', '.join(unknown)}")
-        stopped = simulation.stop(state, stop.reaction, scale)
-        found = stopped.course()
-        if stop.direction == "path":
-            return found
-        nearer = approach(stopped, state, gap)
-        # S_r and S_s only count together; neither may be larger than its path.
-        S_r = np.minimum(found.S_r, nearer)
-        return Course(found.v_r, S_r, nearer - S_r, found.T_s)
+
+        def at(scale: float) -> Course:
+            stopped = simulation.stop(state, stop.reaction, scale)
+            found = stopped.course()
+            if stop.direction == "path":
+                return found
+            nearer = approach(stopped, state, gap)
+            # S_r and S_s only count together; neither may be larger than its path.
+            S_r = np.minimum(found.S_r, nearer)
+            return Course(found.v_r, S_r, nearer - S_r, found.T_s)
+
+        return at
 
     shown = ", ".join("?" if np.isnan(b) else f"{b:g}" for b in brakes)
     inputs = (Input(name="brake torques", value=shown, unit="N·m or N", origin=origin, source=source),)

@@ -38,6 +38,10 @@ class Course:
     """Stopping time [s]."""
 
 
+At = Callable[[float], Course]
+"""The course with all speeds multiplied by a factor."""
+
+
 def way_of_person(v_h: float, T_r: float, T_s: Array | float) -> Array:
     """S_h of a person who comes near at constant speed [m]; a person who recedes counts as standing."""
     return np.asarray(max(v_h, 0.0) * (T_r + np.asarray(T_s)))
@@ -114,11 +118,12 @@ def largest_factor(c: Array, b: Array, a: Array | float = 0.0) -> float:
     Returns:
         0 where no factor is; inf where nothing grows.
     """
+    a, b = np.asarray(a), np.asarray(b)
     left = np.maximum(-np.asarray(c), 0.0)
     # The root that stays exact when the square is small.
     down = b + np.sqrt(np.square(b) + 4 * a * left)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        factors = np.where(down > 0, 2 * left / down, np.inf)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        factors = np.where(down > 0, 2 * left / down, np.where((a == 0) & (b == 0), np.inf, 0.0))
     return 0.0 if np.any(np.asarray(c) > 0) else float(np.min(factors))
 
 

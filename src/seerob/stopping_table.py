@@ -5,6 +5,7 @@ Tables are shipped as cited data in ``norms/stopping``; a user's own has the sam
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from importlib.resources import files
 from typing import Annotated
@@ -143,10 +144,10 @@ def interpolate(axes: Sequence[Sequence[float]], values: Array, at: Sequence[flo
     for axis, x in zip(axes, at, strict=True):
         if not x <= axis[-1] * (1 + 1e-9):
             raise Undecided(f"{x:.3g} is beyond the table, which ends at {axis[-1]:g}")
-        k = int(np.clip(np.searchsorted(axis, x, side="right") - 1, 0, max(len(axis) - 2, 0)))
         if len(axis) == 1:
             found = found[0]
             continue
+        k = min(max(bisect_right(axis, x) - 1, 0), len(axis) - 2)
         share = min(max((x - axis[k]) / (axis[k + 1] - axis[k]), 0.0), 1.0)
         found = (1 - share) * found[k] + share * found[k + 1]
     return float(found)

@@ -7,8 +7,8 @@ a piece's width :math:`w_i = |\Delta q_i| / 2m` of each joint, :math:`\sum_i w_i
 its two values; with m > 1 every way that passes each piece so, as the straight line does.
 
 When the joint velocities at both samples are given, the way may be the cubic with these ends: it leaves
-the straight line by at most :math:`\frac{4}{27} (|\dot q_0 h - \Delta q| + |\dot q_1 h - \Delta q|)` (the largest
-value of :math:`s (1-s)^2`), which is added to :math:`w_i`.
+the straight line by at most :math:`\frac{4}{27} (|\dot q_0 h - \Delta q| + |\dot q_1 h - \Delta q|)` (the
+largest value of :math:`s (1-s)^2`), which is added to :math:`w_i`.
 """
 
 from __future__ import annotations
@@ -224,8 +224,8 @@ class Sweep:
         """What has been marked so far."""
         mean = self._total / self.stamps if self.stamps else 0.0
         guarantee = (
-            "every voxel that a point of the bodies' shapes crosses while each joint goes straight from sample "
-            "to sample, or on the cubic where velocities are given"
+            "every voxel that a point of the bodies' shapes crosses while each joint goes straight from "
+            "sample to sample, or on the cubic where velocities are given"
         )
         return Swept(self.grid, self.dilation, mean, self.stamps, guarantee)
 

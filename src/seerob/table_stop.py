@@ -11,11 +11,11 @@ from seerob.errors import InputError, Undecided
 from seerob.model import Body, Gap, Mechanism, Model
 from seerob.snapshot import Input, Origin
 from seerob.state import State
-from seerob.stopping import Course, course, travel
+from seerob.stopping import At, Course, course, travel
 from seerob.stopping_table import JointStop, SpeedStop, StoppingTable, interpolate, joint_stop
 from seerob.transforms import Array
 
-Bound = tuple[Callable[[State, float], Course], tuple[Input, ...]]
+Bound = tuple[Callable[[State], At], tuple[Input, ...]]
 
 
 def bind_table(
@@ -57,11 +57,14 @@ def bind_table(
     return _by_joint(table, T_r, others, model, robot, gap, load), inputs
 
 
-def _by_tool_speed(tool: SpeedStop, T_r: float, gap: Gap) -> Callable[[State, float], Course]:
-    def courses(state: State, scale: float) -> Course:
-        v = scale * np.array([state.fastest_point(i)[0] for i in gap.b])
+def _by_tool_speed(tool: SpeedStop, T_r: float, gap: Gap) -> Callable[[State], At]:
+    def courses(state: State) -> At:
+        v = np.array([state.fastest_point(i)[0] for i in gap.b])
         # Any point counts as the tool's: the fastest decides for all.
-        return course(v, T_r, interpolate([tool.speed], np.array(tool.time), [float(v.max())]))
+        top = float(v.max())
+        return lambda scale: course(
+            scale * v, T_r, interpolate([tool.speed], np.array(tool.time), [scale * top])
+        )
 
     return courses
 
@@ -74,7 +77,7 @@ def _by_joint(
     robot: Mechanism,
     gap: Gap,
     load: float,
-) -> Callable[[State, float], Course]:
+) -> Callable[[State], At]:
     entries = {entry.joint: entry for entry in table.joints}
     full = [_full_speed(entries.get(j), robot, j) for j in range(len(robot.joints))]
     chains = [_chain(model, robot, model.bodies[i]) for i in gap.b]
@@ -98,22 +101,24 @@ def _by_joint(
         way, time = joint_stop(entries[j], speed / (full[j] or 1.0), load / table.rated_payload, extension)
         return min(way, speed * time), time
 
-    def courses(state: State, scale: float) -> Course:
-        speeds = scale * np.abs(state.qd(robot))
+    def courses(state: State) -> At:
+        speeds = np.abs(state.qd(robot))
+        v = np.array([state.fastest_point(i)[0] for i in gap.b])
+        levers = [_levers(state, robot, chain, index) for chain, index in zip(chains, gap.b, strict=True)]
         extension = _extension(state, robot) / table.reach if table.reach is not None else 1.0
-        stops = [joint(j, float(v), extension) for j, v in enumerate(speeds)]
-        ways = T_r * speeds + np.array([way for way, _ in stops])
-        every = np.abs(robot.coupling) @ ways
-        v = scale * np.array([state.fastest_point(i)[0] for i in gap.b])
-        total = np.array(
-            [
-                travel(turns[chain], every[chain], _levers(state, robot, chain, index))
-                for chain, index in zip(chains, gap.b, strict=True)
-            ]
-        )
-        # What the way of both exceeds the reaction's by; the lever may grow during the reaction.
-        S_r = v * T_r
-        return Course(v, S_r, np.maximum(total - S_r, 0.0), max(time for _, time in stops))
+
+        def at(scale: float) -> Course:
+            stops = [joint(j, float(scale * speed), extension) for j, speed in enumerate(speeds)]
+            ways = T_r * scale * speeds + np.array([way for way, _ in stops])
+            every = np.abs(robot.coupling) @ ways
+            total = np.array(
+                [travel(turns[c], every[c], arms) for c, arms in zip(chains, levers, strict=True)]
+            )
+            # What the way of both exceeds the reaction's by; the lever may grow during the reaction.
+            S_r = scale * v * T_r
+            return Course(scale * v, S_r, np.maximum(total - S_r, 0.0), max(time for _, time in stops))
+
+        return at
 
     return courses
 
@@ -150,8 +155,9 @@ def _levers(state: State, robot: Mechanism, chain: Array, index: int) -> Array:
     joints = state.model.mj.dof_jntid[robot.v_address[chain]]
     corners = state.positions[index] + body.corners @ state.rotations[index].T
     arms = corners[None] - state.data.xanchor[joints][:, None]
-    away = np.cross(state.data.xaxis[joints][:, None], arms)
-    return np.asarray(np.linalg.norm(away, axis=-1).max(axis=1) + body.radius + body.deviation)
+    along = np.einsum("kci,ki->kc", arms, state.data.xaxis[joints])
+    squares = np.einsum("kci,kci->kc", arms, arms) - along**2
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0).max(axis=1)) + body.radius + body.deviation)
 
 
 def _extension(state: State, robot: Mechanism) -> float:

@@ -54,7 +54,7 @@ class VoxelGrid:
     @property
     def origin(self) -> Array:
         """Lower corner of the first voxel [m], shape (3,)."""
-        return self.first * self.pitch
+        return np.asarray(self.first * self.pitch, float)
 
     @property
     def volume(self) -> float:

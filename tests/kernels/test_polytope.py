@@ -203,6 +203,7 @@ def test_nearly_parallel_planes_lose_no_digits_beyond_their_condition(angle: flo
         A[:, 2] = A[:, 0] - angle * rng.normal(size=3)
         low, high = -rng.uniform(5, 200, 6), rng.uniform(5, 200, 6)
         p = zero_moment(A, low, high)
+        assert closed(p)
         assert p.largest == pytest.approx(exactly_farthest(A, low, high), rel=1e-14 / angle)
 
 

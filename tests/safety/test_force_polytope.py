@@ -190,6 +190,12 @@ def test_unknown_torque_limits_are_undecided(tmp_path, name):
     assert any(i.origin is Origin.MISSING and "torque limit" in i.name for i in result.basis.inputs)
 
 
+def test_torque_limit_of_zero_is_one_that_nobody_filled_in(tmp_path):
+    result = arm(tmp_path, "limit = 1e6\n", TWO_R + HAND + "torque_limits = [10, 0]\n")
+    assert result.verdict is Verdict.UNDECIDED
+    assert result.reason.endswith("torque limit of j2")
+
+
 def test_robot_too_weak_for_its_own_weight_is_undecided_or_says_so(tmp_path):
     robot = '[[robots]]\nname = "arm"\nmodel = "arm.urdf"\n'
     pose = ((0, 0, 0), (0, 0, 0))

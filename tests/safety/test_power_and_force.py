@@ -11,6 +11,7 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, heard, judged, made, results_at, state_at, two_r
 from seerob.contact_regions import FORBIDDEN, REGIONS
+from seerob.engine import Engine
 from seerob.errors import InputError
 from seerob.norms.body_limits import SHIPPED
 from seerob.snapshot import Origin, Result, Verdict
@@ -169,14 +170,11 @@ def test_load_counts_in_full(tmp_path: Path) -> None:
 
 
 def test_unknown_mass_is_undecided(tmp_path: Path) -> None:
-    urdf = two_r().replace('<mass value="1.0"/>', "", 1)
+    urdf = two_r()
     start = urdf.index("<inertial>", urdf.index('name="l2"'))
-    stripped = urdf[:start] + urdf[urdf.index("</inertial>", start) + 11 :]
-    stripped = stripped.replace(
-        '<origin xyz="1 0 0"/><inertia', '<origin xyz="1 0 0"/><mass value="1"/><inertia', 1
-    )
-    station = made(tmp_path, f'{FLOATING}{TWO_R}[[safety]]\nkind = "power_and_force"\nrobot = "arm"\n',
-                   {"arm.urdf": stripped})  # fmt: skip
+    bare = urdf[:start] + urdf[urdf.index("</inertial>", start) + len("</inertial>") :]
+    text = f'{FLOATING}{TWO_R}[[safety]]\nkind = "power_and_force"\nrobot = "arm"\n'
+    station = made(tmp_path, text, {"arm.urdf": bare})
     result = judged(station.bound, state_at(station, arm=(STRETCHED, [0.1, 0])))[0]
     assert result.verdict is Verdict.UNDECIDED
     assert "arm/l2" in result.reason
@@ -184,9 +182,9 @@ def test_unknown_mass_is_undecided(tmp_path: Path) -> None:
 
 def test_robot_that_was_not_heard_is_undecided(tmp_path: Path) -> None:
     station = flat(tmp_path)
-    result = judged(station.bound, state_at(station))[0]
-    assert result.verdict is Verdict.UNDECIDED
-    assert "no source" in result.reason or "nothing heard" in result.reason
+    result = judged(station.bound, Engine(station.model, driven={"arm": 0.2}).start())[0]
+    assert (result.verdict, result.value) == (Verdict.UNDECIDED, None)
+    assert "nothing heard" in result.reason
 
 
 def test_robot_at_rest_hits_nobody(tmp_path: Path) -> None:
@@ -222,6 +220,15 @@ def test_clamped_is_the_static_limit_against_the_robots_mass_alone(tmp_path: Pat
     assert chest.reason == "pressure, clamped, arm/l2"
 
 
+def test_clamped_contact_is_as_small_as_the_static_indentation(tmp_path: Path) -> None:
+    options = (
+        'mass = "simplified"\ncontact_radius = { arm = 0.003 }\nthickness = { "Hands and fingers" = 0.3 }'
+    )
+    hand = swing(cell(tmp_path, options, more=WALL), 0.2)["Hands and fingers"]
+    area = math.pi * 0.003 * 140 / 75e3
+    assert hand.limit == pytest.approx(190e4 * area / math.sqrt(M_R * 75e3), rel=1e-9)
+
+
 def test_gap_wider_than_the_body_part_does_not_clamp_it(tmp_path: Path) -> None:
     found = swing(flat(tmp_path, more=WALL), 0.2)
     assert "clamped" in found["Neck"].reason
@@ -241,7 +248,7 @@ def person(x: float) -> str:
 
 
 def test_only_regions_within_the_horizon_count(tmp_path: Path) -> None:
-    station = flat(tmp_path, 'human = "op"\nhorizon = 0.2', more=person(2.4))
+    station = flat(tmp_path, 'human = "op"\nhorizon = 0.2', more=person(2.25))
     found = regions_at(station, 0.1)
     assert "Abdomen" in found
     assert "Lower legs" not in found

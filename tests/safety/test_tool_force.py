@@ -223,6 +223,17 @@ def test_moving_arm_in_the_air_exerts_no_force(tmp_path):
     assert max(sizes) < 0.03 * max(gross)
 
 
+def test_acceleration_never_bridges_a_tick_that_is_undecided(tmp_path):
+    station = made(tmp_path, UR5E + TOOL)
+    engine, judge, reasons = Engine(station.model, driven={"arm": 0.2}), Judge(station.bound), []
+    for k in range(6):
+        torques = {} if k == 3 else {"tau": tuple(held())}
+        engine.take([heard("arm", 0.01 * k, Q, np.zeros(6), **torques)])
+        reasons.append(judge(engine.tick() if k else engine.start())[0].reason)
+    assert ["acceleration" in reason for reason in reasons] == [True, False, False, False, True, False]
+    assert "no joint torques" in reasons[3]
+
+
 def test_long_period_cannot_know_an_acceleration(tmp_path):
     results = run(tmp_path, "every = 0.1\nlimit = 1e6\n", held(), ticks=12)
     assert results[-1].verdict is Verdict.UNDECIDED

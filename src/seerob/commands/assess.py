@@ -32,7 +32,10 @@ def add(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Evaluate, print, and return the exit code of the verdict."""
+    from seerob.real_time import require_recorded
+
     station = compiled(options.workstation, quiet=options.json)
+    require_recorded(station.workstation)
     folder = run_folder(station.model.folder, options.output)
     scene = station.scene()
     if not options.json:

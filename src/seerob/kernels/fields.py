@@ -6,8 +6,8 @@ weights :math:`w_i` Jensen's inequality gives
 
 .. math:: f(x)^2 \ge \sum_i w_i f(x_i)^2 - h^2 \left(a(1-a) + b(1-b) + c(1-c)\right)
 
-with the spacing h and the fractions a, b, c of x in its cell. It is exact in the limit, of second order,
-and needs no smoothness of S. Nodes may hold less than the truth: the bound stays one.
+with the spacing h and the fractions a, b, c of x in its cell. It holds whatever the shape of S, and is of
+second order where f is smooth. Nodes may hold less than the truth: the bound stays one.
 
 A field holds :math:`f^2` outside S and :math:`-g^2` inside, with g a lower bound of the depth.
 """
@@ -83,7 +83,8 @@ def mesh_field(
                     nodes, links, T, x, y, z, 0.0, 0.0, 0.0, np.inf, winner, stack, bounds, W
                 )
                 d = math.sqrt(d2)
-                if not closed or sign == 0.0 or before + d <= since * spacing:
+                # Balls that overlap leave no room for a surface; those that touch may have one between them.
+                if not closed or sign == 0.0 or before + d <= since * spacing * (1.0 + 1e-6):
                     sign = -1.0 if contains(nodes, links, T, x, y, z) else 1.0
                 field[i, j, k] = sign * d2 * DOWN
                 before = d
@@ -112,7 +113,7 @@ def cells_field(cells: Cells, spacing: float, band: int) -> Field:
     nx, ny, nz = cells.shape
     field = np.empty(cells.shape, np.float32)
     cap = (band - 0.5) ** 2
-    line = np.empty(max(nx, max(ny, nz)), np.float32)
+    line = np.empty(max(nx, ny, nz), np.float32)
     for inside in range(2):
         a = np.full(cells.shape, np.float32(cap), np.float32)
         for i in range(nx):
@@ -153,10 +154,10 @@ def cells_field(cells: Cells, spacing: float, band: int) -> Field:
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def box_square(low: Array, high: Array, x: float, y: float, z: float) -> float:
     """Squared distance of a point to the upright box from ``low`` to ``high`` [m²]."""
-    dx = max(low[0] - x, max(0.0, x - high[0]))
-    dy = max(low[1] - y, max(0.0, y - high[1]))
-    dz = max(low[2] - z, max(0.0, z - high[2]))
-    return dx * dx + dy * dy + dz * dz
+    dx = max(low[0] - x, 0.0, x - high[0])
+    dy = max(low[1] - y, 0.0, y - high[1])
+    dz = max(low[2] - z, 0.0, z - high[2])
+    return float(dx * dx + dy * dy + dz * dz)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -207,7 +208,7 @@ def square_at_least(
     f10 = _out(field[i + 1, j, k]) * (1.0 - c) + _out(field[i + 1, j, k + 1]) * c
     f11 = _out(field[i + 1, j + 1, k]) * (1.0 - c) + _out(field[i + 1, j + 1, k + 1]) * c
     mean = (f00 * (1.0 - b) + f01 * b) * (1.0 - a) + (f10 * (1.0 - b) + f11 * b) * a
-    return max(least, mean - spacing * spacing * (a * (1.0 - a) + b * (1.0 - b) + c * (1.0 - c)))
+    return float(max(least, mean - spacing * spacing * (a * (1.0 - a) + b * (1.0 - b) + c * (1.0 - c))))
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -220,11 +221,10 @@ def signed_at_most(
         out = box_square(low, high, x, y, z)
         if out > 0.0:
             return math.sqrt(out)
-        deep = min(min(x - low[0], high[0] - x), min(y - low[1], high[1] - y))
-        return -min(deep, min(z - low[2], high[2] - z))
-    i = int(math.floor((x - start[0]) / spacing + 0.5))
-    j = int(math.floor((y - start[1]) / spacing + 0.5))
-    k = int(math.floor((z - start[2]) / spacing + 0.5))
+        return -float(min(x - low[0], high[0] - x, y - low[1], high[1] - y, z - low[2], high[2] - z))
+    i = int(np.floor((x - start[0]) / spacing + 0.5))
+    j = int(np.floor((y - start[1]) / spacing + 0.5))
+    k = int(np.floor((z - start[2]) / spacing + 0.5))
     if not (0 <= i < nx and 0 <= j < ny and 0 <= k < nz):
         return np.inf
     value = field[i, j, k]

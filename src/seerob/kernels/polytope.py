@@ -8,7 +8,7 @@ Each pair of planes that are not parallel meets in a line
 with unit normals, :math:`b` one of the two offsets of each. The other slabs clip the line; what is left
 of it is an edge. A bounded polytope in three dimensions has no corner that is not the end of an edge, so
 :math:`2n(n-1)` clippings find every one: :math:`O(n^3)`, where the corners of the box of
-:math:`(l, h)` are :math:`2^n`. A corner where three planes meet is found three times and kept once.
+:math:`(l, h)` are :math:`2^n`. A corner is found once per edge that ends there; `merged` keeps one.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def unit_slabs(A: Array, low: Array, high: Array) -> tuple[bool, Array, Array, A
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def corners(N: Array, l: Array, h: Array, V: Array, planes: Indices, quality: Array) -> int:
+def corners(N: Array, l: Array, h: Array, V: Array) -> int:
     """Write the corners of a polytope into ``V``.
 
     Args:
@@ -76,11 +76,9 @@ def corners(N: Array, l: Array, h: Array, V: Array, planes: Indices, quality: Ar
         l: Lower bounds, finite, shape (n,).
         h: Upper bounds, finite, shape (n,); equal to the lower one for a plane.
         V: Room for corners, shape (m, 3) with m >= 4 n (n - 1).
-        planes: Room, shape (m,).
-        quality: Room, shape (m,).
 
     Returns:
-        Number of corners, some of them equal where more than three planes meet; `EMPTY` or `UNBOUNDED`.
+        Number of corners, each as often as edges end there; `EMPTY` or `UNBOUNDED`.
     """
     n = len(N)
     # For each pair, of the lines' range within slab k: its middle base ± by_i ± by_j, half its length.
@@ -138,41 +136,10 @@ def corners(N: Array, l: Array, h: Array, V: Array, planes: Indices, quality: Ar
                         return UNBOUNDED
                     u, w = mi + si * ri, w0 + si * wi + sj * wj
                     px, py, pz = u * ax + w * ex, u * ay + w * ey, u * az + w * ez
-                    for end in range(2):
-                        t = t1 if end else t0
-                        third = -1
-                        for k in range(n):
-                            middle = base[k] + si * by_i[k] + sj * by_j[k]
-                            if t == (middle + half[k] if end else middle - half[k]):
-                                upper = (N[k, 0] * dx + N[k, 1] * dy + N[k, 2] * dz > 0.0) == (
-                                    end == 1
-                                ) and l[k] < h[k]
-                                third = 2 * k + (1 if upper else 0)
-                                break
-                        key = _key(2 * i + side_i, 2 * j + side_j, third)
-                        place = count
-                        for known in range(count):
-                            if planes[known] == key:
-                                place = known
-                                break
-                        if place < count and quality[place] >= s2:
-                            continue
-                        # Of the three lines through a corner the one between the steepest planes is exact.
-                        planes[place], quality[place] = key, s2
-                        V[place, 0], V[place, 1], V[place, 2] = px + t * dx, py + t * dy, pz + t * dz
-                        if place == count:
-                            count += 1
+                    for t in (t0, t1):
+                        V[count, 0], V[count, 1], V[count, 2] = px + t * dx, py + t * dy, pz + t * dz
+                        count += 1
     return count if count else _without_corners(N, l, h)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _key(a: int, b: int, c: int) -> int:
-    """One number for three planes in any order, the first below the second."""
-    if c < a:
-        a, b, c = c, a, b
-    elif c < b:
-        b, c = c, b
-    return (a << 40) | (b << 20) | c
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -218,13 +185,13 @@ def largest(A: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
     """
     N, _, n = A.shape
     room = max(4 * n * (n - 1), 1)
-    V, planes, quality = np.empty((room, 3)), np.empty(room, np.int64), np.empty(room)
+    V = np.empty((room, 3))
     norm, point, radius = np.full(N, np.nan), np.full((N, 3), np.nan), np.full(N, np.nan)
     for s in range(N):
         possible, normals, l, h = unit_slabs(A[s], low[s], high[s])
         count = EMPTY
         if possible:
-            count = corners(normals, l, h, V, planes, quality) if len(l) else UNBOUNDED
+            count = corners(normals, l, h, V) if len(l) else UNBOUNDED
         if count != EMPTY:
             radius[s] = inscribed(l, h)
         if count == UNBOUNDED:

@@ -38,10 +38,10 @@ def profile(
     met = np.zeros((nr, nz), np.bool_)
     across = HALF_DIAGONAL * pitch + MARGIN
     for n in range(len(radii)):
-        r0 = max(0, int(math.floor((radii[n] - across) / fine)))
-        r1 = min(nr - 1, int(math.floor((radii[n] + across) / fine)))
-        z0 = max(0, int(math.floor((heights[n] - half - MARGIN) / fine)))
-        z1 = min(nz - 1, int(math.floor((heights[n] + half + MARGIN) / fine)))
+        r0 = max(0, int(np.floor((radii[n] - across) / fine)))
+        r1 = min(nr - 1, int(np.floor((radii[n] + across) / fine)))
+        z0 = max(0, int(np.floor((heights[n] - half - MARGIN) / fine)))
+        z1 = min(nz - 1, int(np.floor((heights[n] + half + MARGIN) / fine)))
         for r in range(r0, r1 + 1):
             for z in range(z0, z1 + 1):
                 met[r, z] = True
@@ -92,10 +92,10 @@ def revolve(
                 h = x * axis[0] + y * axis[1] + z * axis[2]
                 r = math.sqrt(max(x * x + y * y + z * z - h * h, 0.0))
                 h -= low
-                r0 = max(0, int(math.floor((r - across) / fine)))
-                r1 = min(nr - 1, int(math.floor((r + across) / fine)))
-                z0 = max(0, int(math.floor((h - half) / fine)))
-                z1 = min(nz - 1, int(math.floor((h + half) / fine)))
+                r0 = max(0, int(np.floor((r - across) / fine)))
+                r1 = min(nr - 1, int(np.floor((r + across) / fine)))
+                z0 = max(0, int(np.floor((h - half) / fine)))
+                z1 = min(nz - 1, int(np.floor((h + half) / fine)))
                 if r0 > r1 or z0 > z1:
                     continue
                 if sums[r1 + 1, z1 + 1] - sums[r0, z1 + 1] - sums[r1 + 1, z0] + sums[r0, z0] > 0:

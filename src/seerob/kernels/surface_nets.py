@@ -88,7 +88,7 @@ def fill_pinches(cells: Cells) -> int:
                             for c in range(2):
                                 if cells[i + a, j + b, k + c]:
                                     count += 1
-                    if count != 2 and count != 6:
+                    if count not in (2, 6):
                         continue
                     for b in range(2):
                         for c in range(2):

@@ -141,8 +141,8 @@ def stamp(
             for s in range(3):
                 middle += R[r, s] * (low[s] + high[s]) / 2.0
                 extent += abs(R[r, s]) * (high[s] - low[s]) / 2.0
-            first[r] = max(0, int(math.floor((middle - extent) / pitch))) // TOP * TOP
-            last[r] = min(cells.shape[r] - 1, int(math.floor((middle + extent) / pitch)))
+            first[r] = max(0, int(np.floor((middle - extent) / pitch))) // TOP * TOP
+            last[r] = min(cells.shape[r] - 1, int(np.floor((middle + extent) / pitch)))
         for I in range(max(first[0], begin * TOP), min(last[0] + 1, end * TOP), TOP):
             for J in range(first[1], last[1] + 1, TOP):
                 for K in range(first[2], last[2] + 1, TOP):
@@ -224,12 +224,13 @@ def motion_bounds(
     positions: Array,
     bounds: Array,
 ) -> None:
-    r"""How far any point of each set can be from where it is now, for any joint positions near these.
+    r"""How far any point of each set can be from where it is now, for joint positions near these.
 
     With joint i off by at most :math:`w_i`: turn the joints one after the other from the base to the tip.
     When joint i turns, the joints beyond it are still where they are now, so a point's distance
-    :math:`\rho_i` to its axis is today's, and the way made is at most :math:`w_i \rho_i` (:math:`w_i` for a slide).
-    The sum bounds the displacement. :math:`\rho_i` is convex in the point: corners of a box bound all in it.
+    :math:`\rho_i` to its axis is today's, and the way made is at most :math:`w_i \rho_i` (for a slide
+    :math:`w_i`). The sum bounds the displacement. :math:`\rho_i` is convex in the point: the corners of a
+    box bound all that is in it.
 
     Args:
         anchors: A point of each joint's axis, in the world [m], shape (nj, 3).

@@ -18,7 +18,7 @@ from seerob.norms.iso_13855 import WALKING
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.state import State
 from seerob.stop_models import MOVING, Stop, StopModel, bind_stop
-from seerob.stopping import Course, largest_scale, separation_distance, way_of_person, worst_case
+from seerob.stopping import At, Course, largest_scale, separation_distance, way_of_person, worst_case
 from seerob.transforms import Array
 
 __all__ = ["Detection", "Separation", "Stop", "separation_bound"]
@@ -157,7 +157,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
         def evaluate(state: State) -> Result:
             found = state.closest_per_body(gap)
-            now = stop.courses(state, 1.0)
+            course = stop.courses(state)
+            now = course(1.0)
             S_p = self._distance(now, K)
             if self.mode == "fixed":
                 S_p = largest.including(state, S_p)
@@ -193,7 +194,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 parts=(
                     *parts,
                     *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r)),
-                    *self._permissible(state, stop, now, found.distance, K),
+                    *self._permissible(stop, course, now, found.distance, K),
                 ),
                 markers=(segment,),
             )
@@ -216,7 +217,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
 
     def _permissible(
-        self, state: State, stop: StopModel, now: Course, distance: Array, K: float
+        self, stop: StopModel, course: At, now: Course, distance: Array, K: float
     ) -> tuple[Result, ...]:
         """Largest speed of the robot's fastest point for which no part is nearer than its S_p."""
         speed, factor, reason = None, None, ""
@@ -225,7 +226,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             v_h = iso_13855.speed_at(distance) if given is None else np.full(len(distance), given)
             speed, factor = stop.inverse(now.v_r, distance, v_h, K)
         elif now.v_r.max() > MOVING:
-            factor = _factor(lambda s: self._distance(stop.courses(state, s), K), distance, stop.costly)
+            factor = _factor(lambda s: self._distance(course(s), K), distance, stop.costly)
             speed = factor * float(now.v_r.max())
             reason = "or more" if factor == (1.0 if stop.costly else TOP) else ""
         else:
@@ -268,7 +269,10 @@ class Separation(Criterion, frozen=True, kw_only=True):
         )
         fixed = ", the largest so far" if self.mode == "fixed" else ""
         toward = self.stop.direction == "toward"
-        norm = "ISO/TS 15066:2016 5.5.4.2.3; structure from public sources that agree, no licensed text was opened"
+        norm = (
+            "ISO/TS 15066:2016 5.5.4.2.3; structure from public sources that agree (2S), "
+            "no licensed text was opened"
+        )
         return Basis(
             formula=f"{formula}{fixed}; the distance must not fall below it",
             source=f"Weistroffer et al. 2022, Eq. 2 (upper bound of {norm})" if bound else norm,

@@ -85,7 +85,7 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
         if self.every is not None:
             not_modelled.append("the way between two evaluations, taken as a cubic of joint positions")
         return Basis(
-            formula="voxels that touch the shapes, dilated by Σ |Δq_i|/2 ρ_i around the middle of each piece of way",
+            formula="voxels that touch the shapes at the middle of each piece, dilated by Σ ρ_i |Δq_i|/2",
             source="Weistroffer et al. 2022, section 2.2.2.1",
             inputs=(
                 *provenance.motion(model, *_carriers(model, model.select(self.of))),

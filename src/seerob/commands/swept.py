@@ -1,0 +1,153 @@
+"""``seerob swept``: the volume that something sweeps or can reach, as a closed mesh in a file."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from seerob.commands import Exit, add_workstation, compiled, describe, line, tell
+from seerob.commands.progress import progress
+from seerob.errors import InputError
+
+if TYPE_CHECKING:
+    from seerob.samples import Sample
+    from seerob.snapshot import Snapshot
+    from seerob.station import Station
+    from seerob.transforms import Array
+
+HELP = "write the volume that a robot sweeps, or can reach, as a closed mesh (STL or GLB)"
+EXAMPLE = "seerob swept my_cell --of ur10 --voxel 0.01 -o swept.stl"
+
+
+def metres(text: str) -> float:
+    """A length on the command line [m]; more than nothing, and finite."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a length in m above 0")
+    return value
+
+
+def instant(text: str) -> float:
+    """An instant on the command line [s]; 0 or more, and finite."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds, 0 or more")
+    return value
+
+
+def add(sub: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    add_workstation(sub)
+    sub.add_argument("--of", help="what sweeps (default: the only robot, with all that it carries)")
+    sub.add_argument("--voxel", type=metres, default=0.01, help="edge of a voxel [m] (default: 0.01)")
+    sub.add_argument("--reach", action="store_true", help="all that the joint limits allow, not the motion")
+    sub.add_argument("--from", dest="start", type=instant, default=0.0, help="begin of the part to take [s]")
+    sub.add_argument("--to", dest="end", type=instant, help="end of the part to take [s]")
+    sub.add_argument("--triangles", type=int, help="about how many at most; voxels are merged to get there")
+    sub.add_argument("-o", "--output", type=Path, default=Path("swept.stl"), help=".stl or .glb file")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Sweep, write the mesh and say what is in it."""
+    from seerob.model_io.mesh_out import check_format, write_mesh
+    from seerob.moving import reach_box
+    from seerob.reachable import reachable_volume
+    from seerob.swept import swept_volume
+    from seerob.voxels import check_room
+
+    check_format(options.output)
+    station = compiled(options.workstation, sources=not options.reach)
+    model = station.model
+    bodies = model.select(_subject(station, options.of))
+    check_room(*reach_box(model, bodies), options.voxel)
+    describe(station)
+    tell(model.findings)
+    if options.reach:
+        with progress(1.0, "joint limits") as share:
+            swept = reachable_volume(model, bodies, voxel=options.voxel, progress=share)
+        assert swept is not None
+    else:
+        motion = _motion(station, options.start, options.end)
+        with progress(1.0, "sweeping") as share:
+            swept = swept_volume(model, bodies, motion, voxel=options.voxel, progress=share)
+    mesh = swept.mesh(most=options.triangles)
+    write_mesh(options.output, mesh)
+    line("volume", f"{swept.volume:.4g} m³ in voxels of {options.voxel:g} m: not less than the truth")
+    line("contains", swept.guarantee)
+    line("dilated", f"by up to {swept.dilation * 1e3:.1f} mm for motion between two stamps")
+    line("wrote", f"{options.output}: {len(mesh.faces)} triangles, metres")
+    return Exit.WITHIN
+
+
+def _subject(station: Station, name: str | None) -> str:
+    robots = [robot.name for robot in station.workstation.robots]
+    if name is not None:
+        return name
+    if len(robots) != 1:
+        what = f"{len(robots)} robots: {', '.join(robots)}" if robots else "no robot"
+        raise InputError.at("seerob swept", "--of", f"missing, and there is {what}", "say what sweeps")
+    return robots[0]
+
+
+class _Path:
+    """A writer that keeps the twin's joint positions."""
+
+    def __init__(self, start: float, end: float) -> None:
+        self.start, self.end = start - 1e-9, end + 1e-9
+        self.joints: list[dict[str, tuple[float, ...]]] = []
+        self.off: dict[str, float] = {}
+        """Largest distance of each twin from what was heard [rad or m]."""
+
+    def write(self, snapshot: Snapshot, samples: Iterable[Sample]) -> None:
+        if self.start <= snapshot.t <= self.end:
+            self.joints.append(snapshot.joints)
+            for name, error in snapshot.tracking.items():
+                self.off[name] = max(self.off.get(name, 0.0), error)
+
+    def close(self) -> None:
+        pass
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _motion(station: Station, start: float, end: float | None) -> dict[str, Array]:
+    """Where the twin's joints were at every tick of a part of the run."""
+    last = station.duration if end is None else end
+    if start > last:
+        raise InputError.at(
+            "seerob swept", "--from", f"{start:g} s is after {last:g} s", "begin before the end"
+        )
+    path = _Path(start, last)
+    with progress(station.duration, f"{station.duration:.1f} s of motion") as tick:
+        station.run(writers=[path], progress=tick, stop=lambda: False)
+    if not path.joints:
+        what = f"no tick lies from {start:g} to {last:g} s"
+        raise InputError.at("seerob swept", "--from", what, f"the motion takes {station.duration:g} s")
+    limit = station.workstation.engine.tracking_limit
+    for name, error in path.off.items():
+        if error > limit:
+            text = f"{name}: the twin was off by up to {error:.3g} rad or m; what is swept is the twin's way"
+            line("warning", text, "yellow")
+    driven = {source.target() for source in station.workstation.sources}
+    for name in station.model.mechanisms:
+        if name not in driven:
+            line("note", f"{name}: no source drives it; it stands still", "dim")
+    return {name: np.array([joints[name] for joints in path.joints]) for name in path.joints[0]}

@@ -1,0 +1,55 @@
+"""What ergonomics rules ask of the twin: the anatomical angles of a person at this tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+import numpy as np
+
+from seerob.errors import UnknownName
+from seerob.human.angles import Angles, angles
+from seerob.human.skeleton import BONES
+from seerob.model import Mechanism, Model
+from seerob.state import State
+
+
+def posture(state: State, human: Mechanism) -> Angles:
+    """Angles of a person of the workstation, without batch dimensions.
+
+    Raises:
+        Undecided: The person was not heard lately, or does not follow what was heard.
+    """
+    state.require(human.name)
+    rows = bone_rows(state.model, human)
+    return angles(state.rotations[rows], state.positions[rows])
+
+
+def bone_rows(model: Model, human: Mechanism) -> list[int]:
+    """Slots of the person's bones in `State.rotations`, in the order of `BONES`."""
+    slots = {model.bodies[i].name: i for i in human.bodies}
+    return [slots[f"{human.name}/{bone}"] for bone in BONES]
+
+
+def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> Callable[[State], Angles]:
+    """`posture` of one person with the names resolved, without what nobody measures.
+
+    Args:
+        model: The compiled workstation.
+        name: Of the human.
+        unmeasured: Bones whose orientation the source does not measure but fills in.
+
+    Raises:
+        UnknownName: No such human or bone.
+    """
+    human = model.human(name)
+    for bone in unmeasured:
+        if bone not in BONES:
+            raise UnknownName("bone", bone, BONES)
+    rows = np.array(bone_rows(model, human))
+
+    def read(state: State) -> Angles:
+        state.require(human.name)
+        found = angles(state.rotations[rows], state.positions[rows])
+        return found.without(unmeasured) if unmeasured else found
+
+    return read

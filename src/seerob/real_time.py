@@ -1,0 +1,87 @@
+"""Running in real time: the clock of the loop, and live samples put on it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator
+
+from msgspec.structs import replace
+
+from seerob.errors import InputError, Problem
+from seerob.live import Listening, LiveSource
+from seerob.samples import Sample
+from seerob.workstation import Workstation
+
+
+class Clock:
+    """Holds a loop to real time; one that falls behind slips instead of hurrying after it.
+
+    Args:
+        slip: Lag that is made up for [s]; beyond it the clock is set back. Short where what is heard
+            lives in the same real time.
+    """
+
+    SLIP = 0.25
+    LIVE_SLIP = 0.05
+
+    def __init__(self, *, slip: float = SLIP) -> None:
+        self._slip = slip
+        self.start = time.monotonic()
+        """Host's monotonic time at which the tick of run time 0 is due [s]."""
+        self.slipped = 0.0
+        """How much later than real time the run is by now [s]."""
+
+    def begin(self, start: float) -> None:
+        """Let run time 0 be due at ``start`` [s], host's monotonic time, and wait for it."""
+        self.start = start
+        self.wait(0.0)
+
+    def wait(self, t: float) -> None:
+        """Sleep until run time ``t`` [s] has come."""
+        ahead = self.start + t - time.monotonic()
+        if ahead > 0:
+            time.sleep(ahead)
+        elif ahead < -self._slip:
+            self.start -= ahead
+            self.slipped -= ahead
+
+
+def hear(
+    recorded: Iterable[tuple[Sample, ...]], listening: Listening, clock: Clock
+) -> Iterator[tuple[Sample, ...]]:
+    """The newest samples of live sources, beside those of recorded ones.
+
+    Run time t is the world's instant ``clock.start + t - delay``: when a tick is computed, what it
+    speaks of is a delay old, and samples on either side of it have been heard. The run begins at the
+    first sample, or without one when that takes too long.
+
+    Args:
+        recorded: From `seerob.run.pump`, endless.
+        listening: Live sources, already started.
+        clock: Is set to begin when the first tick is due.
+    """
+    heard = listening.first()
+    origin = max((sample.t for sample in heard), default=time.monotonic() - listening.delay)
+    clock.begin(origin + listening.delay)
+    for samples in recorded:
+        heard += listening.take()
+        zero = clock.start - listening.delay
+        yield (*samples, *(replace(sample, t=sample.t - zero) for sample in heard))
+        heard = ()
+
+
+def require_recorded(workstation: Workstation) -> None:
+    """Refuse to run live sources in any other than real time.
+
+    Raises:
+        InputError: With every live source.
+    """
+    file = next(iter(workstation.files), "workstation")
+    remedy = "use seerob run (in Python: live=True), or drive it from a recording"
+    problems = [
+        Problem(file, f"sources[{i}]", "a live source, which is heard in real time only", remedy)
+        for i, source in enumerate(workstation.sources)
+        if isinstance(source, LiveSource)
+    ]
+    if problems:
+        raise InputError(problems)

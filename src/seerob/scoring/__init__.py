@@ -1,0 +1,1 @@
+"""Posture scores as pure functions: bands, published tables, and what is not known as a span."""

@@ -1,0 +1,208 @@
+"""REBA as pure functions: Hignett and McAtamney 2000, Applied Ergonomics 31.
+
+Bands end with their upper edge inside, as the wording ``>60°`` says: the opposite of RULA. Group A is
+trunk, neck and legs here, group B the arms.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seerob.human.angles import Angles
+from seerob.scoring.published import Ints, cells
+from seerob.scoring.shoulder import ArmPolicy, arm_score
+from seerob.scoring.spans import Span, between, beyond, either, exactly, graded
+from seerob.scoring.thresholds import Thresholds
+from seerob.transforms import Array
+
+_RAD = np.pi / 180
+_ROUNDING = 1e-9
+"""Angles that differ by less [rad] are the same: 60° written as radians."""
+LEAST = {
+    "neck": 1,
+    "trunk": 1,
+    "legs": 1,
+    "upper arm": 1,
+    "lower arm": 1,
+    "wrist": 1,
+    "load": 0,
+    "coupling": 0,
+    "activity": 0,
+}
+"""Components in the order of `reba`, and their least score."""
+
+
+class Coupling(StrEnum):
+    """How well the load can be held."""
+
+    GOOD = "good"
+    """Well-fitting handle, mid-range power grip."""
+    FAIR = "fair"
+    """Acceptable, not ideal, or by another part of the body."""
+    POOR = "poor"
+    """Not acceptable, although possible."""
+    UNACCEPTABLE = "unacceptable"
+    """Awkward, no handle."""
+
+
+class RebaScores(NamedTuple):
+    """Scores of REBA, shape (...)."""
+
+    table_A: Ints
+    table_B: Ints
+    A: Ints
+    """Trunk, neck, legs with the load."""
+    B: Ints
+    """Arms with the coupling."""
+    C: Ints
+    final: Ints
+    """C with the activity, 1 to 15."""
+
+
+def reba(
+    neck: ArrayLike,
+    trunk: ArrayLike,
+    legs: ArrayLike,
+    upper_arm: ArrayLike,
+    lower_arm: ArrayLike,
+    wrist: ArrayLike,
+    load: ArrayLike = 0,
+    coupling: ArrayLike = 0,
+    activity: ArrayLike = 0,
+) -> RebaScores:
+    """Score of component scores, tables A, B and C of the method.
+
+    Args:
+        neck: 1 to 3, shape (...); all others broadcast with it.
+        trunk: 1 to 5.
+        legs: 1 to 4.
+        upper_arm: 1 to 6.
+        lower_arm: 1 or 2.
+        wrist: 1 to 3.
+        load: 0 to 3, added to A.
+        coupling: 0 to 3, added to B.
+        activity: 0 to 3, added at the end.
+
+    Raises:
+        IndexError: A score that the tables do not have.
+    """
+    head, back, feet, upper, lower, hand = (
+        np.asarray(x) for x in (neck, trunk, legs, upper_arm, lower_arm, wrist)
+    )
+    for score, most in ((head, 3), (back, 5), (feet, 4), (upper, 6), (lower, 2), (hand, 3)):
+        if score.size and (score.min() < 1 or score.max() > most):
+            raise IndexError(f"a component score is not within 1 to {most}")
+    table_A = cells("reba", "A")[head - 1, back - 1, feet - 1]
+    table_B = cells("reba", "B")[upper - 1, lower - 1, hand - 1]
+    A, B = table_A + np.asarray(load), table_B + np.asarray(coupling)
+    C = cells("reba", "C")[np.minimum(A, 12) - 1, np.minimum(B, 12) - 1]
+    return RebaScores(table_A, table_B, A, B, C, C + np.asarray(activity))
+
+
+def trunk(flexion: Array, upright: float) -> Ints:
+    """1 to 4 of the flexion [rad], without modifiers."""
+    x = flexion / _RAD - _ROUNDING
+    lying_back = flexion / _RAD + _ROUNDING < -20
+    bent = (x > 20) | lying_back
+    return 1 + ((np.abs(flexion) > upright) | bent).astype(np.int64) + bent + (x > 60)
+
+
+def neck(flexion: Array, extension_from: float) -> Ints:
+    """1 or 2 of the flexion [rad], without modifiers."""
+    return 1 + ((flexion < -extension_from) | (flexion / _RAD - _ROUNDING > 20)).astype(np.int64)
+
+
+def knees(flexion: Array) -> Ints:
+    """What bent knees add to the legs, 0 to 2, of the flexion [rad]."""
+    x = flexion / _RAD
+    return (x >= 30 - _ROUNDING).astype(np.int64) + (x - _ROUNDING > 60)
+
+
+def upper_arm(flexion: Array) -> Ints:
+    """1 to 4 of the flexion [rad], without modifiers."""
+    x = flexion / _RAD - _ROUNDING
+    back = flexion / _RAD + _ROUNDING < -20
+    return 1 + ((x > 20) | back).astype(np.int64) + (x > 45) + (x > 90)
+
+
+def lower_arm(flexion: Array) -> Ints:
+    """1 or 2 of the elbow's flexion [rad]."""
+    x = flexion / _RAD
+    return 1 + ((x < 60 - _ROUNDING) | (x > 100 + _ROUNDING)).astype(np.int64)
+
+
+def wrist(flexion: Array) -> Ints:
+    """1 or 2 of flexion or extension [rad], without modifiers."""
+    return 1 + (np.abs(flexion) / _RAD - _ROUNDING > 15).astype(np.int64)
+
+
+def load(kg: float | None, shock: bool | None) -> Span:
+    """Score of a load [kg], one more for shock or rapid build-up; what is not given may be anything."""
+    weight = between(0, 2) if kg is None else exactly((kg >= 5) + (kg > 10))
+    sudden = between(0, 1) if shock is None else exactly(int(shock))
+    return weight + sudden
+
+
+def coupling(grip: Coupling | None) -> Span:
+    """Score of the grip."""
+    return between(0, 3) if grip is None else exactly(list(Coupling).index(grip))
+
+
+def posture_components(
+    angles: Angles,
+    *,
+    thresholds: Thresholds,
+    supported: Span,
+    legs: Span,
+    sitting: bool | None,
+    accuracy: float = 0.0,
+    policy: ArmPolicy = ArmPolicy.PROJECTION,
+) -> dict[str, Span]:
+    """Scores of the six parts of the body.
+
+    Args:
+        angles: Of the postures.
+        thresholds: Of the modifiers.
+        supported: 1 where an arm is supported, helped by gravity, or the person leans, shape (2,).
+        legs: 1 or 2 by how the weight is borne.
+        sitting: Bent knees add nothing to a person who sits; None when nobody said.
+        accuracy: Of each angle [rad].
+        policy: Which angle stands for the flexion of the upper arm.
+
+    Returns:
+        Span by component: arms with shape (..., 2), right and left; neck, trunk and legs with shape (...).
+    """
+    t, a = thresholds, accuracy
+    outward = beyond(angles.shoulder_abduction, t.arm_abducted, accuracy=a, signed=True)
+    rotated = beyond(angles.shoulder_rotation, t.arm_rotated, accuracy=a)
+    raised = beyond(angles.clavicle_elevation, t.shoulder_raised, accuracy=a, signed=True)
+    relief = Span(-supported.high, -supported.low)
+    bent = graded(angles.knee_flexion.max(axis=-1), knees, within=(0, 2), accuracy=a)
+    if sitting is not False:
+        bent = Span(np.zeros_like(bent.low), np.zeros_like(bent.high) if sitting else bent.high)
+    return {
+        "neck": graded(angles.neck_flexion, lambda x: neck(x, t.neck_extension), within=(1, 2), accuracy=a)
+        + either(
+            beyond(angles.neck_twist, t.neck_twist, accuracy=a),
+            beyond(angles.neck_side_bend, t.neck_side_bend, accuracy=a),
+        ),
+        "trunk": graded(angles.trunk_flexion, lambda x: trunk(x, t.trunk_upright), within=(1, 4), accuracy=a)
+        + either(
+            beyond(angles.trunk_twist, t.trunk_twist, accuracy=a),
+            beyond(angles.trunk_side_bend, t.trunk_side_bend, accuracy=a),
+        ),
+        "legs": legs + bent,
+        "upper arm": (
+            arm_score(angles, upper_arm, policy, accuracy) + either(outward, rotated) + raised + relief
+        ).at_least(1),
+        "lower arm": graded(angles.elbow_flexion, lower_arm, within=(1, 2), accuracy=a, neutral=80 * _RAD),
+        "wrist": graded(angles.wrist_flexion, wrist, within=(1, 2), accuracy=a)
+        + either(
+            beyond(angles.wrist_deviation, t.wrist_deviation, accuracy=a),
+            beyond(angles.forearm_rotation, t.forearm_rotation, accuracy=a),
+        ),
+    }

@@ -1,0 +1,247 @@
+"""RULA as pure functions: McAtamney and Corlett 1993, Applied Ergonomics 24(2).
+
+Bands are half open with the lower edge inside, as the paper's wording fixes for 15° of the wrist, 20° of
+the neck, 60° of the trunk and 90° of the upper arm; the elbow's 60 to 100° includes both ends.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seerob.human.angles import Angles
+from seerob.scoring.published import Ints, cells
+from seerob.scoring.shoulder import ArmPolicy, arm_score
+from seerob.scoring.spans import Span, between, beyond, either, exactly, graded
+from seerob.scoring.thresholds import Thresholds
+from seerob.transforms import Array
+
+_RAD = np.pi / 180
+_ROUNDING = 1e-9
+"""Angles that differ by less [rad] are the same: 15° written as radians."""
+LEAST = {
+    "upper arm": 1,
+    "lower arm": 1,
+    "wrist": 1,
+    "wrist twist": 1,
+    "neck": 1,
+    "trunk": 1,
+    "legs": 1,
+    "muscle use of the arms": 0,
+    "force of the arms": 0,
+    "muscle use of the body": 0,
+    "force of the body": 0,
+}
+"""Components in the order of `rula`, and their least score."""
+
+
+class Profile(StrEnum):
+    """Which publication decides where they differ."""
+
+    ORIGINAL_1993 = "original1993"
+    """More than 10 kg, intermittent: 2. Static is longer than 60 s."""
+    WORKSHEET = "worksheet"
+    """More than 10 kg: 3. Static is longer than 600 s."""
+
+    @property
+    def static(self) -> float:
+        """How long a posture is held to be static [s]."""
+        return 60.0 if self is Profile.ORIGINAL_1993 else 600.0
+
+
+class LoadUse(StrEnum):
+    """How a load acts."""
+
+    INTERMITTENT = "intermittent"
+    STATIC = "static"
+    REPEATED = "repeated"
+    SHOCK = "shock"
+    """Shock or rapid build-up."""
+
+
+class RulaScores(NamedTuple):
+    """Scores of RULA, shape (...)."""
+
+    A: Ints
+    """Posture of the arm and wrist."""
+    B: Ints
+    """Posture of neck, trunk and legs."""
+    C: Ints
+    """A with muscle use and force."""
+    D: Ints
+    """B with muscle use and force."""
+    grand: Ints
+    """1 to 7."""
+
+
+def rula(
+    upper_arm: ArrayLike,
+    lower_arm: ArrayLike,
+    wrist: ArrayLike,
+    wrist_twist: ArrayLike,
+    neck: ArrayLike,
+    trunk: ArrayLike,
+    legs: ArrayLike,
+    muscle_arms: ArrayLike = 0,
+    force_arms: ArrayLike = 0,
+    muscle_body: ArrayLike = 0,
+    force_body: ArrayLike = 0,
+) -> RulaScores:
+    """Grand score of component scores, tables A, B and C of the method.
+
+    Args:
+        upper_arm: 1 to 6, shape (...); all others broadcast with it.
+        lower_arm: 1 to 3.
+        wrist: 1 to 4.
+        wrist_twist: 1 or 2.
+        neck: 1 to 6.
+        trunk: 1 to 6.
+        legs: 1 or 2.
+        muscle_arms: 0 or 1, added to A.
+        force_arms: 0 to 3, added to A.
+        muscle_body: 0 or 1, added to B.
+        force_body: 0 to 3, added to B.
+
+    Raises:
+        IndexError: A score that the tables do not have.
+    """
+    upper, lower, bent, turned = (np.asarray(x) for x in (upper_arm, lower_arm, wrist, wrist_twist))
+    head, back, feet = (np.asarray(x) for x in (neck, trunk, legs))
+    _check((upper, 6), (lower, 3), (bent, 4), (turned, 2), (head, 6), (back, 6), (feet, 2))
+    A = cells("rula", "A")[upper - 1, lower - 1, 2 * (bent - 1) + turned - 1]
+    B = cells("rula", "B")[head - 1, 2 * (back - 1) + feet - 1]
+    C = A + np.asarray(muscle_arms) + np.asarray(force_arms)
+    D = B + np.asarray(muscle_body) + np.asarray(force_body)
+    return RulaScores(A, B, C, D, cells("rula", "C")[np.minimum(C, 8) - 1, np.minimum(D, 7) - 1])
+
+
+def _check(*scores: tuple[Ints, int]) -> None:
+    for score, most in scores:
+        if score.size and (score.min() < 1 or score.max() > most):
+            raise IndexError(f"a component score is not within 1 to {most}")
+
+
+def upper_arm(flexion: Array) -> Ints:
+    """1 to 4 of the flexion [rad], without modifiers."""
+    x = flexion / _RAD + _ROUNDING
+    return 1 + (x < -20).astype(np.int64) + (x >= 20) + (x >= 45) + (x >= 90)
+
+
+def lower_arm(flexion: Array) -> Ints:
+    """1 or 2 of the elbow's flexion [rad], without modifiers."""
+    x = flexion / _RAD
+    return 1 + ((x < 60 - _ROUNDING) | (x > 100 + _ROUNDING)).astype(np.int64)
+
+
+def neck(flexion: Array, extension_from: float) -> Ints:
+    """1 to 4 of the flexion [rad], without modifiers."""
+    x = flexion / _RAD + _ROUNDING
+    return np.where(flexion < -extension_from, 4, 1 + (x >= 10).astype(np.int64) + (x >= 20))
+
+
+def trunk(flexion: Array, upright: float) -> Ints:
+    """1 to 4 of the flexion [rad], without modifiers; extension has no row and counts as 2."""
+    x = flexion / _RAD + _ROUNDING
+    return 1 + (np.abs(flexion) > upright).astype(np.int64) + (x >= 20) + (x >= 60)
+
+
+def wrist(flexion: Array, neutral: float) -> Ints:
+    """1 to 3 of flexion or extension [rad], without modifiers."""
+    x = np.abs(flexion) / _RAD + _ROUNDING
+    return 1 + ((np.abs(flexion) > neutral) | (x >= 15)).astype(np.int64) + (x >= 15)
+
+
+def force(load: float | None, use: LoadUse | None, profile: Profile) -> Span:
+    """Force score of a handled load [kg]; what is not given may be anything.
+
+    Less than 2 kg, static or repeated, has no row: it counts as 0, muscle use apart.
+    """
+    uses = list(LoadUse) if use is None else [use]
+    heavy = 3 if profile is Profile.WORKSHEET else 2
+    loads = [0.0, math.inf] if load is None else [load]
+    scores = []
+    for each in uses:
+        for kg in loads:
+            band = 0 if kg < 2 else 1 if kg <= 10 else 2
+            steady = (0, 2, 3)[band]
+            brief = (0, 1, heavy)[band]
+            scores.append(3 if each is LoadUse.SHOCK else brief if each is LoadUse.INTERMITTENT else steady)
+    return between(min(scores), max(scores))
+
+
+def posture_components(
+    angles: Angles,
+    *,
+    thresholds: Thresholds,
+    supported: Span,
+    back_supported: bool | None,
+    legs: Span | None,
+    accuracy: float = 0.0,
+    policy: ArmPolicy = ArmPolicy.PROJECTION,
+) -> dict[str, Span]:
+    """Scores of the seven parts of the body.
+
+    Args:
+        angles: Of the postures.
+        thresholds: Of the modifiers.
+        supported: 1 where an arm is supported or the person leans, shape (2,) for right and left.
+        back_supported: Seated, back well supported, hip at 90° or more: trunk 1 unless bent forward.
+        legs: Score of the legs; None to estimate it from the feet and knees.
+        accuracy: Of each angle [rad].
+        policy: Which angle stands for the flexion of the upper arm.
+
+    Returns:
+        Span by component: arms with shape (..., 2), right and left; neck, trunk and legs with shape (...).
+    """
+    t, a = thresholds, accuracy
+    lifted = beyond(angles.shoulder_abduction, t.arm_abducted, accuracy=a, signed=True)
+    raised = beyond(angles.clavicle_elevation, t.shoulder_raised, accuracy=a, signed=True)
+    base = arm_score(angles, upper_arm, policy, accuracy)
+    relief = Span(-supported.high, -supported.low)
+    aside = either(
+        beyond(angles.wrist_across, t.wrist_across, accuracy=a, signed=True),
+        beyond(angles.forearm_out, t.forearm_out, accuracy=a, signed=True),
+    )
+    middle = 80 * _RAD
+    back = graded(angles.trunk_flexion, lambda x: trunk(x, t.trunk_upright), within=(1, 4), accuracy=a)
+    if back_supported is not False:
+        leaning = graded(
+            angles.trunk_flexion,
+            lambda x: trunk(np.maximum(x, 0.0), t.trunk_upright),
+            within=(1, 4),
+            accuracy=a,
+        )
+        back = Span(leaning.low, leaning.high if back_supported else back.high)
+    return {
+        "upper arm": (base + lifted + raised + relief).at_least(1),
+        "lower arm": graded(angles.elbow_flexion, lower_arm, within=(1, 2), accuracy=a, neutral=middle)
+        + aside,
+        "wrist": graded(angles.wrist_flexion, lambda x: wrist(x, t.wrist_neutral), within=(1, 3), accuracy=a)
+        + beyond(angles.wrist_deviation, t.wrist_deviation, accuracy=a),
+        "wrist twist": exactly(1) + beyond(angles.forearm_rotation, t.forearm_rotation, accuracy=a),
+        "neck": graded(angles.neck_flexion, lambda x: neck(x, t.neck_extension), within=(1, 4), accuracy=a)
+        + beyond(angles.neck_twist, t.neck_twist, accuracy=a)
+        + beyond(angles.neck_side_bend, t.neck_side_bend, accuracy=a),
+        "trunk": back
+        + beyond(angles.trunk_twist, t.trunk_twist, accuracy=a)
+        + beyond(angles.trunk_side_bend, t.trunk_side_bend, accuracy=a),
+        "legs": exactly(1) + uneven(angles, t, a) if legs is None else legs,
+    }
+
+
+def uneven(angles: Angles, thresholds: Thresholds, accuracy: float = 0.0) -> Span:
+    """1 where one foot is raised or the knees differ: an estimate of weight that is not evenly spread."""
+    right, left = angles.knee_flexion[..., 0], angles.knee_flexion[..., 1]
+    apart = beyond(right - left, thresholds.knee_difference, accuracy=2 * accuracy)
+    return either(apart, one_foot_up(angles, thresholds, accuracy))
+
+
+def one_foot_up(angles: Angles, thresholds: Thresholds, accuracy: float = 0.0) -> Span:
+    """1 where one foot is raised: an estimate of standing on one leg."""
+    # Not fmax: what is not assessed on one side is not known of both.
+    higher = angles.foot_rise.max(axis=-1)
+    return beyond(higher, thresholds.foot_rise, accuracy=accuracy, signed=True)

@@ -1,0 +1,74 @@
+"""Which angle stands for the flexion of the upper arm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+
+import numpy as np
+
+from seerob.human.angles import Angles
+from seerob.scoring.published import Ints
+from seerob.scoring.spans import Span, graded
+from seerob.transforms import Array
+
+
+class ArmPolicy(StrEnum):
+    """How an arm that is raised neither forward nor sideways is read."""
+
+    PROJECTION = "projection"
+    """The arm as seen from the side, as the methods' pictures show it."""
+    ELEVATION = "elevation"
+    """The whole angle to the trunk while the arm points within 60° of forward; up to 90° the arm only
+    counts as abducted; behind, the arm as seen from the side."""
+
+
+WIDEST = np.pi / 3
+"""Direction from forward up to which the elevation stands for the flexion [rad], a choice."""
+BASE = (1, 4)
+"""Least and greatest score of an upper arm without modifiers."""
+
+
+def arm_score(
+    angles: Angles, score: Callable[[Array], Ints], policy: ArmPolicy, accuracy: float = 0.0
+) -> Span:
+    """Score of the upper arm without modifiers, shape (..., 2).
+
+    Seen from the side, an arm that points sideways has no direction: with its angle λ out of the
+    sagittal plane, an error δ turns the projection by up to ``arcsin(sin δ / cos λ)``. So does the
+    direction in which an arm points, with its elevation θ, by ``arcsin(sin δ / sin θ)``.
+
+    Args:
+        angles: Of the postures.
+        score: 1 to 4 of a flexion [rad], least at 0.
+        policy: Which angle it is asked for.
+        accuracy: Of the direction of the arm [rad].
+    """
+    flexion, side = angles.shoulder_flexion, angles.shoulder_abduction
+    spread = _turned(accuracy, np.cos(side))
+    if policy is ArmPolicy.PROJECTION:
+        return graded(flexion, score, within=BASE, accuracy=spread)
+    azimuth = np.abs(np.arctan2(np.sin(side), np.cos(side) * np.sin(flexion)))
+    swing = _turned(accuracy, np.sin(angles.shoulder_elevation))
+    ahead = graded(angles.shoulder_elevation, score, within=BASE, accuracy=accuracy)
+    beside = graded(np.zeros_like(flexion), score, within=BASE)
+    behind = graded(flexion, lambda x: score(np.minimum(x, 0.0)), within=BASE, accuracy=spread)
+    lowest, highest = np.full(flexion.shape, BASE[1]), np.full(flexion.shape, BASE[0])
+    for span, first, last in (
+        (ahead, -np.inf, WIDEST),
+        (beside, WIDEST, np.pi / 2),
+        (behind, np.pi / 2, np.inf),
+    ):
+        # An edge belongs to both: what is said of an arm exactly there is the worse of the two.
+        possible = ~((azimuth + swing < first) | (azimuth - swing > last))
+        lowest = np.where(possible, np.minimum(lowest, span.low), lowest)
+        highest = np.where(possible, np.maximum(highest, span.high), highest)
+    return Span(lowest, highest)
+
+
+def _turned(accuracy: float, lever: Array) -> Array | float:
+    """How far an error turns a direction that is seen under a shortened lever [rad]."""
+    if not accuracy:
+        return 0.0
+    sine = np.minimum(np.sin(min(accuracy, np.pi / 2)) / np.maximum(np.abs(lever), 1e-12), 1.0)
+    return np.where(np.isnan(sine) | (sine < 1.0), np.arcsin(sine), np.pi)

@@ -1,0 +1,235 @@
+"""Universal Robots controllers, live, through their real-time data exchange (RTDE).
+
+Joint angles [rad], speeds [rad/s] and, from controllers that have it, measured torques [N·m]; state,
+speed scaling, payload and tool pose as signals. What a controller does not have is left out and said.
+Nothing is written to the robot: no inputs are registered.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncGenerator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import aclosing
+from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta
+from msgspec.structs import replace
+
+from seerob.errors import InputError, SeerobError
+from seerob.live import LiveSource
+from seerob.protocols import ProtocolError, rtde, rtde_client
+from seerob.protocols.rtde import ControllerVersion, Level, TextMessage, Value
+from seerob.protocols.rtde_states import RobotMode, SafetyStatus, name, quality
+from seerob.samples import JointSample, Sample, SignalSample
+from seerob.snapshot import Finding
+from seerob.source import Opened, Target
+from seerob.trajectory import MotionOrigin, origin_finding
+
+_log = logging.getLogger(__name__)
+
+NEEDED = ("timestamp", "actual_q")
+WANTED = (
+    "actual_qd",
+    "actual_current_as_torque",
+    "robot_mode",
+    "safety_status",
+    "safety_mode",
+    "runtime_state",
+    "speed_scaling",
+    "payload",
+    "actual_TCP_pose",
+    "actual_TCP_speed",
+)
+FIELDS = (*NEEDED, *WANTED)
+SIGNAL_PERIOD = 0.1
+"""Signals are repeated after this time, or when a state changes [s]."""
+CB3_RATE = 125.0
+"""The most that a CB3 controller sends [Hz]."""
+LEVELS = {Level.EXCEPTION: logging.ERROR, Level.ERROR: logging.ERROR, Level.WARNING: logging.WARNING}
+PROBE_WITHIN = 1.5
+"""At start [s]."""
+AXES = ("x", "y", "z", "rx", "ry", "rz")
+
+
+# -- values to samples --------------------------------------------------------------------------
+
+
+def joint_sample(values: Mapping[str, Value], *, target: str, arrived: float) -> JointSample:
+    """What a data package says of the joints.
+
+    Args:
+        values: By field; those of `NEEDED` at least.
+        target: Robot it drives.
+        arrived: Host's monotonic time [s].
+    """
+    return JointSample(
+        source="",
+        seq=0,
+        t=arrived,
+        t_device=_number(values["timestamp"]),
+        target=target,
+        q=_vector(values["actual_q"]),
+        qd=_vector(values["actual_qd"]) if "actual_qd" in values else None,
+        tau=_vector(values["actual_current_as_torque"]) if "actual_current_as_torque" in values else None,
+        quality=quality(_whole(values.get("robot_mode")), _safety(values)),
+    )
+
+
+def states(values: Mapping[str, Value]) -> dict[str, float | bool | str]:
+    """State of the robot in words, for signals; a number that nobody explained as such."""
+    found: dict[str, float | bool | str] = {}
+    mode, safety = _whole(values.get("robot_mode")), _safety(values)
+    if mode is not None:
+        found["robot_mode"] = name(RobotMode, mode) or str(mode)
+    if safety is not None:
+        found["safety_status"] = name(SafetyStatus, safety) or str(safety)
+    if "runtime_state" in values:
+        found["program_running"] = values["runtime_state"] == 2
+    return found
+
+
+def figures(values: Mapping[str, Value]) -> dict[str, float | bool | str]:
+    """What else it says, for signals: SI, the tool in the robot's base frame, as rotation vector."""
+    found: dict[str, float | bool | str] = {
+        key: _number(values[key]) for key in ("speed_scaling", "payload") if key in values
+    }
+    for key in ("actual_TCP_pose", "actual_TCP_speed"):
+        if key in values:
+            vector = _vector(values[key])
+            found |= {f"{key}.{axis}": x for axis, x in zip(AXES, vector, strict=True)}
+    return found
+
+
+def _number(value: Value) -> float:
+    if isinstance(value, tuple):
+        raise ProtocolError(f"a vector where a number belongs: {value}")
+    return float(value)
+
+
+def _vector(value: Value) -> tuple[float, ...]:
+    if not isinstance(value, tuple) or len(value) != 6:
+        raise ProtocolError(f"not six values: {value}")
+    return tuple(float(x) for x in value)
+
+
+def _whole(value: Value | None) -> int | None:
+    return None if value is None else int(_number(value))
+
+
+def _safety(values: Mapping[str, Value]) -> int | None:
+    return _whole(values.get("safety_status", values.get("safety_mode")))
+
+
+# -- the source ---------------------------------------------------------------------------------
+
+
+class Rtde(LiveSource, frozen=True, kw_only=True):
+    """A Universal Robots controller, live, through RTDE."""
+
+    robot: str
+    """The robot it drives."""
+    host: str
+    """Name or address of the controller."""
+    port: Annotated[int, Meta(ge=1, le=65535)] = rtde.PORT
+    frequency: Annotated[float, Meta(ge=1, le=500, extra={"unit": "Hz"})] = 125.0
+    """Samples per second [Hz]; e-Series and later can do 500."""
+    origin: MotionOrigin = MotionOrigin.CONTROLLER
+    """``vendor_emulator`` when it is URSim."""
+
+    def target(self) -> str:
+        """The robot."""
+        return self.robot
+
+    def period(self) -> float:
+        """Interval between samples that is asked for [s]."""
+        return 1 / self.frequency
+
+    def open(self, folder: Path, target: Target | None) -> Opened:
+        """Ask the controller what it has, if it can be reached; a run may begin before it can.
+
+        Raises:
+            InputError: The robot does not have six joints, or the controller does not say where they are.
+        """
+        if target is None:
+            raise InputError.at("sources", "robot", f"no robot {self.robot!r}", "name a robot")
+        if len(target.joints) != 6:
+            what = f"{target.name} has {len(target.joints)} joints, a Universal Robots arm has 6"
+            raise InputError.at(f"rtde {self.host}", "robot", what, "name another robot")
+        where = f"rtde {self.host}:{self.port}"
+        opened = super().open(folder, target)
+        # In a thread: whoever asks may be in an event loop, a notebook for one.
+        with ThreadPoolExecutor(1) as thread:
+            heard = thread.submit(asyncio.run, self._probe()).result()
+        return replace(
+            opened,
+            findings=(
+                origin_finding(self.origin, target.name, where),
+                *opened.findings,
+                *(Finding(level=level, subject=target.name, text=f"{where}: {t}") for level, t in heard),
+            ),
+        )
+
+    async def _probe(self) -> list[tuple[str, str]]:
+        try:
+            async with (
+                asyncio.timeout(PROBE_WITHIN),
+                rtde_client.connect(self.host, self.port, FIELDS, self.frequency) as session,
+            ):
+                lacking = [f for f in NEEDED if f in session.missing]
+                if lacking:
+                    what = f"the controller has no {' and no '.join(lacking)}"
+                    raise InputError.at(f"rtde {self.host}", "host", what, "is it a robot's controller?")
+                return remarks(session, self.frequency)
+        except InputError:
+            raise
+        except (OSError, TimeoutError, SeerobError) as error:
+            return [("warning", f"not reached at start: {str(error) or 'no answer in time'}; keeps trying")]
+
+    async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
+        """Joint samples, and signals ten times a second and whenever a state changes."""
+        async with rtde_client.connect(self.host, self.port, FIELDS, self.frequency) as session:
+            said: dict[str, float | bool | str] = {}
+            due = 0.0
+            async with aclosing(session.receive()) as heard:
+                async for reading in heard:
+                    if isinstance(reading, TextMessage):
+                        _tell(self.name or f"rtde {self.robot}", reading)
+                        continue
+                    now = states(reading.values)
+                    if now != said or reading.arrived >= due:
+                        said, due = now, reading.arrived + SIGNAL_PERIOD
+                        values = now | figures(reading.values)
+                        yield SignalSample(source="", seq=0, t=reading.arrived, values=values)
+                    yield joint_sample(reading.values, target=self.robot, arrived=reading.arrived)
+
+
+def remarks(session: rtde_client.Session, frequency: float) -> list[tuple[str, str]]:
+    """What is to be said of a controller, as level and text."""
+    said = [("note", f"controller software {session.controller or 'unknown'}, RTDE {session.version}")]
+    if session.missing:
+        said.append(("note", f"does not have {', '.join(session.missing)}"))
+    if "actual_qd" in session.missing:
+        said.append(("assumed", "no measured joint speeds: derived from the positions"))
+    if "actual_current_as_torque" in session.missing:
+        said.append(("note", "no measured joint torques: a factor from current to torque is not published"))
+    if "robot_mode" in session.missing:
+        said.append(("warning", "does not say whether the robot is on: what depends on it is undecided"))
+    if {"safety_status", "safety_mode"} <= set(session.missing):
+        said.append(("warning", "does not say its safety status"))
+    if session.version == 1:
+        said.append(("note", "version 1 sends at the controller's own rate, whatever frequency is asked for"))
+    if _is_cb3(session.controller) and frequency > CB3_RATE:
+        said.append(("warning", f"a CB3 controller sends {CB3_RATE:g} Hz at most, not {frequency:g}"))
+    return said
+
+
+def _is_cb3(controller: ControllerVersion | None) -> bool:
+    return controller is not None and controller.major < 5
+
+
+def _tell(who: str, message: TextMessage) -> None:
+    level = LEVELS.get(Level(message.level), logging.INFO) if message.level in list(Level) else logging.INFO
+    _log.log(level, "%s: the controller says: %.300s", who, f"{message.text} ({message.source})")

@@ -127,11 +127,13 @@ def test_ways_bound_the_path_of_every_corner_and_never_exceed_full_speed_for_the
     assert (found.S_s >= v * found.T_s * 0.3).all()
 
 
-def test_speeds_are_those_of_the_state_in_any_pose(tmp_path):
+@pytest.mark.parametrize("shape", ['box size="1 0.1 0.1"', 'sphere radius="0.2"'])
+def test_speeds_are_those_of_the_state_in_any_pose(tmp_path, shape):
     rng = np.random.default_rng(1)
+    urdf = two_r().replace('box size="1 0.1 0.1"', shape)
     for i in range(5):
         q, qd = rng.uniform(-2, 2, 2), rng.uniform(-2, 2, 2)
-        stopped, state, _ = stop(tmp_path / str(i), two_r(), q, qd, [50.0, 50.0])
+        stopped, state, _ = stop(tmp_path / str(i), urdf, q, qd, [50.0, 50.0])
         wanted = [state.fastest_point(b)[0] for b in state.model.robot("arm").moving]
         assert stopped.speeds[0] == pytest.approx(wanted, rel=1e-9)
 

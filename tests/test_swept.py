@@ -1,11 +1,15 @@
 """Swept volumes: nothing is missed, closed forms, memory, stopping."""
 
+from itertools import pairwise
+
+import mujoco
 import numpy as np
 import pytest
 
 from made_cell import TWO_R, made, two_r
 from made_sweep import inside, missed
 from seerob.errors import InputError
+from seerob.moving import posed
 from seerob.swept import Sweep, swept_volume
 
 GRIPPED = """
@@ -90,6 +94,31 @@ def test_full_turn_is_a_disc_and_no_more_than_its_voxels(planar, voxel):
     layers = 2 * np.ceil((half + swept.dilation + 0.1 * voxel) / voxel)
     assert np.pi * rim**2 * 2 * half < swept.volume
     assert swept.volume < np.pi * (rim + swept.dilation + 1.5 * voxel) ** 2 * layers * voxel
+
+
+@pytest.mark.parametrize("voxel", [0.02, 0.027, 0.05])
+def test_no_voxel_is_marked_that_the_bodies_do_not_come_near(ur10, voxel):
+    rng = np.random.default_rng(8)
+    bodies, motion = ur10.select("arm/*"), wander(4, rng, 0.2)
+    swept = swept_volume(ur10, bodies, {"arm": motion}, voxel=voxel)
+    centres = swept.grid.centres()
+    centres = centres[rng.integers(0, len(centres), 300)]
+    data, nearest = mujoco.MjData(ur10.mj), np.full(300, np.inf)
+    shares = np.linspace(0, 1, 12)[:, None]
+    dense = np.vstack([a + shares * (b - a) for a, b in pairwise(motion)])
+    solids = [(ur10.bodies[i].mj, solid) for i in bodies for solid in ur10.bodies[i].solids]
+    for qpos in posed(ur10, {"arm": dense}):
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(ur10.mj, data)
+        for mj, solid in solids:
+            local = (centres - data.xpos[mj]) @ data.xmat[mj].reshape(3, 3)
+            v = solid.mesh.vertices[solid.mesh.faces]
+            n = np.cross(v[:, 1] - v[:, 0], v[:, 2] - v[:, 0])
+            n = n / np.linalg.norm(n, axis=1, keepdims=True)
+            # Of a convex solid, the farthest face plane is a lower bound of the distance.
+            nearest = np.minimum(nearest, (local @ n.T - (v[:, 0] * n).sum(axis=1)).max(axis=1))
+    between = 0.2 / 11 / 2 * 6 * 1.5 / 3  # Joints seldom all add up.
+    assert nearest.max() < swept.dilation + 1.25 * voxel + between
 
 
 def test_standing_still_marks_exactly_the_voxels_that_are_touched(planar):

@@ -10,6 +10,7 @@ from seerob.human.skeleton import without_side
 from seerob.human.skin import BODY_REGION
 from seerob.model import Mechanism, Model
 from seerob.norms import body_limits
+from seerob.snapshot import Verdict
 from seerob.state import State
 from seerob.transforms import Array
 
@@ -19,6 +20,25 @@ FEET = "Feet"
 """In no row of the table; no limit is available."""
 REGIONS = (*body_limits.REGIONS, SENSITIVE, FEET)
 FORBIDDEN = frozenset({*body_limits.FORBIDDEN, SENSITIVE})
+
+
+def without_limit(name: str, permitted: bool, within: str | None, file: str) -> tuple[Verdict, str]:
+    """Verdict on a region that has no permissible speed, and why.
+
+    Args:
+        name: One of `REGIONS`.
+        permitted: What the table says of contact; True when it says nothing.
+        within: What of the robot a person's region is near to; None when there is no person to ask.
+        file: Of the table.
+    """
+    if permitted and name not in FORBIDDEN:
+        return Verdict.UNDECIDED, "no limit available" if name == FEET else f"no limit in {file}"
+    if within is not None:
+        return Verdict.EXCEEDED, f"contact not permitted, {within}"
+    return Verdict.UNDECIDED, (
+        "contact not permitted, and whether it can occur is open without a person: "
+        "name one, or exclude the region if other measures keep it out"
+    )
 
 
 class Person:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -158,8 +159,9 @@ def solid_shape(solid: Solid) -> ContactShape:
     return ContactShape(shape.points, shape.radii, unknown, shape.resolution, shape.unknown_at)
 
 
+@lru_cache(maxsize=256)
 def body_shape(solids: tuple[Solid, ...]) -> ContactShape:
-    """Patches of all solids of a body."""
+    """Patches of all solids of a body; meshes are looked at once."""
     found = [solid_shape(solid) for solid in solids]
     points = np.vstack([np.zeros((0, 3)), *(s.points for s in found)])
     radii = np.vstack([np.zeros((0, 2)), *(s.radii for s in found)])

@@ -14,8 +14,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import os
 import time
 from collections.abc import AsyncGenerator, Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Event, Lock, Thread
 from types import TracebackType
@@ -26,7 +28,7 @@ from msgspec.structs import replace
 
 from seerob.arrivals import Arrivals, Statistics
 from seerob.device_clock import DeviceClock
-from seerob.errors import SeerobError
+from seerob.errors import InputError, SeerobError
 from seerob.samples import Mailbox, Sample, SignalSample
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
@@ -39,6 +41,8 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.1, 2.0
 """Before it is tried again [s]; doubled from the one to the other."""
 STOP_WITHIN = 1.0
 """A listener that does not end by then is left behind [s]; its thread keeps no process alive."""
+ASK_WITHIN = 1.5
+"""At start [s]."""
 PATIENCE = 1.0
 """How long a run waits for the first samples before it begins without them [s]."""
 
@@ -66,13 +70,37 @@ class LiveSource(Source, frozen=True, kw_only=True):
         """Delay behind the world that it needs [s]."""
         return self.period() + MARGIN if self.delay is None else self.delay
 
+    async def ask(self) -> tuple[Finding, ...]:
+        """Connect briefly, for what the other end says of itself: what it is, what it does not have.
+
+        Raises:
+            OSError: There is no connection.
+            SeerobError: It answers, but cannot be understood.
+            InputError: It is understood, and is not what this source can use.
+        """
+        return ()
+
     def open(self, folder: Path, target: Target | None) -> Opened:
-        """Nothing to read at start; a source may override it to check that it will be understood."""
+        """Ask the other end what it has, if it can be reached: a run may begin before it can.
+
+        Raises:
+            InputError: It can be reached, and is not what this source can use.
+        """
+        about = self.target() or self.name
         text = (
-            f"the twin runs {1e3 * self.behind():.0f} ms behind {self.name or self.target() or 'the world'}"
+            f"the twin runs {1e3 * self.behind():.0f} ms behind the world, where samples lie on either side"
         )
-        finding = Finding(level="note", subject=self.target() or self.name, text=text)
-        return Opened(samples=(), duration=0.0, findings=(finding,))
+        behind = Finding(level="note", subject=about, text=text)
+        try:
+            # In a thread: whoever opens it may be in an event loop, a notebook for one.
+            with ThreadPoolExecutor(1) as thread:
+                said = thread.submit(asyncio.run, asyncio.wait_for(self.ask(), ASK_WITHIN)).result()
+        except InputError:
+            raise
+        except (OSError, EOFError, SeerobError) as error:
+            text = f"{self.name}: not reached at start: {because(error)}; it is tried again during the run"
+            said = (Finding(level="warning", subject=about, text=text),)
+        return Opened(samples=(), duration=0.0, findings=(behind, *said))
 
     def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Connect, and yield what is heard until the connection ends; then it is called again.
@@ -85,6 +113,16 @@ class LiveSource(Source, frozen=True, kw_only=True):
             SeerobError: What the other end says cannot be understood.
         """
         raise NotImplementedError
+
+
+def because(error: BaseException) -> str:
+    """Why there is no connection, in one line."""
+    if isinstance(error, TimeoutError):
+        return str(error) or "no answer in time"
+    if isinstance(error, OSError) and error.errno is not None and error.errno > 0:
+        # asyncio's own text hides the reason behind the address.
+        return os.strerror(error.errno)
+    return str(error) or type(error).__name__
 
 
 def delay_of(sources: Iterable[Source]) -> float:
@@ -163,10 +201,8 @@ class Listener:
             async with contextlib.aclosing(self._source.listen(self._target)) as samples:
                 async for sample in samples:
                     self._take(sample)
-        except TimeoutError as error:
-            return str(error) or "no answer in time"
         except (OSError, EOFError, SeerobError) as error:
-            return str(error) or type(error).__name__
+            return because(error)
         except Exception as error:
             _log.exception("%s: a mistake in the source itself", self.name)
             return f"{type(error).__name__}: {error}"

@@ -264,6 +264,15 @@ def test_head_within_the_horizon_is_exceeded_without_a_number(tmp_path: Path) ->
     assert result.verdict is Verdict.EXCEEDED
     assert (result.limit, by_name(result)["Face"].limit) == (None, None)
     assert "contact not permitted" in result.reason
+    sensitive = by_name(result)["Larynx, eyes and ears"]
+    assert (sensitive.verdict, sensitive.limit) == (Verdict.EXCEEDED, None)
+
+
+def test_feet_within_the_horizon_are_undecided_and_not_taken_for_legs(tmp_path: Path) -> None:
+    high = person(2.3).replace("-1.0]", "0.1]")
+    found = regions_at(flat(tmp_path, 'human = "op"\nhorizon = 0.4', more=high), 0.01)
+    assert (found["Feet"].verdict, found["Feet"].limit) == (Verdict.UNDECIDED, None)
+    assert "Thighs and knees" not in found
 
 
 def test_given_speed_of_the_person_adds_to_the_robots(tmp_path: Path) -> None:

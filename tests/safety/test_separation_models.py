@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, heard, judged, made, results_at, state_at, two_r
+from seerob import stop_models
 from seerob.engine import Engine
 from seerob.errors import InputError
+from seerob.stop_simulation import StopSimulation
 
 PERSON = (
     '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = {{ position = [{x}, 0, -1] }}\n'
@@ -279,6 +281,28 @@ def test_toward_counts_what_comes_nearer_and_never_falls_below_standstill(tmp_pa
     else:
         assert ways[1] < 0.15 * ways[0]
         assert ways[1] >= 0
+
+
+@pytest.mark.parametrize("instants", [2, 3, 16])
+def test_toward_misses_nothing_between_the_instants_it_looks_at(tmp_path, monkeypatch, instants):
+    """The arm swings past the person: as far at the end as at the start, nearer in between."""
+    cell = station(tmp_path, SIMULATED, x=3.5)
+    robot = cell.model.robot("arm")
+    gap = cell.model.gap(cell.model.select("op"), robot.moving)
+    state = state_at(cell, arm=((-0.6, 0.0), (2.5, 0.0)))
+    stopped = StopSimulation(cell.model, robot, np.array([15.0, 9.0]), gap.b).stop(state, 0.1)
+    assert stopped.q[-1, 0] > 0.3
+    rotations, positions = state.rotations.copy(), state.positions.copy()
+    seen = []
+    for R, x in zip(stopped.rotations, stopped.positions, strict=True):
+        rotations[list(gap.b)], positions[list(gap.b)] = R, x
+        seen.append(gap.query.per_body(rotations, positions).distance.copy())
+    loss = seen[0] - np.min(seen, axis=0)
+    assert loss.max() > 0.1
+    monkeypatch.setattr(stop_models, "INSTANTS", instants)
+    found = stop_models.approach(stopped, state, gap)
+    assert (found >= loss - 1e-9).all()
+    assert (found <= stopped.ways.sum(axis=0) + 1e-9).all()
 
 
 def test_simulated_stop_without_rotor_inertia_is_undecided_above_and_exceeded_below(tmp_path):

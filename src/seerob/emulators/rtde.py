@@ -12,11 +12,12 @@ import contextlib
 import logging
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from threading import Event, Thread
 from types import TracebackType
 from typing import Self
 
+from seerob.emulators.motions import Motion
 from seerob.protocols import ProtocolError
 from seerob.protocols.rtde import (
     NOT_FOUND,
@@ -46,10 +47,6 @@ from seerob.protocols.rtde_states import RobotMode, SafetyStatus
 
 _log = logging.getLogger(__name__)
 
-Six = tuple[float, float, float, float, float, float]
-Motion = Callable[[float], tuple[Six, Six]]
-"""Joint positions [rad] and speeds [rad/s] at a time [s]."""
-
 TYPES = {
     "timestamp": "DOUBLE",
     "target_q": "VECTOR6D",
@@ -67,6 +64,7 @@ TYPES = {
     "robot_status_bits": "UINT32",
     "safety_status_bits": "UINT32",
 }
+E_SERIES = ControllerVersion(5, 12, 4, 0)
 PLAYING = 2
 MAX_CLIENTS = 8
 MAX_RECIPES = 16
@@ -96,7 +94,7 @@ class RtdeServer:
         *,
         host: str = "127.0.0.1",
         port: int = 0,
-        controller: ControllerVersion = ControllerVersion(5, 12, 4, 0),
+        controller: ControllerVersion = E_SERIES,
         version: int = 2,
         without: frozenset[str] = frozenset(),
         values: Mapping[str, Value] | None = None,
@@ -115,7 +113,8 @@ class RtdeServer:
         self._thread: Thread | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._over: asyncio.Event | None = None
-        self._ready, self._failure = Event(), None
+        self._ready = Event()
+        self._failure: OSError | None = None
 
     def start(self) -> Self:
         """Listen; returns when clients can connect.
@@ -123,12 +122,15 @@ class RtdeServer:
         Raises:
             OSError: The port cannot be listened on.
         """
+        if self._thread is not None:
+            raise RuntimeError("is already started")
         self._ready, self._failure = Event(), None
         self._thread = Thread(target=self._run, name="seerob-emulator-rtde", daemon=True)
         self._thread.start()
         self._ready.wait()
         if self._failure is not None:
             self._thread.join()
+            self._thread = None
             raise self._failure
         return self
 

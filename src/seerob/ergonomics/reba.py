@@ -143,7 +143,7 @@ class Reba(Criterion, frozen=True, kw_only=True):
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
         return Basis(
-            formula="REBA tables A, B and C of the components' scores and the activity; the worse side counts",
+            formula="REBA: tables A, B and C of the components' scores, and the activity; the worse side",
             source="Hignett and McAtamney 2000, Applied Ergonomics 31; tables from five public sources that "
             "agree (2+)",
             inputs=(

@@ -43,7 +43,7 @@ class RulaPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
     back_supported: bool | None = None
     """Seated, the back well supported, hip at 90° or more."""
     legs: Literal["balanced", "unbalanced", "posture"] | None = None
-    """Legs and feet well supported and evenly loaded, or not; ``posture`` estimates it from feet and knees."""
+    """Legs and feet well supported and evenly loaded, or not; ``posture`` estimates it."""
 
 
 def _grand(scores: Mapping[str, Ints]) -> Ints:

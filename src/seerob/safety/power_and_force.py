@@ -2,20 +2,21 @@ r"""Power and force limiting: permissible speed of contact, ISO/TS 15066:2016 5.
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from msgspec import Meta, field
 from numpy.typing import NDArray
 
 from seerob import clamping, collision, contact_limits, contact_shape, provenance
-from seerob.contact_regions import FEET, FORBIDDEN, REGIONS, Person
+from seerob.contact_regions import REGIONS, Person, without_limit
 from seerob.criterion import Criterion, Evaluate, worst
 from seerob.errors import Undecided, UnknownName
 from seerob.impact_mass import masses_along_motion, simplified_mass
-from seerob.model import Body, Frame, Model
+from seerob.model import Frame, Model
 from seerob.norms import body_limits
 from seerob.norms.crushing_gaps import crushing_gaps
 from seerob.norms.limit_inputs import limit_inputs
@@ -26,6 +27,9 @@ from seerob.transforms import Array
 Flags = NDArray[np.bool_]
 STANDSTILL = 1e-3
 """Speed below which a part of the robot hits nobody [m/s]."""
+FAR = 1e6
+"""Larger than any margin of speed [m/s]."""
+GOVERNING = tuple(limit.name.lower() for limit in collision.Governing)
 CAP = 1e-4
 """Contact area that the stiffness of the table is good for [m²] (STIMBA PFL calculator, 1S)."""
 
@@ -88,8 +92,10 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         """
         moving = model.robot(self.robot).moving
         radii = self._by_body(model, self.contact_radius)
+        known = contact_shape.body_shape
         return [
-            contact_shape.round_shape(radii[i]) if i in radii else _shape(model.bodies[i]) for i in moving
+            contact_shape.round_shape(radii[i]) if i in radii else known(model.bodies[i].solids)
+            for i in moving
         ]
 
     def areas(self, model: Model, arrays: contact_limits.RegionArrays) -> Array:
@@ -192,17 +198,15 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         found = []
         for body, shape in zip(moving, self.shapes(model), strict=True):
             name = model.bodies[body].name
+            what, radius = f"contact radius of {name}", shape.sharpest[0]
             if body in areas:
                 found.append(provenance.given(f"contact area of {name}", areas[body], "m²"))
             elif body in radii:
-                found.append(provenance.given(f"contact radius of {name}", radii[body], "m"))
+                found.append(provenance.given(what, radii[body], "m"))
             elif shape.unknown:
-                what = f"contact radius of {name}"
                 found.append(Input(name=what, origin=Origin.MISSING, source=shape.unknown))
             else:
-                radius = shape.sharpest[0]
-                value: float | str = radius if np.isfinite(radius) else "flat"
-                what, unit = f"contact radius of {name}", "m" if np.isfinite(radius) else ""
+                value, unit = (radius, "m") if np.isfinite(radius) else ("flat", "")
                 found.append(
                     Input(name=what, value=value, unit=unit, origin=Origin.COMPUTED, source="its mesh")
                 )
@@ -224,6 +228,7 @@ class _Bound:
         self.limits = spec.table(model)
         self.arrays = contact_limits.RegionArrays.of(self.limits, multiplier=spec.multiplier)
         self.columns = {region.name: k for k, region in enumerate(self.arrays.regions)}
+        self.in_regions = np.array([REGIONS.index(name) for name in self.columns], int)
         shapes = spec.shapes(model)
         self.areas = spec.areas(model, self.arrays)
         self.unknown = [
@@ -232,11 +237,15 @@ class _Bound:
         ]
         self.simplified = simplified_mass(model, self.robot)
         gaps = {**crushing_gaps()[0], **spec.thickness}
-        self.thickness = np.array([gaps[region.name] for region in self.arrays.regions])
+        others = [b for b in model.bodies if b.role not in ("human", "area")]
+        deviation = 2 * max((body.deviation for body in others), default=0.0)
+        # The real surfaces may be nearer than the shapes.
+        self.thickness = np.array([gaps[region.name] + deviation for region in self.arrays.regions])
         self.pinch = clamping.robot_pinch_pairs(
             model, self.robot, cap=float(self.thickness.max(initial=0.0)) + 0.1
         )
         self.memory = clamping.Memory()
+        self.robots = [name for name, m in model.mechanisms.items() if m.role == "robot"]
         if spec.human is not None:
             model.human(spec.human)
         self.people = (
@@ -267,11 +276,9 @@ class _Bound:
         else:
             near, v_h = self.people.near(state, spec.person_speed)
         near &= moves[:, None]
-        found = [
-            self._region(k, near[:, k], v_r, float(v_h[k]), speeds, clamped)
-            for k in range(len(REGIONS))
-            if near[:, k].any()
-        ]
+        v = v_r[:, None] + v_h
+        judged = _Judged(v, speeds, clamped, *self._governing(v, near, speeds))
+        found = [self._region(int(k), judged) for k in np.flatnonzero(near.any(axis=0))]
         known = projected[np.isfinite(projected)]
         heaviest = float(known.max()) if len(known) else None
         mass_parts = (
@@ -279,9 +286,8 @@ class _Bound:
             Result(name="m_u along the motion, heaviest part", value=heaviest, unit="kg"),
         )
         if not found:
-            reason = f"nobody within {spec.horizon:g} m of a moving part"
-            if not moves.any():
-                reason = "no part moves"
+            nobody = f"nobody within {spec.horizon:g} m of a moving part"
+            reason = nobody if moves.any() else "no part moves"
             return Result(name=spec.name, unit="m/s", reason=reason, parts=mass_parts)
         verdict = worst([part.verdict for part, _ in found])
         chosen = [entry for entry in found if entry[0].verdict is verdict]
@@ -308,88 +314,65 @@ class _Bound:
 
     def _clamped(self, state: State) -> Flags:
         """Which moving body clamps which region, shape (b, r)."""
-        state.require(*self.pinch_carriers())
+        state.require(*self.robots)
         gaps, _ = self.pinch.gaps(state.rotations, state.positions)
         return self.pinch.per_body(self.memory.step(state.t, gaps, self.thickness, self.pinch.opened))
 
-    def pinch_carriers(self) -> tuple[str, ...]:
-        """Robots whose pose the gaps depend on."""
-        return tuple(name for name, m in self.model.mechanisms.items() if m.role == "robot")
+    def _governing(self, v: Array, near: Flags, speeds: contact_limits.Speeds) -> tuple[Array, Array]:
+        """Row of the moving body that governs each of `REGIONS`, and its rank: 2 exceeded, 1 open, 0 within.
 
-    def _region(
-        self,
-        k: int,
-        near: Flags,
-        v_r: Array,
-        v_h: float,
-        speeds: contact_limits.Speeds,
-        clamped: Flags,
-    ) -> tuple[Result, int]:
-        """The result of one body region, and the row of the moving body that governs it."""
-        name = REGIONS[k]
-        v = v_r + v_h
-        rows = np.flatnonzero(near)
-        row = int(rows[v[rows].argmax()])
+        Without a limit it is the fastest.
+        """
+        badness, rank = np.where(near, v, -np.inf), np.zeros(v.shape, int)
+        rows = self.in_regions
+        margin = speeds.permissible - v[:, rows]
+        rank[:, rows] = np.where(margin < 0, 2, np.where(np.isnan(speeds.pressure), 1, 0))
+        badness[:, rows] = np.where(near[:, rows], rank[:, rows] * FAR - margin, -np.inf)
+        worst_rows = badness.argmax(axis=0)
+        return worst_rows, rank[worst_rows, np.arange(len(worst_rows))]
+
+    def _region(self, k: int, judged: _Judged) -> tuple[Result, int]:
+        """The result of one of `REGIONS`, and the row of the moving body that governs it."""
+        name, row = REGIONS[k], int(judged.rows[k])
+        value = float(judged.v[row, k])
         body = self.model.bodies[self.moving[row]].name
+        column = self.columns.get(name)
         if name in self.spec.excluded:
             reason = "kept from contact by the workstation file"
-            return Result(name=name, value=float(v[row]), unit="m/s", reason=reason), row
-        region = self.limits.region(name)
-        if name in FORBIDDEN or (region is not None and not region.permitted):
-            verdict = Verdict.EXCEEDED
-            reason = f"contact not permitted, {body} moves within {self.spec.horizon:g} m"
-            if self.people is None:
-                verdict = Verdict.UNDECIDED
-                reason = (
-                    "contact not permitted, and whether it can occur is open without a person: "
-                    "name one, or exclude the region if other measures keep it out"
-                )
-            return Result(name=name, value=float(v[row]), unit="m/s", verdict=verdict, reason=reason), row
-        if region is None:
-            reason = "no limit available" if name == FEET else f"no limit in {self.limits.file}"
-            value = float(v[row])
-            return Result(name=name, value=value, unit="m/s", verdict=Verdict.UNDECIDED, reason=reason), row
-        column = self.columns[name]
-        limit = speeds.permissible[:, column]
-        margin = limit - v
-        open_ = np.isnan(speeds.pressure[:, column])
-        rank = np.where(margin < 0, 2, np.where(open_, 1, 0))
-        row = int(min(rows, key=lambda i: (-rank[i], margin[i])))
-        verdict = (Verdict.WITHIN, Verdict.UNDECIDED, Verdict.EXCEEDED)[rank[row]]
-        how = "clamped" if clamped[row, column] else "free"
-        which = collision.Governing(speeds.governing[row, column]).name.lower()
-        body = self.model.bodies[self.moving[row]].name
-        reason = f"{which}, {how}, {body}"
+            return Result(name=name, value=value, unit="m/s", reason=reason), row
+        if column is None:
+            region = self.limits.region(name)
+            within = None if self.people is None else f"{body} moves within {self.spec.horizon:g} m"
+            permitted = region is None or region.permitted
+            verdict, reason = without_limit(name, permitted, within, self.limits.file)
+            return Result(name=name, value=value, unit="m/s", verdict=verdict, reason=reason), row
+        speeds = judged.speeds
+        verdict = (Verdict.WITHIN, Verdict.UNDECIDED, Verdict.EXCEEDED)[int(judged.ranks[k])]
+        how = "clamped" if judged.clamped[row, column] else "free"
+        reason = f"{GOVERNING[int(speeds.governing[row, column])]}, {how}, {body}"
         if verdict is Verdict.UNDECIDED:
             reason = f"contact pressure of {body} ({how}): {self.unknown[row]}"
         return Result(
             name=name,
-            value=float(v[row]),
+            value=value,
             unit="m/s",
-            limit=float(limit[row]),
+            limit=float(speeds.permissible[row, column]),
             verdict=verdict,
             reason=reason,
-            parts=self._area_results(region, row, column, float(v[row]), speeds),
+            parts=self._area_results(row, column, value, speeds),
         ), row
 
     def _area_results(
-        self,
-        region: body_limits.BodyRegion,
-        row: int,
-        column: int,
-        v: float,
-        speeds: contact_limits.Speeds,
+        self, row: int, column: int, v: float, speeds: contact_limits.Speeds
     ) -> tuple[Result, ...]:
         """The same for each specific area: force belongs to the region, pressure to the area."""
-        others = float(min(speeds.force[row, column], speeds.energy[row, column]))
-        pressed = float(speeds.pressure[row, column]) / self.arrays.pressure[column]
+        others = min(float(speeds.force[row, column]), float(speeds.energy[row, column]))
+        pressed = float(speeds.pressure[row, column]) / float(self.arrays.pressure[column])
+        open_ = math.isnan(pressed)
         found = []
-        for area in region.areas:
-            v_P = pressed * area.pressure.value
-            limit = others if np.isnan(v_P) else min(others, v_P)
-            verdict = Verdict.WITHIN if v <= limit else Verdict.EXCEEDED
-            if np.isnan(v_P) and verdict is Verdict.WITHIN:
-                verdict = Verdict.UNDECIDED
+        for area in self.arrays.regions[column].areas:
+            limit = others if open_ else min(others, pressed * area.pressure.value)
+            verdict = Verdict.EXCEEDED if v > limit else Verdict.UNDECIDED if open_ else Verdict.WITHIN
             reason = self.unknown[row] if verdict is Verdict.UNDECIDED else ""
             found.append(
                 Result(name=area.name, value=v, unit="m/s", limit=limit, verdict=verdict, reason=reason)
@@ -397,17 +380,20 @@ class _Bound:
         return tuple(found)
 
 
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """What the results of the regions are made from."""
+
+    v: Array
+    """Bounds on the relative speed [m/s], shape (b, len(REGIONS))."""
+    speeds: contact_limits.Speeds
+    clamped: Flags
+    """Shape (b, r)."""
+    rows: Array
+    ranks: Array
+
+
 def _margin(entry: tuple[Result, int]) -> float:
     """Without a limit it is the worst: nothing is permitted or known."""
     part = entry[0]
     return -np.inf if part.limit is None or part.value is None else part.limit - part.value
-
-
-_shapes: WeakKeyDictionary[Body, contact_shape.ContactShape] = WeakKeyDictionary()
-
-
-def _shape(body: Body) -> contact_shape.ContactShape:
-    """Of one body; meshes are looked at once per model."""
-    if body not in _shapes:
-        _shapes[body] = contact_shape.body_shape(body.solids)
-    return _shapes[body]

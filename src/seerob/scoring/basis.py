@@ -59,7 +59,12 @@ def choices(
     """Thresholds, how an arm is read, accuracy, and bones that nobody measures."""
     return (
         *chosen(thresholds, Thresholds()),
-        Input(name="arm angle", value=arm.value, origin=Origin.GIVEN, source="option arm"),
+        Input(
+            name="arm angle",
+            value=arm.value,
+            origin=Origin.ASSUMED if arm is ArmPolicy.PROJECTION else Origin.GIVEN,
+            source="option arm, projection when not given",
+        ),
         *posture_quality(accuracy, unmeasured),
     )
 
@@ -75,7 +80,7 @@ def chosen(thresholds: msgspec.Struct, usual: msgspec.Struct) -> tuple[Input, ..
                 name="threshold " + field.name.replace("_", " "),
                 value=round(math.degrees(value), 6),
                 unit="deg",
-                origin=Origin.GIVEN if own else Origin.STATED,
+                origin=Origin.GIVEN if own else Origin.ASSUMED,
                 source="workstation file" if own else "a choice of seerob, the method leaves it open",
             )
         )

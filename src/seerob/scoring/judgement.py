@@ -94,8 +94,9 @@ def judged(
     verdict = _verdict((low, high), limit, complete=not missing)
     known = int(measured.low.max()) == int(measured.high.max())
     value = float(measured.high.max()) if known else None
-    side = int(measured.high.argmax())
-    drivers = _drivers(method, {key: span.high for key, span in sides.items()}, side)
+    # By what is known at least: what is not assessed drives nothing.
+    side = int(measured.low.argmax())
+    drivers = _drivers(method, {key: span.low for key, span in sides.items()}, side)
     reason = _reason(method, sides, drivers, side, value, (low, high), missing, verdict)
     bones = [bone.format(side=SIDES[side]) for key in drivers for bone in BONES_OF.get(key, ())]
     shown = None if spread is None and not missing else (float(low), float(high))
@@ -172,7 +173,7 @@ def _reason(
     elif verdict is Verdict.UNDECIDED:
         parts.append(f"the accuracy leaves it open: the score lies between {ends[0]} and {ends[1]}")
     if drivers:
-        scores = {key: sides[key].high[side % len(sides[key].high)] for key in drivers}
+        scores = {key: sides[key].low[side % len(sides[key].low)] for key in drivers}
         parts.append(f"{SIDES[side]} side: " + ", ".join(f"{key} {score}" for key, score in scores.items()))
     if value is not None:
         parts.append(method.level(value))

@@ -7,18 +7,15 @@ Nothing is written to the robot: no inputs are registered.
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import AsyncGenerator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import aclosing
 from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta
-from msgspec.structs import replace
 
-from seerob.errors import InputError, SeerobError
+from seerob.errors import InputError
 from seerob.live import LiveSource
 from seerob.protocols import ProtocolError, rtde, rtde_client
 from seerob.protocols.rtde import ControllerVersion, Level, TextMessage, Value
@@ -49,8 +46,6 @@ SIGNAL_PERIOD = 0.1
 CB3_RATE = 125.0
 """The most that a CB3 controller sends [Hz]."""
 LEVELS = {Level.EXCEPTION: logging.ERROR, Level.ERROR: logging.ERROR, Level.WARNING: logging.WARNING}
-PROBE_WITHIN = 1.5
-"""At start [s]."""
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
@@ -148,7 +143,7 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
         return 1 / self.frequency
 
     def open(self, folder: Path, target: Target | None) -> Opened:
-        """Ask the controller what it has, if it can be reached; a run may begin before it can.
+        """Ask the controller what it has, if it can be reached.
 
         Raises:
             InputError: The robot does not have six joints, or the controller does not say where they are.
@@ -158,35 +153,23 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
         if len(target.joints) != 6:
             what = f"{target.name} has {len(target.joints)} joints, a Universal Robots arm has 6"
             raise InputError.at(f"rtde {self.host}", "robot", what, "name another robot")
-        where = f"rtde {self.host}:{self.port}"
-        opened = super().open(folder, target)
-        # In a thread: whoever asks may be in an event loop, a notebook for one.
-        with ThreadPoolExecutor(1) as thread:
-            heard = thread.submit(asyncio.run, self._probe()).result()
-        return replace(
-            opened,
-            findings=(
-                origin_finding(self.origin, target.name, where),
-                *opened.findings,
-                *(Finding(level=level, subject=target.name, text=f"{where}: {t}") for level, t in heard),
-            ),
-        )
+        return super().open(folder, target)
 
-    async def _probe(self) -> list[tuple[str, str]]:
-        try:
-            async with (
-                asyncio.timeout(PROBE_WITHIN),
-                rtde_client.connect(self.host, self.port, FIELDS, self.frequency) as session,
-            ):
-                lacking = [f for f in NEEDED if f in session.missing]
-                if lacking:
-                    what = f"the controller has no {' and no '.join(lacking)}"
-                    raise InputError.at(f"rtde {self.host}", "host", what, "is it a robot's controller?")
-                return remarks(session, self.frequency)
-        except InputError:
-            raise
-        except (OSError, TimeoutError, SeerobError) as error:
-            return [("warning", f"not reached at start: {str(error) or 'no answer in time'}; keeps trying")]
+    async def ask(self) -> tuple[Finding, ...]:
+        """Software, protocol, and what the controller does not have."""
+        async with rtde_client.connect(self.host, self.port, FIELDS, self.frequency) as session:
+            lacking = [f for f in NEEDED if f in session.missing]
+            if lacking:
+                what = f"the controller has no {' and no '.join(lacking)}"
+                raise InputError.at(f"rtde {self.host}", "host", what, "is it a robot's controller?")
+            where = f"rtde {self.host}:{self.port}"
+            if self.origin is MotionOrigin.CONTROLLER:
+                text = f"motion heard from the controller, as it happens ({where})"
+                heard = Finding(level="note", subject=self.robot, text=text)
+            else:
+                heard = origin_finding(self.origin, self.robot, where)
+            said = remarks(session, self.frequency)
+            return (heard, *(Finding(level=level, subject=self.robot, text=text) for level, text in said))
 
     async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Joint samples, and signals ten times a second and whenever a state changes."""

@@ -1,0 +1,116 @@
+"""``seerob probe``: connect to a controller, say what is heard, and what to write into the workstation."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+from seerob.commands import OUT, Exit, line, port, seconds
+from seerob.commands.run import Stopped
+from seerob.errors import InputError, SeerobError
+
+if TYPE_CHECKING:
+    from seerob.live import LiveSource
+    from seerob.samples import Sample
+
+HELP = "connect to a controller and print what it says, how regularly, and what is missing"
+EXAMPLE = "seerob probe rtde 192.168.0.10"
+KINDS = ("rtde",)
+
+
+def add(sub: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    sub.add_argument("kind", choices=KINDS, help="what it speaks")
+    sub.add_argument("host", help="its name or address")
+    sub.add_argument("--port", type=port, help="port, when it is not the usual one")
+    sub.add_argument("--frequency", type=float, help="samples per second to ask for [Hz]")
+    sub.add_argument("--robot", default="robot", help="name of the robot in the snippet")
+    sub.add_argument("--seconds", type=seconds, default=3.0, help="how long to listen (default: 3)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Ask, listen, print; `Exit.ERROR` when nothing is heard.
+
+    Raises:
+        InputError: It cannot be reached, or is not what the source can use.
+    """
+    import asyncio
+
+    from seerob.live import Listener, because
+    from seerob.samples import SignalSample
+
+    given = {key: getattr(options, key) for key in ("robot", "host", "port", "frequency")}
+    given = {key: value for key, value in given.items() if value is not None}
+    source = _source(options.kind, given)
+    try:
+        findings = asyncio.run(source.ask())
+    except InputError:
+        raise
+    except (OSError, EOFError, SeerobError) as error:
+        remedy = "is it switched on, is the address right, does a firewall stand between?"
+        raise InputError.at(f"{options.kind} {options.host}", "", because(error), remedy) from error
+    for finding in findings:
+        line(finding.level, finding.text, "" if finding.level == "note" else "yellow")
+    newest: dict[str, Sample] = {}
+    qualities: Counter[str] = Counter()
+
+    def hear(sample: Sample) -> None:
+        newest[type(sample).__name__] = sample
+        if not isinstance(sample, SignalSample):
+            qualities[sample.quality] += 1
+
+    listener = Listener(source, None, hear)
+    stopped = Stopped()
+    end = time.monotonic() + options.seconds
+    listener.start()
+    while time.monotonic() < end and not stopped():
+        time.sleep(0.02)
+    listener.ask_to_stop()
+    listener.join(1.0)
+    if not newest:
+        line("nothing", f"heard in {options.seconds:g} s", "yellow")
+        return Exit.ERROR
+    statistics = listener.statistics()
+    line("heard", str(statistics))
+    if statistics.offset is not None:
+        line("clock", f"host less device {statistics.offset:.3f} s")
+    line("quality", ", ".join(f"{count} {quality}" for quality, count in qualities.items()))
+    for sample in newest.values():
+        _tell(sample)
+    OUT.print(_snippet(options.kind, given), markup=False)
+    return Exit.WITHIN
+
+
+def _source(kind: str, given: dict[str, Any]) -> LiveSource:
+    import msgspec
+
+    from seerob.live import LiveSource
+    from seerob.plugin import load
+
+    try:
+        return msgspec.convert(given, load("sources", kind, LiveSource))  # type: ignore[type-abstract,unused-ignore]
+    except msgspec.ValidationError as error:
+        raise InputError.at(f"seerob probe {kind}", "", str(error)) from error
+
+
+def _tell(sample: Sample) -> None:
+    from seerob.samples import JointSample, SignalSample
+
+    if isinstance(sample, JointSample):
+        for name, unit, values in (
+            ("q", "rad", sample.q),
+            ("qd", "rad/s", sample.qd),
+            ("tau", "N·m", sample.tau),
+        ):
+            text = "not heard" if values is None else f"{' '.join(f'{x:+.4f}' for x in values)} {unit}"
+            line(name, text)
+    elif isinstance(sample, SignalSample):
+        for name, value in sample.values.items():
+            line("signal", f"{name} = {value:.4f}" if isinstance(value, float) else f"{name} = {value}")
+
+
+def _snippet(kind: str, given: dict[str, Any]) -> str:
+    shown = (f'{key} = "{v}"' if isinstance(v, str) else f"{key} = {v}" for key, v in given.items())
+    return "\n".join(["", "[[sources]]", f'kind = "{kind}"', *shown])

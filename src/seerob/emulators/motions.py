@@ -1,0 +1,65 @@
+"""Motions that an emulated robot plays: one that was recorded, or a calm swing."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+
+Joints = tuple[float, ...]
+Motion = Callable[[float], tuple[Joints, Joints]]
+"""Joint positions [rad or m] and speeds [rad/s or m/s] at a time [s]."""
+
+CLOSED = 1e-3
+"""A motion whose ends differ by no more [rad or m] is played round and round."""
+SWING, SWING_PERIOD = 0.25, 8.0
+"""Amplitude [rad] and period [s]."""
+
+
+def swing(home: Sequence[float]) -> Motion:
+    """Every joint to and fro about a pose, each with a phase of its own.
+
+    Args:
+        home: Joint positions [rad], shape (n,).
+    """
+    omega = 2 * math.pi / SWING_PERIOD
+
+    def motion(t: float) -> tuple[Joints, Joints]:
+        phases = [omega * t + k for k in range(len(home))]
+        q = tuple(h + SWING * math.sin(p) for h, p in zip(home, phases, strict=True))
+        return q, tuple(SWING * omega * math.cos(p) for p in phases)
+
+    return motion
+
+
+def played(times: Sequence[float], q: Sequence[Joints], qd: Sequence[Joints]) -> Motion:
+    """A recorded motion: round and round when its ends meet, else it stands still at its end.
+
+    Between samples it is the cubic that has their positions and speeds.
+
+    Args:
+        times: Ascending, from 0 [s], shape (m,).
+        q: Joint positions [rad or m], shape (m, n).
+        qd: Joint speeds [rad/s or m/s], shape (m, n).
+    """
+    closed = max((abs(a - b) for a, b in zip(q[0], q[-1], strict=True)), default=0.0) <= CLOSED
+
+    def motion(t: float) -> tuple[Joints, Joints]:
+        if t >= times[-1] and not (closed and times[-1] > 0):
+            return q[-1], (0.0,) * len(q[-1])
+        t = t % times[-1] if closed and times[-1] > 0 else max(t, 0.0)
+        k = min(bisect_right(times, t), len(times) - 1) - 1
+        T = times[k + 1] - times[k]
+        s = (t - times[k]) / T
+        rows = zip(q[k], q[k + 1], qd[k], qd[k + 1], strict=True)
+        both = [_cubic(s, T, *row) for row in rows]
+        return tuple(x for x, _ in both), tuple(v for _, v in both)
+
+    return motion
+
+
+def _cubic(s: float, T: float, q0: float, q1: float, v0: float, v1: float) -> tuple[float, float]:
+    """Position and speed of the cubic Hermite polynomial at a share ``s`` of the interval ``T`` [s]."""
+    a, b, chord = T * v0, T * v1, q1 - q0
+    c2, c3 = 3 * chord - 2 * a - b, a + b - 2 * chord
+    return q0 + s * (a + s * (c2 + s * c3)), (a + s * (2 * c2 + s * 3 * c3)) / T

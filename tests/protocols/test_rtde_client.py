@@ -104,9 +104,11 @@ def test_several_clients_are_served_at_once_and_leave_nothing():
 
         async def several():
             async def one():
-                async with connect("127.0.0.1", server.port, NEEDED, 500) as session:
-                    async with aclosing(session.receive()) as received:
-                        return [(await anext(received)).values["timestamp"] for _ in range(20)]
+                async with (
+                    connect("127.0.0.1", server.port, NEEDED, 500) as session,
+                    aclosing(session.receive()) as received,
+                ):
+                    return [(await anext(received)).values["timestamp"] for _ in range(20)]
 
             return await asyncio.gather(*(one() for _ in range(4)))
 
@@ -120,7 +122,7 @@ def test_several_clients_are_served_at_once_and_leave_nothing():
 
 
 @contextmanager
-def answering(*chunks, request_first=True):
+def answering(*chunks):
     """A server that answers each thing it hears with the next of some bytes, and then says no more."""
     listening = socket.create_server(("127.0.0.1", 0))
 
@@ -171,9 +173,9 @@ def test_a_server_that_says_nothing_is_given_up(monkeypatch):
 def test_data_that_stops_is_noticed(monkeypatch):
     monkeypatch.setattr("seerob.protocols.rtde_client.SILENCE", 0.2)
     reply = pack(Kind.OUTPUTS, b"\1DOUBLE,VECTOR6D")
-    with answering(YES, CONTROLLER, reply, pack(Kind.START, b"\1")) as port:
-        with pytest.raises(TimeoutError, match=r"silent for 0\.2 s"):
-            heard(port, 1, NEEDED)
+    chunks = YES, CONTROLLER, reply, pack(Kind.START, b"\1")
+    with answering(*chunks) as port, pytest.raises(TimeoutError, match=r"silent for 0\.2 s"):
+        heard(port, 1, NEEDED)
 
 
 def test_a_hostile_client_ends_its_own_connection_only():

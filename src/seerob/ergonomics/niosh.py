@@ -87,7 +87,7 @@ class Niosh(Criterion, frozen=True, kw_only=True):
     """Who lifts."""
     lifts: tuple[Lift, ...]
     """The lifting tasks; several are alternated by the same person."""
-    work: Annotated[Seconds, Meta(gt=0, le=28800)]
+    work: Annotated[float, Meta(gt=0, le=28800, extra={"unit": "s"})]
     """How long they last, spells with too short a recovery in between added up [s]."""
     recovery: Seconds
     """Light work or rest that follows [s]."""

@@ -1,0 +1,201 @@
+"""Live sources in general: thread, back-off, stop, time, and a run that follows one."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+import threading
+import time
+
+import msgspec
+import pytest
+
+from seerob.errors import InputError, SeerobError
+from seerob.live import FIRST_PAUSE, LONGEST_PAUSE, MARGIN, Listener, Listening, LiveSource, delay_of
+from seerob.real_time import Clock, hear, require_recorded
+from seerob.samples import JointSample, SignalSample
+from seerob.source import Source
+from seerob.workstation import Workstation
+
+
+class Made(LiveSource, frozen=True, kw_only=True):
+    """Yields what a script of the test says."""
+
+    script: object = None
+    rate: float = 100.0
+
+    def target(self):
+        return "arm"
+
+    def period(self):
+        return 1 / self.rate
+
+    def listen(self, target):
+        return self.script()
+
+
+def joint(t=None, device=None):
+    return JointSample(
+        source="", seq=0, target="arm", q=(0.0,), t=time.monotonic() if t is None else t, t_device=device
+    )
+
+
+def until(true, seconds=5.0):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+class Ears:
+    def __init__(self, script):
+        self.samples = []
+        self.listener = Listener(Made(script=script, name="made"), None, self.samples.append)
+
+    def __enter__(self):
+        self.listener.start()
+        return self
+
+    def __exit__(self, *_):
+        self.listener.ask_to_stop()
+        assert self.listener.join(1.0)
+
+
+def test_what_is_heard_is_numbered_named_and_put_on_the_hosts_clock():
+    async def script():
+        for k in range(5):
+            yield joint(t=1000 + 0.1 * k + 0.01 * (k == 2), device=5 + 0.1 * k)
+            yield joint(t=1000.05 + 0.1 * k, device=5 + 0.1 * k)  # no news
+        yield SignalSample(source="", seq=0, t=1001.0, values={"on": True})
+        await asyncio.sleep(60)
+
+    with Ears(script) as ears:
+        until(lambda: len(ears.samples) == 6)
+    assert [s.seq for s in ears.samples] == [0, 1, 2, 3, 4, 5]
+    assert {s.source for s in ears.samples} == {"made"}
+    assert [s.t for s in ears.samples] == pytest.approx([1000, 1000.1, 1000.2, 1000.3, 1000.4, 1001.0])
+    found = ears.listener.statistics()
+    assert (found.count, found.repeated, found.offset) == (5, 5, pytest.approx(995))
+
+
+@pytest.mark.parametrize("error", [OSError(111, "x"), SeerobError("nonsense"), ValueError("a bug"), None])
+def test_one_line_per_loss_and_one_per_return_whatever_ends_it(caplog, error):
+    sessions = []
+
+    async def script():
+        sessions.append(time.monotonic())
+        if len(sessions) not in {2, 3}:
+            yield joint()
+        if len(sessions) >= 4:
+            await asyncio.sleep(60)
+        if error:
+            raise error
+
+    with caplog.at_level(logging.INFO, "seerob.live"), Ears(script) as ears:
+        until(lambda: len(ears.samples) == 2)
+    lines = [r.getMessage() for r in caplog.records if "mistake in the source" not in r.getMessage()]
+    assert len(lines) == 2
+    assert lines[0].startswith("made: not heard: ")
+    assert lines[1] == "made: heard again"
+    assert ears.listener.statistics().losses == 1
+
+
+def test_it_is_tried_again_less_and_less_often(monkeypatch):
+    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.01)
+    monkeypatch.setattr("seerob.live.LONGEST_PAUSE", 0.08)
+    tried = []
+
+    async def script():
+        tried.append(time.monotonic())
+        raise OSError
+        yield
+
+    with Ears(script):
+        until(lambda: len(tried) == 8)
+    pauses = [b - a for a, b in itertools.pairwise(tried)]
+    for pause, least in zip(pauses, [0.01, 0.02, 0.04, 0.08, 0.08, 0.08], strict=False):
+        assert pause >= least
+    assert FIRST_PAUSE < LONGEST_PAUSE
+
+
+def test_a_source_that_waits_is_stopped_at_once_and_its_thread_ends():
+    left = threading.Event()
+
+    async def script():
+        try:
+            yield joint()
+            await asyncio.sleep(1e6)
+        finally:
+            left.set()
+
+    before = threading.active_count()
+    with Ears(script) as ears:
+        until(lambda: ears.samples)
+    assert left.is_set()
+    assert threading.active_count() == before
+
+
+def test_a_listener_that_is_stopped_before_it_began_ends():
+    listener = Listener(Made(script=None), None, print)
+    listener.ask_to_stop()
+    listener.start()
+    assert listener.join(1.0)
+
+
+def test_the_newest_wins_and_nothing_queues():
+    async def script():
+        for k in range(1000):
+            yield joint(t=float(k))
+        await asyncio.sleep(60)
+
+    with Listening([(Made(script=script), None)]) as listening:
+        until(lambda: listening.listeners[0].statistics().count == 1000)
+        (sample,) = listening.take()
+        assert (sample.t, sample.seq) == (999.0, 999)
+        assert listening.take() == ()
+
+
+def test_run_time_begins_at_the_first_sample_and_the_tick_that_speaks_of_it_comes_a_delay_later():
+    async def script():
+        while True:
+            yield joint()
+            await asyncio.sleep(0.005)
+
+    source = Made(script=script)
+    clock, period = Clock(slip=10.0), 0.01
+    with Listening([(source, None)]) as listening:
+        feed = hear(iter(lambda: (), None), listening, clock)
+        for k in range(20):
+            samples = next(feed)
+            now = time.monotonic()
+            for sample in samples:
+                assert sample.t <= now - clock.start + listening.delay
+            if k == 0:
+                assert samples[0].t == pytest.approx(0.0, abs=1e-9)
+                assert now - clock.start >= 0
+            clock.wait((k + 1) * period)
+    assert listening.delay == delay_of([source]) == source.behind() == 0.01 + MARGIN
+
+
+def test_a_run_begins_without_a_source_that_is_not_there():
+    async def script():
+        await asyncio.sleep(60)
+        yield
+
+    with Listening([(Made(script=script), None)]) as listening:
+        assert listening.first(patience=0.05) == ()
+
+
+def test_a_live_source_cannot_loop_and_its_time_out_is_longer_than_its_delay():
+    for wrong, what in (({"loop": True}, "remove loop"), ({"timeout": 0.01}, "longer timeout")):
+        with pytest.raises(msgspec.ValidationError, match=what):
+            msgspec.convert({**wrong}, Made)
+    assert Made(delay=0.1).behind() == 0.1
+    assert delay_of([Source(), Made(delay=0.03), Made(delay=0.05)]) == 0.05
+
+
+def test_a_live_source_is_refused_where_time_is_not_real():
+    with pytest.raises(InputError, match=r"sources\[1\].*real time only.*seerob run"):
+        require_recorded(Workstation(folder="", sources=(Source(), Made())))
+    require_recorded(Workstation(folder="", sources=(Source(),)))

@@ -70,8 +70,10 @@ class Station:
 
     @cached_property
     def files(self) -> dict[str, bytes]:
-        """The workstation file and every file it names, those of its sources included."""
-        named = [getattr(source, "file", None) for source in self.workstation.sources]
+        """The workstation file and every file it names, trajectories and tables of limits included."""
+        station = self.workstation
+        named = [getattr(source, "file", None) for source in station.sources]
+        named += [getattr(rule, "limits", None) for rule in (*station.safety, *station.ergonomics)]
         references = [name for name in named if isinstance(name, str)]
         return {**self.model.files, **source_files(references, folder=self.model.folder)}
 

@@ -9,8 +9,8 @@ from msgspec import Meta
 
 from seerob import provenance
 from seerob.criterion import Criterion, Evaluate, judge
-from seerob.errors import Undecided
-from seerob.model import Mechanism, Model
+from seerob.impact_mass import simplified_mass
+from seerob.model import Model
 from seerob.snapshot import Arrow, Basis, Ellipsoid, Result, Verdict
 from seerob.state import State
 from seerob.transforms import Array, wxyz_from_rotation
@@ -58,21 +58,6 @@ def principal_masses(inverse: Array) -> tuple[Array, Array]:
         return 1.0 / np.maximum(mobility, 0.0)[..., ::-1], axes[..., ::-1]
 
 
-def moving_mass(model: Model, robot: Mechanism) -> tuple[float, float]:
-    """Total mass of the links that move, and of what is mounted on them [kg].
-
-    Raises:
-        Undecided: A mass that nobody gave.
-    """
-    if robot.unknown_masses:
-        raise Undecided("; ".join(robot.unknown_masses))
-    masses = {
-        name: model.mj.body(int(i)).mass[0] for i in robot.mj_bodies for name in [model.mj.body(int(i)).name]
-    }
-    links = sum(float(m) for name, m in masses.items() if name.startswith(f"{robot.name}/"))
-    return links, float(sum(masses.values())) - links
-
-
 class EffectiveMass(Criterion, frozen=True, kw_only=True):
     """Mass that somebody hit by a point of the robot would feel, along its motion or toward a person."""
 
@@ -99,8 +84,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         robot = model.carrier(frame)
         offset = np.array(self.offset)
         gap = None if self.toward is None else model.gap(robot.moving, model.select(self.toward))
-        links, load = (0.0, 0.0) if robot.unknown_masses else moving_mass(model, robot)
-        simplified = Result(name="M/2 + m_L", value=links / 2 + load, unit="kg")
+        simplified = Result(name="M/2 + m_L", value=simplified_mass(model, robot), unit="kg")
 
         def direction(state: State, J_v: Array, masses: Array, axes: Array) -> tuple[Array | None, str]:
             if gap is not None:

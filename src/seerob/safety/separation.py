@@ -233,7 +233,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
             reason = "stands still: no motion to scale"
         return (
             Result(name="largest permissible speed", value=speed, unit="m/s", reason=reason),
-            Result(name="share of the present speed", value=factor, unit="", reason=reason),
+            Result(
+                name="share of the present speed",
+                value=factor,
+                reason=reason if factor is not None else reason or "stands still: no speed to compare with",
+            ),
         )
 
     @staticmethod

@@ -1,0 +1,296 @@
+"""The twin of a UR10 over RTDE, on real sockets: it follows, doubts, comes back, and can be replayed."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import threading
+import time
+
+import msgspec
+import numpy as np
+import pytest
+
+from made_cell import TWO_R, made, two_r
+from seerob.emulators.rtde import RtdeServer
+from seerob.errors import InputError
+from seerob.live import Listener
+from seerob.protocols import ProtocolError
+from seerob.protocols.rtde_states import RobotMode, SafetyStatus, quality
+from seerob.recording import Recording
+from seerob.samples import JointSample, Quality, SignalSample
+from seerob.sinks.recorder import Recorder
+from seerob.sources.rtde import Rtde, figures, joint_sample, states
+from seerob.station import load_recorded
+
+HOME, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([0.5, 0.3, -0.3, 0.4, -0.4, 0.5])
+FASTEST = 1.5
+"""More than any point of the robot moves [m/s]."""
+
+
+def motion(t):
+    return tuple((HOME + AMPLITUDE * np.sin(t)).tolist()), tuple((AMPLITUDE * np.cos(t)).tolist())
+
+
+def cell(folder, server, *, frequency=125.0, timeout=0.2, more=""):
+    return made(
+        folder,
+        '[[robots]]\nname = "arm"\nmodel = "library:ur10"\n'
+        f'[[sources]]\nkind = "rtde"\nname = "controller"\nrobot = "arm"\nhost = "127.0.0.1"\n'
+        f"port = {server.port}\nfrequency = {frequency}\ntimeout = {timeout}\n{more}"
+        '[[safety]]\nkind = "velocity"\nname = "speed"\nat = "arm"\nlimit = 1.5\n',
+    )
+
+
+class Story:
+    """Keeps what goes out, and does things to the server at given ticks."""
+
+    def __init__(self, ticks, **deeds):
+        self.ticks, self.deeds = ticks, {int(k.removeprefix("at_")): deed for k, deed in deeds.items()}
+        self.snapshots, self.heard = [], []
+
+    def write(self, snapshot, samples):
+        self.snapshots.append(snapshot)
+        self.heard.append(samples)
+        self.deeds.get(len(self.snapshots), lambda: None)()
+
+    def stop(self):
+        return len(self.snapshots) >= self.ticks
+
+    def close(self):
+        pass
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def joints(self):
+        return [s for samples in self.heard for s in samples if isinstance(s, JointSample)]
+
+    def verdicts(self):
+        return [s.results[0].verdict for s in self.snapshots]
+
+
+def lived(station, story, **more):
+    station.run(live=True, writers=[story], stop=story.stop, **more)
+    return story
+
+
+@pytest.mark.parametrize("frequency", [125.0, 500.0])
+def test_the_twin_follows_the_robot(tmp_path, frequency):
+    with RtdeServer(motion) as server:
+        story = lived(cell(tmp_path, server, frequency=frequency), Story(150))
+    assert len(story.joints()) > 100
+    # Where the device's clock is on the run's, from what was heard of both.
+    offset = np.median([s.t - s.t_device for s in story.joints()])
+    errors = [np.abs(np.subtract(motion(s.t - offset)[0], s.joints["arm"])).max() for s in story.snapshots]
+    # A machine that is busy with other things holds a sample back now and then.
+    assert np.median(errors) < 1e-4
+    assert set(story.verdicts()) == {"within"}
+    speeds = [s.results[0].value for s in story.snapshots]
+    assert max(speeds) < FASTEST
+
+
+def test_samples_lie_on_either_side_of_what_is_shown(tmp_path):
+    with RtdeServer(motion) as server:
+        story = lived(cell(tmp_path, server), Story(100))
+    newest = -math.inf
+    ahead = []
+    for snapshot, samples in zip(story.snapshots, story.heard, strict=True):
+        newest = max([newest, *(s.t for s in samples if isinstance(s, JointSample))])
+        ahead.append(newest >= snapshot.t)
+    assert np.mean(ahead) > 0.8
+
+
+def test_silence_is_undecided_within_the_time_out_and_the_robot_is_followed_again(tmp_path):
+    server = RtdeServer(motion).start()
+    story = Story(400, at_50=server.stop, at_110=server.start)
+    try:
+        station = cell(tmp_path, server)
+        lived(station, story)
+    finally:
+        server.stop()
+    verdicts, times = story.verdicts(), [s.t for s in story.snapshots]
+    lost = verdicts.index("undecided")
+    last = max(s.t for s in story.joints() if s.t < times[lost])
+    # A tick speaks of what was a delay ago.
+    (source,) = station.workstation.sources
+    assert times[lost] + source.behind() <= last + source.timeout + 2 * 0.01
+    assert "not heard for" in story.snapshots[lost + 5].results[0].reason
+    back = lost + verdicts[lost:].index("within")
+    assert back > 110
+    assert set(verdicts[back:]) == {"within"}
+    # It was put where the robot is by then, which no speed was that of.
+    assert max(s.results[0].value for s in story.snapshots[back:]) < FASTEST
+
+
+def test_a_controller_that_comes_late_is_followed(tmp_path):
+    with RtdeServer(motion) as there:
+        port = there.port
+    server = RtdeServer(motion, port=port)
+    station = cell(tmp_path, server)
+    warning = [f.text for f in station.scene().findings if "not reached at start" in f.text]
+    assert warning == [
+        "controller: not reached at start: Connection refused; it is tried again during the run"
+    ]
+    story = Story(400, at_20=server.start)
+    try:
+        lived(station, story)
+    finally:
+        server.stop()
+    verdicts = story.verdicts()
+    assert set(verdicts[:20]) == {"undecided"}
+    assert "nothing heard yet" in story.snapshots[0].results[0].reason
+    back = verdicts.index("within")
+    assert set(verdicts[back:]) == {"within"}
+    assert max(s.results[0].value for s in story.snapshots[back:]) < FASTEST
+
+
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ({"robot_mode": int(RobotMode.POWER_OFF)}, "its source says invalid"),
+        ({"safety_status": int(SafetyStatus.FAULT)}, "its source says degraded"),
+        ({"actual_q": (math.nan,) * 6}, "not finite"),
+    ],
+)
+def test_a_robot_that_says_that_it_does_not_know_is_undecided_at_once(tmp_path, values, reason):
+    with RtdeServer(motion) as server:
+        story = lived(cell(tmp_path, server), Story(60, at_30=lambda: server.values.update(values)))
+    assert story.verdicts()[25] == "within"
+    assert story.verdicts()[50] == "undecided"
+    assert reason in story.snapshots[50].results[0].reason
+
+
+def test_a_clock_that_stands_still_is_silence(tmp_path):
+    """A controller that repeats itself has nothing to say."""
+    with RtdeServer(motion) as server:
+        deed = {"at_30": lambda: server.values.update(timestamp=server.now())}
+        story = lived(cell(tmp_path, server), Story(80, **deed))
+    assert story.verdicts()[25] == "within"
+    assert "not heard for" in story.snapshots[70].results[0].reason
+
+
+def test_what_was_heard_live_is_computed_again_bit_for_bit(tmp_path):
+    server = RtdeServer(motion).start()
+    station = cell(tmp_path / "cell", server)
+    story = Story(130, at_40=server.stop, at_80=server.start)
+    try:
+        lived(station, story, folder=tmp_path / "run", sinks=[Recorder(lossless=True)])
+    finally:
+        server.stop()
+    recording = Recording.open(tmp_path / "run" / "run.mcap")
+    again = Story(10_000)
+    feed = (tuple(tick.samples) for tick in recording.ticks())
+    load_recorded(recording).run(feed=feed, writers=[again])
+    encode = msgspec.msgpack.encode
+    assert [encode(s) for s in again.snapshots] == [encode(s) for s in story.snapshots]
+    assert "undecided" in again.verdicts()
+    assert any(isinstance(s, SignalSample) for samples in again.heard for s in samples)
+
+
+def test_what_a_controller_lacks_is_said_and_what_cannot_be_known_is_undecided(tmp_path):
+    lacking = frozenset({"robot_mode", "actual_qd", "safety_status", "safety_mode"})
+    with RtdeServer(motion, without=lacking) as server:
+        station = cell(tmp_path, server)
+        story = lived(station, Story(30))
+    said = " ".join(f.text for f in station.scene().findings)
+    for text in ("does not say whether the robot is on", "no measured joint speeds", "its safety status"):
+        assert text in said
+    assert {s.qd for s in story.joints()} == {None}
+    assert set(story.verdicts()) == {"undecided"}
+
+
+def test_a_controller_without_joints_and_a_robot_of_another_kind_are_errors(tmp_path):
+    with RtdeServer(motion, without=frozenset({"actual_q"})) as server:
+        with pytest.raises(InputError, match="the controller has no actual_q"):
+            _ = cell(tmp_path / "a", server).sources
+        text = TWO_R + '[[sources]]\nkind = "rtde"\nrobot = "arm"\nhost = "127.0.0.1"\n'
+        with pytest.raises(InputError, match="arm has 2 joints"):
+            _ = made(tmp_path / "b", text, {"arm.urdf": two_r()}).sources
+
+
+def test_only_real_time_will_do(tmp_path):
+    with RtdeServer(motion) as server, pytest.raises(InputError, match="real time only"):
+        cell(tmp_path, server).run()
+
+
+def open_files():
+    return len(os.listdir("/proc/self/fd"))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts open files in /proc")
+def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch, caplog):
+    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.005)
+    server = RtdeServer(motion).start()
+    heard = []
+    files, threads = open_files(), threading.active_count()
+    listener = Listener(Rtde(robot="arm", host="127.0.0.1", port=server.port), None, heard.append)
+    listener.start()
+    try:
+        for _ in range(20):
+            heard.clear()
+            wait_for(lambda: len(heard) > 3)
+            server.stop()
+            server.start()
+    finally:
+        listener.ask_to_stop()
+        assert listener.join(1.0)
+    assert listener.statistics().losses >= 19
+    wait_for(lambda: open_files() <= files and threading.active_count() <= threads)
+    server.stop()
+
+
+def wait_for(true, seconds=10.0):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+# -- values -------------------------------------------------------------------------------------
+
+
+def test_values_are_samples_in_si():
+    six = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    values = {"timestamp": 9.0, "actual_q": six, "actual_qd": six, "actual_current_as_torque": six}
+    values |= {"robot_mode": 7, "safety_mode": 3, "runtime_state": 2, "payload": 1.5, "actual_TCP_pose": six}
+    sample = joint_sample(values, target="arm", arrived=100.0)
+    assert (sample.t, sample.t_device, sample.q, sample.qd, sample.tau) == (100.0, 9.0, six, six, six)
+    assert sample.quality is Quality.GOOD
+    assert states(values) == {
+        "robot_mode": "RUNNING",
+        "safety_status": "PROTECTIVE_STOP",
+        "program_running": True,
+    }
+    assert figures(values) == {
+        "payload": 1.5,
+        **{f"actual_TCP_pose.{a}": x for a, x in zip(("x", "y", "z", "rx", "ry", "rz"), six, strict=True)},
+    }
+    assert states({"robot_mode": 42}) == {"robot_mode": "42"}
+    with pytest.raises(ProtocolError, match="not six values"):
+        joint_sample({**values, "actual_q": (1.0, 2.0, 3.0)}, target="arm", arrived=0.0)
+
+
+@pytest.mark.parametrize(
+    ("mode", "safety", "said"),
+    [
+        (7, 1, "good"),
+        (7, None, "good"),
+        (5, 7, "good"),  # an emergency stop: it stands where it says
+        (3, 1, "invalid"),
+        (-1, 1, "invalid"),
+        (8, 1, "invalid"),
+        (99, 1, "invalid"),
+        (7, 9, "degraded"),
+        (7, 99, "degraded"),
+        (7, 10, "invalid"),
+        (None, 1, "degraded"),
+        (None, 11, "invalid"),
+    ],
+)
+def test_what_a_state_means_for_the_truth(mode, safety, said):
+    assert quality(mode, safety) == said

@@ -175,9 +175,9 @@ WRONG = {
         "> 0 [s]",
     ),
     "stop model of the future": (
-        "[[safety]]\nkind='separation'\nbetween=['a','b']\nstop={model='constant_deceleration',reaction=1,stopping=1}",
+        "[[safety]]\nkind='separation'\nbetween=['a','b']\nstop={model='magnetic',reaction=1,stopping=1}",
         "safety[0].stop.model",
-        "'constant_deceleration' is wrong; one of: bound",
+        "'magnetic' is wrong; one of: bound, constant_deceleration, table, simulated",
     ),
     "time-out of nothing": (
         "[[sources]]\nkind='csv'\nrobot='x'\nfile='y'\ntimeout=0",

@@ -100,3 +100,23 @@ def test_impossible_given_velocity_is_a_jump_too():
     reference.take(0.01, np.array([0.01]), np.array([1e6]))
     assert reference.jumped
     assert reference.at(0.01)[1] == 0.0
+
+
+def test_a_live_reference_coasts_until_the_next_sample_or_its_time():
+    reference = Reference(np.zeros(1), coast=0.2)
+    reference.take(1.0, np.array([3.0]), np.array([2.0]))
+    for t, q, v in ((1.0, 3.0, 2.0), (1.1, 3.2, 2.0), (1.25, 3.4, 0.0), (9.0, 3.4, 0.0)):
+        np.testing.assert_allclose(np.concatenate(reference.at(t)), [q, v, 0.0], atol=1e-12)
+
+
+def test_after_a_silence_the_twin_is_put_where_the_sample_is_and_in_motion_when_its_instant_comes():
+    reference = Reference(np.zeros(1), coast=0.2)
+    reference.take(0.0, np.array([1.0]), np.array([1.0]))
+    assert reference.take(5.0, np.array([3.0]), np.array([2.0]), anew=True)
+    assert reference.lands(4.9)
+    assert not reference.lands(4.95)
+    np.testing.assert_array_equal(np.concatenate(reference.at(4.95)), [3.0, 0.0, 0.0])
+    assert reference.lands(5.0)
+    np.testing.assert_array_equal(np.concatenate(reference.at(5.0)), [3.0, 2.0, 0.0])
+    assert not reference.take(4.0, np.array([9.0]), None, anew=True)
+    assert reference.until == 5.0

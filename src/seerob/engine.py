@@ -14,7 +14,7 @@ gains as applied forces diverge at a floating root. Torque limits clamp the whol
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import mujoco
 import numpy as np
@@ -51,6 +51,7 @@ class Engine:
         model: Model,
         *,
         driven: dict[str, float] | None = None,
+        live: Collection[str] = (),
         controllers: bool = True,
         contacts: bool = True,
     ) -> None:
@@ -59,6 +60,7 @@ class Engine:
         Args:
             model: The compiled workstation.
             driven: Time-out [s] of the source of each robot and human that a source drives.
+            live: Those of them whose source is live; when a sample is late they coast, until the time-out.
             controllers: Whether the twin is pulled at all; off, it moves freely from where the first
                 samples put it, and nothing that is heard later is compared with it.
             contacts: Whether the contacts that the file asks for act.
@@ -81,7 +83,10 @@ class Engine:
         self._wanted = mujoco.MjData(self._mj)
         self._shown = mujoco.MjData(self._mj)
         self._mechanisms = list(model.mechanisms.values())
-        self._references = {m.name: Reference(m.home, _largest_speed(m)) for m in self._mechanisms}
+        self._references = {
+            m.name: Reference(m.home, _largest_speed(m), coast=driven[m.name] if m.name in live else 0.0)
+            for m in self._mechanisms
+        }
         self._hearings = {
             m.name: Hearing(
                 # What moves freely is where it is, whatever is heard.

@@ -6,7 +6,8 @@ Between two samples the reference is the cubic that has their positions and velo
 
 so velocity is continuous and acceleration is known, which feed-forward needs. Samples without
 velocities get that of the parabola through them and their neighbours, of the two before for the
-newest. After the newest sample the reference holds its position, before the oldest it waits there.
+newest. After the newest sample the reference holds its position, of a live source once it has coasted;
+before the oldest it waits there.
 
 Two samples that only an impossible speed could join are a jump, not a motion: the reference stays
 where it was until the later one, and the twin is put there instead of being pulled.
@@ -27,14 +28,17 @@ MAX_KEPT = 4096
 class Reference:
     """Motion of one robot or human through its newest samples, several of which may lie ahead."""
 
-    def __init__(self, home: Array, largest_speed: Array | float = np.inf) -> None:
+    def __init__(self, home: Array, largest_speed: Array | float = np.inf, *, coast: float = 0.0) -> None:
         """Rest at home.
 
         Args:
             home: Position before the first sample [rad or m], shape (n,).
             largest_speed: Above it a motion is a jump [rad/s or m/s], shape (n,) or one for all.
+            coast: How long it goes on at its speed after the newest sample [s]: the next one of a live
+                source may be late, and a robot in motion does not stop for that.
         """
         self._largest = largest_speed
+        self._coast = coast
         self._jumps: list[float] = []
         self._landings: list[float] = []
         self._zero = np.zeros(len(home))
@@ -133,7 +137,9 @@ class Reference:
             return self._points[0], self._zero, self._zero
         k = bisect_right(times, t) - 1
         if k == len(times) - 1:
-            return self._points[k], self._velocities[k] if t == times[k] else self._zero, self._zero
+            after, v = t - times[k], self._velocities[k]
+            moving = after == 0 or after < self._coast
+            return self._points[k] + min(after, self._coast) * v, v if moving else self._zero, self._zero
         if times[k + 1] in self._jumps:
             return self._points[k], self._zero, self._zero
         T = times[k + 1] - times[k]

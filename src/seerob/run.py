@@ -325,7 +325,8 @@ def run(
     with ExitStack() as open_writers:
         for writer in writers:
             open_writers.enter_context(writer)
-        engine = Engine(model, driven=driven)
+        live = {s.target() for s in model.workstation.sources if isinstance(s, LiveSource)}
+        engine = Engine(model, driven=driven, live=live)
         for out, samples in ticks(engine, Judge(bound), feed):
             count, t = count + 1, out.t
             log.add(out)

@@ -78,8 +78,8 @@ REFUSED = [
     (("sources", 0, "fil"), "x"),
     (("sources", 0, "kind"), "cvs"),
     (("safety", 0, "limit"), -1),
-    (("safety", 3, "stop", "model"), "constant_deceleration"),
-    (("safety", 3, "stop"), {"reaction": 0.1}),
+    (("safety", 3, "stop", "model"), "magnetic"),
+    (("safety", 3, "stop"), {"stopping": 0.35}),
 ]
 TAKEN = [
     (("engine",), {"tick_ms": 10}),

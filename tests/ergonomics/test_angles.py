@@ -7,7 +7,7 @@ import pytest
 from made_postures import PERSON, degrees, made_angles, posed, random_q
 
 from seerob.human.angles import NEEDS, SIDED, Angles, angles
-from seerob.human.skeleton import bone_poses, mirrored
+from seerob.human.skeleton import BONES, bone_poses, mirrored
 from seerob.transforms import rotation_from_axis_angle
 
 ODD = ("trunk_side_bend", "trunk_twist", "neck_side_bend", "neck_twist")
@@ -64,6 +64,16 @@ def test_an_arm_that_reaches_forward_is_not_abducted():
     assert degrees(found, "shoulder_abduction") == pytest.approx([5, 5])
 
 
+def test_an_arm_beyond_the_vertical_is_still_raised_forward():
+    """Just beyond 180° the arc tangent says -179°, which would be the score of an arm that hangs back."""
+    bent_back = posed(both_shoulder_flexion=180, both_clavicle_elevation=0, thorax_extension=0)
+    rotations, positions = bone_poses(PERSON, np.zeros(53))
+    index = BONES.index("right_upper_arm")
+    rotations[index] = rotations[index] @ rotation_from_axis_angle([0, 0, 1], np.radians(185))
+    assert degrees(angles(rotations, positions), "shoulder_flexion")[0] == pytest.approx(185)
+    assert degrees(bent_back, "shoulder_flexion") == pytest.approx([180, 180])
+
+
 @pytest.mark.parametrize(("inward", "crosses"), [(70, True), (20, False)])
 def test_a_wrist_beyond_the_middle_of_the_trunk(inward, crosses):
     found = posed(both_elbow_flexion=90, both_shoulder_internal_rotation=inward)
@@ -113,8 +123,6 @@ def test_an_angle_is_made_of_the_bones_that_it_says(name):
     turn = rotation_from_axis_angle([0.3, -0.5, 0.8], 0.2)
     bones = {bone.format(side=side) for bone in NEEDS[name] for side in ("right", "left")}
     uses = set()
-    from seerob.human.skeleton import BONES
-
     for i, bone in enumerate(BONES):
         turned = rotations.copy()
         turned[i] = turn @ rotations[i]

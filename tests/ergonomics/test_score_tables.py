@@ -59,7 +59,7 @@ def test_frequency_multipliers_never_grow_with_frequency_and_duration():
     assert (np.diff(table, axis=0) <= 0).all()
     assert (table[:, 2:] <= table[:, :-2]).all()
     assert (table[:, 1::2] >= table[:, ::2]).all()
-    assert table.sum() == pytest.approx(39.80, abs=0.005)
+    assert table.sum() == pytest.approx(47.15, abs=0.001)
 
 
 @pytest.mark.parametrize(("name", "count"), [("rula", 4), ("reba", 5)])

@@ -46,7 +46,8 @@ class Angles:
     neck_twist: Array
     """To the left, shape (...)."""
     shoulder_flexion: Array
-    """Upper arm projected on the sagittal plane of the thorax, forward positive, shape (..., 2)."""
+    """Upper arm projected on the sagittal plane of the thorax, forward positive, -π/2 to 3π/2: an arm that
+    points up and back went forward to get there. Shape (..., 2)."""
     shoulder_elevation: Array
     """Upper arm against the hanging arm, whatever the direction, 0 to π, shape (..., 2)."""
     shoulder_abduction: Array
@@ -115,7 +116,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "wrist_deviation": ("{side}_forearm", "{side}_hand"),
     "knee_flexion": ("{side}_thigh", "{side}_shank"),
     "shank_tilt": ("{side}_shank",),
-    "foot_rise": tuple(f"{side}_{bone}" for side in SIDES for bone in ("thigh", "shank")),
+    "foot_rise": ("pelvis", *(f"{side}_{bone}" for side in SIDES for bone in ("thigh", "shank"))),
 }
 """Angle → bones that it is made of; ``{side}`` stands for the angle's own side."""
 SIDED = frozenset(NEEDS) - {
@@ -158,7 +159,7 @@ def angles(rotations: ArrayLike, positions: ArrayLike) -> Angles:
         neck_flexion=np.arctan2(neck[..., 0], neck[..., 1]),
         neck_side_bend=_arcsin(neck[..., 2]),
         neck_twist=_twist(thorax, head),
-        shoulder_flexion=np.arctan2(arm[..., 0], -arm[..., 1]),
+        shoulder_flexion=_forward(np.arctan2(arm[..., 0], -arm[..., 1])),
         shoulder_elevation=np.arctan2(np.hypot(arm[..., 0], arm[..., 2]), -arm[..., 1]),
         shoulder_abduction=_arcsin(_OUTWARD * arm[..., 2]),
         shoulder_rotation=_OUTWARD * _twist(chest, upper),
@@ -221,6 +222,11 @@ def _twist(parent: Array, child: Array) -> Array:
         return _dot(parent[..., i], child[..., j])
 
     return np.arctan2(entry(0, 2) - entry(2, 0), entry(0, 0) + entry(2, 2))
+
+
+def _forward(angle: Array) -> Array:
+    """An angle of the range -π/2 to 3π/2."""
+    return np.where(angle < -np.pi / 2, angle + 2 * np.pi, angle)
 
 
 def _wrapped(angle: Array) -> Array:

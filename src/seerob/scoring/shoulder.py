@@ -47,12 +47,12 @@ def arm_score(
     flexion, side = angles.shoulder_flexion, angles.shoulder_abduction
     spread = _turned(accuracy, np.cos(side))
     if policy is ArmPolicy.PROJECTION:
-        return graded(flexion, score, within=BASE, accuracy=spread)
+        return _projected(flexion, score, spread)
     azimuth = np.abs(np.arctan2(np.sin(side), np.cos(side) * np.sin(flexion)))
     swing = _turned(accuracy, np.sin(angles.shoulder_elevation))
     ahead = graded(angles.shoulder_elevation, score, within=BASE, accuracy=accuracy)
     beside = graded(np.zeros_like(flexion), score, within=BASE)
-    behind = graded(flexion, lambda x: score(np.minimum(x, 0.0)), within=BASE, accuracy=spread)
+    behind = _projected(flexion, score, spread)
     lowest, highest = np.full(flexion.shape, BASE[1]), np.full(flexion.shape, BASE[0])
     for span, first, last in (
         (ahead, -np.inf, WIDEST),
@@ -64,6 +64,19 @@ def arm_score(
         lowest = np.where(possible, np.minimum(lowest, span.low), lowest)
         highest = np.where(possible, np.maximum(highest, span.high), highest)
     return Span(lowest, highest)
+
+
+def _projected(flexion: Array, score: Callable[[Array], Ints], spread: Array | float) -> Span:
+    """Score of the flexion, which goes on at 270° where it ends at -90°."""
+    span = graded(flexion, score, within=BASE, accuracy=spread)
+    if not np.any(spread):
+        return span
+    around = (flexion - spread < -np.pi / 2) | (flexion + spread > 3 * np.pi / 2)
+    ends = score(np.array([-np.pi / 2, 3 * np.pi / 2]))
+    return Span(
+        np.where(around, np.minimum(span.low, ends.min()), span.low),
+        np.where(around, np.maximum(span.high, ends.max()), span.high),
+    )
 
 
 def _turned(accuracy: float, lever: Array) -> Array | float:

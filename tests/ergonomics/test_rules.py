@@ -1,0 +1,303 @@
+"""The rules on the twin: sides, verdicts, what is not assessed, phases, accuracy, what drives a score."""
+
+import numpy as np
+import pytest
+from made_postures import PERSON
+
+from made_cell import heard, judged, made, results_at, state_at
+from seerob.engine import Engine
+from seerob.errors import InputError
+from seerob.human.posture import posture
+from seerob.human.skeleton import JOINTS, mirrored
+from seerob.run import Judge, bind
+from seerob.snapshot import Origin, Verdict
+
+STILL = np.zeros(len(JOINTS))
+HUMAN = """
+[[humans]]
+name = "op"
+stature = 1.75
+mass = 75
+sex = "male"
+posture = "{posture}"
+"""
+KNOWN = {
+    "rula": 'load = 0, muscle_arms = false, muscle_body = false, supported_arms = "none", '
+    'back_supported = false, legs = "posture"',
+    "reba": 'load = 0, supported_arms = "none", legs = "posture", '
+    "static = false, repeated = false, rapid = false",
+    "owas": 'load = 0, legs = "posture"',
+}
+RULES = tuple(KNOWN)
+LIMIT = {"rula": "action_level", "reba": "action_level", "owas": "action_category"}
+
+
+def rule(kind, *, phases=None, more="", name=None):
+    entered = KNOWN[kind] if phases is None else phases
+    text = f"[{entered}]" if entered.startswith("{") or not entered else f"[{{ {entered} }}]"
+    return (
+        f'[[ergonomics]]\nkind = "{kind}"\nname = "{name or kind}"\nhuman = "op"\nphases = {text}\n{more}\n'
+    )
+
+
+def station(folder, tables, pose="standing"):
+    return made(folder, HUMAN.format(posture=pose) + tables)
+
+
+def all_rules(folder, pose="standing", **options):
+    return station(folder, "".join(rule(kind, **options) for kind in RULES), pose)
+
+
+def at(stage, q):
+    return results_at(stage, op=(q, STILL))
+
+
+def parts(result):
+    return {part.name: part for part in result.parts}
+
+
+def test_somebody_who_stands_scores_least_but_for_the_straight_elbows(tmp_path):
+    found = results_at(all_rules(tmp_path))
+    assert {name: r.value for name, r in found.items()} == {"rula": 2.0, "reba": 1.0, "owas": 1.0}
+    assert {r.verdict for r in found.values()} == {None}
+    assert parts(found["rula"])["right lower arm"].value == 2
+    assert found["rula"].reason == (
+        "right side: lower arm 2; action level 1: acceptable if not maintained or repeated for long periods"
+    )
+
+
+@pytest.mark.parametrize("kind", ["rula", "reba"])
+def test_a_mirrored_posture_swaps_the_sides(tmp_path, kind):
+    stage = station(tmp_path, rule(kind))
+    q = posture(PERSON, "reach_high")
+    one, other = (at(stage, values)[kind] for values in (q, mirrored(q)))
+    a, b = parts(one), parts(other)
+    assert a["right"].value > a["left"].value
+    assert (a["right"].value, a["left"].value) == (b["left"].value, b["right"].value)
+    assert one.value == other.value == a["right"].value
+    assert a["right upper arm"].value == b["left upper arm"].value
+    swapped = {m.body.replace("right", "left") for m in one.markers}
+    assert {m.body for m in other.markers} == swapped
+    assert "op/left_upper_arm" in swapped
+
+
+@pytest.mark.parametrize("kind", RULES)
+def test_nothing_entered_is_not_assessed_and_never_the_least_score(tmp_path, kind):
+    for more in ("", f"{LIMIT[kind]} = 3"):
+        result = results_at(station(tmp_path, rule(kind, phases="", more=more)))[kind]
+        assert result.value is None
+        assert result.verdict is Verdict.UNDECIDED
+        assert result.reason.startswith("not assessed: ")
+        assert result.interval[0] < result.interval[1]
+        assert parts(result)["legs"].verdict is Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize(
+    ("kind", "bone", "part"),
+    [
+        ("rula", "right_hand", "right wrist"),
+        ("rula", "left_clavicle", "left upper arm"),
+        ("reba", "head", "neck"),
+        ("reba", "left_thigh", "legs"),
+        ("owas", "pelvis", "back"),
+        ("owas", "right_forearm", "arms"),
+    ],
+)
+def test_a_bone_that_is_not_measured_leaves_its_part_undecided(tmp_path, kind, bone, part):
+    more = f'unmeasured = ["{bone}"]\n{LIMIT[kind]} = 4'
+    result = results_at(station(tmp_path, rule(kind, more=more)))[kind]
+    assert parts(result)[part].value is None
+    assert parts(result)[part].verdict is Verdict.UNDECIDED
+    assert result.verdict is Verdict.UNDECIDED
+    assert "not assessed" in result.reason
+
+
+def test_what_exceeds_at_its_best_is_exceeded_whatever_is_missing(tmp_path):
+    found = results_at(station(tmp_path, rule("rula", phases="", more="action_level = 1"), "reach_high"))
+    assert found["rula"].verdict is Verdict.EXCEEDED
+    assert found["rula"].value is None
+    assert found["rula"].interval[0] > 2
+
+
+@pytest.mark.parametrize("kind", RULES)
+@pytest.mark.parametrize("pose", ["standing", "reach_high", "bend_forward", "squatting"])
+def test_the_verdict_is_of_the_value_against_the_level(tmp_path, kind, pose):
+    tops = {
+        "rula": {1: 2, 2: 4, 3: 6, 4: 7},
+        "reba": {0: 1, 1: 3, 2: 7, 3: 10, 4: 15},
+        "owas": {1: 1, 2: 2, 3: 3, 4: 4},
+    }
+    tables = "".join(
+        rule(kind, more=f"{LIMIT[kind]} = {level}", name=f"level {level}") for level in tops[kind]
+    )
+    found = results_at(station(tmp_path, tables, pose))
+    for level, top in tops[kind].items():
+        result = found[f"level {level}"]
+        assert result.limit == top
+        assert result.verdict == ("within" if result.value <= top else "exceeded")
+
+
+def test_phases_follow_each_other_and_before_the_first_nothing_is_known(tmp_path):
+    entered = KNOWN["reba"].replace("load = 0", 'load = {}, shock = false, coupling = "good"')
+    light = "{ start = 1, " + entered.format(1) + " }"
+    heavy = "{ start = 2, " + entered.format(12) + " }"
+    stage = station(tmp_path, rule("reba", phases=f"{light}, {heavy}"))
+    state = state_at(stage)
+    found = {}
+    for t in (0.5, 1.0, 1.99, 2.0, 50.0):
+        state.t = t
+        found[t] = judged(stage.bound, state)[0]
+    assert found[0.5].verdict is Verdict.UNDECIDED
+    assert [found[t].value for t in (1.0, 1.99, 2.0, 50.0)] == [1.0, 1.0, 2.0, 2.0]
+    assert parts(found[2.0])["load"].value == 2
+
+
+def test_phases_in_the_wrong_order_are_a_mistake(tmp_path):
+    with pytest.raises(InputError, match="start after the one before"):
+        station(tmp_path, rule("owas", phases="{ start = 2 }, { start = 1 }"))
+
+
+def test_the_accuracy_opens_what_lies_at_an_edge(tmp_path):
+    """Trunk at 19°: with ± 3° it may be 2 or 3, and a limit between the two scores is undecided."""
+    q = posture(PERSON, {"pelvis_tilt_forward": np.radians(19), "both_elbow_flexion": np.radians(80)})
+    values = {}
+    for degrees in (0.5, 3):
+        more = f"accuracy_deg = {degrees}\naction_level = 1"
+        result = at(station(tmp_path, rule("rula", more=more)), q)["rula"]
+        values[degrees] = result
+        assert parts(result)["trunk"].value == 2
+    assert parts(values[0.5])["trunk"].interval == (2, 2)
+    assert values[0.5].verdict is Verdict.WITHIN
+    assert parts(values[3])["trunk"].interval == (2, 3)
+    assert values[3].interval == (2, 3)
+    assert values[3].verdict is Verdict.UNDECIDED
+    assert values[3].reason.startswith("the accuracy leaves it open")
+
+
+def test_the_part_that_drives_the_score_is_named_and_coloured(tmp_path):
+    q = posture(PERSON, {"pelvis_tilt_forward": np.radians(65), "both_elbow_flexion": np.radians(80)})
+    result = at(station(tmp_path, rule("reba", more="action_level = 0")), q)["reba"]
+    assert "trunk 4" in result.reason
+    assert {m.body for m in result.markers} == {"op/lumbar", "op/thorax"}
+    assert {m.verdict for m in result.markers} == {Verdict.EXCEEDED}
+
+
+def test_a_load_in_one_hand_counts_for_that_arm_and_for_the_body(tmp_path):
+    entered = KNOWN["rula"].replace("load = 0", 'load = 5, load_use = "static", hand = "left"')
+    found = parts(results_at(station(tmp_path, rule("rula", phases=entered)))["rula"])
+    assert [found[f"{own} force of the arms"].value for own in ("right", "left")] == [0, 2]
+    assert found["force of the body"].value == 2
+
+
+def test_the_profile_decides_above_ten_kilograms(tmp_path):
+    entered = KNOWN["rula"].replace("load = 0", 'load = 12, load_use = "intermittent"')
+    tables = "".join(
+        rule("rula", phases=entered, more=f'profile = "{p}"', name=p) for p in ("original1993", "worksheet")
+    )
+    found = results_at(station(tmp_path, tables))
+    force = [parts(found[p])["force of the body"].value for p in ("original1993", "worksheet")]
+    assert force == [2, 3]
+    assert {i.name: i.value for i in found["worksheet"].basis.inputs}["profile"] == "worksheet"
+
+
+def test_a_person_who_is_not_heard_is_not_scored(tmp_path):
+    (tmp_path / "m.toml").write_text(
+        '[[keyframes]]\nt = 0\nposture = "standing"\n[[keyframes]]\nt = 1\nposture = "t_pose"\n'
+    )
+    driven = '[[sources]]\nkind = "keyframes"\nhuman = "op"\nfile = "m.toml"\n'
+    stage = station(tmp_path, driven + "".join(map(rule, RULES)))
+    engine = Engine(stage.model, driven={"op": 0.2})
+    state = engine.start()
+    assert {r.verdict for r in judged(stage.bound, state)} == {Verdict.UNDECIDED}
+    assert {r.reason for r in judged(stage.bound, state)} == {"op: nothing heard yet"}
+    engine = Engine(stage.model, driven={"op": 0.2})
+    engine.take([heard("op", 0.0, posture(PERSON, "standing"))])
+    assert {r.verdict for r in Judge(stage.bound)(engine.start())} == {None}
+
+
+@pytest.mark.parametrize("kind", RULES)
+def test_every_threshold_stands_in_the_basis_with_its_origin(tmp_path, kind):
+    key = "bent_deg = 25" if kind == "owas" else "trunk_twist_deg = 25"
+    stage = station(tmp_path, rule(kind, more=f"thresholds = {{ {key} }}\nunmeasured = ['head']"))
+    criterion, inputs = stage.bound[0].criterion, stage.bound[0].basis.inputs
+    named = {i.name: i for i in inputs}
+    thresholds = [f.replace("_", " ") for f in criterion.thresholds.__struct_fields__]
+    assert {f"threshold {name}" for name in thresholds} <= set(named)
+    changed = named["threshold bent" if kind == "owas" else "threshold trunk twist"]
+    assert (changed.value, changed.unit, changed.origin) == (25.0, "deg", Origin.GIVEN)
+    others = {i.origin for i in inputs if i.name.startswith("threshold") and i is not changed}
+    assert others == {Origin.ASSUMED}
+    assert named["head"].origin is Origin.MISSING
+    assert named["accuracy of the angles"].origin is Origin.MISSING
+
+
+def test_what_was_not_entered_stands_in_the_basis_as_missing(tmp_path):
+    stage = station(tmp_path, rule("reba", phases="load = 3"))
+    named = {i.name: i for i in stage.bound[0].basis.inputs}
+    assert (named["load"].value, named["load"].unit, named["load"].origin) == (3.0, "kg", Origin.GIVEN)
+    assert {named[k].origin for k in ("coupling", "legs", "static", "shock")} == {Origin.MISSING}
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ('unmeasured = ["right_fist"]', "no bone named 'right_fist'"),
+        ("action_level = 5", "action_level"),
+        ("accuracy_deg = -1", "accuracy"),
+        ("thresholds = { trunk_twist_deg = 400 }", "trunk_twist"),
+        ("thresholds = { trunk_twisted = 1 }", "unknown key"),
+    ],
+)
+def test_mistakes_are_named(tmp_path, more, message):
+    with pytest.raises(InputError, match=message):
+        bind(station(tmp_path, rule("rula", more=more)).model)
+
+
+LIFT = """[[ergonomics]]
+kind = "niosh"
+name = "lift"
+human = "op"
+limit = 1
+work = 3000
+recovery = 3000
+exclusions = {exclusions}
+[[ergonomics.lifts]]
+load = {load}
+control = true
+per_minute = 3
+coupling = "fair"
+origin = {{ horizontal = 0.25, vertical_mm = 550 }}
+destination = {{ horizontal = {far}, vertical = 1.475 }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("load", "far", "value", "verdict"),
+    [(6, 0.5, 0.872, "within"), (12, 0.5, 1.745, "exceeded"), (1, 0.7, None, "exceeded")],
+)
+def test_a_lift_against_its_limit(tmp_path, load, far, value, verdict):
+    found = results_at(station(tmp_path, LIFT.format(load=load, far=far, exclusions="[]")))["lift"]
+    assert found.value == (None if value is None else pytest.approx(value, abs=1e-3))
+    assert found.verdict == verdict
+    assert "destination" in found.reason or "beyond the reach" in found.reason
+
+
+def test_lifts_to_which_the_equation_does_not_apply_are_refused(tmp_path):
+    tables = LIFT.format(load=5, far=0.5, exclusions='["one_handed", "slippery_floor"]')
+    with pytest.raises(InputError, match=r"(?s)does not apply: one handed.*slippery floor"):
+        bind(station(tmp_path, tables).model)
+    with pytest.raises(InputError, match="exclusions: missing"):
+        station(tmp_path, LIFT.format(load=5, far=0.5, exclusions="[]").replace("exclusions = []\n", ""))
+    with pytest.raises(InputError, match="work"):
+        station(
+            tmp_path, LIFT.format(load=5, far=0.5, exclusions="[]").replace("work = 3000", "work = 30000")
+        )
+
+
+def test_several_lifts_make_a_composite_index(tmp_path):
+    one = LIFT.format(load=6, far=0.5, exclusions="[]")
+    two = one + one[one.index("[[ergonomics.lifts]]") :]
+    alone = results_at(station(tmp_path, one))["lift"]
+    both = results_at(station(tmp_path, two))["lift"]
+    assert both.value > alone.value
+    assert [p.value for p in both.parts] == pytest.approx([alone.value] * 2)

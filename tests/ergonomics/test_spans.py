@@ -1,0 +1,162 @@
+"""Spans of scores: exact against a dense search, wide where nothing is known, mirrored with the posture."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from made_postures import PERSON, UNSUPPORTED, made_angles, random_q
+
+from seerob.human.angles import angles
+from seerob.human.skeleton import bone_poses, mirrored
+from seerob.scoring import reba, rula
+from seerob.scoring.owas import OwasThresholds, arm_codes, back_codes, category_span, leg_codes, only, owas
+from seerob.scoring.shoulder import ArmPolicy, arm_score
+from seerob.scoring.spans import Span, beyond, exactly, graded
+from seerob.scoring.thresholds import Thresholds
+
+USUAL = Thresholds()
+
+
+def components(found, method, accuracy=0.0, policy=ArmPolicy.PROJECTION):
+    more = (
+        {"back_supported": False, "legs": None} if method is rula else {"legs": exactly(1), "sitting": False}
+    )
+    return method.posture_components(
+        found, thresholds=USUAL, supported=UNSUPPORTED, accuracy=accuracy, policy=policy, **more
+    )
+
+
+def grand(found, method, end="low", accuracy=0.0):
+    scores = {
+        key: np.atleast_1d(getattr(span, end))
+        if key in ("upper arm", "lower arm", "wrist", "wrist twist")
+        else getattr(span, end)[..., None]
+        for key, span in components(found, method, accuracy).items()
+    }
+    if method is rula:
+        return rula.rula(*(scores[key] for key in list(rula.LEAST)[:7])).grand
+    return reba.reba(*(scores[key] for key in list(reba.LEAST)[:6])).final
+
+
+@pytest.mark.parametrize(
+    "score",
+    [
+        rula.upper_arm,
+        reba.upper_arm,
+        lambda x: rula.neck(x, USUAL.neck_extension),
+        lambda x: rula.trunk(x, USUAL.trunk_upright),
+        lambda x: reba.trunk(x, USUAL.trunk_upright),
+        lambda x: rula.wrist(x, USUAL.wrist_neutral),
+    ],
+)
+def test_a_graded_span_is_what_a_dense_search_finds(score):
+    rng = np.random.default_rng(1)
+    angle, accuracy = rng.uniform(-2, 2, 300), rng.uniform(0.0, 0.5, 300)
+    span = graded(angle, score, within=(1, 4), accuracy=accuracy)
+    every = score(angle + np.linspace(-1, 1, 2001)[:, None] * accuracy)
+    # A band narrower than the search's step may be missed by the search, never by the span.
+    assert (span.low <= every.min(axis=0)).all()
+    assert (span.high >= every.max(axis=0)).all()
+    assert (span.low == every.min(axis=0)).mean() > 0.99
+    assert (span.high == every.max(axis=0)).mean() > 0.99
+
+
+def test_the_elbow_is_least_in_the_middle():
+    span = graded(
+        np.radians([50.0, 80.0, 110.0]),
+        rula.lower_arm,
+        within=(1, 2),
+        accuracy=np.radians(31),
+        neutral=np.radians(80),
+    )
+    assert span.low.tolist() == [1, 1, 1]
+    assert span.high.tolist() == [2, 2, 2]
+
+
+def test_not_a_number_may_be_anything_and_never_scores_least():
+    span = graded(np.array([np.nan, 0.0]), rula.upper_arm, within=(1, 4))
+    assert span.low.tolist() == [1, 1]
+    assert span.high.tolist() == [4, 1]
+    assert beyond(np.array(np.nan), 0.1) == Span(np.array(0), np.array(1))
+
+
+@pytest.mark.parametrize("policy", list(ArmPolicy))
+def test_an_arm_that_is_off_by_its_accuracy_stays_in_its_span(policy):
+    """Brute force over directions within δ of the arm: sideways arms have no flexion to speak of."""
+    rng = np.random.default_rng(2)
+    delta = np.radians(8)
+    directions = rng.normal(size=(400, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    near = directions + np.tan(delta) * rng.uniform(-1, 1, (400, 400, 3)).transpose(1, 0, 2) / np.sqrt(3)
+    near /= np.linalg.norm(near, axis=-1, keepdims=True)
+    inside = np.arccos(np.clip((near * directions).sum(-1), -1, 1)) <= delta
+
+    def arm(u):
+        flexion, side = np.arctan2(u[..., 0], -u[..., 1]), np.arcsin(np.clip(u[..., 2], -1, 1))
+        shape = (*u.shape[:-1], 2)
+        flexion = np.where(flexion < -np.pi / 2, flexion + 2 * np.pi, flexion)
+        up = np.arccos(np.clip(-u[..., 1], -1, 1))
+        values = {"shoulder_flexion": flexion, "shoulder_abduction": side, "shoulder_elevation": up}
+        made = made_angles()
+        for name, value in values.items():
+            object.__setattr__(made, name, np.broadcast_to(value[..., None], shape))
+        return made
+
+    span = arm_score(arm(directions), rula.upper_arm, policy, delta)
+    scores = arm_score(arm(near), rula.upper_arm, policy)
+    off = inside[..., None] & ((scores.high < span.low) | (scores.low > span.high))
+    assert not off.any()
+    assert (span.low < span.high).mean() < 0.8  # it does not simply say "anything"
+
+
+@pytest.mark.parametrize("method", [rula, reba])
+def test_mirroring_swaps_the_sides(method):
+    q = random_q(3000, seed=4)
+    one, other = (grand(angles(*bone_poses(PERSON, x)), method) for x in (q, mirrored(q)))
+    assert np.array_equal(one, other[:, ::-1])
+    assert (one[:, 0] != one[:, 1]).mean() > 0.1
+
+
+@pytest.mark.parametrize("method", [rula, reba])
+def test_heading_and_place_change_no_score(method):
+    q = random_q(1000, seed=5)
+    turned = q.copy()
+    turned[:, :2] += [2.0, -1.0]
+    turned[:, 3] += np.random.default_rng(0).uniform(-3, 3, len(q))
+    assert np.array_equal(*(grand(angles(*bone_poses(PERSON, x)), method) for x in (q, turned)))
+
+
+def test_owas_in_a_mirror_and_turned():
+    def category(q):
+        found = angles(*bone_poses(PERSON, q))
+        t = OwasThresholds()
+        return category_span(back_codes(found, t), arm_codes(found), leg_codes(found, t), only(1, 3)).low
+
+    q = random_q(1000, seed=6)
+    turned = q.copy()
+    turned[:, 3] += 1.0
+    assert np.array_equal(category(q), category(mirrored(q)))
+    assert np.array_equal(category(q), category(turned))
+
+
+@pytest.mark.parametrize("method", [rula, reba])
+def test_a_greater_accuracy_never_narrows_the_score_and_holds_the_measured_one(method):
+    found = angles(*bone_poses(PERSON, random_q(500, seed=7, scale=0.5)))
+    ends = [(grand(found, method, "low", a), grand(found, method, "high", a)) for a in (0.0, 0.02, 0.1)]
+    assert np.array_equal(*ends[0])
+    for (low, high), (wider_low, wider_high) in pairwise(ends):
+        assert (wider_low <= low).all()
+        assert (wider_high >= high).all()
+    assert (ends[2][0] < ends[2][1]).any()
+
+
+def test_owas_span_is_the_extreme_of_every_combination():
+    rng = np.random.default_rng(8)
+    for _ in range(50):
+        sets = [rng.random(n) < 0.5 for n in (4, 3, 7, 3)]
+        for possible in sets:
+            possible[rng.integers(len(possible))] = True
+        codes = np.meshgrid(*(np.flatnonzero(s) + 1 for s in sets), indexing="ij")
+        every = owas(*codes)
+        span = category_span(*sets)
+        assert (int(span.low), int(span.high)) == (every.min(), every.max())

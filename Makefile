@@ -27,7 +27,7 @@ help:
 # -- the two commands ---------------------------------------------------------------------------
 
 demo: $(RUN) $(PAGE)
-	$(BIN)/seerob run workstations/ur10_assembly
+	$(BIN)/seerob run workstations/ur10_assembly || [ $$? -le 2 ]  # 1 and 2 are verdicts, not failures
 
 test: setup check unit web-test package
 

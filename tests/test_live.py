@@ -163,7 +163,7 @@ def test_run_time_begins_at_the_first_sample_and_the_tick_that_speaks_of_it_come
             await asyncio.sleep(0.005)
 
     source = Made(script=script)
-    clock, period = Clock(slip=10.0), 0.01
+    clock, period = Clock(), 0.01
     with Listening([(source, None)]) as listening:
         feed = hear(iter(lambda: (), None), listening, clock)
         for k in range(20):
@@ -176,6 +176,35 @@ def test_run_time_begins_at_the_first_sample_and_the_tick_that_speaks_of_it_come
                 assert now - clock.start >= 0
             clock.wait((k + 1) * period)
     assert listening.delay == delay_of([source]) == source.behind() == 0.01 + MARGIN
+
+
+class Said:
+    """Stands where `Listening` does, with what a test says."""
+
+    delay = 0.02
+
+    def __init__(self, *ticks):
+        self.ticks = list(ticks)
+
+    def first(self):
+        return self.take()
+
+    def take(self):
+        return tuple(self.ticks.pop(0)) if self.ticks else ()
+
+
+def test_a_clock_that_slips_makes_the_next_sample_doubtful_and_none_go_back():
+    """Run time stood still while the robot went on: nobody may take that for speed."""
+    clock = Clock()
+    start = time.monotonic()
+    ticks = [[joint(t=start + 0.01 * k)] for k in range(6)]
+    feed = hear(iter(lambda: (), None), Said(*ticks), clock)
+    heard = [*next(feed), *next(feed)]
+    clock.start += 0.025
+    clock.slipped += 0.025
+    heard += [s for _ in range(4) for s in next(feed)]
+    assert [s.quality for s in heard] == ["good"] * 3 + ["degraded"]
+    assert [s.t for s in heard] == pytest.approx([0, 0.01, 0.02, 0.025], abs=1e-9)
 
 
 def test_a_run_begins_without_a_source_that_is_not_there():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable, Iterator
 
@@ -9,23 +10,17 @@ from msgspec.structs import replace
 
 from seerob.errors import InputError, Problem
 from seerob.live import Listening, LiveSource
-from seerob.samples import Sample
+from seerob.samples import Quality, Sample, SignalSample, key
 from seerob.workstation import Workstation
 
 
 class Clock:
-    """Holds a loop to real time; one that falls behind slips instead of hurrying after it.
-
-    Args:
-        slip: Lag that is made up for [s]; beyond it the clock is set back. Short where what is heard
-            lives in the same real time.
-    """
+    """Holds a loop to real time; one that falls behind slips instead of hurrying after it."""
 
     SLIP = 0.25
-    LIVE_SLIP = 0.05
+    """Lag that is made up for [s]; beyond it the clock is set back."""
 
-    def __init__(self, *, slip: float = SLIP) -> None:
-        self._slip = slip
+    def __init__(self) -> None:
         self.start = time.monotonic()
         """Host's monotonic time at which the tick of run time 0 is due [s]."""
         self.slipped = 0.0
@@ -41,7 +36,7 @@ class Clock:
         ahead = self.start + t - time.monotonic()
         if ahead > 0:
             time.sleep(ahead)
-        elif ahead < -self._slip:
+        elif ahead < -self.SLIP:
             self.start -= ahead
             self.slipped -= ahead
 
@@ -53,7 +48,8 @@ def hear(
 
     Run time t is the world's instant ``clock.start + t - delay``: when a tick is computed, what it
     speaks of is a delay old, and samples on either side of it have been heard. The run begins at the
-    first sample, or without one when that takes too long.
+    first sample, or without one when that takes too long. Where the clock slipped, the next sample of
+    each robot is degraded.
 
     Args:
         recorded: From `seerob.run.pump`, endless.
@@ -63,10 +59,30 @@ def hear(
     heard = listening.first()
     origin = max((sample.t for sample in heard), default=time.monotonic() - listening.delay)
     clock.begin(origin + listening.delay)
+    newest: dict[tuple[str, str], float] = {}
+    doubtful: set[tuple[str, str]] = set()
+    slipped = clock.slipped
     for samples in recorded:
-        heard += listening.take()
+        if clock.slipped > slipped:
+            slipped, doubtful = clock.slipped, set(newest)
         zero = clock.start - listening.delay
-        yield (*samples, *(replace(sample, t=sample.t - zero) for sample in heard))
+        taken: list[Sample] = []
+        for sample in (*heard, *listening.take()):
+            t = sample.t - zero
+            if isinstance(sample, SignalSample):
+                taken.append(replace(sample, t=t))
+                continue
+            what = key(sample)
+            if t <= newest.get(what, -math.inf):
+                continue
+            quality = sample.quality
+            if what in doubtful and quality is Quality.GOOD:
+                # Run time stood still while the robot went on: the speed between both samples is false.
+                quality = Quality.DEGRADED
+            doubtful.discard(what)
+            newest[what] = t
+            taken.append(replace(sample, t=t, quality=quality))
+        yield (*samples, *taken)
         heard = ()
 
 

@@ -151,7 +151,7 @@ class Station:
             heard = tuple(s for s in self.workstation.sources if isinstance(s, LiveSource))
         elif feed is None:
             require_recorded(self.workstation)
-        clock = Clock(slip=Clock.LIVE_SLIP if heard else Clock.SLIP) if live else None
+        clock = Clock() if live else None
         scene = scene or self.scene(with_sources=feed is None)
         if feed is None:
             feed = road.pump(self.sources, self.workstation.engine.tick, endless=live)

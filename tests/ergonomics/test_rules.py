@@ -6,6 +6,7 @@ from made_postures import PERSON
 
 from made_cell import heard, judged, made, results_at, state_at
 from seerob.engine import Engine
+from seerob.ergonomics import reba, rula
 from seerob.errors import InputError
 from seerob.human.posture import posture
 from seerob.human.skeleton import JOINTS, mirrored
@@ -32,7 +33,7 @@ RULES = tuple(KNOWN)
 LIMIT = {"rula": "action_level", "reba": "action_level", "owas": "action_category"}
 
 
-def rule(kind, *, phases=None, more="", name=None):
+def table(kind, *, phases=None, more="", name=None):
     entered = KNOWN[kind] if phases is None else phases
     text = f"[{entered}]" if entered.startswith("{") or not entered else f"[{{ {entered} }}]"
     return (
@@ -45,7 +46,7 @@ def station(folder, tables, pose="standing"):
 
 
 def all_rules(folder, pose="standing", **options):
-    return station(folder, "".join(rule(kind, **options) for kind in RULES), pose)
+    return station(folder, "".join(table(kind, **options) for kind in RULES), pose)
 
 
 def at(stage, q):
@@ -68,7 +69,7 @@ def test_somebody_who_stands_scores_least_but_for_the_straight_elbows(tmp_path):
 
 @pytest.mark.parametrize("kind", ["rula", "reba"])
 def test_a_mirrored_posture_swaps_the_sides(tmp_path, kind):
-    stage = station(tmp_path, rule(kind))
+    stage = station(tmp_path, table(kind))
     q = posture(PERSON, "reach_high")
     one, other = (at(stage, values)[kind] for values in (q, mirrored(q)))
     a, b = parts(one), parts(other)
@@ -84,7 +85,7 @@ def test_a_mirrored_posture_swaps_the_sides(tmp_path, kind):
 @pytest.mark.parametrize("kind", RULES)
 def test_nothing_entered_is_not_assessed_and_never_the_least_score(tmp_path, kind):
     for more in ("", f"{LIMIT[kind]} = 3"):
-        result = results_at(station(tmp_path, rule(kind, phases="", more=more)))[kind]
+        result = results_at(station(tmp_path, table(kind, phases="", more=more)))[kind]
         assert result.value is None
         assert result.verdict is Verdict.UNDECIDED
         assert result.reason.startswith("not assessed: ")
@@ -105,7 +106,7 @@ def test_nothing_entered_is_not_assessed_and_never_the_least_score(tmp_path, kin
 )
 def test_a_bone_that_is_not_measured_leaves_its_part_undecided(tmp_path, kind, bone, part):
     more = f'unmeasured = ["{bone}"]\n{LIMIT[kind]} = 4'
-    result = results_at(station(tmp_path, rule(kind, more=more)))[kind]
+    result = results_at(station(tmp_path, table(kind, more=more)))[kind]
     assert parts(result)[part].value is None
     assert parts(result)[part].verdict is Verdict.UNDECIDED
     assert result.verdict is Verdict.UNDECIDED
@@ -113,7 +114,7 @@ def test_a_bone_that_is_not_measured_leaves_its_part_undecided(tmp_path, kind, b
 
 
 def test_what_exceeds_at_its_best_is_exceeded_whatever_is_missing(tmp_path):
-    found = results_at(station(tmp_path, rule("rula", phases="", more="action_level = 1"), "reach_high"))
+    found = results_at(station(tmp_path, table("rula", phases="", more="action_level = 1"), "reach_high"))
     assert found["rula"].verdict is Verdict.EXCEEDED
     assert found["rula"].value is None
     assert found["rula"].interval[0] > 2
@@ -128,7 +129,7 @@ def test_the_verdict_is_of_the_value_against_the_level(tmp_path, kind, pose):
         "owas": {1: 1, 2: 2, 3: 3, 4: 4},
     }
     tables = "".join(
-        rule(kind, more=f"{LIMIT[kind]} = {level}", name=f"level {level}") for level in tops[kind]
+        table(kind, more=f"{LIMIT[kind]} = {level}", name=f"level {level}") for level in tops[kind]
     )
     found = results_at(station(tmp_path, tables, pose))
     for level, top in tops[kind].items():
@@ -141,7 +142,7 @@ def test_phases_follow_each_other_and_before_the_first_nothing_is_known(tmp_path
     entered = KNOWN["reba"].replace("load = 0", 'load = {}, shock = false, coupling = "good"')
     light = "{ start = 1, " + entered.format(1) + " }"
     heavy = "{ start = 2, " + entered.format(12) + " }"
-    stage = station(tmp_path, rule("reba", phases=f"{light}, {heavy}"))
+    stage = station(tmp_path, table("reba", phases=f"{light}, {heavy}"))
     state = state_at(stage)
     found = {}
     for t in (0.5, 1.0, 1.99, 2.0, 50.0):
@@ -154,7 +155,7 @@ def test_phases_follow_each_other_and_before_the_first_nothing_is_known(tmp_path
 
 def test_phases_in_the_wrong_order_are_a_mistake(tmp_path):
     with pytest.raises(InputError, match="start after the one before"):
-        station(tmp_path, rule("owas", phases="{ start = 2 }, { start = 1 }"))
+        station(tmp_path, table("owas", phases="{ start = 2 }, { start = 1 }"))
 
 
 def test_the_accuracy_opens_what_lies_at_an_edge(tmp_path):
@@ -163,7 +164,7 @@ def test_the_accuracy_opens_what_lies_at_an_edge(tmp_path):
     values = {}
     for degrees in (0.5, 3):
         more = f"accuracy_deg = {degrees}\naction_level = 1"
-        result = at(station(tmp_path, rule("rula", more=more)), q)["rula"]
+        result = at(station(tmp_path, table("rula", more=more)), q)["rula"]
         values[degrees] = result
         assert parts(result)["trunk"].value == 2
     assert parts(values[0.5])["trunk"].interval == (2, 2)
@@ -171,12 +172,12 @@ def test_the_accuracy_opens_what_lies_at_an_edge(tmp_path):
     assert parts(values[3])["trunk"].interval == (2, 3)
     assert values[3].interval == (2, 3)
     assert values[3].verdict is Verdict.UNDECIDED
-    assert values[3].reason.startswith("the accuracy leaves it open")
+    assert values[3].reason.startswith("the accuracy leaves it open: the score lies between 2 and 3; ")
 
 
 def test_the_part_that_drives_the_score_is_named_and_coloured(tmp_path):
     q = posture(PERSON, {"pelvis_tilt_forward": np.radians(65), "both_elbow_flexion": np.radians(80)})
-    result = at(station(tmp_path, rule("reba", more="action_level = 0")), q)["reba"]
+    result = at(station(tmp_path, table("reba", more="action_level = 0")), q)["reba"]
     assert "trunk 4" in result.reason
     assert {m.body for m in result.markers} == {"op/lumbar", "op/thorax"}
     assert {m.verdict for m in result.markers} == {Verdict.EXCEEDED}
@@ -184,7 +185,7 @@ def test_the_part_that_drives_the_score_is_named_and_coloured(tmp_path):
 
 def test_a_load_in_one_hand_counts_for_that_arm_and_for_the_body(tmp_path):
     entered = KNOWN["rula"].replace("load = 0", 'load = 5, load_use = "static", hand = "left"')
-    found = parts(results_at(station(tmp_path, rule("rula", phases=entered)))["rula"])
+    found = parts(results_at(station(tmp_path, table("rula", phases=entered)))["rula"])
     assert [found[f"{own} force of the arms"].value for own in ("right", "left")] == [0, 2]
     assert found["force of the body"].value == 2
 
@@ -192,7 +193,7 @@ def test_a_load_in_one_hand_counts_for_that_arm_and_for_the_body(tmp_path):
 def test_the_profile_decides_above_ten_kilograms(tmp_path):
     entered = KNOWN["rula"].replace("load = 0", 'load = 12, load_use = "intermittent"')
     tables = "".join(
-        rule("rula", phases=entered, more=f'profile = "{p}"', name=p) for p in ("original1993", "worksheet")
+        table("rula", phases=entered, more=f'profile = "{p}"', name=p) for p in ("original1993", "worksheet")
     )
     found = results_at(station(tmp_path, tables))
     force = [parts(found[p])["force of the body"].value for p in ("original1993", "worksheet")]
@@ -205,7 +206,7 @@ def test_a_person_who_is_not_heard_is_not_scored(tmp_path):
         '[[keyframes]]\nt = 0\nposture = "standing"\n[[keyframes]]\nt = 1\nposture = "t_pose"\n'
     )
     driven = '[[sources]]\nkind = "keyframes"\nhuman = "op"\nfile = "m.toml"\n'
-    stage = station(tmp_path, driven + "".join(map(rule, RULES)))
+    stage = station(tmp_path, driven + "".join(map(table, RULES)))
     engine = Engine(stage.model, driven={"op": 0.2})
     state = engine.start()
     assert {r.verdict for r in judged(stage.bound, state)} == {Verdict.UNDECIDED}
@@ -218,7 +219,7 @@ def test_a_person_who_is_not_heard_is_not_scored(tmp_path):
 @pytest.mark.parametrize("kind", RULES)
 def test_every_threshold_stands_in_the_basis_with_its_origin(tmp_path, kind):
     key = "bent_deg = 25" if kind == "owas" else "trunk_twist_deg = 25"
-    stage = station(tmp_path, rule(kind, more=f"thresholds = {{ {key} }}\nunmeasured = ['head']"))
+    stage = station(tmp_path, table(kind, more=f"thresholds = {{ {key} }}\nunmeasured = ['head']"))
     criterion, inputs = stage.bound[0].criterion, stage.bound[0].basis.inputs
     named = {i.name: i for i in inputs}
     thresholds = [f.replace("_", " ") for f in criterion.thresholds.__struct_fields__]
@@ -232,7 +233,7 @@ def test_every_threshold_stands_in_the_basis_with_its_origin(tmp_path, kind):
 
 
 def test_what_was_not_entered_stands_in_the_basis_as_missing(tmp_path):
-    stage = station(tmp_path, rule("reba", phases="load = 3"))
+    stage = station(tmp_path, table("reba", phases="load = 3"))
     named = {i.name: i for i in stage.bound[0].basis.inputs}
     assert (named["load"].value, named["load"].unit, named["load"].origin) == (3.0, "kg", Origin.GIVEN)
     assert {named[k].origin for k in ("coupling", "legs", "static", "shock")} == {Origin.MISSING}
@@ -250,7 +251,7 @@ def test_what_was_not_entered_stands_in_the_basis_as_missing(tmp_path):
 )
 def test_mistakes_are_named(tmp_path, more, message):
     with pytest.raises(InputError, match=message):
-        bind(station(tmp_path, rule("rula", more=more)).model)
+        bind(station(tmp_path, table("rula", more=more)).model)
 
 
 LIFT = """[[ergonomics]]
@@ -301,3 +302,26 @@ def test_several_lifts_make_a_composite_index(tmp_path):
     both = results_at(station(tmp_path, two))["lift"]
     assert both.value > alone.value
     assert [p.value for p in both.parts] == pytest.approx([alone.value] * 2)
+
+
+@pytest.mark.parametrize("kind", ["rula", "reba"])
+def test_the_least_posture_is_the_least_of_every_component_and_nothing_drives_it(tmp_path, kind):
+    method = {"rula": rula.METHOD, "reba": reba.METHOD}[kind]
+    q = posture(PERSON, {"both_elbow_flexion": np.radians(80), "both_elbow_pronation": np.radians(90)})
+    result = at(station(tmp_path, table(kind, more="accuracy_deg = 1")), q)[kind]
+    assert result.value == 1
+    assert result.markers == ()
+    assert result.reason == method.level(1)
+    for name, part in parts(result).items():
+        key = name.removeprefix("right ").removeprefix("left ")
+        assert part.value == method.least.get(key, 1)
+        assert part.interval == (part.value, part.value)
+    assert set(method.least) <= {n.removeprefix("right ").removeprefix("left ") for n in parts(result)}
+
+
+def test_action_levels_change_where_the_methods_say():
+    def levels(method, most):
+        return [int(method.level(score).split()[2].rstrip(":")) for score in range(1, most + 1)]
+
+    assert levels(rula.METHOD, 7) == [1, 1, 2, 2, 3, 3, 4]
+    assert levels(reba.METHOD, 15) == [0, 1, 1, *[2] * 4, *[3] * 3, *[4] * 5]

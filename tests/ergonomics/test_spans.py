@@ -160,3 +160,94 @@ def test_owas_span_is_the_extreme_of_every_combination():
         every = owas(*codes)
         span = category_span(*sets)
         assert (int(span.low), int(span.high)) == (every.min(), every.max())
+
+
+OPEN = {
+    ("rula", "shoulder_flexion"): ("upper arm", 1, 4),
+    ("rula", "shoulder_abduction"): ("upper arm", 1, 2),
+    ("rula", "clavicle_elevation"): ("upper arm", 1, 2),
+    ("rula", "elbow_flexion"): ("lower arm", 1, 2),
+    ("rula", "forearm_out"): ("lower arm", 1, 2),
+    ("rula", "wrist_across"): ("lower arm", 1, 2),
+    ("rula", "wrist_flexion"): ("wrist", 1, 3),
+    ("rula", "wrist_deviation"): ("wrist", 1, 2),
+    ("rula", "forearm_rotation"): ("wrist twist", 1, 2),
+    ("rula", "neck_flexion"): ("neck", 1, 4),
+    ("rula", "neck_twist"): ("neck", 1, 2),
+    ("rula", "neck_side_bend"): ("neck", 1, 2),
+    ("rula", "trunk_flexion"): ("trunk", 1, 4),
+    ("rula", "trunk_twist"): ("trunk", 1, 2),
+    ("rula", "trunk_side_bend"): ("trunk", 1, 2),
+    ("rula", "knee_flexion"): ("legs", 1, 2),
+    ("rula", "foot_rise"): ("legs", 1, 2),
+    ("reba", "shoulder_flexion"): ("upper arm", 1, 4),
+    ("reba", "shoulder_abduction"): ("upper arm", 1, 2),
+    ("reba", "shoulder_rotation"): ("upper arm", 1, 2),
+    ("reba", "clavicle_elevation"): ("upper arm", 1, 2),
+    ("reba", "elbow_flexion"): ("lower arm", 1, 2),
+    ("reba", "wrist_flexion"): ("wrist", 1, 2),
+    ("reba", "wrist_deviation"): ("wrist", 1, 2),
+    ("reba", "forearm_rotation"): ("wrist", 1, 2),
+    ("reba", "neck_flexion"): ("neck", 1, 2),
+    ("reba", "neck_twist"): ("neck", 1, 2),
+    ("reba", "neck_side_bend"): ("neck", 1, 2),
+    ("reba", "trunk_flexion"): ("trunk", 1, 4),
+    ("reba", "trunk_twist"): ("trunk", 1, 2),
+    ("reba", "trunk_side_bend"): ("trunk", 1, 2),
+    ("reba", "knee_flexion"): ("legs", 1, 3),
+}
+"""What an angle that nobody measured leaves open of an otherwise least posture."""
+METHODS = {"rula": rula, "reba": reba}
+
+
+@pytest.mark.parametrize(("method", "angle"), OPEN)
+def test_an_angle_that_nobody_measured_leaves_its_component_open_and_no_other(method, angle):
+    component, low, high = OPEN[method, angle]
+    least = components(made_angles(), METHODS[method])
+    found = components(made_angles(**{angle: np.nan}), METHODS[method])
+    assert {key for key, span in found.items() if not span.known} == {component}
+    assert set(np.atleast_1d(found[component].low)) == {low}
+    assert set(np.atleast_1d(found[component].high)) == {high}
+    assert all(span.low.max() == 1 for span in least.values())
+
+
+JUST_BELOW = {
+    "shoulder_flexion": 44,
+    "shoulder_abduction": 19,
+    "shoulder_rotation": -44,
+    "clavicle_elevation": 4,
+    "elbow_flexion": 61,
+    "forearm_out": 44,
+    "wrist_across": -1,
+    "wrist_flexion": -14,
+    "wrist_deviation": 9,
+    "forearm_rotation": -44,
+    "neck_flexion": 19,
+    "neck_twist": -9,
+    "neck_side_bend": 9,
+    "trunk_flexion": 59,
+    "trunk_twist": 9,
+    "trunk_side_bend": -9,
+    "knee_flexion": [59, 59],
+    "foot_rise": [6, 0],
+}
+
+
+@pytest.mark.parametrize(("method", "angle"), OPEN)
+def test_the_accuracy_reaches_every_angle(method, angle):
+    """1° from an edge, ± 0.9° leaves the score and ± 1.1° opens it, of its own component only."""
+    component, *_ = OPEN[method, angle]
+    if (method, angle) == ("rula", "knee_flexion"):
+        near = made_angles(knee_flexion=[13, 0])  # the difference of two angles: twice the accuracy
+    else:
+        near = made_angles(**{angle: JUST_BELOW[angle]})
+    for accuracy, expected in ((0.9, set()), (1.1, {component})):
+        found = components(near, METHODS[method], np.radians(accuracy))
+        assert {key for key, span in found.items() if not span.known} == expected
+
+
+@pytest.mark.parametrize("method", [rula, reba])
+@pytest.mark.parametrize("angle", ["shoulder_abduction", "clavicle_elevation"])
+def test_an_arm_toward_the_body_is_neither_abducted_nor_raised(method, angle):
+    found = components(made_angles(**{angle: -40}), method)
+    assert found["upper arm"].high.tolist() == [1, 1]

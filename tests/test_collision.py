@@ -118,11 +118,6 @@ def test_free_from_fixed_is_the_ratio_of_the_two_models() -> None:
     assert c.free_force(123.0, np.inf, 8.0) == 123.0
 
 
-def test_area_is_the_smallest_of_robot_body_and_cap_and_unknown_stays_unknown() -> None:
-    robot, body = np.array([0.5e-4, 3e-4, 3e-4, np.nan]), np.array([2e-4, 0.7e-4, 2e-4, 1e-4])
-    np.testing.assert_array_equal(c.contact_area(robot, body, 1e-4), [0.5e-4, 0.7e-4, 1e-4, np.nan])
-
-
 def test_least_speed_governs_and_an_equal_energy_is_called_force() -> None:
     v, which = c.permissible_speed([1, 2, 3, 1, 2], [2, 1, 3, 1.5, np.nan], [3, 3, 1, 1, 1.5])
     assert v.tolist() == [1, 1, 1, 1, 1.5]

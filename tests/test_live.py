@@ -207,12 +207,25 @@ def test_a_clock_that_slips_makes_the_next_sample_doubtful_and_none_go_back():
     assert [s.t for s in heard] == pytest.approx([0, 0.01, 0.02, 0.025], abs=1e-9)
 
 
-def test_a_run_begins_without_a_source_that_is_not_there():
+def test_a_run_begins_with_what_is_heard_then_and_not_with_what_was_heard_before():
     async def script():
+        yield joint(t=1.0)
+        await asyncio.sleep(0.2)
+        yield joint(t=2.0)
         await asyncio.sleep(60)
-        yield
 
     with Listening([(Made(script=script), None)]) as listening:
+        until(lambda: listening.listeners[0].statistics().count)
+        assert [s.t for s in listening.first()] == [2.0]
+
+
+def test_a_run_begins_without_a_source_that_is_not_there():
+    async def script():
+        yield joint()
+        await asyncio.sleep(60)
+
+    with Listening([(Made(script=script), None)]) as listening:
+        until(lambda: listening.listeners[0].statistics().count)
         assert listening.first(patience=0.05) == ()
 
 

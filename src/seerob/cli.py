@@ -13,7 +13,19 @@ from typing import NoReturn
 from seerob.commands import Exit
 from seerob.errors import SeerobError
 
-COMMANDS = ("new", "check_file", "run", "assess", "replay", "report", "swept", "kinds", "schema", "emulate", "probe")
+COMMANDS = (
+    "new",
+    "check_file",
+    "run",
+    "assess",
+    "replay",
+    "report",
+    "swept",
+    "kinds",
+    "schema",
+    "emulate",
+    "probe",
+)
 """One module each in `seerob.commands`, with ``HELP``, ``EXAMPLE``, ``add`` and ``run``."""
 
 

@@ -115,15 +115,6 @@ def energy_limit(F: ArrayLike, k: ArrayLike, printed: ArrayLike) -> Array:
     return np.fmin(spring_energy(F, k), printed)
 
 
-def contact_area(robot: ArrayLike, body: ArrayLike, cap: float) -> Array:
-    """Area that carries the force, the smaller of robot and body, never above ``cap`` [m²].
-
-    Stiffness k belongs to a contact of about 1 cm²: a larger area would promise too much.
-    An area that is NaN is unknown, not large.
-    """
-    return np.minimum(np.minimum(robot, body), cap)
-
-
 def permissible_speed(v_F: ArrayLike, v_P: ArrayLike, v_E: ArrayLike) -> tuple[Array, NDArray[np.int64]]:
     """The least of the three speeds [m/s] and which limit it is (`Governing`).
 

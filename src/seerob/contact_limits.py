@@ -3,6 +3,10 @@ r"""Permissible speeds of many surfaces against many body regions at once.
 From a table of limits and the contact areas, the least of the speeds at which force, pressure and energy
 reach their limits (`seerob.collision`): transient limits and :math:`m_H` when the body part is free,
 quasi-static ones and :math:`m_H \to \infty` when it is clamped.
+
+The contact area grows with the force. The force that a pressure allows is the one up to which the
+pressure is never above it, :math:`F = p A(F)`, not the area at the largest force: at every force below
+that the area is smaller.
 """
 
 from __future__ import annotations
@@ -14,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob import collision
-from seerob.contact_shape import ContactShape, patch_area
+from seerob.contact_shape import ContactShape, force_at_pressure
 from seerob.norms.body_limits import BodyLimits, BodyRegion
+from seerob.snapshot import Input, Origin
 from seerob.transforms import Array
 
 
@@ -26,7 +31,9 @@ class RegionArrays:
     regions: tuple[BodyRegion, ...]
     force: Array
     pressure: Array
-    """Least of the areas of each region."""
+    """Of every specific area of every region in turn, shape (a,)."""
+    owner: NDArray[np.int64]
+    """Row of the region of each of them, shape (a,)."""
     multiplier: Array
     stiffness: Array
     mass: Array
@@ -46,48 +53,64 @@ class RegionArrays:
         return cls(
             regions,
             np.array([r.force.value for r in regions]),
-            np.array([r.pressure.value for r in regions]),
+            np.array([area.pressure.value for r in regions for area in r.areas]),
+            np.array([k for k, r in enumerate(regions) for _ in r.areas], np.int64),
             np.array([min(r.multiplier.value, most) if r.multiplier else 1.0 for r in regions]),
             np.array([r.stiffness.value for r in regions]),
             np.array([r.mass.value for r in regions]),
             np.array([math.nan if r.energy is None else r.energy.value for r in regions]),
         )
 
-    def contact_area(self, shape: ContactShape, cap: float) -> Array:
-        """Least contact area of a surface with each region, free and clamped [m²], shape (2, r).
+    def pressures(self) -> Array:
+        """Limits of every specific area, free and clamped [Pa], shape (2, a)."""
+        return self.pressure * np.stack([self.multiplier[self.owner], np.ones_like(self.pressure)])
 
-        NaN where the mesh does not tell.
+    def pressure_force(self, shape: ContactShape, cap: float) -> Array:
+        """Largest force of a surface that keeps the pressure on each specific area [N], shape (2, a).
+
+        Free and clamped. NaN where the mesh does not tell, 0 where no force does.
+
+        Args:
+            shape: The surface.
+            cap: Area above which a contact is not credited [m²].
         """
+        p = self.pressures()
         if shape.unknown:
-            return np.full((2, len(self.regions)), np.nan)
-        indentation = self.force / self.stiffness * np.stack([self.multiplier, np.ones_like(self.force)])
-        area = np.full(indentation.shape, cap)
+            return np.full(p.shape, np.nan)
         radii = shape.radii[np.isfinite(shape.radii[:, 0])]
-        if len(radii):
-            # What both a smaller and a flatter radius than another patch has is never the least.
-            radii = np.unique(np.sort(radii, axis=1), axis=0)
-            keep = np.concatenate([[True], radii[1:, 1] < np.minimum.accumulate(radii[:-1, 1])])
-            areas = patch_area(radii[keep][:, None, None, :], indentation[None], cap)
-            area = areas.min(axis=0)
-        return collision.contact_area(area, cap, cap)
+        if not len(radii):
+            return p * cap
+        # What both a smaller and a flatter radius than another patch has is never the least.
+        radii = np.unique(np.sort(radii, axis=1), axis=0)
+        keep = np.concatenate([[True], radii[1:, 1] < np.minimum.accumulate(radii[:-1, 1])])
+        k = self.stiffness[self.owner]
+        return np.asarray(force_at_pressure(radii[keep][:, None, None, :], p, k, cap).min(axis=0))
 
-    def speeds(self, m_R: Array, areas: Array, clamped: NDArray[np.bool_]) -> Speeds:
+    def by_region(self, forces: Array) -> Array:
+        """The least over the specific areas of each region, (..., a) to (..., r); NaN stays."""
+        found = np.full((*forces.shape[:-1], len(self.regions)), np.inf)
+        for column, owner in enumerate(self.owner):
+            found[..., owner] = np.minimum(found[..., owner], forces[..., column])
+        return found
+
+    def speeds(self, m_R: Array, forces: Array, clamped: NDArray[np.bool_]) -> Speeds:
         """Permissible relative speeds.
 
         Args:
             m_R: Effective mass of the robot at each surface [kg], shape (b,).
-            areas: Of each surface, free and clamped, NaN when unknown [m²], shape (b, 2, r).
+            forces: That the pressure limits allow each surface, free and clamped, NaN when unknown [N],
+                shape (b, 2, r).
             clamped: Whether the body part cannot recoil, shape (b, r).
         """
         k = self.stiffness
         factor = np.where(clamped, 1.0, self.multiplier)
         m = np.broadcast_to(np.asarray(m_R, float)[:, None], clamped.shape)
         mu = np.where(clamped, m, collision.reduced_mass(self.mass, m))
-        A = np.where(clamped, areas[:, 1], areas[:, 0])
+        F_P = np.where(clamped, forces[:, 1], forces[:, 0])
         printed = np.where(clamped, np.nan, self.energy)
         F = factor * self.force
         v_F = collision.speed_at_force(F, mu, k)
-        v_P = collision.speed_at_pressure(factor * self.pressure, A, mu, k)
+        v_P = collision.speed_at_force(F_P, mu, k)
         v_E = collision.speed_at_energy(collision.energy_limit(F, k, printed), mu)
         v, which = collision.permissible_speed(v_F, v_P, v_E)
         return Speeds(v, which, v_F, v_P, v_E, mu)
@@ -103,7 +126,31 @@ class Speeds:
     """`seerob.collision.Governing`."""
     force: Array
     pressure: Array
-    """NaN where the contact area is unknown: then ``permissible`` is only an upper bound."""
+    """NaN where the contact area is unknown: then ``permissible`` is only an upper bound; 0 where the shape
+    exceeds the pressure at every force."""
     energy: Array
     mu: Array
     """Reduced mass [kg]."""
+
+
+def contact_input(
+    name: str, shape: ContactShape, *, radius: float | None = None, area: float | None = None
+) -> Input:
+    """Where the contact area of a part is from.
+
+    Args:
+        name: Of the part.
+        shape: By which it touches.
+        radius: That the workstation file gives [m].
+        area: Likewise, instead [m²].
+    """
+    what, sharpest = f"contact radius of {name}", shape.sharpest[0]
+    file = "workstation file"
+    if area is not None:
+        return Input(name=f"contact area of {name}", value=area, unit="m²", origin=Origin.GIVEN, source=file)
+    if radius is not None:
+        return Input(name=what, value=radius, unit="m", origin=Origin.GIVEN, source=file)
+    if shape.unknown:
+        return Input(name=what, origin=Origin.MISSING, source=shape.unknown)
+    value, unit = (sharpest, "m") if np.isfinite(sharpest) else ("flat", "")
+    return Input(name=what, value=value, unit=unit, origin=Origin.COMPUTED, source="its mesh")

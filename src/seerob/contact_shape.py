@@ -70,7 +70,7 @@ def patch_area(radii: ArrayLike, indentation: ArrayLike, cap: float) -> Array:
 
     Args:
         radii: Radii of curvature [m], shape (..., 2); inf where flat.
-        indentation: Of the body [m], shape (...); the most that the force limit allows, F/k.
+        indentation: Of the body [m], shape (...), F/k.
         cap: Largest area [m²].
     """
     R = np.asarray(radii, float)
@@ -78,6 +78,38 @@ def patch_area(radii: ArrayLike, indentation: ArrayLike, cap: float) -> Array:
     with np.errstate(invalid="ignore"):
         half = np.minimum(np.sqrt(R * np.minimum(R, d)), math.sqrt(cap / math.pi))
     return np.asarray(math.pi * half[..., 0] * half[..., 1])
+
+
+def force_at_pressure(radii: ArrayLike, pressure: ArrayLike, stiffness: ArrayLike, cap: float) -> Array:
+    r"""Largest force up to which a rounded patch never presses harder than a pressure [N].
+
+    The solution of :math:`F = p A(F/k)` with `patch_area`. Its pressure :math:`F / A(F/k)` never falls
+    while the force grows: it is :math:`p_0 = k / (\pi \sqrt{R_1 R_2})` until the first half axis has grown
+    to its end :math:`H`, and grows from there on. So no force holds where :math:`p_0 > p`; else the
+    least of
+
+    .. math:: k R_2 (\pi p H_1 / k)^2 \quad (\text{only } r_1 \text{ at its end}), \qquad
+        \pi p H_1 H_2 \quad (\text{both})
+
+    Args:
+        radii: Radii of curvature [m], shape (..., 2); inf where flat.
+        pressure: [Pa], shape (...).
+        stiffness: k of the body [N/m], shape (...).
+        cap: See `patch_area`.
+    """
+    R = np.asarray(radii, float)
+    p, k = np.asarray(pressure, float), np.asarray(stiffness, float)
+    end = math.sqrt(cap / math.pi)
+    H = np.minimum(R, end)
+    # Indentation at which a half axis ends; the flatter one ends first wherever both exceed the cap.
+    depth = np.minimum(R, end**2 / R)
+    first = depth[..., 0] <= depth[..., 1]
+    H_1 = np.where(first, H[..., 0], H[..., 1])
+    R_2 = np.where(first, R[..., 1], R[..., 0])
+    one = k * R_2 * (math.pi * p * H_1 / k) ** 2
+    both = math.pi * p * H[..., 0] * H[..., 1]
+    holds = k <= math.pi * p * np.sqrt(R[..., 0]) * np.sqrt(R[..., 1])
+    return np.asarray(np.where(holds, np.minimum(one, both), 0.0))
 
 
 def round_shape(radius: float) -> ContactShape:

@@ -17,10 +17,18 @@ def simplified_mass(model: Model, robot: Mechanism) -> float:
 
     Means nothing where `Mechanism.unknown_masses` names any.
     """
+    return float(collision.robot_mass(*moving_masses(model, robot)))
+
+
+def moving_masses(model: Model, robot: Mechanism) -> tuple[float, float]:
+    """M and m_L: mass of the links that the joints move, and of tools and workpieces [kg].
+
+    Mean nothing where `Mechanism.unknown_masses` names any.
+    """
     names = {int(i): model.mj.body(int(i)).name for i in robot.mj_bodies}
     masses = {i: float(model.mj.body_mass[i]) for i in names}
     links = sum(masses[i] for i, name in names.items() if name.startswith(f"{robot.name}/"))
-    return float(collision.robot_mass(links, sum(masses.values()) - links))
+    return links, sum(masses.values()) - links
 
 
 def masses_along_motion(

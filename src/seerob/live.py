@@ -19,7 +19,7 @@ import time
 from collections.abc import AsyncGenerator, Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from threading import Event, Lock, Thread
+from threading import Lock, Thread
 from types import TracebackType
 from typing import Annotated, Self
 
@@ -29,7 +29,7 @@ from msgspec.structs import replace
 from seerob.arrivals import Arrivals, Statistics
 from seerob.device_clock import DeviceClock
 from seerob.errors import InputError, SeerobError
-from seerob.samples import Mailbox, Sample, SignalSample
+from seerob.samples import Mailbox, Sample, SignalSample, key
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
 
@@ -141,8 +141,8 @@ class Listener:
 
     def __init__(self, source: LiveSource, target: Target | None, post: Callable[[Sample], None]) -> None:
         self.name = source.name or f"{type(source).__module__.rpartition('.')[2]} {source.target()}".strip()
-        self.heard = Event()
-        """Set by the first sample."""
+        self.drives = bool(source.target())
+        """Whether it drives a robot or a person, or only has signals."""
         self._source, self._target, self._post = source, target, post
         self._clock, self._arrivals = DeviceClock(), Arrivals(source.period())
         self._lock = Lock()
@@ -224,7 +224,6 @@ class Listener:
             self._up = True
         self._post(replace(sample, source=self.name, seq=self._seq, t=instant))
         self._seq += 1
-        self.heard.set()
 
     def _lose(self, reason: str) -> None:
         """One line per loss, however often it is tried again."""
@@ -267,11 +266,17 @@ class Listening:
             _log.info("%s: %s", listener.name, listener.statistics())
 
     def first(self, patience: float = PATIENCE) -> tuple[Sample, ...]:
-        """What has been heard once every source was, or when that takes too long."""
+        """What is heard from now on, once all that drive something were, or when that takes too long."""
         end = time.monotonic() + patience
-        for listener in self.listeners:
-            listener.heard.wait(max(0.0, end - time.monotonic()))
-        return self.take()
+        self.take()
+        heard: dict[tuple[str, str], Sample] = {}
+        while time.monotonic() < end:
+            heard |= {key(sample): sample for sample in self.take()}
+            spoke = {sample.source for sample in heard.values() if not isinstance(sample, SignalSample)}
+            if spoke >= {listener.name for listener in self.listeners if listener.drives}:
+                break
+            time.sleep(0.001)
+        return tuple(heard.values())
 
     def take(self) -> tuple[Sample, ...]:
         """What was heard since the last call, the newest of each; ``t`` on the host's clock."""

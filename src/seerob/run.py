@@ -261,6 +261,17 @@ def snapshot(state: State, seq: int, results: tuple[Result, ...]) -> Snapshot:
     )
 
 
+def warm_up(model: Model) -> None:
+    """Ask every criterion once, of the twin at home, and forget it.
+
+    What is compiled or loaded at first use would else make the first tick of a live run late.
+    """
+    engine = Engine(model, controllers=False)
+    judge = Judge(bind(model))
+    judge(engine.start())
+    Engine(model).tick()
+
+
 def ticks(engine: Engine, judge: Judge, feed: Feed) -> Iterator[tuple[Snapshot, tuple[Sample, ...]]]:
     """The road: for each tick what goes out, and the samples it was made from."""
     for seq, samples in enumerate(feed):

@@ -157,6 +157,7 @@ class Station:
             feed = road.pump(self.sources, self.workstation.engine.tick, endless=live)
         with ExitStack() as until_the_end:
             if clock and heard:
+                road.warm_up(self.model)
                 targets = [(source, road.target(self.model, source.target())) for source in heard]
                 feed = hear(feed, until_the_end.enter_context(Listening(targets)), clock)
             opened = self.open_sinks(sinks, Path(folder or "."), scene) if sinks else []

@@ -27,7 +27,7 @@ from seerob.stopping import (
     largest_speed_in_time,
 )
 from seerob.stopping_table import StoppingTable
-from seerob.table_stop import bind_table
+from seerob.table_stop import bind_table, not_its_own
 from seerob.transforms import Array
 
 SHARE = 0.8
@@ -52,6 +52,9 @@ class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Of the fastest point [m/s²], instead of ``stopping``, with ``constant_deceleration``."""
     table: str | StoppingTable | None = None
     """Name of a table that comes with seerob (`seerob.stopping_table.shipped`), or the table itself."""
+    table_for: str | None = None
+    """Name of the robot that the table is that of, by your own word; without it, a table that is not of the
+    robot's ``model`` leaves what it would keep within undecided."""
     brakes: Annotated[tuple[Annotated[float, Meta(gt=0)], ...], Meta(extra={"unit": "N·m"})] | None = None
     """Torque of each joint's brake [N·m or N] with ``simulated``; ``torque_share`` of the robot's torque
     limits when not given."""
@@ -77,6 +80,7 @@ class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         idle = {
             "deceleration": self.deceleration is not None and self.model != "constant_deceleration",
             "table": self.table is not None and self.model != "table",
+            "table_for": self.table_for is not None and self.model != "table",
             "stopping": self.stopping is not None and self.model == "simulated",
             "brakes": self.brakes is not None and self.model != "simulated",
             "torque_share": self.torque_share != 0.8
@@ -197,10 +201,18 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopMode
     table = stopping_table.table(stop.table) if isinstance(stop.table, str) else stop.table
     if table is None:
         raise InputError.at("stop", "table", "not given", "the name of a table, or a table")
+    if stop.table_for is not None and stop.table_for != robot.name:
+        raise InputError.at("stop", "table_for", f"{stop.table_for} does not stop here", robot.name)
+    doubt = not_its_own(table, model, robot) if stop.table_for is None else ""
     courses, inputs = bind_table(table, stop.reaction, stop.stopping, model, robot, gap)
     source = f"{table.source} ({table.confidence})" + (f"; {table.note}" if table.note else "")
     named = Input(name="stopping table", value=table.robot, origin=Origin.STATED, source=source)
     rest = () if stop.stopping is None else (_given("T_s of joints without a table", stop.stopping, "s"),)
+    if stop.table_for is not None:
+        said = Input(
+            name="stopping table is of", value=robot.name, origin=Origin.GIVEN, source="workstation file"
+        )
+        rest = (said, *rest)
     formula = (
         "S_s = v_r T_s(v_r)"
         if table.tool is not None
@@ -210,9 +222,11 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopMode
         courses,
         formula,
         (named, *inputs, *rest),
+        doubts=(doubt,) if doubt else (),
         not_modelled=(
             f"stop category {table.category} only, as tabulated",
-            "below the table's first nodes its first figures hold: the worse corner",
+            "below the table's first speed, payload and extension its first stopping time holds"
+            + ("" if table.tool is not None else ", and the lesser of its first way and speed times time"),
         ),
     )
 

@@ -61,6 +61,9 @@ class StoppingTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """What a maker publishes on stopping."""
 
     robot: str
+    """Whose figures these are: in a table of your own, the name of the robot in the workstation file."""
+    models: Annotated[tuple[str, ...], Meta(max_length=MOST)] = ()
+    """What ``model`` of a robot in the workstation file is that robot, such as ``library:ur10``."""
     category: Annotated[int, Meta(ge=0, le=2)]
     """Stop category, IEC 60204-1."""
     source: str

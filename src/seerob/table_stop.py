@@ -18,10 +18,23 @@ from seerob.transforms import Array
 Bound = tuple[Callable[[State], At], tuple[Input, ...]]
 
 
+def not_its_own(table: StoppingTable, model: Model, robot: Mechanism) -> str:
+    """Why it is not known that a table is of a robot; empty when it is."""
+    entry = next(r for r in model.workstation.robots if r.name == robot.name)
+    if table.robot == robot.name or entry.model in table.models:
+        return ""
+    return (
+        f"the stopping table is that of {table.robot}, and whether {robot.name} ({entry.model}) is one is "
+        "not known: say so with stop.table_for"
+    )
+
+
 def bind_table(
     table: StoppingTable, T_r: float, others: float | None, model: Model, robot: Mechanism, gap: Gap
 ) -> Bound:
     """Course of a robot's moving parts by its stopping table, and the inputs that it needs.
+
+    Both kinds of tables are undecided above their largest payload, and where the payload is not known.
 
     Args:
         table: The maker's figures.
@@ -34,8 +47,6 @@ def bind_table(
     Raises:
         InputError: The table speaks of joints that the robot does not have.
     """
-    if table.tool is not None:
-        return _by_tool_speed(table.tool, T_r, gap), ()
     beyond = [entry.joint for entry in table.joints if entry.joint >= len(robot.joints)]
     if beyond:
         raise InputError.at(
@@ -53,12 +64,26 @@ def bind_table(
             origin=Origin.COMPUTED if np.isfinite(load) else Origin.MISSING,
             source="masses of tools and workpieces",
         ),
+        Input(
+            name="rated payload of the stopping table",
+            value=table.rated_payload,
+            unit="kg",
+            origin=Origin.MISSING if table.rated_payload is None else Origin.STATED,
+            source=f"{table.source} ({table.confidence})",
+        ),
     )
+    if table.tool is not None:
+        return _by_tool_speed(table, table.tool, T_r, robot, gap, load), inputs
     return _by_joint(table, T_r, others, model, robot, gap, load), inputs
 
 
-def _by_tool_speed(tool: SpeedStop, T_r: float, gap: Gap) -> Callable[[State], At]:
+def _by_tool_speed(
+    table: StoppingTable, tool: SpeedStop, T_r: float, robot: Mechanism, gap: Gap, load: float
+) -> Callable[[State], At]:
     def courses(state: State) -> At:
+        share = _payload_share(table, robot, load)
+        if not share <= 1 + 1e-9:
+            raise Undecided(f"payload is {share:.3g} of the rated payload, at which the stopping table ends")
         v = np.array([state.fastest_point(i)[0] for i in gap.b])
         # Any point counts as the tool's: the fastest decides for all.
         top = float(v.max())
@@ -94,11 +119,8 @@ def _by_joint(
             return speed * others, others
         if full[j] is None:
             raise Undecided(f"{name}: neither the stopping table nor the robot says what full speed is")
-        if table.rated_payload is None:
-            raise Undecided("the stopping table does not say for which payload it holds (rated_payload)")
-        if not np.isfinite(load):
-            raise Undecided("; ".join(robot.unknown_masses))
-        way, time = joint_stop(entries[j], speed / (full[j] or 1.0), load / table.rated_payload, extension)
+        share = _payload_share(table, robot, load)
+        way, time = joint_stop(entries[j], speed / (full[j] or 1.0), share, extension)
         return min(way, speed * time), time
 
     def courses(state: State) -> At:
@@ -121,6 +143,14 @@ def _by_joint(
         return at
 
     return courses
+
+
+def _payload_share(table: StoppingTable, robot: Mechanism, load: float) -> float:
+    if table.rated_payload is None:
+        raise Undecided("the stopping table does not say for which payload it holds (rated_payload)")
+    if not np.isfinite(load):
+        raise Undecided("; ".join(robot.unknown_masses))
+    return load / table.rated_payload
 
 
 def _full_speed(entry: JointStop | None, robot: Mechanism, j: int) -> float | None:

@@ -198,3 +198,8 @@ def test_what_nobody_gave_may_be_anything():
     assert tuple(map(int, load(7.0, None))) == (1, 2)
     assert tuple(map(int, coupling(None))) == (0, 3)
     assert [int(coupling(grip).low) for grip in Coupling] == [0, 1, 2, 3]
+
+
+def test_a_knee_that_nobody_measured_of_somebody_who_may_sit():
+    span = scored(made_angles(knee_flexion=np.nan), sitting=None)["legs"]
+    assert (int(span.low), int(span.high)) == (1, 3)

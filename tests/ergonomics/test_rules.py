@@ -1,16 +1,21 @@
 """The rules on the twin: sides, verdicts, what is not assessed, phases, accuracy, what drives a score."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from made_postures import PERSON
 
 from made_cell import heard, judged, made, results_at, state_at
 from seerob.engine import Engine
+from seerob.ergonomic_posture import posture as angles_of
 from seerob.ergonomics import reba, rula
 from seerob.errors import InputError
+from seerob.human.angles import Angles, angles
 from seerob.human.posture import posture
-from seerob.human.skeleton import JOINTS, mirrored
+from seerob.human.skeleton import JOINTS, bone_poses, mirrored
 from seerob.run import Judge, bind
+from seerob.scoring.owas import Legs
 from seerob.snapshot import Origin, Verdict
 
 STILL = np.zeros(len(JOINTS))
@@ -254,56 +259,6 @@ def test_mistakes_are_named(tmp_path, more, message):
         bind(station(tmp_path, table("rula", more=more)).model)
 
 
-LIFT = """[[ergonomics]]
-kind = "niosh"
-name = "lift"
-human = "op"
-limit = 1
-work = 3000
-recovery = 3000
-exclusions = {exclusions}
-[[ergonomics.lifts]]
-load = {load}
-control = true
-per_minute = 3
-coupling = "fair"
-origin = {{ horizontal = 0.25, vertical_mm = 550 }}
-destination = {{ horizontal = {far}, vertical = 1.475 }}
-"""
-
-
-@pytest.mark.parametrize(
-    ("load", "far", "value", "verdict"),
-    [(6, 0.5, 0.872, "within"), (12, 0.5, 1.745, "exceeded"), (1, 0.7, None, "exceeded")],
-)
-def test_a_lift_against_its_limit(tmp_path, load, far, value, verdict):
-    found = results_at(station(tmp_path, LIFT.format(load=load, far=far, exclusions="[]")))["lift"]
-    assert found.value == (None if value is None else pytest.approx(value, abs=1e-3))
-    assert found.verdict == verdict
-    assert "destination" in found.reason or "beyond the reach" in found.reason
-
-
-def test_lifts_to_which_the_equation_does_not_apply_are_refused(tmp_path):
-    tables = LIFT.format(load=5, far=0.5, exclusions='["one_handed", "slippery_floor"]')
-    with pytest.raises(InputError, match=r"(?s)does not apply: one handed.*slippery floor"):
-        bind(station(tmp_path, tables).model)
-    with pytest.raises(InputError, match="exclusions: missing"):
-        station(tmp_path, LIFT.format(load=5, far=0.5, exclusions="[]").replace("exclusions = []\n", ""))
-    with pytest.raises(InputError, match="work"):
-        station(
-            tmp_path, LIFT.format(load=5, far=0.5, exclusions="[]").replace("work = 3000", "work = 30000")
-        )
-
-
-def test_several_lifts_make_a_composite_index(tmp_path):
-    one = LIFT.format(load=6, far=0.5, exclusions="[]")
-    two = one + one[one.index("[[ergonomics.lifts]]") :]
-    alone = results_at(station(tmp_path, one))["lift"]
-    both = results_at(station(tmp_path, two))["lift"]
-    assert both.value > alone.value
-    assert [p.value for p in both.parts] == pytest.approx([alone.value] * 2)
-
-
 @pytest.mark.parametrize("kind", ["rula", "reba"])
 def test_the_least_posture_is_the_least_of_every_component_and_nothing_drives_it(tmp_path, kind):
     method = {"rula": rula.METHOD, "reba": reba.METHOD}[kind]
@@ -325,3 +280,42 @@ def test_action_levels_change_where_the_methods_say():
 
     assert levels(rula.METHOD, 7) == [1, 1, 2, 2, 3, 3, 4]
     assert levels(reba.METHOD, 15) == [0, 1, 1, *[2] * 4, *[3] * 3, *[4] * 5]
+
+
+def test_owas_names_what_drives_the_category(tmp_path):
+    """Code 2 3 4 1 is category 3; upright it would be 2, with the arms down 3, with straight knees 2."""
+    q = posture(PERSON, "squatting", joints={"both_shoulder_flexion": np.radians(180)})
+    result = at(station(tmp_path, table("owas", more="action_category = 2")), q)["owas"]
+    assert [p.value for p in result.parts] == [2, 3, 4, 1]
+    assert result.value == 3
+    assert result.reason.startswith("back 2, legs 4; action category 3")
+    assert {m.body.split("/")[1] for m in result.markers} >= {"thorax", "right_thigh", "left_shank"}
+    assert not any("arm" in m.body for m in result.markers)
+
+
+@pytest.mark.parametrize(
+    ("kind", "legs", "expected"),
+    [
+        ("rula", "balanced", 1),
+        ("rula", "unbalanced", 2),
+        ("reba", "bilateral", 2),
+        ("reba", "unilateral", 3),
+        ("reba", "sitting", 1),
+        ("reba", "posture", 2),
+        *(("owas", name, code) for code, name in enumerate(list(Legs)[:7], 1)),
+    ],
+)
+def test_how_the_legs_are_used_is_entered(tmp_path, kind, legs, expected):
+    """With knees at 45°, which REBA counts unless somebody sits."""
+    q = posture(PERSON, {"both_knee_flexion": np.radians(45), "both_hip_flexion": np.radians(45)})
+    entered = KNOWN[kind].replace('legs = "posture"', f'legs = "{legs}"')
+    assert parts(at(station(tmp_path, table(kind, phases=entered)), q)[kind])["legs"].value == expected
+
+
+def test_the_twin_is_asked_for_the_angles_that_its_joints_have(tmp_path):
+    stage = station(tmp_path, "")
+    q = posture(PERSON, "reach_low", heading=1.2)
+    found = angles_of(state_at(stage, op=(q, STILL)), stage.model.human("op"))
+    expected = angles(*bone_poses(PERSON, q))
+    for field in fields(Angles):
+        assert getattr(found, field.name) == pytest.approx(getattr(expected, field.name), abs=1e-9)

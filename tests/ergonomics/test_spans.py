@@ -251,3 +251,11 @@ def test_the_accuracy_reaches_every_angle(method, angle):
 def test_an_arm_toward_the_body_is_neither_abducted_nor_raised(method, angle):
     found = components(made_angles(**{angle: -40}), method)
     assert found["upper arm"].high.tolist() == [1, 1]
+
+
+def test_an_arm_that_points_sideways_has_any_flexion():
+    aside = made_angles(shoulder_flexion=170, shoulder_abduction=85, shoulder_elevation=91)
+    span = arm_score(aside, rula.upper_arm, ArmPolicy.PROJECTION, np.radians(8))
+    assert (span.low.tolist(), span.high.tolist()) == ([1, 1], [4, 4])
+    sure = arm_score(aside, rula.upper_arm, ArmPolicy.PROJECTION, np.radians(4))
+    assert (sure.low.tolist(), sure.high.tolist()) == ([4, 4], [4, 4])

@@ -128,7 +128,7 @@ def answering(*chunks):
 
     def serve():
         connection, _ = listening.accept()
-        with connection:
+        with connection, suppress(ConnectionError):
             for chunk in chunks:
                 connection.recv(4096)
                 connection.sendall(chunk)

@@ -45,6 +45,7 @@ class Owas(Criterion, frozen=True, kw_only=True):
     """OWAS action category of a person's posture."""
 
     human: str
+    """Who is judged."""
     action_category: Literal[1, 2, 3, 4] | None = None
     """Highest admissible action category."""
     phases: tuple[OwasPhase, ...] = ()

@@ -61,6 +61,7 @@ class Reba(Criterion, frozen=True, kw_only=True):
     """REBA score of a person, the worse of both sides."""
 
     human: str
+    """Who is judged."""
     action_level: Literal[0, 1, 2, 3, 4] | None = None
     """Highest admissible action level; the limit is its highest score: 1, 3, 7, 10, 15."""
     phases: tuple[RebaPhase, ...] = ()

@@ -60,6 +60,7 @@ class Rula(Criterion, frozen=True, kw_only=True):
     """RULA grand score of a person, the worse of both sides."""
 
     human: str
+    """Who is judged."""
     profile: method.Profile = method.Profile.ORIGINAL_1993
     """Publication that decides where they differ: the force score above 10 kg, and how long is static."""
     action_level: Literal[1, 2, 3, 4] | None = None
@@ -140,6 +141,7 @@ class Rula(Criterion, frozen=True, kw_only=True):
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
+        usual = self.profile is method.Profile.ORIGINAL_1993
         return Basis(
             formula="RULA tables A, B and C of the components' scores; the worse side counts",
             source="McAtamney and Corlett 1993, Applied Ergonomics 24(2); tables from six or more public "
@@ -147,7 +149,10 @@ class Rula(Criterion, frozen=True, kw_only=True):
             inputs=(
                 *provenance.motion(model, self.human),
                 Input(
-                    name="profile", value=self.profile.value, origin=Origin.GIVEN, source="workstation file"
+                    name="profile",
+                    value=self.profile.value,
+                    origin=Origin.ASSUMED if usual else Origin.GIVEN,
+                    source="option profile, original1993 when not given",
                 ),
                 *entered(self.phases, RulaPhase()),
                 *choices(self.thresholds, self.arm, self.accuracy, self.unmeasured),

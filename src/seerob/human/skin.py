@@ -32,7 +32,7 @@ BODY_REGION: dict[str, tuple[str | None, str | None]] = {
     "thorax": ("Chest", "Back and shoulders"),
     "neck": ("Neck", "Neck"),
     "head": ("Face", "Skull and forehead"),
-    "clavicle": ("Back and shoulders", "Back and shoulders"),
+    "clavicle": ("Chest", "Back and shoulders"),
     "upper_arm": ("Upper arms and elbow joints", "Upper arms and elbow joints"),
     "forearm": ("Lower arms and wrist joints", "Lower arms and wrist joints"),
     "hand": ("Hands and fingers", "Hands and fingers"),
@@ -43,6 +43,7 @@ BODY_REGION: dict[str, tuple[str | None, str | None]] = {
 }
 """Bone without side → body region of ISO/TS 15066:2016 Table A.3 in front and behind.
 
+The shoulder girdle counts as chest in front, the stricter of its neighbours.
 Feet are in no region of that table. The face is the front of the head below the eyes.
 """
 

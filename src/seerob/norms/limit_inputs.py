@@ -8,12 +8,13 @@ from seerob.snapshot import Input, Origin
 _ORIGIN = {"M": Origin.ESTIMATED, "D": Origin.COMPUTED, "own": Origin.GIVEN}
 
 
-def limit_inputs(limits: BodyLimits, *, own: bool) -> tuple[Input, ...]:
+def limit_inputs(limits: BodyLimits, *, own: bool, multiplier: float | None = None) -> tuple[Input, ...]:
     """Every figure of a table.
 
     Args:
         limits: The table.
         own: Whether it is the user's own file.
+        multiplier: Of the transient limits, where it is lower than the table's.
     """
     found = []
     for region in limits.regions.values():
@@ -31,7 +32,15 @@ def limit_inputs(limits: BodyLimits, *, own: bool) -> tuple[Input, ...]:
             **{f"p_s {area.name}": area.pressure for area in region.areas},
         }
         for name, figure in figures.items():
-            if figure is not None:
+            if figure is None:
+                continue
+            if name == "transient multiplier" and multiplier is not None and multiplier < figure.value:
+                source = f"workstation file, instead of {figure.value:g}: {figure.source}"
+                given = Input(
+                    name=f"{region.name}: {name}", value=multiplier, origin=Origin.GIVEN, source=source
+                )
+                found.append(given)
+            else:
                 found.append(
                     Input(
                         name=f"{region.name}: {name}",

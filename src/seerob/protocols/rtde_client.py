@@ -128,11 +128,15 @@ class _Stream:
 
     async def read(self, patience: float) -> bool:
         """Wait for more; False when the other end has closed."""
-        try:
-            async with asyncio.timeout(patience):
-                data = await self.reader.read(CHUNK)
-        except TimeoutError as error:
-            raise TimeoutError(f"connected, but silent for {patience:g} s") from error
+        for last in (False, True):
+            try:
+                async with asyncio.timeout(patience / 2):
+                    data = await self.reader.read(CHUNK)
+                break
+            except TimeoutError as error:
+                # On a busy machine this thread may have slept, with data waiting: look again.
+                if last:
+                    raise TimeoutError(f"connected, but silent for {patience:g} s") from error
         self.arrived = time.monotonic()
         self._waiting += self._splitter.feed(data)
         return bool(data)

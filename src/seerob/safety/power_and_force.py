@@ -9,16 +9,17 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from msgspec import Meta, field
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from seerob import clamping, collision, contact_limits, contact_shape, provenance
+from seerob import clamping, collision, contact_limits, contact_shape, figures, provenance
 from seerob.contact_regions import REGIONS, Person, without_limit
 from seerob.criterion import Criterion, Evaluate, worst
 from seerob.errors import Undecided, UnknownName
-from seerob.impact_mass import masses_along_motion, simplified_mass
+from seerob.impact_mass import masses_along_motion, moving_masses, simplified_mass
 from seerob.model import Frame, Model
 from seerob.norms import body_limits
-from seerob.norms.crushing_gaps import crushing_gaps
+from seerob.norms.crushing_gaps import NOT_VERIFIED, crushing_gaps, gap_inputs
 from seerob.norms.limit_inputs import limit_inputs
 from seerob.snapshot import Arrow, Basis, Highlight, Input, Origin, Result, Verdict
 from seerob.state import State
@@ -35,6 +36,7 @@ CAP = 1e-4
 
 _Positive = Annotated[float, Meta(gt=0, extra={"unit": "m"})]
 _Area = Annotated[float, Meta(gt=0, extra={"unit": "m²"})]
+_Credited = Annotated[float, Meta(gt=0, le=CAP, extra={"unit": "m²"})]
 
 
 class PowerAndForce(Criterion, frozen=True, kw_only=True):
@@ -63,8 +65,8 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     """Radius of the sharpest edge of parts by name [m], instead of what their meshes tell."""
     contact_area: dict[str, _Area] = field(default_factory=dict)
     """Smallest contact area of parts by name [m²], instead of what their meshes tell."""
-    largest_area: _Area = CAP
-    """Area above which a contact is not credited [m²]."""
+    largest_area: _Credited = CAP
+    """Area above which a contact is not credited [m²]; never more than 1 cm²."""
     thickness: dict[str, _Positive] = field(default_factory=dict)
     """Gap in which a body region can be clamped [m], instead of the gaps of ISO 13854."""
 
@@ -98,15 +100,18 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
             for i in moving
         ]
 
-    def areas(self, model: Model, arrays: contact_limits.RegionArrays) -> Array:
-        """Contact area of each moving body with each region, free and clamped [m²], shape (b, 2, r)."""
+    def pressure_forces(self, model: Model, arrays: contact_limits.RegionArrays) -> Array:
+        """Force of each moving body that keeps the pressure of each specific area [N], shape (b, 2, a).
+
+        Free and clamped; see `contact_limits.RegionArrays.pressure_force`.
+        """
         moving = model.robot(self.robot).moving
         given = self._by_body(model, self.contact_area)
-        found = [arrays.contact_area(shape, self.largest_area) for shape in self.shapes(model)]
+        found = [arrays.pressure_force(shape, self.largest_area) for shape in self.shapes(model)]
         for row, body in enumerate(moving):
             if body in given:
-                found[row] = np.full_like(found[row], min(given[body], self.largest_area))
-        return np.array(found).reshape(len(moving), 2, len(arrays.regions))
+                found[row] = arrays.pressures() * min(given[body], self.largest_area)
+        return np.array(found).reshape(len(moving), 2, len(arrays.pressure))
 
     def _by_body(self, model: Model, given: dict[str, float]) -> dict[int, float]:
         moving = model.robot(self.robot).moving
@@ -134,7 +139,6 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
             )
         if limits.reviewed_by:
             label += f"; figures outside the usual ranges: {limits.reviewed_by}"
-        gap_source = crushing_gaps()[1]
         return Basis(
             formula="v = min(F/√(μk), pA/√(μk), √(2E/μ)), μ = 1/(1/m_H + 1/m_R), m_R = M/2 + m_L; "
             "clamped: m_H → ∞ and quasi-static limits; "
@@ -146,10 +150,9 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
             source="ISO/TS 15066:2016 Annex A.3, A.1 to A.6 (public sources that agree, 2S; A.1, A.2: M)",
             inputs=(
                 *provenance.motion(model, *names),
-                *provenance.masses(model, robot),
+                *self._given(model),
                 Input(name="limits", value=limits.file, origin=Origin.STATED, source=label),
-                *limit_inputs(limits, own=self.limits is not None),
-                *self._contact_inputs(model),
+                *limit_inputs(limits, own=self.limits is not None, multiplier=self.multiplier),
                 Input(
                     name="largest contact area",
                     value=self.largest_area,
@@ -159,12 +162,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
                     if self.largest_area == CAP
                     else "workstation file",
                 ),
-                Input(
-                    name="gaps that clamp",
-                    value=", ".join(f"{r} {self.thickness[r]:g} m" for r in self.thickness) or None,
-                    origin=Origin.ESTIMATED,
-                    source=gap_source + (", otherwise workstation file" if self.thickness else ""),
-                ),
+                *gap_inputs(self.thickness, [r.name for r in limits.regions.values() if r.permitted]),
                 *(
                     Input(
                         name=f"{region}: kept from contact",
@@ -179,8 +177,10 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
                 *doubts,
                 "larynx, eyes, ears and feet have no row in the table",
                 "people other than adults, protective padding, clothing",
-                "the contact area is that at the largest indentation the force limit allows; less is carried "
-                "at a lower force",
+                "the contact itself: its area grows with the indentation F/k by a convention of seerob, not the "
+                "norm's; the pressure is within its limit at every force up to the one permitted",
+                "free or clamped is decided by gaps after ISO 13854 that are not verified (M), unless the file "
+                "gives thickness",
                 "duration of the contact: what is free counts as transient, what is clamped as quasi-static",
                 "forces that drives keep up after the impact, detection and stop of the robot",
                 *(
@@ -188,29 +188,37 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
                     if robot.rotor_inertia_known
                     else ("rotor inertia: the effective mass along the motion is link side only",)
                 ),
-                *(() if self.human is not None or self.person_speed else ("the person's own motion",)),
+                *self._motion_left_out(),
             ),
         )
 
-    def _contact_inputs(self, model: Model) -> tuple[Input, ...]:
-        moving = model.robot(self.robot).moving
+    def _motion_left_out(self) -> tuple[str, ...]:
+        if self.person_speed is not None:
+            return ()
+        seen = "" if self.human is None else ", beyond what is observed: who stands still counts with 0 m/s"
+        return (f"the person's own motion{seen} (person_speed is not given)",)
+
+    def _given(self, model: Model) -> tuple[Input, ...]:
+        """What the file says of the contact, and what the robot and its surfaces are."""
+        robot = model.robot(self.robot)
+        M = None if robot.unknown_masses else moving_masses(model, robot)[0]
+        links, *carried = provenance.masses(model, robot)
+        links = replace(links, name=f"M, moving links of {self.robot}", value=M)
+        found = [links, *carried]
+        if self.human is not None:
+            found.append(provenance.given("horizon", self.horizon, "m"))
+        if self.person_speed is not None:
+            found.append(provenance.given("person_speed", self.person_speed, "m/s"))
         radii, areas = self._by_body(model, self.contact_radius), self._by_body(model, self.contact_area)
-        found = []
-        for body, shape in zip(moving, self.shapes(model), strict=True):
-            name = model.bodies[body].name
-            what, radius = f"contact radius of {name}", shape.sharpest[0]
-            if body in areas:
-                found.append(provenance.given(f"contact area of {name}", areas[body], "m²"))
-            elif body in radii:
-                found.append(provenance.given(what, radii[body], "m"))
-            elif shape.unknown:
-                found.append(Input(name=what, origin=Origin.MISSING, source=shape.unknown))
-            else:
-                value, unit = (radius, "m") if np.isfinite(radius) else ("flat", "")
-                found.append(
-                    Input(name=what, value=value, unit=unit, origin=Origin.COMPUTED, source="its mesh")
+        return (
+            *found,
+            *(
+                contact_limits.contact_input(
+                    model.bodies[body].name, shape, radius=radii.get(body), area=areas.get(body)
                 )
-        return tuple(found)
+                for body, shape in zip(robot.moving, self.shapes(model), strict=True)
+            ),
+        )
 
 
 class _Bound:
@@ -230,10 +238,11 @@ class _Bound:
         self.columns = {region.name: k for k, region in enumerate(self.arrays.regions)}
         self.in_regions = np.array([REGIONS.index(name) for name in self.columns], int)
         shapes = spec.shapes(model)
-        self.areas = spec.areas(model, self.arrays)
+        self.forces = spec.pressure_forces(model, self.arrays)
+        self.least = self.arrays.by_region(self.forces)
         self.unknown = [
-            shape.unknown if np.isnan(area).any() else ""
-            for shape, area in zip(shapes, self.areas, strict=True)
+            shape.unknown if np.isnan(force).any() else ""
+            for shape, force in zip(shapes, self.forces, strict=True)
         ]
         self.simplified = simplified_mass(model, self.robot)
         gaps = {**crushing_gaps()[0], **spec.thickness}
@@ -268,7 +277,7 @@ class _Bound:
             either = np.fmax if spec.mass == "larger" else (lambda m, m_u: np.where(np.isnan(m_u), m, m_u))
             masses = either(masses, projected)
         clamped = self._clamped(state)
-        speeds = self.arrays.speeds(masses, self.areas, clamped)
+        speeds = self.arrays.speeds(masses, self.least, clamped)
         moves = v_r > STANDSTILL
         if self.people is None:
             near: Flags = np.ones((len(v_r), len(REGIONS)), bool)
@@ -294,7 +303,8 @@ class _Bound:
         part, row = min(chosen, key=_margin)
         body = self.model.bodies[self.moving[row]]
         _, point, velocity = fastest[row]
-        label = f"{part.name}: {part.value:.2f} m/s" + (f" of {part.limit:.2f}" if part.limit else "")
+        shown = figures.against(part.value, part.limit, spec.unit, at_most=spec.at_most)
+        label = f"{part.name}: {shown.value} m/s" + ("" if part.limit is None else f" of {shown.limit}")
         arrow = Arrow(
             origin=tuple(point.tolist()),
             vector=tuple((0.3 * velocity).tolist()),
@@ -350,6 +360,12 @@ class _Bound:
         verdict = (Verdict.WITHIN, Verdict.UNDECIDED, Verdict.EXCEEDED)[int(judged.ranks[k])]
         how = "clamped" if judged.clamped[row, column] else "free"
         reason = f"{GOVERNING[int(speeds.governing[row, column])]}, {how}, {body}"
+        if speeds.pressure[row, column] == 0.0:
+            reason += (
+                ": by the shape of its contact every force exceeds the pressure; a contact_area replaces it"
+            )
+        if verdict is Verdict.WITHIN and how == "free" and name not in self.spec.thickness:
+            reason += f"; not clamped {NOT_VERIFIED}"
         if verdict is Verdict.UNDECIDED:
             reason = f"contact pressure of {body} ({how}): {self.unknown[row]}"
         return Result(
@@ -359,19 +375,20 @@ class _Bound:
             limit=float(speeds.permissible[row, column]),
             verdict=verdict,
             reason=reason,
-            parts=self._area_results(row, column, value, speeds),
+            parts=self._area_results(row, column, value, judged),
         ), row
 
-    def _area_results(
-        self, row: int, column: int, v: float, speeds: contact_limits.Speeds
-    ) -> tuple[Result, ...]:
+    def _area_results(self, row: int, column: int, v: float, judged: _Judged) -> tuple[Result, ...]:
         """The same for each specific area: force belongs to the region, pressure to the area."""
+        speeds = judged.speeds
         others = min(float(speeds.force[row, column]), float(speeds.energy[row, column]))
-        pressed = float(speeds.pressure[row, column]) / float(self.arrays.pressure[column])
-        open_ = math.isnan(pressed)
+        forces = self.forces[row, int(judged.clamped[row, column]), self.arrays.owner == column]
+        region = self.arrays.regions[column]
+        pressed = collision.speed_at_force(forces, speeds.mu[row, column], region.stiffness.value)
         found = []
-        for area in self.arrays.regions[column].areas:
-            limit = others if open_ else min(others, pressed * area.pressure.value)
+        for area, v_P in zip(region.areas, pressed.tolist(), strict=True):
+            open_ = math.isnan(v_P)
+            limit = others if open_ else min(others, v_P)
             verdict = Verdict.EXCEEDED if v > limit else Verdict.UNDECIDED if open_ else Verdict.WITHIN
             reason = self.unknown[row] if verdict is Verdict.UNDECIDED else ""
             found.append(

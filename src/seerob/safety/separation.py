@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from msgspec import Meta, Struct
 
-from seerob import provenance
+from seerob import figures, provenance
 from seerob.criterion import Criterion, Evaluate, judge
 from seerob.errors import InputError, Undecided
 from seerob.model import Gap, Model
@@ -58,6 +58,12 @@ class Detection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Smallest object that is always seen [m]; when none was demonstrated, the largest C holds."""
     height: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
     """Of a field along the floor [m]."""
+    reach_over: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
+    """C_RO (D_DO) for reaching over a field across the approach, from the norm's table [m]; 0 where other
+    measures exclude it. C is the larger of it and what the field gives."""
+    reach_under: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
+    """D_DU for reaching under the field, or crawling under one more than 0.2 m above the floor [m]; 0 where
+    other measures exclude it."""
     supplement: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
     """Z of the 2024 edition [m]."""
 
@@ -121,13 +127,19 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 iso_13855.Edition(d.edition),
                 capability=d.capability,
                 height=d.height,
+                over=d.reach_over,
+                under=d.reach_under,
             )
         except Undecided as unknown:
             return None, str(unknown), ""
         source = f"{found.source}; {found.note}" if found.note else found.source
+        missing = [
+            f"detection.{'reach_over' if 'over' in way else 'reach_under'} ({way}; 0 where it is excluded)"
+            for way in found.uncovered
+        ]
         if d.edition == "2024" and d.supplement is None:
-            return found.value, "detection.supplement (Z of ISO 13855:2024)", source
-        return found.value + (d.supplement or 0.0), "", source
+            missing.append("detection.supplement (Z of ISO 13855:2024)")
+        return found.value + (d.supplement or 0.0), ", ".join(missing), source
 
     def _terms(self) -> tuple[tuple[float, float, float], list[str]]:
         """C, Z_d and Z_r [m], 0 where not known, and what is not known."""
@@ -177,10 +189,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
             k = int((found.distance - S_p).argmin())
             verdict = parts[k].verdict
             where = f"{parts[k].name} ↔ {parts[k].reason}"
+            shown = figures.against(float(found.distance[k]), float(S_p[k]), self.unit, at_most=self.at_most)
             segment = Segment(
                 start=tuple(found.point_b[k].tolist()),
                 end=tuple(found.point_a[k].tolist()),
-                label=f"{found.distance[k]:.2f} m, S_p {S_p[k]:.2f} m",
+                label=f"{shown.value} m, S_p {shown.limit} m",
                 verdict=verdict,
             )
             return Result(
@@ -284,6 +297,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             not_modelled=(
                 *stop.not_modelled,
                 *(() if toward else ("direction: the speed counts in full, also of parts that move away",)),
+                *self._ways_around(),
                 "a person whose own speed exceeds v_h",
             ),
         )
@@ -295,7 +309,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 value=f"{WALKING} m/s, {iso_13855.REACHING:g} m/s up to S_p = {iso_13855.ARM_REACH} m",
                 unit="",
                 origin=Origin.STATED,
-                source="ISO/TS 15066:2016 5.5.4.2.3 and ISO 13855, from public sources that agree (2S)",
+                source="ISO/TS 15066:2016 5.5.4.2.3 and ISO 13855, from public sources that agree (2S); "
+                f"that S_p with {WALKING} m/s is not below {iso_13855.ARM_REACH} m is from memory (M)",
             )
         if self.human_speed == WALKING:
             return Input(
@@ -306,6 +321,13 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 source="ISO/TS 15066:2016 5.5.4.2.3, from public sources that agree (2S)",
             )
         return provenance.given("v_h", self.human_speed, "m/s")
+
+    def _ways_around(self) -> tuple[str, ...]:
+        if self.detection is None:
+            return ()
+        if self.detection.approach == "orthogonal":
+            return ("reaching over or under the detection field, beyond reach_over and reach_under",)
+        return ("crawling under the detection field, beyond reach_under",)
 
     def _intrusion_input(self) -> Input:
         C, missing, source = self._intrusion()

@@ -46,8 +46,10 @@ def entered(phases: Sequence[Phase], unknown: Phase) -> tuple[Input, ...]:
                         name=name,
                         value=_plain(value),
                         unit=_UNITS.get(field.name, ""),
-                        origin=Origin.GIVEN,
-                        source="workstation file",
+                        origin=Origin.ASSUMED if value == field.default else Origin.GIVEN,
+                        source=f"workstation file, {_plain(field.default)} when not given"
+                        if value == field.default
+                        else "workstation file",
                     )
                 )
     return tuple(found)

@@ -38,6 +38,8 @@ class Origin(StrEnum):
     """Follows from the others by the formula."""
     ESTIMATED = "estimated"
     """By a stated method with a stated error, asked for by the user."""
+    CHOICE = "choice"
+    """What a method leaves open, decided by seerob in the open; the workstation file can choose otherwise."""
     ASSUMED = "assumed"
     """Nobody gave it; a verdict that needs it is UNDECIDED."""
     MISSING = "missing"

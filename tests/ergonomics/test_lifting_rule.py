@@ -26,8 +26,8 @@ load = {load}
 control = true
 per_minute = 3
 coupling = "fair"
-origin = {{ horizontal = 0.25, vertical_mm = 550 }}
-destination = {{ horizontal = {far}, vertical = 1.475 }}
+origin = {{ horizontal = 0.25, vertical_mm = 550, asymmetry = 0 }}
+destination = {{ horizontal = {far}, vertical = 1.475, asymmetry = 0 }}
 """
 
 
@@ -63,3 +63,14 @@ def test_several_lifts_make_a_composite_index(tmp_path):
     both = results_at(made(tmp_path, HUMAN + two))["lift"]
     assert both.value > alone.value
     assert [p.value for p in both.parts] == pytest.approx([alone.value] * 2)
+
+
+def test_a_lift_on_its_own_is_judged_by_its_greatest_mass(tmp_path):
+    """5 kg on average and 12 kg at times is as much as 12 kg."""
+    usual = LIFT.format(load=12, far=0.5, exclusions="[]")
+    varied = LIFT.format(load=5, far=0.5, exclusions="[]").replace("load = 5", "load = 5\nheaviest = 12")
+    values = [
+        results_at(made(tmp_path / name, HUMAN + text))["lift"].value
+        for name, text in (("a", usual), ("b", varied))
+    ]
+    assert values[0] == values[1] == pytest.approx(1.745, abs=1e-3)

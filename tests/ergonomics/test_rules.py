@@ -232,7 +232,7 @@ def test_every_threshold_stands_in_the_basis_with_its_origin(tmp_path, kind):
     changed = named["threshold bent" if kind == "owas" else "threshold trunk twist"]
     assert (changed.value, changed.unit, changed.origin) == (25.0, "deg", Origin.GIVEN)
     others = {i.origin for i in inputs if i.name.startswith("threshold") and i is not changed}
-    assert others == {Origin.ASSUMED}
+    assert others == {Origin.CHOICE}
     assert named["head"].origin is Origin.MISSING
     assert named["accuracy of the angles"].origin is Origin.MISSING
 

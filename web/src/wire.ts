@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "4ea118ce08d73e43";
+export const SCHEMA = "cf3c11c1b6fd31e0";
 
 export type Vec3 = [number, number, number];
 
@@ -30,6 +30,7 @@ export type Verdict =
  * - `given`: Written by the user in the workstation file.
  * - `computed`: Follows from the others by the formula.
  * - `estimated`: By a stated method with a stated error, asked for by the user.
+ * - `choice`: What a method leaves open, decided by seerob in the open; the workstation file can choose otherwise.
  * - `assumed`: Nobody gave it; a verdict that needs it is UNDECIDED.
  */
 export type Origin =
@@ -38,6 +39,7 @@ export type Origin =
   | "given"
   | "computed"
   | "estimated"
+  | "choice"
   | "assumed"
   | "missing";
 

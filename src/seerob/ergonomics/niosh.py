@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
@@ -42,7 +43,7 @@ class LiftEnd(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """H: from the middle between the ankles to the middle between the hands, along the floor [m]."""
     vertical: Height
     """V: hands above the floor [m]."""
-    asymmetry: Turn = 0.0
+    asymmetry: Turn
     """A: turn of the load out of the sagittal plane [rad]."""
 
 
@@ -52,7 +53,7 @@ class Lift(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     load: Kilograms
     """Mass on average [kg]."""
     heaviest: Kilograms | None = None
-    """Greatest mass [kg]; the average when not given."""
+    """Greatest mass [kg]; the average when not given. A lift on its own is judged by it."""
     origin: LiftEnd
     """Where the lift begins."""
     destination: LiftEnd
@@ -137,6 +138,9 @@ class Niosh(Criterion, frozen=True, kw_only=True):
     def _result(self) -> Result:
         spell = method.duration(self.work, self.recovery)
         tasks = [lift.task() for lift in self.lifts]
+        if len(tasks) == 1:
+            # The composite index takes the greatest mass only from the second task on.
+            tasks = [replace(tasks[0], average=tasks[0].heaviest)]
         index = method.composite_index(tasks, spell)
         parts, zero = [], []
         for i, task in enumerate(tasks):

@@ -159,7 +159,7 @@ class Owas(Criterion, frozen=True, kw_only=True):
                 Input(
                     name="arm at or above shoulder level",
                     value="elbow or wrist at the height of the shoulder's joint or above",
-                    origin=Origin.ASSUMED,
+                    origin=Origin.CHOICE,
                     source="a choice of seerob",
                 ),
                 *(() if self.limit is None else provenance.limit(self.limit, "")),

@@ -151,7 +151,7 @@ class Rula(Criterion, frozen=True, kw_only=True):
                 Input(
                     name="profile",
                     value=self.profile.value,
-                    origin=Origin.ASSUMED if usual else Origin.GIVEN,
+                    origin=Origin.CHOICE if usual else Origin.GIVEN,
                     source="option profile, original1993 when not given",
                 ),
                 *entered(self.phases, RulaPhase()),

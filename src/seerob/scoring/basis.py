@@ -46,7 +46,7 @@ def entered(phases: Sequence[Phase], unknown: Phase) -> tuple[Input, ...]:
                         name=name,
                         value=_plain(value),
                         unit=_UNITS.get(field.name, ""),
-                        origin=Origin.ASSUMED if value == field.default else Origin.GIVEN,
+                        origin=Origin.CHOICE if value == field.default else Origin.GIVEN,
                         source=f"workstation file, {_plain(field.default)} when not given"
                         if value == field.default
                         else "workstation file",
@@ -64,7 +64,7 @@ def choices(
         Input(
             name="arm angle",
             value=arm.value,
-            origin=Origin.ASSUMED if arm is ArmPolicy.PROJECTION else Origin.GIVEN,
+            origin=Origin.CHOICE if arm is ArmPolicy.PROJECTION else Origin.GIVEN,
             source="option arm, projection when not given",
         ),
         *posture_quality(accuracy, unmeasured),
@@ -82,7 +82,7 @@ def chosen(thresholds: msgspec.Struct, usual: msgspec.Struct) -> tuple[Input, ..
                 name="threshold " + field.name.replace("_", " "),
                 value=round(math.degrees(value), 6),
                 unit="deg",
-                origin=Origin.GIVEN if own else Origin.ASSUMED,
+                origin=Origin.GIVEN if own else Origin.CHOICE,
                 source="workstation file" if own else "a choice of seerob, the method leaves it open",
             )
         )

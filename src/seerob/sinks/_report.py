@@ -18,6 +18,7 @@ WHO = {
     Origin.GIVEN: "given by the user",
     Origin.COMPUTED: "computed",
     Origin.ESTIMATED: "estimated",
+    Origin.CHOICE: "a choice of the method, by seerob",
     Origin.ASSUMED: "assumed, nobody gave it",
     Origin.MISSING: "missing",
 }

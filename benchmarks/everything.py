@@ -84,11 +84,12 @@ def main() -> int:
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     found = measure(1.0 if options.smoke else 20.0)
     print(
-        f"two robots, one person: {found['dof']} dof, {found['criteria']} criteria, {found['ticks']} ticks, one core"
+        f"two robots, one person: {found['dof']} dof, {found['criteria']} criteria, "
+        f"{found['ticks']} ticks, one core"
     )
     print(
-        "median {median_ms:.2f} ms (engine {engine_ms:.2f}, criteria {criteria_ms:.2f}, snapshot {snapshot_ms:.2f}), "
-        "p99 {p99_ms:.2f}, max {max_ms:.2f}".format(**found)
+        "median {median_ms:.2f} ms (engine {engine_ms:.2f}, criteria {criteria_ms:.2f}, "
+        "snapshot {snapshot_ms:.2f}), p99 {p99_ms:.2f}, max {max_ms:.2f}".format(**found)
     )
     print(f"real time / computed time: {found['x_real_time']:.1f} x   (goal: >= 5, p99 < 10 ms)")
     return 0 if np.isfinite(found["least_distance"]) else 1

@@ -9,7 +9,15 @@ import pytest
 import trimesh
 
 from seerob.contact_limits import RegionArrays
-from seerob.contact_shape import ContactShape, body_shape, mesh_shape, patch_area, round_shape, solid_shape
+from seerob.contact_shape import (
+    ContactShape,
+    body_shape,
+    force_at_pressure,
+    mesh_shape,
+    patch_area,
+    round_shape,
+    solid_shape,
+)
 from seerob.geometry import Mesh, Solid, capsule
 from seerob.norms.body_limits import shipped
 
@@ -166,17 +174,50 @@ def test_sharper_is_never_a_larger_area() -> None:
     assert areas.max() <= CAP * (1 + 1e-12)
 
 
-def test_least_area_of_many_patches_is_brute_force() -> None:
+@pytest.mark.parametrize("p", [1.2e6, 3.8e6])
+@pytest.mark.parametrize("k", [10e3, 75e3])
+def test_pressure_is_within_its_limit_at_every_force_up_to_the_permitted_one_and_beyond_above(
+    p: float, k: float
+) -> None:
+    R = np.geomspace(3e-4, 0.1, 25)
+    radii = np.array([(a, b) for a in R for b in (*R, np.inf) if a <= b] + [(np.inf, np.inf)])
+    F = force_at_pressure(radii, p, k, CAP)
+    share = np.linspace(1e-6, 1, 400)[:, None] * F
+    some = F > 0
+    assert (share[:, some] <= p * patch_area(radii, share / k, CAP)[:, some] * (1 + 1e-9)).all()
+    beyond = np.where(some, F * 1.001, 1e-3)
+    assert (beyond > p * patch_area(radii, beyond / k, CAP)).all()
+    assert 0 < some.sum() < len(F)
+
+
+def test_ball_of_5_mm_presses_harder_than_the_hand_may_be_at_every_force() -> None:
+    """p = k/(π R) = 4.77 MPa whatever the force, above 3.8 MPa; from 6.3 mm on it holds."""
+    assert force_at_pressure([0.005, 0.005], 3.8e6, 75e3, CAP) == 0
+    assert 75e3 / (math.pi * 0.005) == pytest.approx(4.77e6, rel=1e-3)
+    R = 75e3 / (math.pi * 3.8e6)
+    assert force_at_pressure([R * 0.999] * 2, 3.8e6, 75e3, CAP) == 0
+    # Larger than the cap of 5.64 mm: the area ends at 1 cm².
+    assert force_at_pressure([R * 1.001] * 2, 3.8e6, 75e3, CAP) == pytest.approx(380)
+
+
+def test_force_of_many_patches_is_brute_force() -> None:
     arrays = RegionArrays.of(shipped())
     rng = np.random.default_rng(3)
     # The sharper one way, the flatter the other: none is the least everywhere.
-    sharp = rng.uniform(5e-4, 4e-3, 500)
-    radii = np.column_stack([sharp, 6e-6 / sharp**0.9 * rng.uniform(1, 2, 500)])
+    sharp = rng.uniform(3e-3, 6e-3, 500)
+    radii = np.column_stack([sharp, 3e-4 / sharp**0.9 * rng.uniform(1, 2, 500)])
     radii[::7, 1] = np.inf
-    found = arrays.contact_area(ContactShape(np.zeros((500, 3)), np.sort(radii, axis=1)), CAP)
-    for row, factor in enumerate((arrays.multiplier, np.ones(10))):
-        d = factor * arrays.force / arrays.stiffness
-        brute = [min(float(patch_area(r, x, CAP)) for r in radii) for x in d]
-        np.testing.assert_allclose(found[row], brute, rtol=1e-12)
-    assert np.isnan(arrays.contact_area(ContactShape(np.zeros((0, 3)), np.zeros((0, 2)), "?"), CAP)).all()
-    assert (arrays.contact_area(round_shape(1.0), CAP) == CAP).all()
+    radii = np.sort(radii, axis=1)
+    found = arrays.pressure_force(ContactShape(np.zeros((500, 3)), radii), CAP)
+    k = arrays.stiffness[arrays.owner]
+    for row, p in enumerate(arrays.pressures()):
+        F = np.linspace(0.05, 900, 18000)
+        for a in range(0, len(k), 5):
+            areas = np.min([patch_area(r, F / k[a], CAP) for r in radii[::10]], axis=0)
+            holds = np.cumprod(p[a] * areas >= F)
+            few = arrays.pressure_force(ContactShape(np.zeros((50, 3)), radii[::10]), CAP)
+            assert few[row, a] == pytest.approx(0.05 * holds.sum(), abs=0.051)
+            assert found[row, a] <= few[row, a]
+    assert (found > 0).any()
+    assert np.isnan(arrays.pressure_force(ContactShape(np.zeros((0, 3)), np.zeros((0, 2)), "?"), CAP)).all()
+    np.testing.assert_allclose(arrays.pressure_force(round_shape(1.0), CAP), arrays.pressures() * CAP)

@@ -38,6 +38,8 @@ def three(low, high):
 
 
 ACROSS, ALONG = Approach.ORTHOGONAL, Approach.PARALLEL
+NO_WAY = {"over": 0.0, "under": 0.0}
+"""Around the field."""
 
 
 @pytest.mark.parametrize(
@@ -158,14 +160,15 @@ def test_travel_bounds_the_path_of_a_folded_arm():
     ],
 )
 def test_worked_minimum_distances(approach, edition, d, H, T, S):
-    found = minimum_distance(approach, Edition(edition), T, capability=d, height=H, supplement=0.0)
+    found = minimum_distance(approach, Edition(edition), T, capability=d, height=H, supplement=0.0, **NO_WAY)
     assert found.distance == pytest.approx(S, abs=1e-12)
 
 
 def test_supplement_of_2024_is_added_and_needed():
+    field = {"capability": 0.07, "height": 0.3, **NO_WAY}
     with pytest.raises(Undecided, match="Z is not given"):
-        minimum_distance(ALONG, Edition.E2024, 0.3, capability=0.07, height=0.3)
-    with_it = minimum_distance(ALONG, Edition.E2024, 0.3, capability=0.07, height=0.3, supplement=0.05)
+        minimum_distance(ALONG, Edition.E2024, 0.3, **field)
+    with_it = minimum_distance(ALONG, Edition.E2024, 0.3, **field, supplement=0.05)
     assert with_it.distance == pytest.approx(1.73)
 
 
@@ -194,6 +197,9 @@ def test_two_hand_control_of_2024_is_undecided():
         ("height", {"approach": ALONG, "height": 1.01}),
         ("height", {"approach": ALONG, "height": -0.1}),
         ("height", {"approach": ACROSS, "height": 0.5}),
+        # H would have to be above 1 m: d is at most 1000 / 15 + 50 = 116.7 mm.
+        ("capability", {"approach": ALONG, "capability": 0.1167}),
+        ("capability", {"approach": ALONG, "capability": 0.2}),
         ("capability", {"approach": ACROSS, "capability": -0.03}),
         ("capability", {"approach": ACROSS, "capability": float("nan")}),
     ],
@@ -207,9 +213,48 @@ def test_what_the_norm_does_not_admit_is_an_error(key, more):
 @given(d=st.floats(0.001, 0.07), finer=st.floats(0, 1))
 def test_a_finer_field_never_needs_more_room(d, finer):
     for approach in (ACROSS, ALONG):
+        height = 0.3 if approach is ALONG else None
         for edition in Edition:
-            fine = intrusion(approach, edition, capability=max(d * finer, 1e-4))
-            assert fine.value <= intrusion(approach, edition, capability=d).value
+            fine = intrusion(approach, edition, capability=max(d * finer, 1e-4), height=height)
+            assert fine.value <= intrusion(approach, edition, capability=d, height=height).value
+
+
+@pytest.mark.parametrize("edition", Edition)
+def test_coarse_field_along_the_floor_needs_its_height(edition):
+    with pytest.raises(Undecided, match=r"at least 0\.3 m above the floor"):
+        intrusion(ALONG, edition, capability=0.07)
+    assert intrusion(ALONG, edition, capability=0.05).value == 1.2
+    assert intrusion(ALONG, edition, capability=0.1166, height=1.0).value >= 0.85
+
+
+@pytest.mark.parametrize(
+    ("approach", "edition", "height", "ways"),
+    [
+        (ACROSS, "2010", None, ["reaching over the field"]),
+        (ACROSS, "2024", None, ["reaching over the field", "reaching under the field"]),
+        (ALONG, "2010", 0.2, []),
+        (ALONG, "2010", 0.201, ["crawling under the field"]),
+        (ALONG, "2024", None, ["crawling under the field"]),
+    ],
+)
+def test_ways_around_the_field_are_open_until_somebody_speaks_of_them(approach, edition, height, ways):
+    """C is the larger of C_RO and what the field gives: 8 (30 - 14) = 128 mm."""
+    field = {"capability": 0.03, "height": height}
+    assert list(intrusion(approach, Edition(edition), **field).uncovered) == ways
+    closed = intrusion(approach, Edition(edition), **field, **NO_WAY)
+    assert closed.uncovered == ()
+    if approach is ACROSS:
+        assert closed.value == pytest.approx(0.128)
+        assert intrusion(approach, Edition(edition), **field, over=0.9, under=0.0).value == 0.9
+    if ways:
+        with pytest.raises(Undecided, match=ways[0]):
+            minimum_distance(approach, Edition(edition), 0.3, **field, supplement=0.0)
+
+
+def test_what_is_from_memory_says_so():
+    for edition in Edition:
+        assert "M)" in intrusion(ACROSS, edition, capability=0.07).source
+        assert "M)" not in intrusion(ACROSS, edition, capability=0.03).source
 
 
 @given(v=st.floats(0, 3), T=st.floats(0.01, 0.5), d=st.floats(0, 2))

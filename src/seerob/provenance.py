@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from seerob.model import Gap, Mechanism, Model
 from seerob.snapshot import Input, Origin
 
@@ -88,6 +90,19 @@ def shapes(gap: Gap) -> tuple[Input, ...]:
             )
         )
     return tuple(found)
+
+
+def point(model: Model, at: str, offset: tuple[float, float, float]) -> Input:
+    """Which point a figure is of: a name may mean a tool's working point or a link's origin."""
+    frame = model.frame(at)
+    local = frame.body_from_frame[:3, 3]
+    shown = [round(float(x), 4) for x in local + frame.body_from_frame[:3, :3] @ np.array(offset)]
+    return Input(
+        name="point",
+        value=f"{shown} m in the frame of {frame.name}",
+        origin=Origin.GIVEN if at != model.carrier(frame).name or local.any() else Origin.CHOICE,
+        source="workstation file" if at != model.carrier(frame).name else f"point of interest of {at}",
+    )
 
 
 def given(name: str, value: float, unit: str) -> Input:

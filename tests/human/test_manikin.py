@@ -319,6 +319,8 @@ def test_body_regions():
     front, back = np.array([0.1, 0.05, 0.0]), np.array([-0.1, 0.05, 0.0])
     assert skin.body_region("thorax", front, body=body) == "Chest"
     assert skin.body_region("thorax", back, body=body) == "Back and shoulders"
+    assert skin.body_region("left_clavicle", front, body=body) == "Chest"
+    assert skin.body_region("left_clavicle", back, body=body) == "Back and shoulders"
     assert skin.body_region("left_forearm", back, body=body) == "Lower arms and wrist joints"
     assert skin.body_region("right_foot", front, body=body) is None
     eye = body.length["head"] - 0.064 * 1.75

@@ -36,6 +36,13 @@ def test_distance_in_closed_form(tmp_path, limit, verdict):
     assert segment.end[0] == pytest.approx(2.3)
 
 
+def test_shapes_that_cross_are_exceeded_whatever_the_limit(tmp_path):
+    """Their figure is 0, at least that deep: 0 against a limit of 0 is not within."""
+    d = judged(tmp_path, BOX.format(name="box", at=[1.5, 0, 0]) + distance(0.0))["d"]
+    assert d.value <= 0
+    assert d.verdict == "exceeded"
+
+
 def test_distance_of_boxes_is_coals(tmp_path):
     boxes = [[0.9, 1.3, 0.4], [-1.2, -0.4, 0.0], [0.1, -1.7, -0.3]]
     tables = "".join(BOX.format(name=f"cell/box{i}", at=at) for i, at in enumerate(boxes))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, heard, judged, made, results_at, state_at, two_r
+from made_cell import FLOATING, TWO_R, UR10, heard, judged, made, results_at, state_at, two_r
 from seerob import stop_models
 from seerob.engine import Engine
 from seerob.errors import InputError
@@ -22,7 +22,7 @@ BRAKING = 'reaction = 0.1, deceleration = 2.0, model = "constant_deceleration"'
 SIMULATED = 'reaction = 0.1, model = "simulated", brakes = [40.0, 20.0]'
 ROTOR = "rotor_inertia = [0.0, 0.0]\n"
 JOINT = "{{ joint = {j}, full_speed = 3.0, way = [[[{way}]]], time = [[[{time}]]] }}"
-HEAD = 'robot = "r", category = 0, source = "s", confidence = "1S"'
+HEAD = 'robot = "arm", category = 0, source = "s", confidence = "1S"'
 TABLE = (
     f'reaction = 0.1, model = "table", table = {{ {HEAD}, rated_payload = 5.0, joints = ['
     + JOINT.format(j=0, way=0.4, time=0.3)
@@ -136,10 +136,12 @@ def test_given_speed_of_the_person_is_taken_as_it_is(tmp_path):
 @pytest.mark.parametrize(
     ("detection", "C"),
     [
-        ('edition = "2010", capability = 0.07, height = 0.3', 1.08),
-        ('edition = "2024", capability = 0.07, height = 0.3, supplement = 0.1', 1.3),
-        ('edition = "2010", approach = "orthogonal", capability = 0.03', 0.128),
-        ('edition = "2010"', 1.2),
+        ('edition = "2010", capability = 0.07, height = 0.3, reach_under = 0', 1.08),
+        ('edition = "2024", capability = 0.07, height = 0.3, supplement = 0.1, reach_under = 0', 1.3),
+        ('edition = "2010", approach = "orthogonal", capability = 0.03, reach_over = 0', 0.128),
+        ('edition = "2010", approach = "orthogonal", capability = 0.03, reach_over = 0.9', 0.9),
+        ('edition = "2010", capability = 0.05, height = 0.1', 1.16),
+        ('edition = "2010", reach_under = 0', 1.2),
     ],
 )
 def test_intrusion_by_iso_13855(tmp_path, detection, C):
@@ -153,13 +155,40 @@ def test_intrusion_by_iso_13855(tmp_path, detection, C):
 
 @pytest.mark.parametrize(
     "detection",
-    ["capability = 0.07, height = 0.3", 'approach = "orthogonal", capability = 0.08, edition = "2010"'],
+    [
+        "capability = 0.07, height = 0.3, reach_under = 0",
+        'approach = "orthogonal", capability = 0.08, edition = "2010", reach_over = 0',
+        'approach = "orthogonal", capability = 0.03, edition = "2010"',
+        'capability = 0.07, height = 0.3, edition = "2010"',
+        'capability = 0.07, edition = "2010", reach_under = 0',
+    ],
 )
 def test_intrusion_that_is_not_settled_is_undecided(tmp_path, detection):
     options = KNOWN.replace("intrusion = 0.2", f"detection = {{ {detection} }}")
     S = separation(tmp_path / "far", BOUND, options, x=9.0)
     assert S.verdict == "undecided"
     assert separation(tmp_path / "near", BOUND, options, x=3.0).verdict == "exceeded"
+
+
+def test_what_the_field_does_not_cover_is_named(tmp_path):
+    across = KNOWN.replace("intrusion = 0.2", 'detection = { approach = "orthogonal", edition = "2010" }')
+    S = separation(tmp_path, BOUND, across, x=9.0)
+    assert "detection.reach_over (reaching over the field" in S.reason
+    assert any("reaching over" in text for text in S.basis.not_modelled)
+
+
+def test_the_floor_of_half_a_metre_is_from_memory(tmp_path):
+    v_h = next(i for i in separation(tmp_path, BOUND).basis.inputs if i.name == "v_h")
+    assert "not below 0.5 m is from memory (M)" in v_h.source
+
+
+def test_marker_never_shows_an_exceeded_distance_as_equal(tmp_path):
+    S = separation(tmp_path / "a", BOUND, qd=(0.0, 0.0))
+    K_more = S.value - S.limit + 1e-6
+    near = separation(tmp_path / "b", BOUND, KNOWN.replace("0.2", repr(0.2 + K_more)), qd=(0.0, 0.0))
+    assert near.verdict == "exceeded"
+    value, _, limit = near.markers[0].label.replace(" m", "").partition(", S_p ")
+    assert float(value) < float(limit)
 
 
 # -- fixed -------------------------------------------------------------------------------------
@@ -233,8 +262,44 @@ def test_joint_without_a_table_needs_a_stopping_time(tmp_path):
     assert terms(given)[:3] == pytest.approx([1.6 * 0.6, 0.1 * arm, 0.5 * arm])
 
 
+UR10_TABLE = 'reaction = 0.1, model = "table", table = "ur10_cb3"'
+
+
+def test_table_by_tool_speed_is_undecided_above_its_payload_and_without_a_mass(tmp_path):
+    tool = '[[tools]]\nname = "t"\non = "arm/tip"\nshape = { box = [0.1, 0.1, 0.1] }\n'
+    stop = UR10_TABLE + ', table_for = "arm"'
+    heavy = separation(tmp_path / "h", stop, more=tool + "mass = 15\n", x=20.0)
+    assert (heavy.verdict, "payload is 1.5" in heavy.reason) == ("undecided", True)
+    unknown = separation(tmp_path / "u", stop, more=tool, x=20.0)
+    assert (unknown.verdict, "mass" in unknown.reason) == ("undecided", True)
+    light = separation(tmp_path / "l", stop, more=tool + "mass = 9.9\n", x=20.0)
+    assert light.verdict == "within"
+    inputs = {i.name: i.value for i in light.basis.inputs}
+    assert inputs["payload of arm"] == pytest.approx(9.9)
+    assert inputs["rated payload of the stopping table"] == 10.0
+
+
+@pytest.mark.parametrize("stop", [UR10_TABLE, TABLE.replace('robot = "arm"', 'robot = "another"')])
+def test_table_of_another_robot_keeps_nothing_within_unless_the_file_says_so(tmp_path, stop):
+    far = separation(tmp_path / "far", stop, x=20.0)
+    assert (far.verdict, "stop.table_for" in far.reason) == ("undecided", True)
+    assert separation(tmp_path / "near", stop, x=3.0).verdict == "exceeded"
+    said = separation(tmp_path / "said", stop + ', table_for = "arm"', x=20.0)
+    assert said.verdict == "within"
+    assert any((i.name, i.origin) == ("stopping table is of", "given") for i in said.basis.inputs)
+
+
+def test_table_of_the_librarys_robot_is_known_to_be_its_own(tmp_path):
+    q = ([0.0, -1.2, 1.4, -1.5, -1.5, 0.0], [0.3, 0, 0, 0, 0, 0])
+    for model, verdict in (("ur10", "within"), ("ur10e", "undecided")):
+        text = UR10.replace("library:ur10", f"library:{model}") + PERSON.format(x=15.0)
+        text += f'[[safety]]\nkind = "separation"\nname = "S"\nbetween = ["arm", "op"]\n{KNOWN}'
+        cell = made(tmp_path / model, text + f"stop = {{ {UR10_TABLE} }}\n")
+        assert results_at(cell, arm=q)["S"].verdict == verdict
+
+
 def test_table_by_tool_speed(tmp_path):
-    S = separation(tmp_path, 'reaction = 0.1, model = "table", table = "ur10_cb3"', x=9.0)
+    S = separation(tmp_path, UR10_TABLE, x=9.0)
     T_s = 0.55 + 0.1 * (V - 2)
     assert terms(S)[:3] == pytest.approx([1.6 * (0.1 + T_s), 0.1 * V, T_s * V])
 
@@ -349,6 +414,8 @@ def test_permissible_speed_by_simulation_is_one_that_holds(tmp_path):
         ('reaction = 0.1, model = "simulated", brakes = [1.0, -1.0]', "> 0"),
         ('reaction = 0.1, model = "table", table = "ur5"', "ur5_cb3"),
         ('reaction = 0.1, model = "table", table = "ur5_cb3"', "has joint 2, arm has 2 joints"),
+        (f'{BOUND}, table_for = "arm"', "does nothing"),
+        (f'{TABLE}, table_for = "other"', "other does not stop here"),
         ("reaction = 0.0, stopping = 0.3", "> 0"),
     ],
 )

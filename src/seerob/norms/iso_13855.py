@@ -228,8 +228,8 @@ def _along(edition: Edition, capability: float | None, height: float | None) -> 
     lowest = _lowest(capability)
     if height is None and lowest > 0:
         raise Undecided(
-            f"ISO 13855:{edition}: a field that resolves {capability:g} m must be at least {lowest:g} m above "
-            "the floor, and its height is not given"
+            f"ISO 13855:{edition}: a field that resolves {capability:g} m must be at least {lowest:g} m "
+            "above the floor, and its height is not given"
         )
     if edition is Edition.E2024:
         return Intrusion(FLOOR, f"{source} (2S)")

@@ -8,6 +8,32 @@ from seerob.snapshot import Input, Origin
 _ORIGIN = {"M": Origin.ESTIMATED, "D": Origin.COMPUTED, "own": Origin.GIVEN}
 
 
+def table_input(limits: BodyLimits, edition: str) -> tuple[Input, tuple[str, ...]]:
+    """The table itself, and what is doubtful about it.
+
+    Args:
+        limits: The table.
+        edition: Of the norm that the workstation file asks for.
+    """
+    label = f"{limits.edition}; {limits.title}"
+    doubts: tuple[str, ...] = ()
+    if edition != limits.edition:
+        label += f"; used for {edition}"
+        doubts = (
+            f"{edition}: whether any figure of its Annex M differs is not known row by row; "
+            f"the figures are those of {limits.edition}",
+        )
+    if limits.reviewed_by:
+        label += f"; figures outside the usual ranges: {limits.reviewed_by}"
+    return Input(name="limits", value=limits.file, origin=Origin.STATED, source=label), doubts
+
+
+def excluded_input(region: str) -> Input:
+    """A body region that the workstation file keeps from contact."""
+    source = "workstation file; by measures that are not evaluated here"
+    return Input(name=f"{region}: kept from contact", origin=Origin.GIVEN, source=source)
+
+
 def limit_inputs(limits: BodyLimits, *, own: bool, multiplier: float | None = None) -> tuple[Input, ...]:
     """Every figure of a table.
 

@@ -165,10 +165,13 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         return Basis(
             formula=f"1/m_u = uᵀ J_v M⁻¹ J_vᵀ u, u {which}",
             source="Weistroffer et al. 2022, Eqs. 7 and 8; Khatib 1995",
-            inputs=provenance.motion(model, robot.name, *(gap.carriers if gap is not None else ()))
-            + provenance.masses(model, robot)
-            + (provenance.shapes(gap) if gap is not None else ())
-            + provenance.limit(self.limit, "kg"),
+            inputs=(
+                provenance.point(model, self.at, self.offset),
+                *provenance.motion(model, robot.name, *(gap.carriers if gap is not None else ())),
+                *provenance.masses(model, robot),
+                *(provenance.shapes(gap) if gap is not None else ()),
+                *provenance.limit(self.limit, "kg"),
+            ),
             not_modelled=(
                 "joints held by brakes, friction or position control, which make the robot heavier",
                 *(

@@ -101,6 +101,10 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
         return Basis(
             formula="smallest singular value of J_v(q); ellipsoid of J_v J_vᵀ",
             source="Weistroffer et al. 2022, section 2.2.2.2",
-            inputs=provenance.motion(model, carrier.name) + provenance.limit(self.limit, "m/rad"),
+            inputs=(
+                provenance.point(model, self.at, self.offset),
+                *provenance.motion(model, carrier.name),
+                *provenance.limit(self.limit, "m/rad"),
+            ),
             not_modelled=("orientation: only the linear rows of the Jacobian count",),
         )

@@ -11,7 +11,7 @@ from seerob.criterion import Criterion, Evaluate, judge_interval
 from seerob.distance import Reach
 from seerob.errors import InputError
 from seerob.model import Model
-from seerob.snapshot import Basis, Result, Segment
+from seerob.snapshot import Basis, Result, Segment, Verdict
 from seerob.state import State
 
 
@@ -45,6 +45,9 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
             distance = closest.distance
             interval = (distance - gap.deviation, distance)
             verdict = judge_interval(interval, self.limit, at_most=False)
+            if closest.reach == Reach.DEPTH_AT_LEAST and self.limit is not None:
+                # Crossing shapes are deeper than the figure says: never within, not even of 0.
+                verdict = Verdict.EXCEEDED
             names = model.bodies[closest.body_a].name, model.bodies[closest.body_b].name
             deeper = " (overlap, at least this deep)" if closest.reach == Reach.DEPTH_AT_LEAST else ""
             segment = Segment(

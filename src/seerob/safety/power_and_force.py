@@ -20,7 +20,7 @@ from seerob.impact_mass import masses_along_motion, moving_masses, simplified_ma
 from seerob.model import Frame, Model
 from seerob.norms import body_limits
 from seerob.norms.crushing_gaps import NOT_VERIFIED, crushing_gaps, gap_inputs
-from seerob.norms.limit_inputs import limit_inputs
+from seerob.norms.limit_inputs import excluded_input, limit_inputs, table_input
 from seerob.snapshot import Arrow, Basis, Highlight, Input, Origin, Result, Verdict
 from seerob.state import State
 from seerob.transforms import Array
@@ -128,17 +128,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         """See `Criterion.basis`."""
         robot, limits = model.robot(self.robot), self.table(model)
         names = (self.robot,) if self.human is None else (self.robot, self.human)
-        edition = model.workstation.edition
-        doubts: list[str] = []
-        label = f"{limits.edition}; {limits.title}"
-        if edition != limits.edition:
-            label += f"; used for {edition}"
-            doubts.append(
-                f"{edition}: whether any figure of its Annex M differs is not known row by row; "
-                f"the figures are those of {limits.edition}"
-            )
-        if limits.reviewed_by:
-            label += f"; figures outside the usual ranges: {limits.reviewed_by}"
+        table, doubts = table_input(limits, model.workstation.edition)
         return Basis(
             formula="v = min(F/√(μk), pA/√(μk), √(2E/μ)), μ = 1/(1/m_H + 1/m_R), m_R = M/2 + m_L; "
             "clamped: m_H → ∞ and quasi-static limits; "
@@ -151,7 +141,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
             inputs=(
                 *provenance.motion(model, *names),
                 *self._given(model),
-                Input(name="limits", value=limits.file, origin=Origin.STATED, source=label),
+                table,
                 *limit_inputs(limits, own=self.limits is not None, multiplier=self.multiplier),
                 Input(
                     name="largest contact area",
@@ -163,24 +153,16 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
                     else "workstation file",
                 ),
                 *gap_inputs(self.thickness, [r.name for r in limits.regions.values() if r.permitted]),
-                *(
-                    Input(
-                        name=f"{region}: kept from contact",
-                        origin=Origin.GIVEN,
-                        source="workstation file; by measures that are not evaluated here",
-                    )
-                    for region in self.excluded
-                ),
+                *(excluded_input(region) for region in self.excluded),
             ),
             not_modelled=(
                 "a design estimate: power and force limiting needs measurement at the real robot",
                 *doubts,
                 "larynx, eyes, ears and feet have no row in the table",
                 "people other than adults, protective padding, clothing",
-                "the contact itself: its area grows with the indentation F/k by a convention of seerob, not the "
-                "norm's; the pressure is within its limit at every force up to the one permitted",
-                "free or clamped is decided by gaps after ISO 13854 that are not verified (M), unless the file "
-                "gives thickness",
+                "the contact itself: its area grows with the indentation F/k by a convention of seerob; "
+                "up to the permitted force the pressure is within its limit",
+                "free or clamped is decided by gaps that are not verified (M), unless thickness is given",
                 "duration of the contact: what is free counts as transient, what is clamped as quasi-static",
                 "forces that drives keep up after the impact, detection and stop of the robot",
                 *(

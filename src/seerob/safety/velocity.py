@@ -11,7 +11,7 @@ from seerob import provenance
 from seerob.criterion import Criterion, Evaluate, judge
 from seerob.errors import InputError
 from seerob.model import Model
-from seerob.snapshot import Arrow, Basis, Result
+from seerob.snapshot import Arrow, Basis, Input, Result
 from seerob.state import State
 from seerob.transforms import Array
 from seerob.workstation import Metres3
@@ -103,14 +103,19 @@ class Velocity(Criterion, frozen=True, kw_only=True):
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
+        points: tuple[Input, ...]
         if self.at is not None:
             carriers = [model.carrier(model.frame(self.at)).name]
             formula = "|v|, v = J_v(q) q̇"
+            points = (provenance.point(model, self.at, self.offset),)
         else:
             carriers = [model.bodies[i].carrier for i in model.select(self.of or "")]
             formula = "max over all points of |v + ω × r|"
+            points = ()
         return Basis(
             formula=formula,
             source="Weistroffer et al. 2022, Eq. 4",
-            inputs=provenance.motion(model, *filter(None, carriers)) + provenance.limit(self.limit, "m/s"),
+            inputs=points
+            + provenance.motion(model, *filter(None, carriers))
+            + provenance.limit(self.limit, "m/s"),
         )

@@ -119,6 +119,7 @@ def test_limits_of_the_file_win_and_say_so(tmp_path):
         ("rotor_inertia = [1, -1]\n", "rotor_inertia", "0 or more"),
         ("[robots.masses]\nl3 = { mass = 1 }\n", "masses.l3", "known: base, l1, l2"),
         ('tool = "tpi"\n', "tool", "known: arm/base, arm/l1"),
+        ('arguments = { length = "1" }\n', "arguments", "arm.urdf is not a xacro file"),
         (GRIP.replace("arm/tip", "arm/tpi"), "tools[0]", "did you mean 'arm/tip'"),
         ('[[areas]]\nname = "a"\nshape = { sphere = 1 }\non = "arm/l9"\n', "areas[0]", "arm/l9"),
         ('[[parts]]\nname = "p"\nmesh = "missing.stl"\nunits = "m"\n', "parts[0]", "missing.stl"),
@@ -192,6 +193,51 @@ def test_compiled_model_is_the_same_each_time(tmp_path):
     assert [x.mesh for x in a.bodies] == [x.mesh for x in b.bodies]
     assert a.files == b.files
     assert a.mj.opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+
+
+def limited(lower, upper):
+    return (
+        two_r()
+        .replace('type="continuous"', 'type="revolute"')
+        .replace("<limit", f'<limit lower="{lower}" upper="{upper}"')
+    )
+
+
+def test_a_pose_beyond_position_limits_is_refused_joint_by_joint(tmp_path):
+    with pytest.raises(InputError) as error:
+        made(tmp_path, TWO_R + "q_deg = [90, -20]\n", {"arm.urdf": limited(-0.1, 1)})
+    first, second = error.value.problems
+    assert first.key == "robots[0] (q)"
+    assert "'j1' at 1.571 rad (90.0°), above its limit 1 rad (57.3°)" in first.what
+    assert "'j2' at -0.3491 rad (-20.0°), below its limit -0.1 rad (-5.7°)" in second.what
+    assert "give -0.1 rad (-5.7°) to 1 rad (57.3°)" in first.remedy
+
+
+def test_a_pose_at_its_limits_is_accepted(tmp_path):
+    robot = made(tmp_path, TWO_R + "q = [1, -0.1]\n", {"arm.urdf": limited(-0.1, 1)}).model.robot("arm")
+    np.testing.assert_allclose(robot.home, [1, -0.1])
+
+
+def test_joints_of_a_person_beyond_their_limits_are_refused(tmp_path):
+    person = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
+    with pytest.raises(InputError, match=r"300\.0° is beyond its limit; give 0…\d+°"):
+        made(tmp_path, person + "joints_deg = { right_elbow_flexion = 300 }\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "files", "assumed"),
+    [
+        (TWO_R + GRIP, two_r(), True),
+        (TWO_R + GRIP + "tcp = { position = [0.3, 0, 0] }\n", two_r(), False),
+        (TWO_R + 'tool = "tip"\n', two_r(), False),
+        (TWO_R, two_r().replace('"tip"', '"flange"'), False),
+        ('[[robots]]\nname = "arm"\nmodel = "library:iiwa7"\n', "", False),
+    ],
+)
+def test_a_point_of_interest_that_nobody_named_is_assumed(tmp_path, text, files, assumed):
+    model = made(tmp_path, FLOATING + text, {"arm.urdf": files}).model
+    said = [f for f in model.findings if "point of interest" in f.text]
+    assert [(f.level, f.subject) for f in said] == [("assumed", "arm")] * assumed
 
 
 # -- files that travel --------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from seerob.errors import InputError
-from seerob.reading import convert_workstation, read
+from seerob.reading import convert_workstation, read, readable
 from seerob.workstation import MAX_FILE_SIZE, TABLES, Workstation
 
 ROBOT = '[[robots]]\nname = "ur10"\nmodel = "library:ur10"\n'
@@ -293,6 +293,23 @@ def test_a_file_that_is_not_one_says_why_and_where(tmp_path, content, words):
     assert len(error.value.problems) == 1
     assert str(file) in str(error.value)
     assert words in str(error.value)
+
+
+def test_what_is_wrong_at_the_top_hides_nothing_else_there(tmp_path):
+    (tmp_path / "workstation.toml").write_text("title = 'x'\nedition = 7\n[engine]\ntick = 1\n" + ROBOT)
+    found = readable(tmp_path)
+    assert {p.key for p in found.problems} == {"edition", "engine.tick"}
+    assert found.head.title == "x"
+    assert found.entries["robots"][0].name == "ur10"
+
+
+def test_what_is_right_in_a_robot_of_the_library_can_be_looked_at(tmp_path):
+    wrong = "q = [0]\nbase = { positon = [0, 0, 0] }\nargumnts = {}\n"
+    of_a_file = ROBOT.replace("ur10", "b").replace("library:b", "b.urdf")
+    (tmp_path / "workstation.toml").write_text(ROBOT + wrong + of_a_file + wrong)
+    found = readable(tmp_path)
+    assert len(found.problems) == 4
+    assert {i: robot.q for i, robot in found.entries["robots"].items()} == {0: (0.0,)}
 
 
 def test_windows_line_ends_and_a_byte_order_mark_are_read(tmp_path):

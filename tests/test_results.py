@@ -179,3 +179,22 @@ def test_an_unknown_name_gets_the_known_ones():
     assert result_named(tick(0), "speed") is None
     assert [s.name for s in log.ranked()] == ["speed"]
     assert log.history(10).traces[0].name == "speed"
+
+
+def test_a_part_has_its_own_unit_and_its_own_extremum():
+    def said(k, factor, speed, distance):
+        parts = (
+            Result(name="share", value=factor),
+            Result(name="permissible", value=speed, unit="mm/s", at_most=False),
+            Result(name="hand", value=distance, unit="m", limit=0.1, at_most=False, verdict=W),
+        )
+        return tick(k, result(parts=parts))
+
+    log = log_of([said(0, 2.0, 900.0, 0.5), said(1, 4e5, 300.0, 0.4), said(2, 1.0, 700.0, 0.6)])
+    parts = log["speed"].parts
+    assert [(p.name, p.unit) for p in parts.values()] == [
+        ("share", ""),
+        ("permissible", "mm/s"),
+        ("hand", "m"),
+    ]
+    assert [p.worst().value for p in parts.values()] == [4e5, 300.0, 0.4]

@@ -71,6 +71,10 @@ def test_every_mistake_is_named_with_its_row():
     assert "row 7: time goes back" in refused(t=changed(good.t, 5, good.t[3]))
     assert "row 9: position[1] is nan" in refused(position=changed(good.position, (7, 1), np.nan))
     assert "row 9: wxyz[2] is inf" in refused(wxyz=changed(good.wxyz, (7, 2), np.inf))
+    assert "row 9: position[1] is 1e+300, beyond 1e+06" in refused(
+        position=changed(good.position, (7, 1), 1e300)
+    )
+    assert "row 9: wxyz[2] is -1e+300" in refused(wxyz=changed(good.wxyz, (7, 2), -1e300))
     assert "row 5: quaternion of length 1.01, not 1" in refused(
         wxyz=changed(good.wxyz, 3, 1.01 * good.wxyz[3])
     )

@@ -149,3 +149,29 @@ def test_rows_that_the_file_calls_invalid_are_not_judged():
     )
     with pytest.raises(InputError, match="its limit"):
         limit_check(Trajectory(file="a.csv", t=T, q=q, qd=qd), TARGET)
+
+
+@pytest.mark.parametrize(
+    ("q", "degrees", "doubtful"),
+    [
+        (np.radians(0.3 * Q), True, True),
+        (np.radians(3 * Q), True, True),
+        (np.radians(Q) + np.radians([90.0, 0.0]), True, False),
+        (np.radians(30 * Q), True, False),
+        (np.radians(1e-3 * Q), True, False),
+        (0.3 * Q, False, False),
+    ],
+)
+def test_degrees_that_look_like_radians_are_doubted(q, degrees, doubtful):
+    motion = Trajectory(file="a.csv", t=T, q=q, degrees=degrees)
+    texts = [f.text for f in limit_check(motion, TARGET) if f.level == "warning"]
+    span = np.ptp(np.degrees(q), axis=0).max()
+    wanted = [f"the whole motion spans {span:.2g}°: is the column in radians?"] if doubtful else []
+    assert [t[t.index("the whole") :] for t in texts] == wanted
+
+
+def test_a_clock_that_does_not_start_at_zero_is_said():
+    (finding,) = sampling_findings(made(t=T + 5), "ur10", 0.2)
+    assert finding.level == "note"
+    assert "starts at 5.000 s on its own clock; shifted to 0: two files keep no common clock" in finding.text
+    assert sampling_findings(made(t=T + 1e-4), "ur10", 0.2) == ()

@@ -6,11 +6,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from seerob.errors import InputError, UnknownName
-from seerob.model_io.description import Description, Quantity
+import numpy as np
+
+from seerob.errors import InputError, Problem, UnknownName
+from seerob.model_io.description import Description, Joint, JointKind, Quantity
 from seerob.snapshot import Origin
 from seerob.things import link_by_hand
+from seerob.transforms import Array
 from seerob.workstation import Robot
+
+ROUNDING = 1e-6
+"""Beyond a limit by less than this is the rounding of a printed number [rad or m]."""
 
 
 def by_hand(description: Description, robot: Robot, file: str) -> Description:
@@ -41,13 +47,67 @@ def by_hand(description: Description, robot: Robot, file: str) -> Description:
             wrong = UnknownName(f"link of {robot.name}", name, known)
             raise InputError.at(file, f"masses.{name}", str(wrong))
     links = []
+    problems: list[Problem] = []
+    findings = list(description.findings)
     for link in description.links:
         joints = tuple(replace(j, **changes[j.name]) if changes.get(j.name) else j for j in link.joints)
         inertial = link.inertial
         if link.name in robot.masses:
-            inertial = link_by_hand(robot.masses[link.name], link.solids, f"{robot.name}/{link.name}")
+            try:
+                inertial, more = link_by_hand(robot.masses[link.name], link, robot=robot.name, file=file)
+                findings += more
+            except InputError as error:
+                problems += error.problems
         links.append(replace(link, joints=joints, inertial=inertial))
-    return replace(description, links=tuple(links))
+    if problems:
+        raise InputError(problems)
+    return replace(description, links=tuple(links), findings=tuple(findings))
+
+
+def home(description: Description, robot: Robot, file: str) -> Array:
+    """Where a robot stands when nothing drives it, shape (n,) [rad or m]; zeros when its table is silent.
+
+    Args:
+        description: With n joints.
+        robot: Its table.
+        file: The workstation file, for messages.
+
+    Raises:
+        InputError: Another number of values than joints, or values beyond position limits.
+    """
+    joints = description.joints()
+    if robot.q is None:
+        return np.zeros(len(joints))
+    if len(robot.q) != len(joints):
+        remedy = f"{robot.name} has {len(joints)} joints: give {len(joints)}"
+        raise InputError.at(file, "q", f"{len(robot.q)} values", remedy)
+    beyond = [_beyond(joint, value, file) for joint, value in zip(joints, robot.q, strict=True)]
+    if any(beyond):
+        raise InputError(filter(None, beyond))
+    return np.array(robot.q, float)
+
+
+def _beyond(joint: Joint, value: float, file: str) -> Problem | None:
+    low = -np.inf if joint.lower is None else joint.lower
+    high = np.inf if joint.upper is None else joint.upper
+    if low - ROUNDING <= value <= high + ROUNDING:
+        return None
+    side, limit = ("below", low) if value < low else ("above", high)
+    what = f"joint {joint.name!r} at {_shown(value, joint)}, {side} its limit {_shown(limit, joint)}"
+    turning = joint.kind is JointKind.REVOLUTE
+    return Problem(
+        file,
+        "q",
+        what,
+        f"give {_shown(low, joint)} to {_shown(high, joint)}"
+        + ("; degrees go into q_deg" if turning else ""),
+    )
+
+
+def _shown(value: float, joint: Joint) -> str:
+    if joint.kind is JointKind.REVOLUTE:
+        return f"{value:.4g} rad ({np.degrees(value):.1f}°)"
+    return f"{value:.4g} m"
 
 
 def _check(table: str, values: Sequence[float], names: Sequence[str], file: str) -> None:

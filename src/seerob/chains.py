@@ -9,6 +9,7 @@ import numpy as np
 from seerob.geometry import Solid
 from seerob.model import Mechanism
 from seerob.model_io.description import Description, Inertial, Joint
+from seerob.model_io.lint import TIPS
 from seerob.mounting import extreme_points
 from seerob.snapshot import Finding, Origin
 from seerob.transforms import Array
@@ -16,6 +17,8 @@ from seerob.transforms import Array
 PLACEHOLDER_DENSITY = 500.0
 """Of the box around a moving link that nobody gave a mass [kg/m³]: it lets the twin move, and no
 criterion may use it."""
+MAX_PAYLOAD = 500.0
+"""More than this on a robot is a mistake in a unit rather than a payload [kg]."""
 
 
 def couple(every: Sequence[Joint], commanded: Sequence[Joint]) -> tuple[Array, Array]:
@@ -69,8 +72,13 @@ def unknown_masses(
     return (*links, *(f"nobody gave the mass or the density of {thing}" for thing in unweighed))
 
 
-def assumed(robot: Mechanism) -> list[Finding]:
-    """What is assumed of a robot because nobody gave it."""
+def assumed(robot: Mechanism, *, tip_given: bool) -> list[Finding]:
+    """What is assumed of a robot because nobody gave it.
+
+    Args:
+        robot: The robot.
+        tip_given: Whether the file or the library says which link is its point of interest.
+    """
     texts = [
         f"{text}: energies and effective masses are UNDECIDED; a placeholder moves the twin"
         for text in robot.unknown_masses
@@ -80,7 +88,33 @@ def assumed(robot: Mechanism) -> list[Finding]:
             "rotor inertia not given for every joint: mass matrix and effective mass are link-side only "
             "(give rotor_inertia)"
         )
+    if not tip_given and not robot.description.tip.lower().endswith(TIPS):
+        texts.append(
+            f"point of interest is the origin of {robot.description.tip}: name one with tool = or mount a "
+            "tool with tcp"
+        )
     return [Finding(level="assumed", subject=robot.name, text=text) for text in texts]
+
+
+def payload(robot: str, things: Mapping[str, float | None]) -> list[Finding]:
+    """What a robot carries, in one finding; none when nothing is mounted on it.
+
+    Args:
+        robot: The robot.
+        things: Mass [kg] of each tool and workpiece mounted on it; None when nobody gave one.
+    """
+    if not things:
+        return []
+    known = {name: mass for name, mass in things.items() if mass is not None}
+    total = sum(known.values())
+    text = "carries " + ("at least " if len(known) < len(things) else "") + f"{total:.4g} kg: "
+    text += ", ".join(
+        f"{name} {'unknown' if mass is None else f'{mass:.4g} kg'}" for name, mass in things.items()
+    )
+    if total <= MAX_PAYLOAD:
+        return [Finding(level="note", subject=robot, text=text)]
+    text += f"; no robot beside a person carries more than {MAX_PAYLOAD:g} kg: check the unit"
+    return [Finding(level="warning", subject=robot, text=text)]
 
 
 def placeholder(solids: Sequence[Solid]) -> Inertial:

@@ -80,8 +80,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.ERROR
     except OSError as error:
-        sys.stderr.write(f"{error.filename or 'seerob'}: {error.strerror or error}\n")
+        remedy = "; check that it exists and may be read and written" if error.filename else ""
+        sys.stderr.write(f"{error.filename or 'seerob'}: {error.strerror or error}{remedy}\n")
         return Exit.ERROR
+    except Exception as error:
+        # Libraries with a bare except turn an interrupt into an error of their own.
+        if not _interrupted(error):
+            raise
+        sys.stderr.write("stopped\n")
+        return Exit.ERROR
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__context__
+    return error is not None
 
 
 if __name__ == "__main__":

@@ -10,8 +10,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from seerob.by_hand import by_hand
-from seerob.chains import assumed, couple, placeholder, unknown_masses
+from seerob.by_hand import by_hand, home
+from seerob.chains import assumed, couple, payload, placeholder, unknown_masses
 from seerob.contacts import add_contacts
 from seerob.distance import Shapes
 from seerob.errors import InputError, Problem, UnknownName
@@ -21,6 +21,7 @@ from seerob.model import Body, Frame, Mechanism, Model
 from seerob.model_io.description import Description, Link, Quantity
 from seerob.model_io.loader import load_robot
 from seerob.mounting import Mounting, extreme_points
+from seerob.snapshot import Finding
 from seerob.things import AREA_COLOR, PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, load_thing
 from seerob.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
 from seerob.workstation import Area, Human, Mounted, Pose, Robot, Tool, Workstation
@@ -111,6 +112,9 @@ class _Compiler:
 
     def _robot(self, robot: Robot) -> None:
         self.progress(f"reading {robot.name} ({robot.model})")
+        if robot.arguments and not robot.model.lower().endswith(".xacro"):
+            what = f"{robot.model} is not a xacro file and takes none"
+            raise InputError.at(self.file, "arguments", what, "leave them out, or name the .xacro file")
         description = load_robot(
             robot.model,
             folder=self.folder,
@@ -120,15 +124,8 @@ class _Compiler:
             name=robot.name,
         )
         description = by_hand(description, robot, self.file)
-        n = len(description.joints())
-        home = np.zeros(n)
-        if robot.q is not None:
-            if len(robot.q) != n:
-                raise InputError.at(
-                    self.file, "q", f"{len(robot.q)} values", f"{robot.name} has {n} joints: give {n}"
-                )
-            home = np.array(robot.q, float)
-        self._chain(robot.name, description, "robot", pose_matrix(robot.base), home, robot.q is not None)
+        q = home(description, robot, self.file)
+        self._chain(robot.name, description, "robot", pose_matrix(robot.base), q, robot.q is not None)
         self.mounting.files |= filed(
             robot.name,
             description.files,
@@ -160,8 +157,8 @@ class _Compiler:
             lengths=human.lengths,
             hand=human.hand,
         )
-        home = posture.posture(description, human.posture, joints=human.joints, file=f"{human.name}.joints")
-        self._chain(human.name, description, "human", pose_matrix(human.at), home, True)
+        q = posture.posture(description, human.posture, joints=human.joints, file=f"{human.name}.joints")
+        self._chain(human.name, description, "human", pose_matrix(human.at), q, True)
 
     def _chain(
         self, name: str, description: Description, role: str, world_from_base: Array, home: Array, given: bool
@@ -240,7 +237,8 @@ class _Compiler:
         color: tuple[float, float, float, float],
     ) -> None:
         self.progress(f"reading {thing.name}")
-        loaded = load_thing(thing, self.folder, color, needs_mass=role in ("tool", "workpiece"))
+        moves = role in ("tool", "workpiece")
+        loaded = load_thing(thing, self.folder, color, needs_mass=moves, file=self.file)
         self.mounting.findings += loaded.findings
         self.mounting.files |= filed(thing.name, loaded.files, folder=self.folder, references=(thing.mesh,))
         carrier = "" if parent is None else self.carriers[parent]
@@ -324,7 +322,7 @@ class _Compiler:
             meshes=self.mounting.meshes,
             findings=(
                 *self.mounting.findings,
-                *(f for m in mechanisms.values() if m.role == "robot" for f in assumed(m)),
+                *(f for robot in self.station.robots for f in self._about(robot, mechanisms[robot.name])),
             ),
             files={**self.station.files, **self.mounting.files},
         )
@@ -366,13 +364,23 @@ class _Compiler:
             rotor_inertia_known=all(joint.armature is not None for joint in commanded),
         )
 
+    def _about(self, robot: Robot, mechanism: Mechanism) -> list[Finding]:
+        given = self.chains[robot.name].tip is not None or robot.model.startswith("library:")
+        return [*assumed(mechanism, tip_given=given), *payload(robot.name, self._carried(robot.name))]
+
+    def _carried(self, name: str) -> dict[str, float | None]:
+        """Mass [kg] of each tool and workpiece on a robot; None when nobody gave one."""
+        things: dict[str, float | None] = {}
+        for entry in self.mounting.entries:
+            if entry.carrier == name and entry.role in ("tool", "workpiece"):
+                known = things.get(entry.owner)
+                things[entry.owner] = known if entry.mass is None else entry.mass.value
+        return things
+
     def _unknown_masses(self, name: str) -> tuple[str, ...]:
         mounted = {thing.on for thing in (*self.station.tools, *self.station.workpieces)}
         on = {full.partition("/")[2] for full in mounted if full.startswith(f"{name}/")}
-        things: dict[str, bool] = {}
-        for entry in self.mounting.entries:
-            if entry.carrier == name and entry.role in ("tool", "workpiece"):
-                things[entry.owner] = things.get(entry.owner, False) or entry.mass is not None
+        things = {thing: mass is not None for thing, mass in self._carried(name).items()}
         return unknown_masses(name, self.chains[name].description, loaded=on, things=things)
 
 

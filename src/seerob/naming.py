@@ -7,15 +7,11 @@ before its first ``/`` that does not belong to a part's own name is looked at.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from msgspec import Struct
 
 from seerob.errors import Problem, suggestion
-
-if TYPE_CHECKING:
-    from seerob.workstation import Workstation
 
 NAMED = ("robots", "tools", "workpieces", "parts", "areas", "humans")
 """Tables whose entries have a name that is theirs alone."""
@@ -162,16 +158,3 @@ def _fields_with(entry: Struct, value: str) -> Iterator[tuple[str, str]]:
             yield field, ""
         elif isinstance(held, tuple) and value in held:
             yield field, f"[{held.index(value)}]"
-
-
-def missing_files(station: Workstation) -> list[Problem]:
-    """Files of sources that do not exist: what opening the sources would say, were there a model."""
-    problems = []
-    toml = next(iter(station.files), "")
-    for i, source in enumerate(station.sources):
-        name = getattr(source, "file", None)
-        if isinstance(name, str) and ":" not in name and not (Path(station.folder) / name).is_file():
-            problems.append(
-                Problem(toml, f"sources[{i}].file", f"no such file {name!r}", "name one that exists")
-            )
-    return problems

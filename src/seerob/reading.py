@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 from msgspec import Struct
@@ -16,7 +16,7 @@ from seerob.criterion import Criterion
 from seerob.errors import InputError, Problem, SeerobError
 from seerob.sink import Sink
 from seerob.source import Source
-from seerob.workstation import PLUGINS, TABLES, Workstation, locate, read_toml
+from seerob.workstation import PLUGINS, TABLES, Robot, Workstation, locate, read_toml
 
 BASES: dict[str, type[Struct]] = {
     "sources": Source,
@@ -30,6 +30,21 @@ _NOT_IN_FILE = ("folder", "files")
 _MAX_PROBLEMS = 200
 
 
+class Readable(NamedTuple):
+    """What of a workstation file can be read, and every mistake in it."""
+
+    head: Workstation
+    """What is not in a list of tables; what is wrong there is as if it were not given."""
+    entries: dict[str, dict[int, Any]]
+    """List of tables → number of the entry in the file → the entry, where it could be read; of a
+    robot of the library or a human, what is wrong is as if it were not given."""
+    names: list[naming.Named]
+    """What the file declares, also where it cannot be read."""
+    problems: list[Problem]
+    between: list[Problem]
+    """Those of them that an entry has with others: a name that is taken or leads nowhere."""
+
+
 def read(path: Path | str) -> Workstation:
     """The workstation of a file or of a folder that contains one.
 
@@ -37,39 +52,103 @@ def read(path: Path | str) -> Workstation:
         InputError: With every mistake in it: unknown keys, missing keys, wrong types and ranges,
             unknown kinds, names that are taken or lead nowhere.
     """
+    found = readable(path)
+    if found.problems:
+        raise InputError(shortened(found.problems))
+    return with_entries(found.head, found.entries)
+
+
+def readable(path: Path | str) -> Readable:
+    """What can be read of a file or of a folder that contains one, beside every mistake in it.
+
+    Raises:
+        InputError: There is no such file, or it is not TOML.
+    """
     file = locate(path)
     table, raw = read_toml(file)
-    station, problems = convert_workstation(table, str(file))
-    if problems or station is None:
-        raise InputError(problems)
-    return msgspec.structs.replace(station, folder=str(file.parent.resolve()), files={file.name: raw})
+    found = _convert(table, str(file))
+    head = msgspec.structs.replace(found.head, folder=str(file.parent.resolve()), files={file.name: raw})
+    return found._replace(head=head)
 
 
 def convert_workstation(table: Mapping[str, Any], file: str) -> tuple[Workstation | None, list[Problem]]:
     """The typed workstation of a parsed file, and every mistake that was found."""
+    found = _convert(table, file)
+    if found.problems:
+        return None, shortened(found.problems)
+    return with_entries(found.head, found.entries), []
+
+
+def with_entries(head: Workstation, entries: Mapping[str, Mapping[int, Any]]) -> Workstation:
+    """A workstation of its head and its lists of tables."""
+    return msgspec.structs.replace(head, **{g: tuple(found.values()) for g, found in entries.items()})
+
+
+def shortened(problems: list[Problem]) -> list[Problem]:
+    """At most so many mistakes as anybody reads, and how many more there are."""
+    more = len(problems) - _MAX_PROBLEMS
+    if more <= 0:
+        return problems
+    last = Problem(problems[0].file, "", f"and {more} mistakes more", "mend these first")
+    return [*problems[:_MAX_PROBLEMS], last]
+
+
+def _convert(table: Mapping[str, Any], file: str) -> Readable:
     problems: list[Problem] = []
     groups = (*TABLES, *PLUGINS)
     entries: dict[str, dict[int, Any]] = {}
     for group in groups:
-        read_entries = {
-            i: convert(entry, TABLES[group], file=file, key=f"{group}[{i}]", problems=problems)
-            if group in TABLES
-            else _plugin(entry, group, f"{group}[{i}]", file, problems)
-            for i, entry in enumerate(tables(table.get(group, []), group, file, problems))
-        }
-        entries[group] = {i: entry for i, entry in read_entries.items() if entry is not None}
+        entries[group] = {}
+        for i, table_of_entry in enumerate(tables(table.get(group, []), group, file, problems)):
+            entry = _entry(table_of_entry, group, f"{group}[{i}]", file, problems)
+            if entry is not None:
+                entries[group][i] = entry
     for group in ("sources", "safety", "ergonomics"):
         entries[group] = _named(entries[group])
-    head = {key: value for key, value in table.items() if key not in groups}
+    head = _head({key: value for key, value in table.items() if key not in groups}, file, problems)
+    names = naming.declared(table)
+    between = naming.check(names, entries, file)
+    return Readable(head, entries, names, [*problems, *between], between)
+
+
+def _entry(
+    table: Mapping[str, Any], group: str, key: str, file: str, problems: list[Problem]
+) -> Struct | None:
+    if group in PLUGINS:
+        return _plugin(table, group, key, file, problems)
+    before = len(problems)
+    entry = convert(table, TABLES[group], file=file, key=key, problems=problems)
+    if entry is not None or group not in ("robots", "humans"):
+        return entry
+    rest = convert(_right(table, key, problems[before:]), TABLES[group], file=file, key=key, problems=[])
+    # Whether a file can be read may hang on the key that is wrong: packages, arguments.
+    files = isinstance(rest, Robot) and not (rest.model.startswith("library:") and rest.meshes is None)
+    return None if files else rest
+
+
+def _right(table: Mapping[str, Any], place: str, problems: Sequence[Problem]) -> dict[str, Any]:
+    """A table without the keys that problems are in."""
+    start = f"{place}." if place else ""
+    wrong = [problem.key for problem in problems]
+    return {
+        name: value
+        for name, value in table.items()
+        if not any(
+            key == start + name or key.startswith((f"{start}{name}.", f"{start}{name}[")) for key in wrong
+        )
+    }
+
+
+def _head(table: Mapping[str, Any], file: str, problems: list[Problem]) -> Workstation:
+    """What is not in a list of tables; a key that is wrong is left out."""
+    groups = (*TABLES, *PLUGINS)
     hidden = (*_NOT_IN_FILE, *groups)
-    station = convert(head, Workstation, file=file, key="", problems=problems, hidden=hidden, beside=groups)
-    problems += naming.check(naming.declared(table), entries, file)
-    if station is None or problems:
-        more = len(problems) - _MAX_PROBLEMS
-        if more > 0:
-            problems[_MAX_PROBLEMS:] = [Problem(file, "", f"and {more} mistakes more", "mend these first")]
-        return None, problems
-    return msgspec.structs.replace(station, **{g: tuple(found.values()) for g, found in entries.items()}), []
+    before = len(problems)
+    head = convert(table, Workstation, file=file, key="", problems=problems, hidden=hidden, beside=groups)
+    if head is not None:
+        return head
+    right = _right(table, "", problems[before:])
+    return convert(right, Workstation, file=file, key="", problems=[], hidden=hidden) or Workstation()
 
 
 def _plugin(

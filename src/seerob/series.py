@@ -146,7 +146,7 @@ class Series:
         for part in result.parts:
             series = self._parts.get(part.name)
             if series is None:
-                series = Series(name=part.name, unit=part.unit or self.unit, at_most=part.at_most)
+                series = Series(name=part.name, unit=part.unit, at_most=part.at_most)
                 self._parts[part.name] = series
             series.append(part, t)
         self._verdicts.append(CODES[result.verdict])

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from seerob.errors import InputError, Problem
 from seerob.geometry import Mesh, Solid, capsule
-from seerob.model_io import detail, mass_properties, shapes
-from seerob.model_io.description import Inertial
+from seerob.model_io import detail, lint, mass_properties, shapes
+from seerob.model_io.description import Inertial, Link
 from seerob.model_io.mesh import load_meshes
+from seerob.model_io.mesh_bodies import is_closed, joined
+from seerob.model_io.moments import signed_volume
 from seerob.snapshot import Finding, Origin
 from seerob.transforms import Array
 from seerob.workstation import Body as BodyTable
@@ -46,7 +50,9 @@ class LoadedThing:
     files: dict[str, bytes]
 
 
-def load_thing(thing: Thing, folder: Path, color: Color, *, needs_mass: bool) -> LoadedThing:
+def load_thing(
+    thing: Thing, folder: Path, color: Color, *, needs_mass: bool, file: str = "workstation"
+) -> LoadedThing:
     """Read a tool, a workpiece or a part.
 
     Args:
@@ -54,9 +60,11 @@ def load_thing(thing: Thing, folder: Path, color: Color, *, needs_mass: bool) ->
         folder: What its mesh path is relative to.
         color: For what has no colour of its own.
         needs_mass: Whether it moves, so that a mass from the shape is worth computing.
+        file: The workstation file, for messages.
 
     Raises:
-        InputError: The mesh cannot be read, or a mass was asked for that the shape cannot give.
+        InputError: The mesh cannot be read, a mass was asked for that the shape cannot give, or no body
+            of this shape has the given centre of mass or inertia.
     """
     if thing.color is not None:
         color = (*thing.color, 1.0)
@@ -80,10 +88,22 @@ def load_thing(thing: Thing, folder: Path, color: Color, *, needs_mass: bool) ->
         assert thing.shape is not None
         piece, whole = _simple(thing.shape, color)
         pieces, source = (piece,), "shape in the workstation file"
-    inertial = None
+    solids = tuple(solid for piece in pieces for solid in piece.solids)
+    findings += _odd(thing, solids, whole)
+    inertial: Inertial | None = None
+    more: tuple[Finding, ...] = ()
     if needs_mass and (thing.mass is not None or thing.density is not None):
         inertial, more = _inertial(thing, whole, source)
-        findings += more
+    elif thing.mass is not None and thing.com is not None:
+        # It stands still, so only what the user wrote is looked at.
+        inertial = by_hand(thing.mass, thing.com, thing.inertia or (0.0,) * 6, source)
+    if inertial is not None:
+        inertial, noticed = _possible(
+            inertial, solids, thing, thing.name, file, "", lambda: _spread(thing, whole)
+        )
+        findings += more + noticed
+    if not needs_mass:
+        inertial = None
     return LoadedThing(pieces, inertial, findings, files)
 
 
@@ -121,24 +141,126 @@ def _simple(shape: Shape, color: Color) -> tuple[Piece, list[Mesh]]:
 def _inertial(thing: Thing, meshes: list[Mesh], source: str) -> tuple[Inertial, tuple[Finding, ...]]:
     if thing.mass is not None and thing.com is not None and thing.inertia is not None:
         return by_hand(thing.mass, thing.com, thing.inertia, "workstation file"), ()
-    if thing.shape is not None and thing.shape.sphere is not None:
-        radius = thing.shape.sphere
-        volume = 4 / 3 * np.pi * radius**3
-        mass = thing.mass if thing.mass is not None else float(volume * (thing.density or 0.0))
-        inertial = Inertial(
-            mass, np.zeros(3), np.eye(3) * 0.4 * mass * radius**2, Origin.GIVEN, f"sphere, {source}"
-        )
-        findings: tuple[Finding, ...] = ()
-    else:
-        inertial, findings = mass_properties.from_shape(
-            meshes, density=thing.density, mass=thing.mass, subject=thing.name
-        )
+    inertial, findings = _spread(thing, meshes)
     if thing.com is not None:
         inertial = replace(inertial, com=np.array(thing.com, float))
     if thing.mass is not None:
         # The mass itself was given; only how it is spread follows from the shape.
         inertial = replace(inertial, origin=Origin.GIVEN, error=0.0, source=f"workstation file; {source}")
+        return inertial, findings
+    figure = f"mass {inertial.mass:.4g} kg"
+    if not any(finding.text.startswith(figure) for finding in findings):
+        text = f"{figure} estimated: {inertial.source}, error ±{100 * inertial.error:.2g} %"
+        findings += (Finding(level="note", subject=thing.name, text=text),)
     return inertial, findings
+
+
+def _spread(thing: Thing, meshes: list[Mesh]) -> tuple[Inertial, tuple[Finding, ...]]:
+    """Mass properties at uniform density, and what was noticed."""
+    if thing.shape is None or thing.shape.sphere is None:
+        return mass_properties.from_shape(meshes, density=thing.density, mass=thing.mass, subject=thing.name)
+    radius = thing.shape.sphere
+    mass, origin, source = thing.mass, Origin.GIVEN, "sphere, shape in the workstation file"
+    if mass is None:
+        mass = float(4 / 3 * np.pi * radius**3 * (thing.density or 0.0))
+        origin, source = Origin.ESTIMATED, f"{thing.density:g} kg/m³ × volume of the sphere"
+    return Inertial(mass, np.zeros(3), np.eye(3) * 0.4 * mass * radius**2, origin, source), ()
+
+
+def _odd(thing: Thing, solids: tuple[Solid, ...], meshes: list[Mesh]) -> tuple[Finding, ...]:
+    """Warnings for a size, a mass or a density that speaks of a wrong unit."""
+    low, high = lint.box(solids)
+    texts = [lint.odd_extent(float((high - low).max()), unit=thing.units)]
+    if thing.mass is not None:
+        texts.append(_odd_mass(thing.mass, thing, meshes))
+    if thing.density is not None:
+        odd = lint.odd_density(thing.density)
+        texts.append(f"density is {odd}" if odd else "")
+    return tuple(Finding(level="warning", subject=thing.name, text=text) for text in texts if text)
+
+
+def _odd_mass(mass: float, thing: Thing, meshes: list[Mesh]) -> str:
+    """What is odd about a mass in this shape, whose hull bounds its volume where it is not closed."""
+    if thing.shape is not None and thing.shape.sphere is not None:
+        return lint.odd_mass(mass, 4 / 3 * np.pi * thing.shape.sphere**3, exact=True)
+    mesh, _ = joined([m for m in meshes if len(m.faces)])
+    hull = _hull_volume(mesh)
+    volume = signed_volume(mesh) if is_closed(mesh) else 0.0
+    if 1e-9 * hull < volume <= hull * (1 + 1e-9):
+        return lint.odd_mass(mass, volume, exact=True)
+    return lint.odd_mass(mass, hull, exact=False)
+
+
+def _hull_volume(mesh: Mesh) -> float:
+    """[m³]; 0 when the mesh is flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return float(ConvexHull(mesh.vertices).volume)
+    except (QhullError, ValueError):
+        return 0.0
+
+
+Spread = Callable[[], tuple[Inertial, tuple[Finding, ...]]]
+
+
+def _possible(
+    inertial: Inertial,
+    solids: Sequence[Solid],
+    table: Thing | BodyTable,
+    subject: str,
+    file: str,
+    key: str,
+    spread: Spread,
+) -> tuple[Inertial, tuple[Finding, ...]]:
+    """Mass properties that a body of this shape can have, rounding mended, and what is odd about them.
+
+    Args:
+        inertial: What follows from the table.
+        solids: The shape; empty when there is none.
+        table: What the user gave.
+        subject: Full name of the body.
+        file: The workstation file, for messages.
+        key: Of the table in the file, ends in a dot; empty for the table itself.
+        spread: Mass properties at uniform density, to propose.
+
+    Raises:
+        InputError: No body of this shape has the given centre of mass or inertia.
+    """
+    problems = []
+    findings: list[Finding] = []
+    if table.com is not None and solids:
+        low, high = lint.box(solids)
+        what = lint.misplaced_com(inertial.com, low, high)
+        if what:
+            remedy = f"its box is {np.round(low, 4).tolist()} to {np.round(high, 4).tolist()} m"
+            problems.append(Problem(file, f"{key}com", what, f"{remedy}; millimetres go into com_mm"))
+    if table.inertia is not None:
+        what = lint.impossible_inertia(inertial.inertia)
+        if what:
+            problems.append(Problem(file, f"{key}inertia", what, _proposed(spread)))
+        else:
+            mended, level, text = lint.plausible_inertial(inertial, moves=True)
+            if mended is not None and text:
+                inertial = mended
+                findings.append(Finding(level=level, subject=subject, text=text))
+    if problems:
+        raise InputError(problems)
+    if table.com is not None or table.inertia is not None:
+        body = Link(subject, None, np.eye(4), inertial=inertial, solids=tuple(solids))
+        findings += [Finding(level=a, subject=b, text=c) for a, b, c in lint.misplaced_mass(body)]
+    return inertial, tuple(findings)
+
+
+def _proposed(spread: Spread) -> str:
+    """What an inertia could be, in words."""
+    order = "ixx, iyy, izz, ixy, ixz, iyz about the centre of mass in kg·m²"
+    try:
+        inertia = spread()[0].inertia
+    except InputError:
+        return f"give {order}"
+    six = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+    return f"give {order}; at uniform density [{', '.join(f'{x:.4g}' for x in six)}]"
 
 
 def by_hand(
@@ -157,22 +279,39 @@ def symmetric(six: tuple[float, float, float, float, float, float]) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def link_by_hand(table: BodyTable, solids: tuple[Solid, ...], subject: str) -> Inertial:
+def link_by_hand(
+    table: BodyTable, link: Link, *, robot: str, file: str
+) -> tuple[Inertial, tuple[Finding, ...]]:
     """Mass properties of a link from its table; what the table leaves out follows from the shape.
 
-    Raises:
-        InputError: Something was left out and the link has no shape to compute it from.
-    """
-    if table.com is not None and table.inertia is not None:
-        return by_hand(table.mass, table.com, table.inertia, table.source)
-    from seerob.errors import InputError
-    from seerob.model_io.glb import solid_mesh
+    Args:
+        table: What the user gave.
+        link: The link as read.
+        robot: Name of its robot.
+        file: The workstation file, for messages.
 
-    if not solids:
-        raise InputError.at(subject, "masses", "has no shape to compute com and inertia from", "give both")
-    inertial, _ = mass_properties.from_shape(
-        [s.mesh if s.mesh is not None else solid_mesh(s) for s in solids], mass=table.mass, subject=subject
-    )
-    com = inertial.com if table.com is None else np.array(table.com, float)
-    inertia = inertial.inertia if table.inertia is None else symmetric(table.inertia)
-    return Inertial(table.mass, com, inertia, Origin.GIVEN, f"{table.source}; rest from the shape")
+    Returns:
+        The mass properties, and what is odd about them.
+
+    Raises:
+        InputError: Something was left out and the link has no shape to compute it from, or no body of
+            this shape has the given centre of mass or inertia.
+    """
+    key = f"masses.{link.name}"
+
+    def spread() -> tuple[Inertial, tuple[Finding, ...]]:
+        from seerob.model_io.glb import solid_mesh
+
+        if not link.solids:
+            raise InputError.at(file, key, "has no shape to compute com and inertia from", "give both")
+        meshes = [s.mesh if s.mesh is not None else solid_mesh(s) for s in link.solids]
+        return mass_properties.from_shape(meshes, mass=table.mass, subject=f"{robot}/{link.name}")
+
+    if table.com is not None and table.inertia is not None:
+        inertial = by_hand(table.mass, table.com, table.inertia, table.source)
+    else:
+        inertial = spread()[0]
+        com = inertial.com if table.com is None else np.array(table.com, float)
+        inertia = inertial.inertia if table.inertia is None else symmetric(table.inertia)
+        inertial = Inertial(table.mass, com, inertia, Origin.GIVEN, f"{table.source}; rest from the shape")
+    return _possible(inertial, link.solids, table, f"{robot}/{link.name}", file, f"{key}.", spread)

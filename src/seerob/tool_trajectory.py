@@ -38,9 +38,9 @@ class ToolTrajectory(Timed):
     Quaternions come out normalised, each with the sign that makes it continue the one before.
 
     Raises:
-        InputError: Values that are not finite, time that does not strictly increase, quaternions that
-            are not of unit length, shapes that do not fit, fewer than two samples; every kind of
-            mistake once, with its first place.
+        InputError: Values that are not finite or too large, time that does not strictly increase,
+            quaternions that are not of unit length, shapes that do not fit, fewer than two samples;
+            every kind of mistake once, with its first place.
     """
 
     file: str
@@ -104,7 +104,10 @@ class ToolTrajectory(Timed):
 
     def _value_problems(self) -> Iterator[Problem]:
         yield from self._time_problems()
-        yield from self._finite_problems(("position", "wxyz"))
+        wrong_numbers = list(self._number_problems(("position", "wxyz")))
+        yield from wrong_numbers
+        if wrong_numbers:
+            return
         off = np.abs(np.linalg.norm(self.wxyz, axis=1) - 1)
         wrong = np.flatnonzero(off > UNIT_TOLERANCE)
         if wrong.size:

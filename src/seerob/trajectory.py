@@ -20,6 +20,10 @@ from seerob.transforms import Array
 
 MAX_SAMPLES = 5_000_000
 """More rows than this are refused: 80 minutes at 1 kHz."""
+LARGEST = 1e6
+"""A value beyond it is no motion of a robot [rad, m, and per second; N·m or N]."""
+LATEST = 1e12
+"""A time beyond it is no time in seconds, but a stamp in another unit [s]."""
 
 
 class MotionOrigin(StrEnum):
@@ -96,6 +100,12 @@ class Timed:
             i = int(np.argmin(finite_time))
             yield Problem(self.file, self.place(i), f"time is {self.t[i]}", "give every row a time")
             return
+        late = np.abs(self.t) > LATEST
+        if late.any():
+            i = int(np.argmax(late))
+            what = f"time {self.t[i]:.4g} s is beyond {LATEST:g} s ({int(late.sum())} such rows)"
+            yield Problem(self.file, self.place(i), what, "correct the time unit or the row")
+            return
         step = np.diff(self.t)
         wrong = np.flatnonzero(step <= 0)
         if wrong.size:
@@ -104,7 +114,8 @@ class Timed:
             what = f"time {kind}: {self.t[i]:.9g} s after {self.t[i - 1]:.9g} s ({wrong.size} such rows)"
             yield Problem(self.file, self.place(i), what, "remove the rows, or export one motion per file")
 
-    def _finite_problems(self, names: Iterable[str]) -> Iterator[Problem]:
+    def _number_problems(self, names: Iterable[str]) -> Iterator[Problem]:
+        """Values that are not finite or so large that nothing can be computed with them."""
         for name in names:
             array = getattr(self, name)
             if array is None:
@@ -114,6 +125,12 @@ class Timed:
                 i, j = (int(k) for k in np.argwhere(bad)[0])
                 what = f"{name}[{j}] is {array[i, j]} ({int(bad.sum())} such values)"
                 yield Problem(self.file, self.place(i), what, "every value must be a finite number")
+                continue
+            far = np.abs(array) > LARGEST
+            if far.any():
+                i, j = (int(k) for k in np.argwhere(far)[0])
+                what = f"{name}[{j}] is {array[i, j]:.4g}, beyond {LARGEST:g} ({int(far.sum())} such values)"
+                yield Problem(self.file, self.place(i), what, "correct the row, the unit or the columns")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,8 +138,9 @@ class Trajectory(Timed):
     """Joint values over time, one row per sample of the file.
 
     Raises:
-        InputError: Values that are not finite, time that does not strictly increase, shapes that
-            do not fit, fewer than two samples; every kind of mistake once, with its first place.
+        InputError: Values that are not finite or too large, time that does not strictly increase,
+            shapes that do not fit, fewer than two samples; every kind of mistake once, with its
+            first place.
     """
 
     file: str
@@ -139,6 +157,8 @@ class Trajectory(Timed):
     """Tool centre point in whatever frame the file uses [m], shape (n, 3)."""
     tcp_wxyz: Array | None = None
     """Orientation of the tool in whatever frame the file uses, unit quaternions, shape (n, 4)."""
+    degrees: bool = False
+    """Whether angles were converted from degrees because a table or its mapping says so."""
     invalid: NDArray[np.bool_] | None = None
     """Rows of which the file itself says that they are not the robot's state, shape (n,)."""
     rows: NDArray[np.int64] | None = None
@@ -169,7 +189,7 @@ class Trajectory(Timed):
 
     def _value_problems(self) -> Iterator[Problem]:
         yield from self._time_problems()
-        yield from self._finite_problems(("q", "qd", "tau", "tcp_position", "tcp_wxyz"))
+        yield from self._number_problems(("q", "qd", "tau", "tcp_position", "tcp_wxyz"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ the velocity columns are the derivative of the position columns.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from enum import StrEnum
 from math import pi
 
@@ -24,6 +25,11 @@ TOLERANCE = 1e-6
 
 MOVES = {"rad": 0.02, "m": 0.002}
 """A joint whose positions span less than this stands still: its noise says nothing of velocities."""
+
+RESTS = 0.05
+"""Angles that stay below it say nothing of their unit: the robot rests at its zero [as stated]."""
+STARTS = 5e-4
+"""A first instant nearer to 0 is 0 [s]."""
 
 
 class Beyond(StrEnum):
@@ -58,15 +64,15 @@ def limit_check(
         beyond: Whether positions beyond a limit stop here or become warnings.
 
     Returns:
-        Warnings for speeds beyond a limit (and positions, when reported); a note for joints
-        of which nobody stated a limit.
+        Warnings for speeds beyond a limit (and positions, when reported) and for degrees that look
+        like radians; a note for joints of which nobody stated a limit.
 
     Raises:
         InputError: Another number of joints, a wrapped angle, or a position beyond a limit.
     """
     joint_count_check(trajectory, target)
     slopes = _slopes(trajectory)
-    problems, findings = [], []
+    problems, findings = [], list(_doubtful_degrees(trajectory, target))
     for j, joint in enumerate(target.joints):
         unit = target.units[j]
         wrapped = _wrapped(trajectory, slopes, j) if unit == "rad" else None
@@ -111,6 +117,23 @@ def _slopes(trajectory: Trajectory) -> Array:
     slopes = np.diff(trajectory.q, axis=0) / np.diff(trajectory.t)[:, None]
     judged = _judged(trajectory)
     return np.asarray(np.where((judged[1:] & judged[:-1])[:, None], slopes, 0.0))
+
+
+def _doubtful_degrees(trajectory: Trajectory, target: Target) -> Iterator[Finding]:
+    """A warning when every angle that is said to be in degrees would be plausible in radians."""
+    angular = [j for j, unit in enumerate(target.units) if unit == "rad"]
+    judged = _judged(trajectory)
+    if not trajectory.degrees or not angular or not judged.any():
+        return
+    stated = np.degrees(trajectory.q[judged][:, angular])
+    largest, span = float(np.abs(stated).max()), float(np.ptp(stated, axis=0).max())
+    if not RESTS < largest < 2 * pi:
+        return
+    text = (
+        f"angles are read as degrees, but none exceeds {largest:.3g} and the whole motion spans "
+        f"{span:.2g}°: is the column in radians?"
+    )
+    yield Finding(level="warning", subject=target.name, text=text)
 
 
 def _position(trajectory: Trajectory, target: Target, j: int) -> tuple[str, str] | None:
@@ -236,7 +259,7 @@ def _disagreement(power_s: float, power_v: float, cross: float) -> str:
 
 
 def sampling_findings(trajectory: Timed, target: str, timeout: float) -> tuple[Finding, ...]:
-    """Gaps longer than the source's time-out, and sampling so odd that the time unit is doubtful."""
+    """Gaps longer than the time-out, sampling so odd that the time unit is doubtful, a start not at 0."""
     step = np.diff(trajectory.t)
     median, worst = float(np.median(step)), int(np.argmax(step))
     findings = []
@@ -249,6 +272,13 @@ def sampling_findings(trajectory: Timed, target: str, timeout: float) -> tuple[F
     if not 2e-4 <= median <= 1.0:
         text = f"samples are {median:.3g} s apart (median): is the time unit right?"
         findings.append(Finding(level="warning", subject=target, text=text))
+    start = float(trajectory.t[0])
+    if abs(start) >= STARTS:
+        text = (
+            f"starts at {start:.3f} s on its own clock; shifted to 0: two files keep no common clock "
+            f"({trajectory.file})"
+        )
+        findings.append(Finding(level="note", subject=target, text=text))
     return tuple(findings)
 
 

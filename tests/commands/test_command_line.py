@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 import pytest
-from made_cells import HUMAN, ROBOT, SEPARATION, make_cell, seerob
+from made_cells import HUMAN, ROBOT, SEPARATION, SOURCE, make_cell, seerob
 from mcap.writer import Writer
 
 import seerob as sr
@@ -88,6 +88,12 @@ def test_a_wrong_call_is_an_error_and_not_an_undecided(capsys, arguments):
     assert "seerob" in err
 
 
+def test_python_m_seerob_is_the_command_line():
+    done = subprocess.run([sys.executable, "-m", "seerob", "--version"], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("seerob ")
+
+
 # -- new, check-file, kinds, schema -------------------------------------------------------------
 
 
@@ -118,6 +124,78 @@ def test_mistakes_go_to_standard_error_and_nothing_is_written(capsys, tmp_path, 
     assert len(lines) == 2
     assert all(line.startswith(f"{cell / 'workstation.toml'}: safety[0].") for line in lines)
     assert not (cell / "runs").exists()
+
+
+def test_a_folder_that_nobody_may_make_names_a_remedy(capsys, tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    code, out, err = seerob(capsys, "new", tmp_path / "file" / "cell")
+    assert (code, out, err.count("\n")) == (3, "", 1)
+    assert err.endswith("give a folder that may be written\n")
+
+
+def test_a_volume_is_not_computed_for_a_folder_that_does_not_exist(capsys, tmp_path):
+    cell = make_cell(tmp_path / "cell")
+    code, out, err = seerob(capsys, "swept", cell, "-o", tmp_path / "nowhere" / "swept.stl")
+    assert (code, out, err.count("\n")) == (3, "", 1)
+    assert "nowhere/swept.stl: its folder does not exist; make it" in err
+
+
+@pytest.mark.parametrize("command", ["check-file", "assess", "run"])
+@pytest.mark.parametrize("text", ["", "robots = []", '[[areas]]\nname = "a"\nshape = { sphere = 1 }\n'])
+def test_a_workstation_that_describes_nothing_is_a_mistake(capsys, tmp_path, command, text):
+    (tmp_path / "workstation.toml").write_text(text)
+    code, out, err = seerob(capsys, command, tmp_path)
+    assert (code, out, err.count("\n")) == (3, "", 1)
+    assert "describes nothing" in err
+    assert [p.name for p in tmp_path.iterdir()] == ["workstation.toml"]
+
+
+def test_mistakes_of_every_stage_come_together_and_none_follows_from_another(capsys, tmp_path):
+    box = "shape = { sphere = 0.01 }\nmass = 1\n"
+    more = (
+        ROBOT.replace("ur5e", "short").replace("library:short", "library:ur5e")
+        + "q = [0, 0]\n"
+        + ROBOT.replace("ur5e", "odd")  # the library has no such robot
+        + ROBOT.replace("ur5e", "typo").replace("library:typo", "library:ur5e")
+        + "basis = 1\n"
+        + HUMAN
+        + 'posture = "lying"\n'
+        + f'[[tools]]\nname = "good"\non = "ur5e/tool0"\n{box}'
+        + f'[[tools]]\nname = "lost"\non = "ur5e/toolO"\n{box}'
+        + '[[tools]]\nname = "unmade"\non = "odd/tool0"\nmesh = "unmade.stl"\n'
+        + f'[[workpieces]]\nname = "block"\non = "lost"\n{box}'
+        + '[[parts]]\nname = "table"\nmesh = "table.stl"\n'
+        + f'[[areas]]\nname = "zone"\non = "ur5e/rim"\n{box.split("mass", maxsplit=1)[0]}'
+        + SOURCE.replace('"ur5e"', '"odd"').replace("motion", "nowhere")
+        + SEPARATION  # speaks of the human, whose posture is wrong
+        + '[[safety]]\nkind = "velocity"\nat = "ur5e/elbow"\nlimit = 1\n'
+        + '[[safety]]\nkind = "velocity"\nat = "typo/toolO"\nlimit = 1\n'
+        + '[[safety]]\nkind = "kinetic_energy"\nrobot = "odd"\nlimit = 1\n'
+    )
+    cell = make_cell(tmp_path / "cell", more=more)
+    (cell / "motion.csv").write_text("time [s],J1 [deg],J2 [deg]\n0,1,2\n0.1,1,2\n")
+    code, out, err = seerob(capsys, "check-file", cell)
+    assert (code, out) == (3, "")
+    places = [
+        line.split(": ")[1].split(" ")[0]
+        for line in err.splitlines()
+        if line.startswith(f"{cell / 'workstation.toml'}: ")
+    ]
+    assert sorted(places) == [
+        "areas[0]",
+        "humans[0]",
+        "robots[1]",
+        "robots[2]",
+        "robots[3].basis",
+        "safety[2]",
+        "safety[3]",
+        "sources[1].file",
+        "tools[1].on",
+        "tools[2].mesh",
+    ], err
+    for word in ("'lying'", "in the library named 'odd'", "table.stl", "motion.csv"):
+        assert sum(word in line for line in err.splitlines()) == 1, err
+    assert len(err.splitlines()) == len(places) + 2, err
 
 
 def test_missing_files_and_unknown_links_come_in_one_go(capsys, tmp_path):
@@ -182,6 +260,59 @@ def test_exit_codes_tell_within_exceeded_and_undecided(capsys, tmp_path, monkeyp
         found, out, err = seerob(capsys, "assess", cell)
         assert (name, found, err) == (name, code, "")
         assert any(line.startswith(word) for line in out.splitlines())
+
+
+def test_nothing_judged_is_undecided(capsys, tmp_path, monkeypatch):
+    cell = make_cell(tmp_path / "cell")
+    file = cell / "workstation.toml"
+    file.write_text(file.read_text().replace("limit = 9.0\n", ""))
+    folder = tmp_path / "out"
+    code, out, err = seerob(capsys, "assess", cell, "-o", folder)
+    assert (code, err) == (2, "")
+    assert sum(line.startswith("nothing judged") for line in out.splitlines()) == 1
+    code, out, _ = seerob(capsys, "report", folder / "run.mcap", "-o", tmp_path / "again", "--json")
+    assert (code, json.loads(out)["verdict"]) == (2, None)
+    page = ("--port", "0", "--seconds", "0.1", "--no-record")
+    code, out, _ = seerob(capsys, "run", cell, *page)
+    assert code == 2
+    assert "nothing judged" in out
+
+
+@pytest.mark.parametrize("name", ["report.html", "results.xlsx"])
+@pytest.mark.parametrize("command", ["assess", "report"])
+def test_no_file_of_another_run_is_written_over(capsys, tmp_path, recorded, command, name):
+    (tmp_path / name).write_text("mine")
+    what = recorded[1] / "run.mcap" if command == "report" else recorded[0]
+    code, out, err = seerob(capsys, command, what, "-o", tmp_path)
+    assert (code, out, err.count("\n")) == (3, "", 1)
+    assert f"{name}: exists already; give another folder with -o" in err
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == "mine"
+
+
+def test_a_wait_for_the_compiler_is_announced_once(capsys, tmp_path, monkeypatch):
+    from seerob.commands import loops
+
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    loops.tell_compiling()
+    assert capsys.readouterr() == ("", "compiling the inner loops (once)\n")
+    (folder,) = loops.cache_folders()
+    folder.mkdir()
+    (folder / "tree.build-1.py311.nbi").write_bytes(b"")
+    loops.tell_compiling()
+    assert capsys.readouterr() == ("", "")
+
+
+def test_numba_keeps_what_it_compiles_where_it_is_looked_for(tmp_path):
+    """Asked of Numba itself, in a process that may keep it nowhere else."""
+    script = (
+        "from pathlib import Path\nfrom seerob.commands import loops\n"
+        "from seerob.kernels import boxes\n"
+        "kept = boxes._spread._cache.cache_path\n"
+        "assert [Path(kept)] == loops.cache_folders(), (kept, loops.cache_folders())"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", script], env=environment, check=True)
 
 
 def test_assess_writes_beside_the_workstation_and_never_over_a_recording(capsys, tmp_path):
@@ -319,7 +450,7 @@ def test_output_into_a_closed_pipe_is_quiet():
     reading, writing = os.pipe()
     os.close(reading)
     done = subprocess.run(
-        [sys.executable, "-m", "seerob.cli", "kinds"], stdout=writing, stderr=subprocess.PIPE, check=False
+        [sys.executable, "-m", "seerob", "kinds"], stdout=writing, stderr=subprocess.PIPE, check=False
     )
     os.close(writing)
     assert (done.returncode, done.stderr) == (3, b"")

@@ -74,3 +74,19 @@ def test_a_second_signal_writes_no_report_but_loses_no_recording(live):
     assert not (out / "report.html").exists()
     assert Recording.open(out / "run.mcap").duration > 0.3
     assert [p.name for p in out.iterdir() if p.name.startswith(".")] == []
+
+
+def test_an_interrupt_that_a_library_turned_into_its_own_error_is_one(monkeypatch, capsys):
+    """A bare ``except`` around an import makes a TypeError of Ctrl-C."""
+    from seerob import cli
+    from seerob.commands import kinds
+
+    def interrupted(options):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            raise TypeError("expected float")  # noqa: B904
+
+    monkeypatch.setattr(kinds, "run", interrupted)
+    assert cli.main(["kinds"]) == 3
+    assert capsys.readouterr().err == "stopped\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ import trimesh
 from seerob.errors import InputError, UnknownName
 from seerob.model_io.description import JointKind
 from seerob.model_io.loader import load_robot
+from seerob.model_io.resolve import Resolver
+from seerob.model_io.xml_values import Reader
 from seerob.snapshot import Origin
 
 LIMIT = '<limit lower="-1" upper="2" effort="30" velocity="3"/>'
@@ -347,3 +350,32 @@ def test_an_installed_robot_by_its_tail(tmp_path):
     assert "3.4 mm" in forearm
     # The figure travels with the shape, so that distances carry it as an interval.
     assert made.link("forearm_link").solids[0].deviation == pytest.approx(0.0034, abs=5e-5)
+
+
+def test_a_missing_mesh_says_where_it_was_looked_for_only_when_it_was(tmp_path, monkeypatch):
+    for variable in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"):
+        monkeypatch.delenv(variable, raising=False)
+    found = Resolver("r.urdf", tmp_path).find("package://nobody_has_this/m.stl")
+    assert (
+        found.remedy == 'say where the package is: packages = { nobody_has_this = "folder of the package" }'
+    )
+    named = Resolver("r.urdf", tmp_path, {"p": tmp_path / "p"})
+    assert named.find("package://p/../m.stl").remedy == "what a package names stays in the package"
+    assert named.find("package://p/m.stl").remedy == f"searched {tmp_path / 'p' / 'm.stl'}"
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "1 2", "heavy"])
+def test_a_single_number_is_asked_for_as_one(value):
+    reader = Reader("r.urdf", "r")
+    reader.number(ElementTree.fromstring(f'<mass value="{value}"/>'), "value", "link[a].mass")
+    assert [p.remedy for p in reader.problems] == ["must be a finite number"]
+
+
+def test_a_link_larger_than_20_m_speaks_of_a_wrong_unit(tmp_path):
+    shape = '<collision><geometry><box size="{} 1 1"/></geometry></collision>'
+    text = f'<robot name="r"><link name="a">{shape}</link></robot>'
+    for size, expected in (("19", 0), ("120", 1)):
+        (tmp_path / "r.urdf").write_text(text.format(size))
+        found = [f for f in load_robot("r.urdf", folder=tmp_path).findings if "largest extent" in f.text]
+        assert [(f.level, f.subject) for f in found] == [("warning", "robot/a")] * expected
+    assert "read as mm it would be 0.12 m" in found[0].text

@@ -95,3 +95,27 @@ def test_an_unexpanded_file_says_so(tmp_path):
     (tmp_path / "r.urdf").write_text(MAIN)
     with pytest.raises(InputError, match=r"name the file \.xacro"):
         load_robot("r.urdf", folder=tmp_path)
+
+
+def test_an_argument_that_nobody_declared(folder):
+    with pytest.raises(InputError) as caught:
+        load_robot("r.urdf.xacro", folder=folder, arguments={"lenght": "1"})
+    (problem,) = caught.value.problems
+    assert problem.key == "arguments.lenght"
+    assert "did you mean 'length'? known: length" in problem.remedy
+
+
+def test_an_argument_behind_a_condition_is_declared(folder):
+    text = MAIN.replace("<link", '<xacro:if value="0"><xacro:arg name="b" default="1"/></xacro:if><link', 1)
+    (folder / "r.urdf.xacro").write_text(text)
+    assert len(load_robot("r.urdf.xacro", folder=folder, arguments={"b": "2"}).links) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"), [({}, ["xacro argument length = 0.3"]), ({"length": "1"}, [])]
+)
+def test_an_argument_left_at_its_default_is_assumed(folder, arguments, expected):
+    found = load_robot("r.urdf.xacro", folder=folder, arguments=arguments, name="arm").findings
+    said = [f for f in found if "default of the file" in f.text]
+    assert [f.text.removesuffix(" (default of the file)") for f in said] == expected
+    assert {(f.level, f.subject) for f in said} <= {("assumed", "arm")}

@@ -222,6 +222,7 @@ def test_table_by_hand_with_levers(tmp_path):
     S = separation(tmp_path, TABLE)
     S_s = 0.4 * V - 0.1 * V
     assert terms(S)[:3] == pytest.approx([1.6 * 0.4, 0.1 * V, S_s])
+    assert any("the lesser of its first way and speed times time" in t for t in S.basis.not_modelled)
 
 
 def test_table_at_full_speed(tmp_path):

@@ -238,3 +238,19 @@ def test_a_part_without_the_verdict_governs_nothing(tmp_path):
     assert log["separation"].worst().part == "wrist"
     log.add(replace(made_run.snapshot(1), results=(replace(result, value=0.6, parts=(informs,)),)))
     assert log["separation"].worst().part == ""
+
+
+def test_parts_that_inform_show_the_extremum_in_their_own_sense_and_unit(tmp_path):
+    with Dossier().open(made_run.scene(), made_run.MESHES, made_run.FILES, tmp_path) as writer:
+        for k, (share, speed) in enumerate([(2.0, 0.9), (434474.0, 0.3), (1.0, 0.7)]):
+            parts = (
+                Result(name="share of speed", value=share),
+                Result(name="permissible speed", value=speed, unit="m/s", at_most=False),
+                Result(name="unknown", unit="m"),
+            )
+            made = made_run.snapshot(k)
+            first = replace(made.results[0], parts=parts)
+            writer.write(replace(made, results=(first, *made.results[1:])), ())
+    page = Page((tmp_path / "report.html").read_text())
+    assert re.search(r"largest 434 ?474(\.0+)?(?! ?m)", page.text)
+    assert "smallest 0.3" in page.text

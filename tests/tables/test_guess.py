@@ -212,3 +212,48 @@ def test_grad_is_a_degree_to_some_and_less_to_others(tmp_path):
     path = table(tmp_path / "a.csv", ["Zeit [s]", "Achse 1 [Grad]"], [T, 50 * Q[:, 0]])
     found = guess(path)
     assert "header says grad" in found.questions["joint_unit"]
+
+
+def test_rows_with_more_cells_than_the_header_are_said_and_trailing_blanks_are_none(tmp_path):
+    path = table(tmp_path / "a.csv", ["Time [s]", "J1 [rad]", "J2 [rad]", "J3 [rad]"], [T, Q])
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([*lines[:4], *(line + "; ;" for line in lines[4:])]))
+    assert not any("more cells" in note for note in read_motion(path)[2])
+    lines[6] += ";;7"
+    lines[9] += ";x"
+    path.write_text("\n".join(lines))
+    trajectory, _, notes = read_motion(path)
+    (note,) = (note for note in notes if "more cells" in note)
+    assert "more cells than the header (4): 2, the first is row 7" in note
+    np.testing.assert_array_equal(trajectory.q, Q)
+
+
+def test_a_workbooks_surplus_cells_are_said_with_sheet_and_row(tmp_path):
+    from openpyxl import Workbook
+
+    book = Workbook()
+    book.active.title = "Arm"
+    rows = [["Time [s]", "J1 [rad]", "J2 [rad]", "J3 [rad]"], *np.column_stack([T, Q]).tolist()]
+    rows[5].append("by hand")
+    for row in rows:
+        book.active.append(row)
+    book.save(tmp_path / "a.xlsx")
+    notes = read_motion(tmp_path / "a.xlsx")[2]
+    assert any("more cells than the header (4): 1, the first is sheet 'Arm' row 6" in n for n in notes)
+
+
+@pytest.mark.parametrize(("unit", "degrees"), [("deg", True), ("rad", False)])
+def test_a_motion_knows_whether_its_table_is_in_degrees(tmp_path, unit, degrees):
+    header = ["Time [s]", *(f"J{i} [{unit}]" for i in range(3))]
+    assert read_motion(table(tmp_path / "a.csv", header, [T, Q]))[0].degrees is degrees
+
+
+@pytest.mark.parametrize(("column", "words"), [(0, "time"), (2, "q[1] is 1e+307"), (4, "tcp_position[0]")])
+def test_numbers_beyond_all_bounds_are_refused_and_not_computed_with(tmp_path, column, words):
+    header = ["Time [min]", *(f"J{i} [rad]" for i in range(3)), *(f"TCP {a} [m]" for a in "XYZ")]
+    values = np.column_stack([T, Q, Q])
+    values[7, column] = 1e307
+    with pytest.raises(InputError) as error:
+        read_motion(table(tmp_path / "a.csv", header, [values]))
+    assert words in str(error.value)
+    assert "row 9" in str(error.value)

@@ -39,6 +39,14 @@ def test_quaternion_orders_and_lengths():
         wxyz_from("wxyz", np.array([[1.0, 0, 0, 0], [0, 0, 0, 0]]))
 
 
+@pytest.mark.parametrize(("convention", "columns"), [("wxyz", 4), ("rotation_vector", 3), ("ZYX", 3)])
+def test_what_is_beyond_all_bounds_is_refused_before_anything_overflows(convention, columns):
+    values = np.full((3, columns), 0.5)
+    values[2, 1] = -1e200
+    with pytest.raises(ValueError, match=r"beyond 1e\+06 in sample 2"):
+        wxyz_from(convention, values)
+
+
 @pytest.mark.parametrize("text", ["ZYx", "XXY", "zy", "ABC", "", "zyxz", "RPY"])
 def test_what_is_no_convention(text):
     assert not is_convention(text)

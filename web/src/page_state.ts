@@ -1,6 +1,7 @@
 // What the page knows, as signals: one selection, one time cursor, one set of results for every panel.
 
 import { batch, computed, signal } from "@preact/signals";
+import { type Elsewhere, worseElsewhere } from "./elsewhere";
 import type { Frame, LinkState } from "./messages";
 import { Trace } from "./traces";
 import { type State, stateOf, worstState } from "./verdicts";
@@ -74,6 +75,13 @@ export const rows = computed<Row[]>(() => {
 export const overall = computed<State>(() => {
   if (!frame.value) return "missing";
   return worstState(rows.value.map((row) => row.state));
+});
+
+/** What a recording holds at other times that is worse than what is shown; null while live. */
+export const elsewhere = computed<Elsewhere | null>(() => {
+  // Traces are changed in place: only the revision tells.
+  if (tracesRevision.value < 0 || isLive.value) return null;
+  return worseElsewhere(traces.values(), overall.value);
 });
 
 /** Nodes of the selection, by full name. */

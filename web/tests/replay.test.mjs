@@ -67,6 +67,22 @@ test("] goes to where a limit begins to be exceeded, and [ back", async () => {
   await page.waitForFunction((before) => window.seerob.t < before - 0.02, t);
 });
 
+test("the pill says what is exceeded elsewhere while this instant is not", async () => {
+  const box = await page.locator(".strip").boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  await page.waitForFunction(() => Math.abs(window.seerob.t - 10) < 0.1);
+  const { results } = await served.tell(`snapshot ${await settled(page)}`);
+  assert.ok(!results.some((r) => r.verdict === "exceeded"));
+  await page.waitForSelector(".pill.state-undecided .elsewhere-exceeded");
+  const told = page.locator(".pill-elsewhere");
+  assert.match(await told.textContent(), /at this instant; ✕ exceeded elsewhere: separation/);
+  // A narrow screen leaves the first words out.
+  assert.match(await told.innerText(), /✕ exceeded elsewhere: separation/);
+  await page.keyboard.press("]");
+  await page.waitForSelector(".pill.state-exceeded");
+  assert.equal(await told.count(), 0);
+});
+
 test("space plays at the chosen speed and pauses", async () => {
   await page.getByLabel("Speed", { exact: true }).selectOption("4");
   const start = await settled(page);

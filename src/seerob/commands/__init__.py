@@ -70,12 +70,12 @@ def port(text: str) -> int:
 
 
 def exit_code(verdict: Verdict | None) -> Exit:
-    """Exit code of a verdict; a run in which nothing is judged is not exceeded."""
+    """Exit code of a verdict; a run in which nothing is judged is not within."""
     return {
         Verdict.WITHIN: Exit.WITHIN,
         Verdict.EXCEEDED: Exit.EXCEEDED,
         Verdict.UNDECIDED: Exit.UNDECIDED,
-        None: Exit.WITHIN,
+        None: Exit.UNDECIDED,
     }[verdict]
 
 
@@ -127,29 +127,54 @@ def compiled(path: Path, *, quiet: bool = False, sources: bool = True) -> Statio
         sources: Whether its sources will be played.
 
     Raises:
-        InputError: With the mistakes of all criteria and all sources together.
+        InputError: With every mistake in the file and in the files it names, those of criteria and
+            sources included, also where an entry before them is wrong; or it describes nothing.
     """
-    from seerob import naming
+    from seerob.commands.draft import Draft
+    from seerob.commands.loops import tell_compiling
     from seerob.commands.progress import spinner
-    from seerob.reading import read
+    from seerob.reading import readable, shortened
     from seerob.station import Station
+    from seerob.workstation import locate
 
-    workstation = read(path)
-    problems: list[Problem] = []
+    found = readable(path)
+    problems = list(found.problems)
+    whole = Draft(str(locate(path)), found.head, found.entries, tuple(found.names))
+    draft = whole.without(found.between)
+    station = None
+    if draft.empty and not problems:
+        what = "describes nothing: no robot, no human, no part"
+        raise InputError.at(whole.file, "", what, "add [[robots]]; `seerob new` shows how")
+    if not draft.empty:
+        tell_compiling()
     with spinner(quiet=quiet) as say:
-        try:
-            station = Station(workstation, cache=cache_folder(), progress=say)
-        except InputError as error:
-            missing = naming.missing_files(workstation) if sources else []
-            raise InputError([*error.problems, *missing]) from error
-        for prepare in (lambda: station.bound, lambda: station.sources if sources else ()):
+        while station is None and not draft.empty:
             try:
-                prepare()
+                station = Station(draft.station, cache=cache_folder(), progress=say)
             except InputError as error:
-                problems += error.problems
-    if problems:
-        raise InputError(problems)
+                more = draft.in_file(error.problems)
+                problems += draft.own(more)
+                left = draft.without(more)
+                if left.entries == draft.entries:
+                    break
+                draft = left
+        if station is not None:
+            problems += draft.in_file(_unprepared(station, sources=sources))
+    if problems or station is None:
+        unseen = whole if station is None else whole.less(draft)
+        raise InputError(shortened([*problems, *unseen.missing_files(problems, sources=sources)]))
     return station
+
+
+def _unprepared(station: Station, *, sources: bool) -> list[Problem]:
+    """Mistakes of all criteria and of all sources."""
+    problems: list[Problem] = []
+    for prepare in (lambda: station.bound, lambda: station.sources if sources else ()):
+        try:
+            prepare()
+        except InputError as error:
+            problems += error.problems
+    return problems
 
 
 def describe(station: Station) -> None:
@@ -183,11 +208,13 @@ def tell(findings: tuple[Finding, ...]) -> None:
 
 
 def tell_results(summary: Summary) -> None:
-    """One line per criterion, in the order of the file."""
+    """One line per criterion, in the order of the file; and when none of them has a verdict."""
     width = max((len(name) for name in summary.results), default=0)
     for name, series in summary.results.items():
         word, style = WORDS[series.verdict]
         line(word, f"{name:<{width}}  {extreme(series)}", style)
+    if summary.verdict is None:
+        line("nothing judged", "no criterion has a verdict: give one a limit", WORDS[Verdict.UNDECIDED][1])
 
 
 def extreme(series: Series) -> str:

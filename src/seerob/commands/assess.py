@@ -18,7 +18,7 @@ from seerob.commands import (
     tell_results,
 )
 from seerob.commands.progress import announced, progress
-from seerob.commands.sinks import file_of, sinks_of, tell_files
+from seerob.commands.sinks import file_of, refuse_existing, sinks_of, tell_files
 
 HELP = "evaluate a workstation as fast as possible; write recording, report and tables"
 EXAMPLE = "seerob assess my_cell"
@@ -37,11 +37,12 @@ def run(options: argparse.Namespace) -> int:
     station = compiled(options.workstation, quiet=options.json)
     require_recorded(station.workstation)
     folder = run_folder(station.model.folder, options.output)
+    sinks = sinks_of(station.workstation, lossless=True)
+    refuse_existing(sinks, folder)
     scene = station.scene()
     if not options.json:
         describe(station)
         tell(scene.findings)
-    sinks = sinks_of(station.workstation, lossless=True)
     with progress(station.duration, f"{station.duration:.1f} s of motion") as tick:
         writers = announced(station.open_sinks(sinks, folder, scene), list(map(file_of, sinks)), tick.say)
         summary = station.run(writers=writers, scene=scene, progress=tick)

@@ -22,12 +22,16 @@ def run(options: argparse.Namespace) -> int:
     """Copy the starter; nothing that exists is touched.
 
     Raises:
-        InputError: The folder exists and is not empty.
+        InputError: The folder exists and is not empty, or cannot be made.
     """
     folder: Path = options.folder
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError.at(folder, "", "exists already", "give the name of a new folder")
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        what = f"cannot be made: {error.strerror}"
+        raise InputError.at(folder, "", what, "give a folder that may be written") from error
     starter = resources.files("seerob.commands") / "starter"
     for entry in starter.iterdir():
         (folder / entry.name).write_bytes(entry.read_bytes())

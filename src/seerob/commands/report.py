@@ -20,8 +20,9 @@ from seerob.commands import (
     run_folder,
     tell_results,
 )
+from seerob.commands.loops import tell_compiling
 from seerob.commands.progress import progress
-from seerob.commands.sinks import sinks_of, tell_files
+from seerob.commands.sinks import refuse_existing, sinks_of, tell_files
 
 if TYPE_CHECKING:
     from seerob.results import Series
@@ -47,9 +48,11 @@ def run(options: argparse.Namespace) -> int:
     if options.workstation is not None:
         station = compiled(options.workstation, quiet=options.json, sources=False)
     else:
+        tell_compiling()
         station = load_recorded(recording, cache=cache_folder())
     folder = run_folder(options.recording.parent, options.output)
     sinks = sinks_of(station.workstation, lossless=True, record=False)
+    refuse_existing(sinks, folder)
     with progress(recording.duration, f"{recording.duration:.1f} s recorded") as tick:
         summary = station.replay(recording, folder=folder, sinks=sinks, progress=tick)
     before = log_of(recording.snapshots(), recording.scene.criteria)

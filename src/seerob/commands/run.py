@@ -20,7 +20,7 @@ from seerob.commands import (
     tell_results,
 )
 from seerob.commands.progress import announced, spinner
-from seerob.commands.sinks import file_of, sinks_of, tell_files
+from seerob.commands.sinks import file_of, refuse_existing, sinks_of, tell_files
 from seerob.errors import InputError
 
 if TYPE_CHECKING:
@@ -95,6 +95,7 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
 
     folder = run_folder(station.model.folder, options.output)
     sinks = [] if options.no_record else sinks_of(station.workstation, lossless=False)
+    refuse_existing(sinks, folder)
     stopped = Stopped()
     with LiveView(
         scene=scene, meshes=station.model.meshes, host=options.host, port=options.port, token=options.token

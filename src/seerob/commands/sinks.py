@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from msgspec.structs import replace
 
 from seerob.commands import line
+from seerob.errors import InputError
 from seerob.sink import Sink
 
 if TYPE_CHECKING:
@@ -39,6 +40,17 @@ def sinks_of(workstation: Workstation, *, lossless: bool, record: bool = True) -
 def file_of(sink: Sink) -> str:
     """Name of the file that a sink writes in the run's folder; empty when it writes none."""
     return str(getattr(sink, "file", ""))
+
+
+def refuse_existing(sinks: list[Sink], folder: Path) -> None:
+    """Refuse a folder that holds files of another run.
+
+    Raises:
+        InputError: Naming the first of them.
+    """
+    for sink in sinks:
+        if file_of(sink) and (folder / file_of(sink)).exists():
+            raise InputError.at(folder / file_of(sink), "", "exists already", "give another folder with -o")
 
 
 def tell_files(sinks: list[Sink], folder: Path) -> None:

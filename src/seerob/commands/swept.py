@@ -68,6 +68,8 @@ def run(options: argparse.Namespace) -> int:
     from seerob.voxels import check_room
 
     check_format(options.output)
+    if not options.output.parent.is_dir():
+        raise InputError.at(options.output, "", "its folder does not exist", "make it, or give another place")
     station = compiled(options.workstation, sources=not options.reach)
     model = station.model
     bodies = model.select(_subject(station, options.of))

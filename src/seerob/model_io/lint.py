@@ -1,4 +1,4 @@
-"""Is it plausible? Every check on what a robot description says, each a small function of plain numbers.
+"""Is it plausible? Every check on what a robot or a thing is said to be, each a small function of numbers.
 
 Checks of one value return what may be used of it and a sentence for the reader of a result; checks
 of a whole description return findings. What cannot be used at all is the readers' business.
@@ -18,9 +18,18 @@ from seerob.model_io.rigid import groups
 from seerob.model_io.xml_values import Reader
 from seerob.snapshot import Origin
 from seerob.transforms import Array
+from seerob.units import LENGTHS
 
 MAX_LIMIT = {"effort": 1e5, "velocity": 1e3}
 """Beyond these a limit means "none" [N·m or N; rad/s or m/s]."""
+EXTENTS = (1e-4, 20.0)
+"""Largest edge of the box around a link, tool, workpiece or part, outside of which a unit is wrong [m]."""
+LIKELY = (0.01, 10.0)
+"""Within these a unit is worth proposing [m]."""
+MAX_MASS = 1e4
+"""Of one thing [kg]."""
+DENSITIES = (10.0, 25_000.0)
+"""From foam to the heaviest metals [kg/m³]."""
 REPAIRABLE = 0.02
 """Violation of A + B >= C, relative to the largest moment, that rounding in a file explains."""
 TIPS = (
@@ -95,6 +104,73 @@ def plausible_inertial(inertial: Inertial, *, moves: bool) -> tuple[Inertial | N
     return replace(inertial, inertia=0.5 * (mended + mended.T)), "note", text
 
 
+def impossible_inertia(inertia: Array) -> str:
+    """Why no body has this inertia (3, 3) [kg·m²]; empty when one does, but for rounding."""
+    a, b, c = np.linalg.eigvalsh(inertia)
+    shown = f"principal moments {a:.4g}, {b:.4g}, {c:.4g} kg·m²"
+    if a <= 0:
+        return f"{shown} are not all greater than 0"
+    if c - a - b > 2 * REPAIRABLE * c:
+        return f"{shown} break A + B ≥ C"
+    return ""
+
+
+def odd_extent(extent: float, *, unit: str | None = None) -> str:
+    """What is odd about the largest edge [m] of something, and which unit would fit; empty when nothing is.
+
+    Args:
+        extent: As read.
+        unit: Unit that it was read in; None when the file itself said it.
+    """
+    if EXTENTS[0] <= extent <= EXTENTS[1]:
+        return ""
+    raw = extent / LENGTHS[unit or "m"]
+    fits = [u for u in ("m", "mm", "inch", "cm", "um") if LIKELY[0] <= raw * LENGTHS[u] <= LIKELY[1]]
+    what = f"largest extent {extent:.4g} m, expected {EXTENTS[0]:g} m to {EXTENTS[1]:g} m: check the unit"
+    return what + (f"; read as {fits[0]} it would be {raw * LENGTHS[fits[0]]:.4g} m" if fits else "")
+
+
+def odd_mass(mass: float, volume: float, *, exact: bool) -> str:
+    """What is odd about a mass [kg] in a shape; empty when nothing is.
+
+    Args:
+        mass: As given.
+        volume: Of the shape [m³].
+        exact: Whether the shape fills its volume; otherwise it is a bound from above.
+    """
+    if mass > MAX_MASS:
+        return f"mass is {mass:.4g} kg, expected at most {MAX_MASS:g} kg: check the unit"
+    density = mass / volume if volume > 0 else 0.0
+    if density > DENSITIES[1] or (exact and 0 < density < DENSITIES[0]):
+        at = "" if exact else "at least "
+        return f"mass {mass:.4g} kg in {volume:.3g} m³ is {at}{odd_density(density)}"
+    return ""
+
+
+def odd_density(density: float) -> str:
+    """A density [kg/m³] that no solid has, in words; empty when one has it."""
+    if DENSITIES[0] <= density <= DENSITIES[1]:
+        return ""
+    low, high = DENSITIES
+    return (
+        f"{density:.4g} kg/m³, expected {low:g} to {high:g} kg/m³: check the units of mass, density and size"
+    )
+
+
+def misplaced_com(com: Array, low: Array, high: Array) -> str:
+    """Why a centre of mass [m] cannot belong to the box from ``low`` to ``high``; empty when it can."""
+    size = float(np.linalg.norm(high - low))
+    if ((low - size <= com) & (com <= high + size)).all():
+        return ""
+    return f"centre of mass {com.tolist()} m lies more than {size:.3g} m, the size of the shape, outside it"
+
+
+def box(solids: Sequence[Solid]) -> tuple[Array, Array]:
+    """Lowest and highest corner [m] of the box around solids, of which there is at least one."""
+    points = np.concatenate([extreme_points(solid) for solid in solids])
+    return points.min(axis=0), points.max(axis=0)
+
+
 def guessed_tip(links: Sequence[Link]) -> str:
     """The link a tool is most likely mounted on: a customary name, else the end of the longest chain."""
     for ending in TIPS:
@@ -127,6 +203,10 @@ def _findings(description: Description) -> Iterator[tuple[str, str, str]]:
             yield "warning", "", f"{which} limit unknown: {', '.join(unknown)}"
     yield from massless(description)
     for link in description.links:
+        if link.solids:
+            text = odd_extent(float(np.subtract(*box(link.solids)[::-1]).max()))
+            if text:
+                yield "warning", link.name, text
         yield from misplaced_mass(link)
         if link.inertial is not None and not link.solids and link.inertial.mass > 0.05:
             yield (
@@ -163,8 +243,7 @@ def misplaced_mass(link: Link) -> Iterator[tuple[str, str, str]]:
     """Findings when centre of mass or radius of gyration do not fit the link's shape."""
     if link.inertial is None or not link.solids:
         return
-    points = np.concatenate([extreme_points(solid) for solid in link.solids])
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = box(link.solids)
     size = float(np.linalg.norm(high - low))
     com = link.inertial.com
     outside = float(np.linalg.norm(np.maximum(np.maximum(low - com, com - high), 0)))

@@ -34,6 +34,8 @@ class Resolver:
     """The folder it is in; relative references start there."""
     packages: Mapping[str, Path] = field(default_factory=dict)
     """Folder of each ROS package that the user named."""
+    remarks: list[str] = field(default_factory=list)
+    """What was taken as the files have it because the user did not say otherwise."""
 
     def find(self, uri: str) -> Found | Problem:
         """The file behind ``package://``, ``model://``, ``file://`` or a path; a problem when there is none.
@@ -64,10 +66,14 @@ class Resolver:
                 )
                 return Found(found, remark)
         package = rest.partition("/")[0]
-        remedy = "searched " + ", ".join(map(str, searched))
-        if scheme in {"package", "model"} and package not in self.packages:
-            remedy += f'; or say where the package is: packages = {{ {package} = "folder of the package" }}'
-        return Problem(self.file, uri, "no such file", remedy)
+        remedies = ["searched " + ", ".join(map(str, searched))] if searched else []
+        if scheme in {"package", "model"}:
+            if package not in self.packages:
+                where = f'say where the package is: packages = {{ {package} = "folder of the package" }}'
+                remedies.append(f"or {where}" if searched else where)
+            elif not searched:
+                remedies.append("what a package names stays in the package")
+        return Problem(self.file, uri, "no such file", "; ".join(remedies))
 
     def _candidates(self, scheme: str, rest: str) -> Iterator[Path]:
         if scheme in {"package", "model"}:

@@ -38,6 +38,8 @@ def from_text(content: bytes, *, resolver: Resolver, name: str = "robot") -> Des
         InputError: Every mistake in the file at once.
     """
     reader = Reader(resolver.file, name)
+    for remark in resolver.remarks:
+        reader.finding("assumed", "", remark)
     root = parse_xml(content, resolver.file)
     if root.tag != "robot":
         raise InputError.at(

@@ -17,9 +17,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from seerob.errors import InputError
+from seerob.errors import InputError, Problem, suggestion
 from seerob.model_io.resolve import Resolver
-from seerob.model_io.xml_values import parse_xml
+from seerob.model_io.xml_values import MAX_BYTES, parse_xml
 
 MAX_EXPRESSION = 2000
 """Longest expression evaluated [characters]."""
@@ -33,6 +33,23 @@ class _Refused(Exception):
     """An expression or substitution that is not evaluated here."""
 
 
+class _Arguments(dict[str, str]):
+    """Values of arguments; xacro adds the defaults of those that were not given."""
+
+    def __init__(self, given: Mapping[str, str]) -> None:
+        super().__init__(given)
+        self.known: set[str] = set()
+        """Every name that the file declared or asked for."""
+
+    def __contains__(self, name: object) -> bool:
+        self.known.add(str(name))
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> str:
+        self.known.add(name)
+        return super().__getitem__(name)
+
+
 def expanded(
     path: Path, resolver: Resolver, arguments: Mapping[str, str] | None = None
 ) -> tuple[bytes, dict[str, bytes]]:
@@ -40,19 +57,21 @@ def expanded(
 
     Args:
         path: The file.
-        resolver: Knows where ``$(find package)`` is.
+        resolver: Knows where ``$(find package)`` is; is told which arguments kept their defaults.
         arguments: Values of its ``xacro:arg``.
 
     Raises:
-        InputError: An unknown argument, package, include or symbol, or a refused expression.
+        InputError: An argument that the file does not declare or that has no value, an unknown package,
+            include or symbol, or a refused expression.
     """
     parse_xml(path.read_bytes(), resolver.file)
     xacro = importlib.import_module("xacro")
+    values = _Arguments(arguments or {})
     said = io.StringIO()
     with _ONE_AT_A_TIME, _guarded(xacro, resolver), contextlib.redirect_stderr(said):
         xacro.all_includes.clear()
         try:
-            document = xacro.process_file(str(path), mappings=dict(arguments or {}))
+            document = xacro.process_file(str(path), mappings=values)
         except Exception as error:  # xacro passes on whatever an expression raises
             raise InputError.at(resolver.file, _place(xacro, path), _what(error), _remedy(error)) from None
         included = [Path(name) for name in xacro.all_includes]
@@ -61,7 +80,29 @@ def expanded(
     for file in included:
         with contextlib.suppress(OSError):
             files[str(file)] = file.read_bytes()
+    known = values.known.union(*(_declared(content, resolver.file) for content in files.values()))
+    _refuse_unknown(arguments or {}, known, resolver.file)
+    for name in sorted(values.keys() - (arguments or {}).keys()):
+        resolver.remarks.append(f"xacro argument {name} = {values[name]} (default of the file)")
     return text, files
+
+
+def _declared(content: bytes, file: str) -> set[str]:
+    """Arguments that a file declares, also behind a condition that does not hold."""
+    # Yaml and the like are included too and declare nothing.
+    if len(content) > MAX_BYTES or b"<" not in content[:1000]:
+        return set()
+    tags = parse_xml(content, file).iter()
+    return {e.get("name", "") for e in tags if "xacro" in str(e.tag) and str(e.tag).endswith("}arg")}
+
+
+def _refuse_unknown(given: Mapping[str, str], known: set[str], file: str) -> None:
+    unknown = sorted(given.keys() - known)
+    if unknown:
+        what = "is no argument of this file"
+        raise InputError(
+            [Problem(file, f"arguments.{n}", what, suggestion(n, sorted(known))) for n in unknown]
+        )
 
 
 @contextlib.contextmanager

@@ -45,11 +45,10 @@ class Reader:
             return np.array(default)
         words = text.split()
         if len(words) != len(default) or not all(map(NUMBER.fullmatch, words)):
-            many = "a number" if len(default) == 1 else f"{len(default)} numbers"
+            one = len(default) == 1
+            many = "a finite number" if one else f"{len(default)} numbers separated by blanks"
             hint = "; write a decimal point, not a comma" if "," in text else ""
-            self.problem(
-                f"{key}.{attribute}", f"is {text[:80]!r}", f"must be {many} separated by blanks{hint}"
-            )
+            self.problem(f"{key}.{attribute}", f"is {text[:80]!r}", f"must be {many}{hint}")
             return np.array(default)
         values = np.array([float(word) for word in words])
         if not np.isfinite(values).all():

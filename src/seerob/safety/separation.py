@@ -244,13 +244,15 @@ class Separation(Criterion, frozen=True, kw_only=True):
             reason = "or more" if factor == (1.0 if stop.costly else TOP) else ""
         else:
             reason = "stands still: no motion to scale"
+        beside = reason
+        if factor is None:
+            beside = reason or "stands still: no speed to compare with"
+        elif factor > TOP:
+            # Against next to no speed any factor comes out, and none says anything.
+            factor, beside = None, f"more than {TOP:g} times the present speed"
         return (
-            Result(name="largest permissible speed", value=speed, unit="m/s", reason=reason),
-            Result(
-                name="share of the present speed",
-                value=factor,
-                reason=reason if factor is not None else reason or "stands still: no speed to compare with",
-            ),
+            Result(name="largest permissible speed", value=speed, unit="m/s", at_most=False, reason=reason),
+            Result(name="share of the present speed", value=factor, at_most=False, reason=beside),
         )
 
     @staticmethod

@@ -10,7 +10,7 @@ from seerob.sinks._evidence import assumed, evaluated, not_covered
 from seerob.sinks._html import Html, joined, table, tag
 from seerob.sinks._page_style import STYLE
 from seerob.sinks._report import Report, badge, input_row
-from seerob.sinks._sentences import about, bound, percent, reached, summary
+from seerob.sinks._sentences import about, bound, extremum, percent, reached, summary
 from seerob.snapshot import Basis, CriterionInfo, Verdict
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
@@ -172,7 +172,7 @@ def _parts(series: Series) -> Html | None:
             [
                 part.name,
                 badge(part.verdict),
-                _whole(reached(worst, part)),
+                _whole(extremum(worst, part)),
                 _whole(bound(worst, part)),
                 f"{worst.t:.2f} s",
                 share,

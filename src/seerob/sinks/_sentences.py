@@ -45,6 +45,14 @@ def reached(worst: Worst, series: Series) -> str:
     )
 
 
+def extremum(worst: Worst, series: Series) -> str:
+    """The worst value; where nothing is judged, with the side on which it is the extreme one."""
+    text = reached(worst, series)
+    if series.verdict is not None or worst.value is None:
+        return text
+    return f"{'largest' if series.at_most else 'smallest'} {text}"
+
+
 def bound(worst: Worst, series: Series) -> str:
     """The limit at the worst instant with its unit, not kinder than it is."""
     if worst.value is None or worst.limit is None:

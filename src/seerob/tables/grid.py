@@ -91,6 +91,10 @@ class Numbers:
     """Blank rows between rows with values."""
     selections: tuple[str, ...]
     """Distinct texts in the column of selection, at most a hundred."""
+    longer: int = 0
+    """Rows with values beyond the last column of the header."""
+    first_longer: int = 0
+    """The first of them, from 1; 0 when there is none."""
 
 
 def read_numbers(
@@ -100,6 +104,7 @@ def read_numbers(
     *,
     decimal_comma: bool = False,
     select: tuple[int, str | None] | None = None,
+    width: int | None = None,
 ) -> Numbers:
     """Read numeric columns.
 
@@ -109,6 +114,7 @@ def read_numbers(
         columns: Column index, from 0, per name.
         decimal_comma: Whether text such as ``1,5`` is a number.
         select: Column index and the text that a row must have there; None takes every row.
+        width: Columns of the header; None when there is no header.
 
     Raises:
         InputError: A cell that is not a finite number, or more rows or columns than are taken;
@@ -118,7 +124,7 @@ def read_numbers(
     flat, numbers = array("d"), array("q")
     problems: list[Problem] = []
     seen: dict[str, None] = {}
-    skipped = pending = 0
+    skipped = pending = longer = first_longer = 0
     for count, row in enumerate(grid.rows(), start=1):
         if count < first_row:
             continue
@@ -139,6 +145,8 @@ def read_numbers(
             raise InputError.at(
                 grid.file, place(grid, count), f"more than {MAX_SAMPLES} rows", "split the file"
             )
+        if width is not None and len(row) > width and not all(map(blank, row[width:])):
+            longer, first_longer = longer + 1, first_longer or count
         values = [number(cell, decimal_comma=decimal_comma) for cell in cells]
         for name, value in zip(names, values, strict=True):
             if isinstance(value, str):
@@ -155,4 +163,4 @@ def read_numbers(
         raise InputError(problems)
     # Views of the arrays: a long file is not held twice.
     table = np.frombuffer(flat, np.float64).reshape(-1, len(indices))
-    return Numbers(np.frombuffer(numbers, np.int64), table, skipped, tuple(seen))
+    return Numbers(np.frombuffer(numbers, np.int64), table, skipped, tuple(seen), longer, first_longer)

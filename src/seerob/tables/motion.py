@@ -83,11 +83,18 @@ def read_table(
         columns,
         decimal_comma=bool(mapping.decimal_comma),
         select=select,
+        width=len(layout.headers) if layout.header_row else None,
     )
     _check_selection(found.file, mapping, numbers)
     notes = list(found.notes)
     if numbers.skipped:
         notes.append(f"{numbers.skipped} blank rows between rows with values were skipped")
+    if numbers.longer:
+        where = place(layout.grid, numbers.first_longer)
+        notes.append(
+            f"rows with more cells than the header ({len(layout.headers)}): {numbers.longer}, the first is "
+            f"{where}; the surplus is left out"
+        )
     return Table(found, numbers.rows, _blocks(numbers, indices, factors), tuple(notes))
 
 
@@ -115,6 +122,7 @@ def read_motion(
         tau=blocks.get("torques"),
         tcp_position=blocks.get("tcp_position"),
         tcp_wxyz=wxyz,
+        degrees=_says_degrees(table.guess.mapping),
         rows=table.rows,
         sheet=table.guess.layout.grid.sheet,
     )
@@ -136,7 +144,12 @@ def read_tool_motion(
     if convention == "xyzw":
         orientation = np.roll(orientation, 1, axis=1)
     elif convention is not None and convention != "wxyz":
-        orientation = wxyz_from(convention, orientation)
+        try:
+            orientation = wxyz_from(convention, orientation)
+        except ValueError as error:
+            raise InputError.at(
+                table.guess.file, table.place, str(error), "correct the row or the unit"
+            ) from error
     trajectory = ToolTrajectory(
         file=table.guess.file,
         t=table.blocks["time"][:, 0],
@@ -146,6 +159,13 @@ def read_tool_motion(
         sheet=table.guess.layout.grid.sheet,
     )
     return trajectory, table.guess, table.notes
+
+
+def _says_degrees(mapping: Mapping) -> bool:
+    """Whether every joint that has an angle is in degrees."""
+    unit = mapping.joint_unit
+    each = unit if isinstance(unit, tuple) else (unit,)
+    return "deg" in each and "rad" not in each
 
 
 def _indices(layout: Layout, mapping: Mapping) -> dict[str, tuple[int, ...]]:
@@ -225,6 +245,8 @@ def _blocks(
 ) -> dict[str, Array]:
     blocks, start = {}, 0
     for key, group in indices.items():
-        blocks[key] = numbers.values[:, start : start + len(group)] * factors[key]
+        # What overflows is refused by the trajectory, with its place.
+        with np.errstate(over="ignore"):
+            blocks[key] = numbers.values[:, start : start + len(group)] * factors[key]
         start += len(group)
     return blocks

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from seerob.trajectory import LARGEST
 from seerob.transforms import Array
 
 EULER = re.compile(r"[XYZ]{3}|[xyz]{3}")
@@ -45,8 +46,11 @@ def wxyz_from(convention: str, values: Array) -> Array:
         Shape (n, 4).
 
     Raises:
-        ValueError: A quaternion of length zero; the message names the row.
+        ValueError: A value beyond all bounds, or a quaternion of length zero; the message names the sample.
     """
+    far = (np.abs(values) > LARGEST).any(axis=1)
+    if far.any():
+        raise ValueError(f"orientation beyond {LARGEST:g} in sample {int(np.argmax(far))}")
     if convention in ("wxyz", "xyzw"):
         q = np.roll(values, 1, axis=1) if convention == "xyzw" else values
         length = np.linalg.norm(q, axis=1)

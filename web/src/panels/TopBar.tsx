@@ -1,9 +1,10 @@
 // What is shown, from where, and the worst that is said about it.
 
+import type { Elsewhere } from "../elsewhere";
 import { formatQuantity } from "../format";
-import { frame, hello, isLive, link, lookingAt, overall, rows, scene, stale } from "../page_state";
+import { elsewhere, frame, hello, isLive, link, lookingAt, overall, rows, scene, stale } from "../page_state";
 import { orderedRows } from "../row_order";
-import { STATE_ICONS, type State } from "../verdicts";
+import { STATE_ICONS, STATE_WORDS, type State } from "../verdicts";
 
 export function TopBar() {
   const run = scene.value;
@@ -51,7 +52,10 @@ const HEADLINES: Record<State, string> = {
   none: "NO LIMITS SET",
 };
 
-/** The worst verdict, and the criterion that gives it. Grey as soon as it may be out of date. */
+/**
+ * The worst verdict, and the criterion that gives it. Grey as soon as it may be out of date; it speaks of
+ * the instant on screen, and says so where a recording is worse at another.
+ */
 function StatusPill() {
   const state = overall.value;
   if (stale.value || !frame.value) {
@@ -67,6 +71,7 @@ function StatusPill() {
   const there = orderedRows.value.filter((row) => row.state === state);
   const worst = there[0];
   const others = there.length - 1;
+  const other = elsewhere.value;
   const detail = worst && state !== "within" && state !== "none" ? ` ${worst.info.name}` : "";
   return (
     <output class={`pill state-${state}`} aria-live="polite">
@@ -80,10 +85,25 @@ function StatusPill() {
           {formatQuantity(worst.result.value, worst.result.unit, worst.result.limit)}
         </span>
       )}
-      {!detail && state !== "none" && <span class="pill-more">all {judgedCount()} with a limit</span>}
+      {other && <ElsewhereNote {...other} />}
+      {!detail && !other && state !== "none" && (
+        <span class="pill-more">all {judgedCount()} with a limit</span>
+      )}
       {detail && others > 0 && <span class="pill-more">+{others}</span>}
       {lookingAt.value !== null && <span class="pill-more">looking back</span>}
     </output>
+  );
+}
+
+function ElsewhereNote({ verdict, criteria }: Elsewhere) {
+  const more = criteria.length > 1 ? ` +${criteria.length - 1}` : "";
+  return (
+    <span class={`pill-elsewhere elsewhere-${verdict}`} title={criteria.join(", ")}>
+      <span class="pill-instant">at this instant; </span>
+      <span aria-hidden="true">{STATE_ICONS[verdict]} </span>
+      {STATE_WORDS[verdict]} elsewhere: {criteria[0]}
+      {more}
+    </span>
   );
 }
 

@@ -1,0 +1,34 @@
+"""The inner loops: whether Numba has compiled them before, and what to say when it has not."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from importlib.util import find_spec
+from pathlib import Path
+
+from seerob.commands import STATUS
+
+COMPILING = "compiling the inner loops (once)"
+
+
+def tell_compiling() -> None:
+    """One line that stays during the wait, when nothing is compiled yet."""
+    if not any(folder.is_dir() and any(folder.glob("*.nbi")) for folder in cache_folders()):
+        STATUS.print(COMPILING, markup=False)
+
+
+def cache_folders() -> list[Path]:
+    """Where Numba keeps, or looks for, what it compiled of `seerob.kernels`."""
+    spec = find_spec("seerob.kernels")
+    assert spec is not None
+    assert spec.origin is not None
+    package = os.path.dirname(os.path.abspath(spec.origin))
+    # As numba.core.caching names the folder of a package in a cache for all of them.
+    inner = f"{os.path.basename(package)}_{hashlib.sha1(package.encode(), usedforsecurity=False).hexdigest()}"
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    if chosen:
+        return [Path(chosen) / inner]
+    from platformdirs import user_cache_path
+
+    return [Path(package) / "__pycache__", user_cache_path("numba", appauthor=False) / inner]

@@ -130,23 +130,24 @@ def compiled(path: Path, *, quiet: bool = False, sources: bool = True) -> Statio
         InputError: With every mistake in the file and in the files it names, those of criteria and
             sources included, also where an entry before them is wrong; or it describes nothing.
     """
-    from seerob.commands.draft import Draft
     from seerob.commands.loops import tell_compiling
+    from seerob.workstation import locate
+
+    file = locate(path)
+    tell_compiling()  # before the imports: many loops are compiled by them
+    from seerob.commands.draft import Draft
     from seerob.commands.progress import spinner
     from seerob.reading import readable, shortened
     from seerob.station import Station
-    from seerob.workstation import locate
 
     found = readable(path)
     problems = list(found.problems)
-    whole = Draft(str(locate(path)), found.head, found.entries, tuple(found.names))
+    whole = Draft(str(file), found.head, found.entries, tuple(found.names))
     draft = whole.without(found.between)
     station = None
     if draft.empty and not problems:
         what = "describes nothing: no robot, no human, no part"
         raise InputError.at(whole.file, "", what, "add [[robots]]; `seerob new` shows how")
-    if not draft.empty:
-        tell_compiling()
     with spinner(quiet=quiet) as say:
         while station is None and not draft.empty:
             try:

@@ -32,9 +32,9 @@ def add(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Evaluate, print, and return the exit code of the verdict."""
+    station = compiled(options.workstation, quiet=options.json)
     from seerob.real_time import require_recorded
 
-    station = compiled(options.workstation, quiet=options.json)
     require_recorded(station.workstation)
     folder = run_folder(station.model.folder, options.output)
     sinks = sinks_of(station.workstation, lossless=True)

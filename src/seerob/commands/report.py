@@ -42,13 +42,14 @@ def run(options: argparse.Namespace) -> int:
     """Recompute, write, print what changed, and return the exit code of the verdict."""
     from seerob.recording import Recording
     from seerob.results import log_of
-    from seerob.station import load_recorded
 
     recording = Recording.open(options.recording)
     if options.workstation is not None:
         station = compiled(options.workstation, quiet=options.json, sources=False)
     else:
         tell_compiling()
+        from seerob.station import load_recorded
+
         station = load_recorded(recording, cache=cache_folder())
     folder = run_folder(options.recording.parent, options.output)
     sinks = sinks_of(station.workstation, lossless=True, record=False)

@@ -62,15 +62,16 @@ def add(sub: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Sweep, write the mesh and say what is in it."""
     from seerob.model_io.mesh_out import check_format, write_mesh
-    from seerob.moving import reach_box
-    from seerob.reachable import reachable_volume
-    from seerob.swept import swept_volume
-    from seerob.voxels import check_room
 
     check_format(options.output)
     if not options.output.parent.is_dir():
         raise InputError.at(options.output, "", "its folder does not exist", "make it, or give another place")
     station = compiled(options.workstation, sources=not options.reach)
+    from seerob.moving import reach_box
+    from seerob.reachable import reachable_volume
+    from seerob.swept import swept_volume
+    from seerob.voxels import check_room
+
     model = station.model
     bodies = model.select(_subject(station, options.of))
     check_room(*reach_box(model, bodies), options.voxel)

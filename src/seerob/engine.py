@@ -83,6 +83,12 @@ class Engine:
         self._wanted = mujoco.MjData(self._mj)
         self._shown = mujoco.MjData(self._mj)
         self._mechanisms = list(model.mechanisms.values())
+        # Without mimics every joint is commanded itself, and a person's 53 by 53 products can be spared.
+        self._coupled = {
+            m.name
+            for m in self._mechanisms
+            if m.offset.any() or not np.array_equal(m.coupling, np.eye(len(m.v_address)))
+        }
         self._references = {
             m.name: Reference(m.home, _largest_speed(m), coast=driven[m.name] if m.name in live else 0.0)
             for m in self._mechanisms
@@ -214,11 +220,15 @@ class Engine:
             q, v, a = reference.at(t)
             if reference.lands(t):
                 self._put(mechanism, q, v, a)
-            wanted.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
             # mj_step moves positions with the velocity at the end of the step, so its velocities
             # belong half a step earlier than its positions.
-            wanted.qvel[mechanism.v_address] = mechanism.coupling @ (v - 0.5 * self._dt * a)
-            wanted.qacc[mechanism.v_address] = mechanism.coupling @ a
+            before = v - 0.5 * self._dt * a
+            if mechanism.name in self._coupled:
+                q = mechanism.coupling @ q + mechanism.offset
+                before, a = mechanism.coupling @ before, mechanism.coupling @ a
+            wanted.qpos[mechanism.q_address] = q
+            wanted.qvel[mechanism.v_address] = before
+            wanted.qacc[mechanism.v_address] = a
         mujoco.mj_kinematics(self._mj, wanted)
         mujoco.mj_comPos(self._mj, wanted)
         mujoco.mj_comVel(self._mj, wanted)

@@ -118,7 +118,10 @@ class State:
         """Raise `Undecided` unless each robot or human is where the twin shows it."""
         self.asked.update(names)
         for name in names:
-            reason = self.doubt(name)
+            key = ("doubt", name)
+            reason = self._cache.get(key)
+            if reason is None:
+                reason = self._cache[key] = self.doubt(name)
             if reason:
                 raise Undecided(reason)
 

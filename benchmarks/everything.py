@@ -18,8 +18,6 @@ from pathlib import Path
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
-import gc
-
 import msgspec
 import numpy as np
 
@@ -42,25 +40,25 @@ def measure(seconds: float) -> dict[str, float]:
     encoder = msgspec.msgpack.Encoder()
     stages: dict[str, list[float]] = {"engine": [], "criteria": [], "snapshot": []}
     whole, worst_distance = [], np.inf
-    gc.collect()
-    for seq, samples in enumerate(feed):
-        begin = time.perf_counter()
-        engine.take(samples)
-        state = engine.tick() if seq else engine.start()
-        moved = time.perf_counter()
-        results = judge(state)
-        judged = time.perf_counter()
-        encoder.encode(road.snapshot(state, seq, results))
-        end = time.perf_counter()
-        if seq >= 20:  # the first ticks touch cold memory
-            whole.append(end - begin)
-            for name, spent in zip(stages, (moved - begin, judged - moved, end - judged), strict=True):
-                stages[name].append(spent)
-        for result in results:
-            if result.unit == "m" and result.value is not None:
-                worst_distance = min(worst_distance, result.value)
-        if state.t >= seconds:
-            break
+    with road.settled():
+        for seq, samples in enumerate(feed):
+            begin = time.perf_counter()
+            engine.take(samples)
+            state = engine.tick() if seq else engine.start()
+            moved = time.perf_counter()
+            results = judge(state)
+            judged = time.perf_counter()
+            encoder.encode(road.snapshot(state, seq, results))
+            end = time.perf_counter()
+            if seq >= 20:  # the first ticks touch cold memory
+                whole.append(end - begin)
+                for name, spent in zip(stages, (moved - begin, judged - moved, end - judged), strict=True):
+                    stages[name].append(spent)
+            for result in results:
+                if result.unit == "m" and result.value is not None:
+                    worst_distance = min(worst_distance, result.value)
+            if state.t >= seconds:
+                break
     ms = 1e3 * np.array(whole)
     return {
         "ticks": len(ms),

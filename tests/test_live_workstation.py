@@ -13,7 +13,8 @@ import pytest
 
 from seerob import cli
 from seerob.commands import Exit
-from seerob.commands.emulate import HOME, read, target_of
+from seerob.commands.emulating._motions import read, target_of
+from seerob.commands.emulating.rtde import HOME
 from seerob.emulators.motions import swing
 from seerob.emulators.rtde import RtdeServer
 from seerob.errors import InputError
@@ -121,13 +122,13 @@ def test_a_port_that_is_taken_is_an_error(capsys):
 
 
 def test_an_emulator_plays_a_file_within_the_limits_of_its_robot(tmp_path):
-    motion = read(MOTION, target_of("ur10"))
+    motion = read(MOTION, target_of("ur10", joints=6, whose="this kind of controller"))
     q, qd = motion(1.0)
     assert len(q) == len(qd) == 6
     rows = "".join(f"{0.1 * k:.1f},{k}.0,0,0,0,0,0\n" for k in range(20))
     wild = tmp_path / "wild.csv"
     wild.write_text("t [s]," + ",".join(f"J{k} [rad]" for k in range(1, 7)) + "\n" + rows)
     with pytest.raises(InputError, match="beyond"):
-        read(wild, target_of("ur10"))
+        read(wild, target_of("ur10", joints=6, whose="this kind of controller"))
     with pytest.raises(InputError, match="7 joints"):
-        target_of("iiwa14")
+        target_of("iiwa14", joints=6, whose="this kind of controller")

@@ -1,6 +1,7 @@
 """A small scene, its snapshots, and a visitor, for the tests of the server."""
 
 import contextlib
+import socket
 
 import msgspec
 import numpy as np
@@ -120,3 +121,15 @@ class Visitor:
     def __exit__(self, *_):
         with contextlib.suppress(Exception):
             self._open.__exit__(None, None, None)
+
+
+def raw(server, data, *, finish=False):
+    """What the server answers to bytes, until it closes."""
+    with socket.create_connection(("127.0.0.1", server.port), timeout=5) as s:
+        s.sendall(data)
+        if finish:
+            s.shutdown(socket.SHUT_WR)
+        answer = b""
+        while chunk := s.recv(65536):
+            answer += chunk
+        return answer

@@ -17,16 +17,25 @@ if TYPE_CHECKING:
 
 HELP = "connect to a controller and print what it says, how regularly, and what is missing"
 EXAMPLE = "seerob probe rtde 192.168.0.10"
-KINDS = ("rtde",)
+ADDRESSES = ("host", "url", "address")
+"""Options of live sources that say where the other end is; a source has one of them, or listens itself."""
 
 
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
-    sub.add_argument("kind", choices=KINDS, help="what it speaks")
-    sub.add_argument("host", help="its name or address")
+    sub.add_argument("kind", help="what it speaks: the kind of a live source, as `seerob kinds` lists it")
+    sub.add_argument("address", nargs="?", help="its name, address or URL; none for what sends to us")
     sub.add_argument("--port", type=port, help="port, when it is not the usual one")
     sub.add_argument("--frequency", type=float, help="samples per second to ask for [Hz]")
     sub.add_argument("--robot", default="robot", help="name of the robot in the snippet")
+    sub.add_argument("--human", default="operator", help="name of the person in the snippet")
+    sub.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="any other option of the source, value as in the workstation file; may be repeated",
+    )
     sub.add_argument("--seconds", type=seconds, default=3.0, help="how long to listen (default: 3)")
 
 
@@ -41,16 +50,15 @@ def run(options: argparse.Namespace) -> int:
     from seerob.live import Listener, because
     from seerob.samples import SignalSample
 
-    given = {key: getattr(options, key) for key in ("robot", "host", "port", "frequency")}
-    given = {key: value for key, value in given.items() if value is not None}
-    source = _source(options.kind, given)
+    source, given = _source(options)
+    where = f"{options.kind} {options.address or ''}".strip()
     try:
         findings = asyncio.run(source.ask())
     except InputError:
         raise
     except (OSError, EOFError, SeerobError) as error:
         remedy = "is it switched on, is the address right, does a firewall stand between?"
-        raise InputError.at(f"{options.kind} {options.host}", "", because(error), remedy) from error
+        raise InputError.at(where, "", because(error), remedy) from error
     for finding in findings:
         line(finding.level, finding.text, "" if finding.level == "note" else "yellow")
     newest: dict[str, Sample] = {}
@@ -83,16 +91,43 @@ def run(options: argparse.Namespace) -> int:
     return Exit.WITHIN
 
 
-def _source(kind: str, given: dict[str, Any]) -> LiveSource:
+def _source(options: argparse.Namespace) -> tuple[LiveSource, dict[str, Any]]:
+    """The source, and the options that make it."""
     import msgspec
 
     from seerob.live import LiveSource
     from seerob.plugin import load
 
+    kind = load("sources", options.kind, LiveSource)  # type: ignore[type-abstract,unused-ignore]
+    fields = set(kind.__struct_fields__)
+    given = {key: getattr(options, key) for key in ("robot", "human", "port", "frequency")}
+    given = {key: value for key, value in given.items() if value is not None and key in fields}
+    if options.address is not None:
+        where = next((name for name in ADDRESSES if name in fields), None)
+        if where is None:
+            what = f"{options.kind} has no address: it is sent to this machine"
+            raise InputError.at("seerob probe", "address", what, "leave it out")
+        given[where] = options.address
+    given |= _set(options.set)
     try:
-        return msgspec.convert(given, load("sources", kind, LiveSource))  # type: ignore[type-abstract,unused-ignore]
+        return msgspec.convert(given, kind), given
     except msgspec.ValidationError as error:
-        raise InputError.at(f"seerob probe {kind}", "", str(error)) from error
+        raise InputError.at(f"seerob probe {options.kind}", "", str(error)) from error
+
+
+def _set(pairs: list[str]) -> dict[str, Any]:
+    import tomllib
+
+    found: dict[str, Any] = {}
+    for pair in pairs:
+        key, equals, text = pair.partition("=")
+        if not (equals and key.isidentifier()):
+            raise InputError.at("seerob probe", "--set", f"{pair!r}", "write key=value")
+        try:
+            found[key] = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            found[key] = text  # a bare word, which a shell takes the quotes of
+    return found
 
 
 def _tell(sample: Sample) -> None:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import os
 import sys
 import threading
-import time
 
 import msgspec
 import numpy as np
 import pytest
 
+from live_story import Story, lived, open_files, wait_for
 from made_cell import TWO_R, made, two_r
 from seerob.emulators.rtde import RtdeServer
 from seerob.errors import InputError
@@ -41,50 +40,6 @@ def cell(folder, server, *, frequency=125.0, timeout=0.2, more=""):
         f"port = {server.port}\nfrequency = {frequency}\ntimeout = {timeout}\n{more}"
         '[[safety]]\nkind = "velocity"\nname = "speed"\nat = "arm"\nlimit = 1.5\n',
     )
-
-
-class Story:
-    """Keeps what goes out, and does things to the server at given ticks."""
-
-    def __init__(self, ticks, **deeds):
-        self.ticks, self.deeds = ticks, {int(k.removeprefix("at_")): deed for k, deed in deeds.items()}
-        self.snapshots, self.heard = [], []
-
-    def write(self, snapshot, samples):
-        self.snapshots.append(snapshot)
-        self.heard.append(samples)
-        self.deeds.get(len(self.snapshots), lambda: None)()
-
-    def stop(self):
-        return len(self.snapshots) >= self.ticks
-
-    def close(self):
-        pass
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
-
-    def joints(self):
-        return [s for samples in self.heard for s in samples if isinstance(s, JointSample)]
-
-    def verdicts(self):
-        return [s.results[0].verdict for s in self.snapshots]
-
-    def decided(self, first=0):
-        """Share of the ticks that are decided: a busy machine may be late for one now and then."""
-        return np.mean([verdict == "within" for verdict in self.verdicts()[first:]])
-
-    def fastest(self, first=0):
-        """Largest speed that was claimed [m/s]."""
-        return max(s.results[0].value or 0.0 for s in self.snapshots[first:])
-
-
-def lived(station, story, **more):
-    station.run(live=True, writers=[story], stop=story.stop, **more)
-    return story
 
 
 @pytest.mark.parametrize("frequency", [125.0, 500.0])
@@ -225,10 +180,6 @@ def test_only_real_time_will_do(tmp_path):
         cell(tmp_path, server).run()
 
 
-def open_files():
-    return len(os.listdir("/proc/self/fd"))
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="counts open files in /proc")
 def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch, caplog):
     monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.005)
@@ -249,13 +200,6 @@ def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch, caplog):
     assert listener.statistics().losses >= 19
     wait_for(lambda: open_files() <= files and threading.active_count() <= threads)
     server.stop()
-
-
-def wait_for(true, seconds=10.0):
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.002)
 
 
 # -- values -------------------------------------------------------------------------------------

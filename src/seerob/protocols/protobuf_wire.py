@@ -1,0 +1,164 @@
+"""Fields of Protocol Buffers messages, without a schema compiler: for the few messages that are needed.
+
+Encoding as in the public description of the format: a field is a tag, ``number << 3 | wire type``, and a
+value. Repeated numbers come one by one or packed in one field; a reader takes both.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from enum import IntEnum
+from typing import NamedTuple
+
+from seerob.protocols import ProtocolError
+
+
+class Wire(IntEnum):
+    """How a value is written."""
+
+    VARINT = 0
+    FIXED64 = 1
+    LENGTH = 2
+    FIXED32 = 5
+
+
+class Field(NamedTuple):
+    """One field as it stands in a message."""
+
+    number: int
+    wire: Wire
+    value: int | bytes
+    """A number for `Wire.VARINT`, else the bytes."""
+
+    def whole(self) -> int:
+        """An unsigned whole number.
+
+        Raises:
+            ProtocolError: It is none.
+        """
+        if not isinstance(self.value, int):
+            raise ProtocolError(f"field {self.number} is no whole number")
+        return self.value
+
+    def signed(self) -> int:
+        """A signed whole number of 32 or 64 bits (``int32``, ``int64``)."""
+        value = self.whole()
+        return value - (1 << 64) if value >= 1 << 63 else value
+
+    def bytes(self) -> bytes:
+        """Text or a message of its own.
+
+        Raises:
+            ProtocolError: It is a number.
+        """
+        if self.wire is not Wire.LENGTH or not isinstance(self.value, bytes):
+            raise ProtocolError(f"field {self.number} is no text and no message")
+        return self.value
+
+    def text(self) -> str:
+        """Text; what is not UTF-8 is replaced."""
+        return self.bytes().decode("utf-8", "replace")
+
+    def doubles(self) -> tuple[float, ...]:
+        """One number or several packed ones.
+
+        Raises:
+            ProtocolError: The length does not fit.
+        """
+        if not isinstance(self.value, bytes) or self.wire is Wire.FIXED32 or len(self.value) % 8:
+            raise ProtocolError(f"field {self.number} holds no doubles")
+        return struct.unpack(f"<{len(self.value) // 8}d", self.value)
+
+    def float(self) -> float:
+        """A number of four bytes.
+
+        Raises:
+            ProtocolError: It has another length.
+        """
+        if self.wire is not Wire.FIXED32 or not isinstance(self.value, bytes):
+            raise ProtocolError(f"field {self.number} holds no float")
+        return float(struct.unpack("<f", self.value)[0])
+
+    def wholes(self) -> tuple[int, ...]:
+        """One whole number or several packed ones."""
+        if self.wire is Wire.VARINT:
+            return (self.whole(),)
+        data, at, found = self.bytes(), 0, []
+        while at < len(data):
+            value, at = _varint(data, at)
+            found.append(value)
+        return tuple(found)
+
+
+def fields(data: bytes) -> Iterator[Field]:
+    """The fields of a message in the order in which they stand.
+
+    Raises:
+        ProtocolError: The bytes are no message.
+    """
+    at, end = 0, len(data)
+    while at < end:
+        tag, at = _varint(data, at)
+        number, kind = tag >> 3, tag & 7
+        if not 1 <= number < 1 << 29:
+            raise ProtocolError(f"a field with the number {number}")
+        if kind == Wire.VARINT:
+            value, at = _varint(data, at)
+            yield Field(number, Wire.VARINT, value)
+            continue
+        if kind == Wire.LENGTH:
+            length, at = _varint(data, at)
+        elif kind in (Wire.FIXED64, Wire.FIXED32):
+            length = 8 if kind == Wire.FIXED64 else 4
+        else:
+            raise ProtocolError(f"field {number} has the unknown wire type {kind}")
+        if length > end - at:
+            raise ProtocolError(f"field {number} of {length} bytes, {end - at} are left")
+        yield Field(number, Wire(kind), data[at : at + length])
+        at += length
+
+
+def _varint(data: bytes, at: int) -> tuple[int, int]:
+    value = shift = 0
+    while at < len(data):
+        byte = data[at]
+        at += 1
+        value |= (byte & 0x7F) << shift
+        if byte < 0x80:
+            return value & 0xFFFF_FFFF_FFFF_FFFF, at
+        shift += 7
+        if shift > 63:
+            raise ProtocolError("a number of more than 64 bits")
+    raise ProtocolError("ends within a number")
+
+
+def varint(value: int) -> bytes:
+    """A whole number, negative ones in 64 bits as ``int32`` and ``int64`` are."""
+    value &= 0xFFFF_FFFF_FFFF_FFFF
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    out.append(value)
+    return bytes(out)
+
+
+def whole(number: int, value: int | None) -> bytes:
+    """A field with a whole number; nothing for None."""
+    return b"" if value is None else varint(number << 3 | Wire.VARINT) + varint(value)
+
+
+def double(number: int, value: float | None) -> bytes:
+    """A field with a number of eight bytes; nothing for None."""
+    return b"" if value is None else varint(number << 3 | Wire.FIXED64) + struct.pack("<d", value)
+
+
+def doubles(number: int, values: tuple[float, ...]) -> bytes:
+    """A repeated field, one by one."""
+    return b"".join(double(number, value) for value in values)
+
+
+def message(number: int, data: bytes | None) -> bytes:
+    """A field with text or with a message; nothing for None."""
+    return b"" if data is None else varint(number << 3 | Wire.LENGTH) + varint(len(data)) + data

@@ -1,0 +1,176 @@
+"""The twin of an LBR over FRI, on real sockets: it follows, keeps the session alive and commands nothing."""
+
+from __future__ import annotations
+
+import socket
+import threading
+
+import numpy as np
+import pytest
+
+from live_story import Story, lived, open_files, wait_for
+from made_cell import made
+from seerob.differentiation import Differentiator, end_slope
+from seerob.emulators.fri import FriServer
+from seerob.errors import InputError
+from seerob.live import Listener
+from seerob.protocols.fri import Edition, Monitoring
+from seerob.samples import JointSample, SignalSample
+from seerob.sources.fri import DeviceTime, Fri
+
+HOME, AMPLITUDE = np.array([0, 0.5, 0, -1.4, 0, 1.2, 0]), np.array([0.4, 0.2, 0.3, 0.2, 0.4, 0.3, 0.5])
+
+
+def motion(t):
+    return tuple((HOME + AMPLITUDE * np.sin(t)).tolist()), tuple((AMPLITUDE * np.cos(t)).tolist())
+
+
+@pytest.fixture
+def port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+def cell(folder, port, *, robot="iiwa14", more=""):
+    return made(
+        folder,
+        f'[[robots]]\nname = "arm"\nmodel = "library:{robot}"\n'
+        f'[[sources]]\nkind = "fri"\nname = "controller"\nrobot = "arm"\nhost = "127.0.0.1"\n'
+        f"port = {port}\ntimeout = 0.2\n{more}"
+        '[[safety]]\nkind = "velocity"\nname = "speed"\nat = "arm"\nlimit = 1.5\n',
+    )
+
+
+@pytest.mark.parametrize("edition", Edition)
+def test_the_twin_follows_the_robot_and_commands_nothing(tmp_path, port, edition):
+    with FriServer(motion, to=("127.0.0.1", port), edition=edition) as server:
+        story = lived(cell(tmp_path, port), Story(120))
+        assert server.answers > 50
+        assert server.wrong == []
+        assert server.moved_by_answer < 1e-12
+    offset = np.median([s.t - s.t_device for s in story.joints()])
+    errors = [np.abs(np.subtract(motion(s.t - offset)[0], s.joints["arm"])).max() for s in story.snapshots]
+    assert np.median(errors) < 1e-4
+    assert story.decided() > 0.8
+    speeds = [np.abs(np.subtract(motion(s.t_device)[1], s.qd)).max() for s in story.joints() if s.qd]
+    assert len(speeds) > 50
+    assert np.median(speeds) < 1e-3
+
+
+def test_the_session_becomes_ready_because_it_is_answered(tmp_path, port):
+    heard = []
+    listener = Listener(Fri(robot="arm", host="127.0.0.1", port=port), None, heard.append)
+    with FriServer(motion, to=("127.0.0.1", port), torques=lambda t: (t,) * 7) as server:
+        listener.start()
+        try:
+            said = lambda: {s.values["session"] for s in heard if isinstance(s, SignalSample)}  # noqa: E731
+            wait_for(lambda: "MONITORING_READY" in said())
+            server.overlay = True
+            wait_for(lambda: "COMMANDING_ACTIVE" in said())
+            count = server.answers
+            wait_for(lambda: server.answers > count + 20)
+        finally:
+            listener.ask_to_stop()
+            assert listener.join(2.0)
+        assert server.wrong == []
+        assert server.moved_by_answer < 1e-12
+    assert all(s.tau == pytest.approx((s.t_device,) * 7) for s in heard if isinstance(s, JointSample))
+
+
+def test_silence_is_undecided_and_the_robot_is_followed_again(tmp_path, port):
+    server = FriServer(motion, to=("127.0.0.1", port)).start()
+    story = Story(260, at_40=server.stop, at_100=server.start)
+    try:
+        lived(cell(tmp_path, port), story)
+    finally:
+        server.stop()
+    verdicts = story.verdicts()
+    lost = next(k for k, s in enumerate(story.snapshots) if "not heard for" in s.results[0].reason)
+    assert set(verdicts[lost:100]) == {"undecided"}
+    assert "within" in verdicts[100:]
+    assert story.fastest(100) < 1.5
+
+
+def test_what_the_controller_is_is_said_at_start(tmp_path, port):
+    with FriServer(motion, to=("127.0.0.1", port), period=0.01) as server:
+        server.overlay = True
+        said = " ".join(f.text for f in cell(tmp_path, port).scene().findings)
+    for text in ("speaks FRI 2.7", "slope of a parabola", "sends every 10 ms", "motion overlay", "torques"):
+        assert text in said
+
+
+def test_another_arm_is_an_error(tmp_path, port):
+    with pytest.raises(InputError, match="an LBR has 7"):
+        _ = cell(tmp_path, port, robot="ur10").sources
+
+
+def test_strangers_are_not_listened_to(port):
+    heard = []
+    listener = Listener(Fri(robot="arm", host="127.0.0.2", port=port), None, heard.append)
+    other = []
+    with FriServer(motion, to=("127.0.0.1", port)) as server:
+        listener.start()
+        try:
+            with FriServer(motion, to=("127.0.0.1", port), host="127.0.0.2", edition=Edition.V2) as own:
+                wait_for(lambda: len(heard) > 20)
+                other.append(own.answers)
+        finally:
+            listener.ask_to_stop()
+            assert listener.join(2.0)
+        assert server.answers == 0
+    assert other[0] > 0
+
+
+def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch, port):
+    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.sources.fri.SILENCE", 0.05)
+    files, threads = open_files(), threading.active_count()
+    server, heard = FriServer(motion, to=("127.0.0.1", port)), []
+    listener = Listener(Fri(robot="arm", host="127.0.0.1", port=port), None, heard.append)
+    listener.start()
+    try:
+        for _ in range(8):
+            heard.clear()
+            with server:
+                wait_for(lambda: len(heard) > 3)
+    finally:
+        listener.ask_to_stop()
+        assert listener.join(2.0)
+    wait_for(lambda: open_files() <= files and threading.active_count() <= threads)
+
+
+# -- time and speed -----------------------------------------------------------------------------
+
+
+def test_slope_is_exact_for_constant_acceleration_at_uneven_instants():
+    t = np.array([0.0, 0.004, 0.011, 0.015, 0.02])
+    values = np.stack([1 + 2 * t + 3 * t**2, -t], axis=1)
+    assert end_slope(t, values) == pytest.approx([2 + 6 * 0.02, -1.0], abs=1e-11)
+
+
+def test_noise_of_the_slope_is_what_the_formula_says():
+    n, T, sigma, rng = 7, 0.005, 1e-5, np.random.default_rng(1)
+    t = T * np.arange(n)
+    spread = np.std(end_slope(t, sigma * rng.standard_normal((n, 20_000))))
+    stated = sigma / T * np.sqrt(12 * (2 * n - 1) * (8 * n - 11) / (n * (n**2 - 1) * (n**2 - 4)))
+    assert spread == pytest.approx(stated, rel=0.02)
+
+
+def test_a_gap_begins_anew():
+    slope = Differentiator(0.1)
+    ramp = [slope.add(0.01 * k, (0.02 * k,)) for k in range(4)]
+    assert ramp[:2] == [None, None]
+    assert ramp[3] == pytest.approx((2.0,))
+    assert slope.add(1.0, (5.0,)) is None
+    assert slope.add(0.5, (5.0,)) is None
+
+
+def test_messages_are_the_clock_where_there_is_none_and_the_count_comes_round():
+    def message(sequence):
+        return Monitoring(edition=Edition.V2, sequence=sequence, send_period=5, q=(0.0,) * 7)
+
+    clock = DeviceTime()
+    assert clock(message(2**32 - 1)) == pytest.approx(0.005 * (2**32 - 1))
+    assert clock(message(0)) == pytest.approx(0.005 * 2**32)
+    assert clock(message(2)) == pytest.approx(0.005 * (2**32 + 2))

@@ -25,6 +25,7 @@ COMMANDS = (
     "schema",
     "emulate",
     "probe",
+    "import_aml",
 )
 """One module each in `seerob.commands`, with ``HELP``, ``EXAMPLE``, ``add`` and ``run``."""
 

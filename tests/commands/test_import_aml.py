@@ -1,0 +1,188 @@
+"""AutomationML plants become workstation folders: both editions, containers, and hostile ones."""
+
+from __future__ import annotations
+
+import io
+import math
+import random
+import tomllib
+import zipfile
+
+import numpy as np
+import pytest
+
+from seerob import cli
+from seerob.automationml import read
+from seerob.commands import Exit
+from seerob.errors import InputError
+from seerob.station import load
+
+OLD = '<CAEXFile SchemaVersion="2.15" FileName="cell.aml">{}</CAEXFile>'
+NEW = '<CAEXFile SchemaVersion="3.0" xmlns="http://www.dke.de/CAEX">{}</CAEXFile>'
+INTERFACE = "AutomationMLBaseInterface/ExternalDataConnector"
+VARIABLE = f"{INTERFACE}/PLCopenXMLInterface/VariableInterface"
+ROLE = "AutomationMLDMIRoleClassLib/DiscManufacturingEquipment"
+
+
+def frame(unit="m", **values):
+    rows = "".join(
+        f'<Attribute Name="{k}" Unit="{"deg" if k[0] == "r" else unit}"><Value>{v}</Value></Attribute>'
+        for k, v in values.items()
+    )
+    return f'<Attribute Name="Frame">{rows}</Attribute>'
+
+
+def hierarchy(text):
+    return OLD.format(f'<InstanceHierarchy Name="a">{text}</InstanceHierarchy>')
+
+
+def plant(*, unit="m", uri="geometry/box.dae", k=1):
+    return (
+        '<InstanceHierarchy Name="Plant"><InternalElement Name="Line 1" ID="{A}">'
+        + frame(unit, x=1 * k, y=2 * k, rz=90)
+        + '<InternalElement Name="Fixture" ID="{B}">'
+        + frame(unit, x=1 * k, z=0.5 * k)
+        + f'<ExternalInterface Name="Geometry" ID="{{C}}" RefBaseClassPath="{INTERFACE}/COLLADAInterface">'
+        f'<Attribute Name="refURI" AttributeDataType="xs:anyURI"><Value>{uri}</Value></Attribute>'
+        "</ExternalInterface></InternalElement>"
+        f'<InternalElement Name="Arm" ID="{{D}}"><RoleRequirements RefBaseRoleClassPath="{ROLE}/Robot"/>'
+        "</InternalElement>"
+        '<InternalElement Name="Belt" ID="{E}">'
+        f'<ExternalInterface Name="Speed" RefBaseClassPath="{VARIABLE}">'
+        '<Attribute Name="refURI" AttributeDataType="xs:double" Unit="mm/s">'
+        "<Value>DB1.Speed</Value></Attribute>"
+        "</ExternalInterface>"
+        f'<ExternalInterface Name="On" RefBaseClassPath="{VARIABLE}">'
+        '<Attribute Name="refURI" AttributeDataType="xs:boolean"><Value>DB1.On</Value></Attribute>'
+        "</ExternalInterface>"
+        '<InternalLink Name="l" RefPartnerSideA="{b}:Geometry" RefPartnerSideB="{E}:Speed"/>'
+        "</InternalElement></InternalElement></InstanceHierarchy>"
+    )
+
+
+@pytest.fixture(scope="module")
+def box():
+    import trimesh
+
+    scene = trimesh.creation.box((0.2, 0.3, 0.4))
+    return trimesh.exchange.dae.export_collada(scene)
+
+
+def written(folder, text, box):
+    (folder / "geometry").mkdir(parents=True)
+    (folder / "geometry" / "box.dae").write_bytes(box)
+    (folder / "cell.aml").write_text(text, encoding="utf-8")
+    return folder / "cell.aml"
+
+
+def packed(folder, text, box, *, name="cell.amlx"):
+    folder.mkdir(parents=True, exist_ok=True)
+    with zipfile.ZipFile(folder / name, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("[Content_Types].xml", "<Types/>")
+        archive.writestr("libs/standard.aml", OLD.format(""))
+        archive.writestr("cell.aml", text)
+        archive.writestr("geometry/box.dae", box)
+    return folder / name
+
+
+@pytest.mark.parametrize("edition", [OLD, NEW])
+@pytest.mark.parametrize("make", [written, packed])
+def test_a_plant_becomes_a_workstation(tmp_path, capsys, box, edition, make):
+    file = make(tmp_path / "plant", edition.format(plant()), box)
+    made = tmp_path / "cell"
+    assert cli.main(["import-aml", str(file), str(made)]) == Exit.WITHIN
+    assert "1 parts with a shape, 1 robots, 2 variables" in capsys.readouterr().out
+    assert cli.main(["check-file", str(made)]) == Exit.WITHIN
+    (body,) = load(made).model.bodies
+    assert body.name == "Line_1/Fixture"
+    table = tomllib.loads((made / "workstation.toml").read_text())
+    # Line 1 is at (1, 2) and turned by 90°, so one metre along its x is one along y.
+    assert table["parts"][0]["at"]["position"] == pytest.approx([1, 3, 0.5])
+    half = math.sqrt(0.5)
+    assert table["parts"][0]["at"]["wxyz"] == pytest.approx([half, 0, 0, half])
+    variables = tomllib.loads((made / "variables.toml").read_text())["variables"]
+    assert [(v["name"], v["address"], v.get("unit"), v.get("type")) for v in variables] == [
+        ("Line_1/Belt/Speed", "DB1.Speed", "mm/s", None),
+        ("Line_1/Belt/On", "DB1.On", None, "bool"),
+    ]
+    assert '# name = "Arm"' in (made / "workstation.toml").read_text()
+
+
+def test_millimetres_are_the_same_plant(tmp_path, box):
+    a = read(written(tmp_path / "a", OLD.format(plant()), box))
+    b = read(written(tmp_path / "b", OLD.format(plant(unit="mm", k=1000)), box))
+    for (_, _, world), (_, _, other) in zip(a.walk(), b.walk(), strict=True):
+        assert np.allclose(world, other, atol=1e-12)
+    assert a.links == (("b:geometry", "e:speed"),)
+
+
+def test_turns_about_several_axes_are_about_fixed_ones_and_said(tmp_path):
+    (tmp_path / "a.aml").write_text(hierarchy(frame(rx=90, rz=90)))
+    found = read(tmp_path / "a.aml")
+    *_, (_, _, world) = found.walk()
+    # First about x, then about the fixed z: y goes to z and stays there.
+    assert np.allclose(world[:3, :3] @ [0, 1, 0], [0, 0, 1])
+    assert "fixed axes" in found.findings[0].text
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "is not XML"),
+        ("<a/>", "is no CAEXFile"),
+        ('<!DOCTYPE a [<!ENTITY b "c">]><CAEXFile>&b;</CAEXFile>', "declares XML entities"),
+        (hierarchy("<InternalElement>" * 200 + "</InternalElement>" * 200), "nested 60 deep"),
+        (hierarchy(frame(unit="furlong", x=1)), "furlong"),
+        (hierarchy(frame(x="near")), "'near' is no length"),
+        (hierarchy(frame(x="nan")), "is no length"),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path, text, says):
+    (tmp_path / "a.aml").write_text(text)
+    with pytest.raises(InputError, match=says):
+        read(tmp_path / "a.aml")
+
+
+@pytest.mark.parametrize(
+    "uri", ["../secret.dae", "/etc/passwd", "C:\\a.dae", "file:///etc/passwd", "gone.dae"]
+)
+def test_nothing_outside_the_plant_is_read(tmp_path, capsys, box, uri):
+    (tmp_path / "secret.dae").write_bytes(box)
+    for make in (written, packed):
+        folder = tmp_path / make.__name__
+        file = make(folder, OLD.format(plant(uri=uri)), box)
+        assert cli.main(["import-aml", str(file), str(folder / "made")]) == Exit.WITHIN
+        assert "0 parts with a shape" in capsys.readouterr().out
+        assert not list((folder / "made" / "cad").iterdir())
+
+
+def test_a_folder_with_something_in_it_is_not_touched(tmp_path, capsys, box):
+    file = written(tmp_path / "plant", OLD.format(plant()), box)
+    assert cli.main(["import-aml", str(file), str(tmp_path / "plant")]) == Exit.ERROR
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_damaged_containers_are_an_error_or_a_plant(tmp_path, box):
+    rng, refused = random.Random(3), 0
+    whole = packed(tmp_path, OLD.format(plant()), box).read_bytes()
+    for _ in range(300):
+        data = bytearray(whole)
+        for _ in range(rng.randrange(1, 30)):
+            data[rng.randrange(len(data))] = rng.randrange(256)
+        file = tmp_path / "damaged.amlx"
+        file.write_bytes(data)
+        try:
+            read(file)
+        except InputError:
+            refused += 1
+    assert refused > 10
+
+
+def test_a_container_that_unpacks_to_too_much_is_refused(tmp_path):
+    file = tmp_path / "bomb.amlx"
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("cell.aml", b" " * (70 << 20))
+    file.write_bytes(buffer.getvalue())
+    with pytest.raises(InputError, match="larger than 64 MiB"):
+        read(file)

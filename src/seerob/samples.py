@@ -8,7 +8,7 @@ from __future__ import annotations
 from enum import StrEnum
 from threading import Lock
 
-from msgspec import Struct
+from msgspec import Struct, field
 
 Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
@@ -62,19 +62,68 @@ class PoseSample(SampleBase, frozen=True, kw_only=True, tag="pose"):
     """Orientation in the world, unit quaternion."""
 
 
+class BodyPoint(Struct, frozen=True, kw_only=True):
+    """One thing that a device sees on a person, as a pull on one bone."""
+
+    name: str
+    """As the device calls it."""
+    bone: str
+    """Bone of the person, such as ``right_hand``."""
+    at: Vec3 = (0.0, 0.0, 0.0)
+    """Where it is fixed, in the bone's frame [m]; the bone's proximal joint when not given."""
+    position: Vec3 | None = None
+    """Of that point in the world [m]; None when it is not known."""
+    wxyz: Vec4 | None = None
+    """World from bone, unit quaternion; None when it is not known."""
+    position_weight: float = 1.0
+    """How much its position counts: 1 for one that is good to `POSITION_SCALE`."""
+    orientation_weight: float = 1.0
+    """How much its orientation counts: 1 for one that is good to `ORIENTATION_SCALE`."""
+    confidence: float | None = None
+    """From 0 (guessed) to 1 (seen), as the device says; None when it does not."""
+
+
+POSITION_SCALE = 0.02
+"""Error of a position of weight 1 [m]; twice as good weighs 4."""
+ORIENTATION_SCALE = 0.1
+"""Error of an orientation of weight 1 [rad]."""
+
+
+class BodySample(SampleBase, frozen=True, kw_only=True, tag="body"):
+    """What one device sees of one person; several devices may speak of the same one."""
+
+    target: str
+    """Human it drives."""
+    points: tuple[BodyPoint, ...]
+    """What was seen. What the device has but did not see this time has neither position nor orientation."""
+    subject: str = ""
+    """The person, as the device calls it."""
+    latency: float = 0.0
+    """By how much ``t`` was put earlier than the device's time of arrival or stamp [s]."""
+    hold: float = 0.5
+    """Age at which a bone that this device no longer sees does not count any more [s]."""
+
+
 class SignalSample(SampleBase, frozen=True, kw_only=True, tag="signal"):
     """Named values of a machine: a lamp, a light curtain, a conveyor's speed."""
 
     values: dict[str, float | bool | str]
+    doubts: dict[str, str] = field(default_factory=dict)
+    """Why what is known of a name may not be relied on: too old, called bad by its source, out of range."""
 
 
-Sample = JointSample | PoseSample | SignalSample
+Sample = JointSample | PoseSample | BodySample | SignalSample
 
 
-def key(sample: Sample) -> tuple[str, str]:
-    """What a newer sample replaces: the same kind of thing about the same target."""
+def key(sample: Sample) -> tuple[str, ...]:
+    """What a newer sample replaces: the same kind of thing about the same target.
+
+    Of a person's body each source has its own: devices complement one another.
+    """
     if isinstance(sample, SignalSample):
         return "signal", sample.source
+    if isinstance(sample, BodySample):
+        return "body", sample.target, sample.source
     return type(sample).__name__, sample.target
 
 
@@ -85,7 +134,7 @@ class Mailbox:
     """
 
     def __init__(self) -> None:
-        self._latest: dict[tuple[str, str], Sample] = {}
+        self._latest: dict[tuple[str, ...], Sample] = {}
         self._lock = Lock()
 
     def post(self, sample: Sample) -> None:

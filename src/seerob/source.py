@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
+from seerob.dictionary import Variable
 from seerob.model_io.description import Description
 from seerob.samples import JointSample, PoseSample, Quality, Sample
 from seerob.snapshot import Finding
@@ -46,6 +47,10 @@ class Target(Struct, frozen=True, kw_only=True):
     """Where its root link stands."""
     frames: tuple[str, ...] = ()
     """Full names of what its joints move and a `PoseSample` may drive; empty when nobody says."""
+    variables: tuple[Variable, ...] = ()
+    """Of the workstation's dictionary, those that this source reads."""
+    folder: str = ""
+    """Folder of the workstation file, where relative paths start."""
 
 
 class Opened(Struct, frozen=True, kw_only=True):
@@ -64,6 +69,9 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     name: str = ""
     """Made from the kind and the target when not given."""
+    shares: ClassVar[bool] = False
+    """Whether several sources of its sort may drive the same target."""
+
     timeout: Annotated[float, _seconds] = 0.2
     """Age at which what it said no longer counts [s]: dependent verdicts turn UNDECIDED."""
     loop: bool = False

@@ -21,7 +21,7 @@ class Told(VariablesSource, frozen=True, kw_only=True):
 
     said: tuple[tuple[float, tuple[Change, ...]], ...]
 
-    async def changes(self, variables):
+    async def changes(self, variables, folder):
         assert [v.name for v in variables] == ["speed", "door"]
         for pause, changes in self.said:
             await asyncio.sleep(pause)

@@ -11,6 +11,7 @@ import asyncio
 import time
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing
+from pathlib import Path
 from typing import ClassVar, NamedTuple
 
 from seerob.dictionary import BadValue, Value, Variable
@@ -59,8 +60,14 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
         """Interval between samples that is expected [s]."""
         return BEAT
 
-    def changes(self, variables: tuple[Variable, ...]) -> AsyncGenerator[tuple[Change, ...], None]:
+    def changes(
+        self, variables: tuple[Variable, ...], folder: Path
+    ) -> AsyncGenerator[tuple[Change, ...], None]:
         """Connect, and yield what the device says of the variables until the connection ends.
+
+        Args:
+            variables: Those to read.
+            folder: Where relative paths start: the folder of the workstation file.
 
         Raises:
             OSError: There is no connection, or no longer.
@@ -82,7 +89,9 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
         """Everything that is known, whenever something changes and at least every `BEAT`."""
         variables = () if target is None else target.variables
         picture = Picture(variables, by_exception=self.by_exception)
-        async with aclosing(self.changes(tuple(v for v in variables if not v.write))) as said:
+        folder = Path("" if target is None else target.folder)
+        read = tuple(v for v in variables if not v.write)
+        async with aclosing(self.changes(read, folder)) as said:
             async for changes in _beating(said):
                 now = time.monotonic()
                 picture.take(changes, now)

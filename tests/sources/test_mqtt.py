@@ -1,0 +1,201 @@
+"""Machines behind a real MQTT broker, another maker's: values, ages, births, and a broker that is killed."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import socket
+import threading
+import time
+from contextlib import contextmanager
+
+import pytest
+from paho.mqtt import publish
+
+from live_story import open_files, wait_for
+from seerob.dictionary import Kind, Variable
+from seerob.errors import InputError
+from seerob.live import Listener
+from seerob.protocols.sparkplug import Metric, Payload, encode
+from seerob.source import Target
+from seerob.sources.mqtt import Mqtt, Plain, address, plain_change
+
+pytest.importorskip("aiomqtt")
+
+BELT = {"node": "plant/edge", "device": "belt"}
+SPEED = Variable(
+    name="belt/speed", source="plc", address={"topic": "belt", "pointer": "/speed"}, unit="mm/s", timeout=0.4
+)
+DOOR = Variable(name="door", source="plc", address="cell/door", type=Kind.BOOL, timeout=60)
+COUNT = Variable(name="count", source="plc", address=BELT | {"metric": "count"}, unit="1")
+
+
+@pytest.fixture
+def port():
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+@contextmanager
+def broker(port):
+    """Another maker's broker, in a thread of its own."""
+    from amqtt.broker import Broker
+
+    logging.getLogger("amqtt").setLevel(logging.CRITICAL)
+    logging.getLogger("transitions").setLevel(logging.CRITICAL)
+    config = {
+        "listeners": {"default": {"type": "tcp", "bind": f"127.0.0.1:{port}"}},
+        "plugins": {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}},
+    }
+    up, over, loops = threading.Event(), [], []
+
+    async def serve():
+        found = Broker(config)
+        await found.start()
+        stop = asyncio.Event()
+        loops.append(asyncio.get_running_loop())
+        over.append(stop)
+        up.set()
+        await stop.wait()
+        await found.shutdown()
+
+    thread = threading.Thread(target=lambda: asyncio.run(serve()), daemon=True)
+    thread.start()
+    assert up.wait(20)
+    try:
+        yield
+    finally:
+        loops[0].call_soon_threadsafe(over[0].set)
+        thread.join(20)
+        assert not thread.is_alive()
+
+
+def said(port, topic, payload, **more):
+    publish.single(topic, payload, hostname="127.0.0.1", port=port, **more)
+
+
+@contextmanager
+def listening(port, *variables):
+    heard = []
+    target = Target(name="", joints=(), units=(), lower=(), upper=(), velocity=(), variables=variables)
+    listener = Listener(Mqtt(name="plc", host="127.0.0.1", port=port), target, heard.append)
+    listener.start()
+    try:
+        yield heard
+    finally:
+        listener.ask_to_stop()
+        assert listener.join(5)
+
+
+def newest(heard):
+    return heard[-1] if heard else None
+
+
+def known(heard, name):
+    sample = newest(heard)
+    return None if sample is None or name in sample.doubts else sample.values.get(name)
+
+
+def until(heard, true, say=lambda: None):
+    """Say something again and again until it is heard: a subscription may take its time."""
+    end = time.monotonic() + 20
+    while not true():
+        assert time.monotonic() < end, newest(heard)
+        say()
+        time.sleep(0.02)
+
+
+def test_values_arrive_in_si_and_grow_old(port):
+    with broker(port), listening(port, SPEED, DOOR) as heard:
+        until(heard, lambda: known(heard, "belt/speed") == 0.5, lambda: said(port, "belt", '{"speed": 500}'))
+        until(heard, lambda: known(heard, "door") is True, lambda: said(port, "cell/door", "true"))
+        # Silence: the one that must be said often grows old, the other stands.
+        wait_for(lambda: "not heard for" in newest(heard).doubts.get("belt/speed", ""), 20)
+        assert known(heard, "door") is True
+        until(
+            heard,
+            lambda: "no number" in newest(heard).doubts.get("belt/speed", ""),
+            lambda: said(port, "belt", '{"speed": "fast"}'),
+        )
+
+
+def test_a_sparkplug_device_is_known_from_birth_to_death(port):
+    def send(kind, *metrics, seq, device="/belt"):
+        said(port, f"spBv1.0/plant/{kind}/edge{device}", encode(Payload(seq=seq, metrics=metrics)))
+
+    birth = Metric(name="count", alias=5, type=4, value=7.0)
+
+    def born():
+        send("NBIRTH", seq=0, device="")
+        send("DBIRTH", birth, seq=1)
+
+    with broker(port), listening(port, COUNT) as heard:
+        wait_for(lambda: "birth was not heard" in newest(heard).doubts["count"] if heard else False, 20)
+        until(heard, lambda: known(heard, "count") == 7.0, born)
+        send("DDATA", Metric(alias=5, value=-8.0, type=4), seq=2)
+        wait_for(lambda: known(heard, "count") == -8.0, 20)
+        # It stands as long as the node lives, however long it says nothing.
+        beats = len(heard)
+        wait_for(lambda: len(heard) > beats + 15, 20)
+        assert known(heard, "count") == -8.0
+        send("NDEATH", seq=0, device="")
+        wait_for(lambda: "not alive" in newest(heard).doubts.get("count", ""), 20)
+
+
+def test_a_broker_that_is_killed_is_found_again(port, monkeypatch):
+    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.02)
+    monkeypatch.setattr("seerob.live.LONGEST_PAUSE", 0.1)
+    files, threads = open_files(), threading.active_count()
+    with listening(port, DOOR) as heard:
+        for _ in range(3):
+            with broker(port):
+                heard.clear()
+                until(heard, lambda: known(heard, "door") is True, lambda: said(port, "cell/door", "1"))
+    wait_for(lambda: open_files() <= files and threading.active_count() <= threads, 20)
+
+
+# -- payloads -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("pointer", "payload", "raw", "doubt"),
+    [
+        ("", b"1.5", 1.5, ""),
+        ("", b"true", True, ""),
+        ("", b"idle", "idle", ""),
+        ("/a/0", b'{"a": [3]}', 3, ""),
+        ("/b", b'{"a": [3]}', None, "has no 'b'"),
+        ("/b", b"{", None, "no JSON"),
+        ("/a", b'{"a": NaN}', None, "no JSON"),
+    ],
+)
+def test_payloads(pointer, payload, raw, doubt):
+    found = plain_change("v", Plain("t", pointer), payload, retained=False, now=0.0)
+    assert found.raw == raw
+    assert doubt in found.doubt
+    assert bool(doubt) == bool(found.doubt)
+
+
+def test_what_the_broker_kept_is_as_old_as_it_says_or_doubtful():
+    where = Plain("t", "/v", time="/t")
+    for stamp in (1000.0, "1970-01-01T00:16:40Z", "1970-01-01T00:16:40"):
+        payload = json.dumps({"v": 1, "t": stamp}).encode()
+        assert plain_change("v", where, payload, retained=True, now=1002.5).age == pytest.approx(2.5)
+    payload = json.dumps({"v": 1, "t": 1.7e12 + 500}).encode()
+    assert plain_change("v", where, payload, retained=True, now=1.7e9 + 1).age == pytest.approx(0.5)
+    assert "how old" in plain_change("v", Plain("t"), b"1", retained=True, now=0.0).doubt
+    assert "is no time" in plain_change("v", where, b'{"v": 1, "t": true}', retained=False, now=0.0).doubt
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    ["a/#", "", 5, {"topic": "a", "pointer": "b"}, {"node": "a", "metric": "b"}, {"topic": "a", "x": 1}],
+)
+def test_addresses_that_cannot_be_are_named(tmp_path, wrong):
+    bad = Variable(name="bad", source="plc", address=wrong, unit="1")
+    target = Target(name="", joints=(), units=(), lower=(), upper=(), velocity=(), variables=(SPEED, bad))
+    with pytest.raises(InputError, match=r"bad\.address"):
+        Mqtt(name="plc", host="127.0.0.1", password_env="SEEROB_NO_SUCH").open(tmp_path, target)
+    assert address(SPEED) == Plain("belt", "/speed")

@@ -16,6 +16,7 @@ from typing import ClassVar, NamedTuple
 
 from seerob.dictionary import BadValue, Value, Variable
 from seerob.live import LiveSource
+from seerob.quantities import Seconds
 from seerob.samples import Sample, SignalSample
 from seerob.source import Target
 
@@ -55,6 +56,9 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
     by_exception: ClassVar[bool] = True
     """Whether the device speaks up when something changes: then a value stands as long as the connection
     does. Else it grows old from when it was said."""
+
+    timeout: Seconds = 1.0
+    """Age at which what it said no longer counts [s], beside the time-out of each variable."""
 
     def period(self) -> float:
         """Interval between samples that is expected [s]."""

@@ -1,0 +1,187 @@
+"""Siemens PLCs through their own web server (S7 web API): variables by their symbolic names."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
+from ipaddress import ip_address
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from urllib.parse import urlsplit
+
+from msgspec import Meta
+from msgspec.structs import replace
+
+from seerob.dictionary import Variable
+from seerob.errors import InputError, Problem
+from seerob.protocols import ProtocolError, s7_web
+from seerob.quantities import Seconds
+from seerob.snapshot import Finding
+from seerob.source import Opened, Target
+from seerob.sources._variables import Change, Node, VariablesSource
+
+if TYPE_CHECKING:
+    import httpx
+
+PATIENCE = 2.0
+"""With each answer [s]."""
+LARGEST = 1 << 20
+"""Answer [byte]."""
+DEEPEST = 4
+"""Levels that `browse` goes down."""
+
+
+class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
+    """Variables of a Siemens PLC, asked through its web server."""
+
+    by_exception: ClassVar[bool] = False
+
+    url: Annotated[str, Meta(pattern=r"^https?://[^/\s]+/?$")]
+    """``https://192.168.0.1``; unencrypted only to this machine itself."""
+    user: str
+    """A user of the PLC who may read."""
+    password_env: str
+    """Environment variable that holds the password: a workstation file is no place for one."""
+    ca: str | None = None
+    """The PLC's own certificate, or that of who signed it: a PEM file beside the workstation."""
+    every: Seconds = 0.2
+    """Interval between questions [s]; a PLC answers 2 to 10 times a second."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parts = urlsplit(self.url)
+        if parts.scheme == "http" and not _is_here(parts.hostname or ""):
+            raise ValueError(f"url = {self.url!r} would send a password unencrypted: write https://")
+
+    def period(self) -> float:
+        """Interval between samples that is expected [s]."""
+        return self.every
+
+    def open(self, folder: Path, target: Target | None) -> Opened:
+        """Check the addresses, and log in once, if it can be reached.
+
+        Raises:
+            InputError: An address that is no text, no password, no certificate file.
+        """
+        where = f"siemens_web {self.url}"
+        problems = [
+            Problem(where, f"{v.name}.address", f"{v.address!r} is no name", r'write "\"Belt\".speed"')
+            for v in (() if target is None else target.variables)
+            if not isinstance(v.address, str) or not v.address
+        ]
+        if self.password_env not in os.environ:
+            what = f"no environment variable {self.password_env!r}"
+            problems.append(Problem(where, "password_env", what, "set it before the start"))
+        if self.ca is not None and not (folder / self.ca).is_file():
+            problems.append(Problem(where, "ca", f"no such file: {self.ca}", "give a PEM file"))
+        if problems:
+            raise InputError(problems)
+        at_home = self if self.ca is None else replace(self, ca=str(folder / self.ca))
+        return VariablesSource.open(at_home, folder, target)
+
+    async def ask(self) -> tuple[Finding, ...]:
+        """Log in and out."""
+        async with self._session(Path()):
+            text = f"variables asked from {self.url} every {self.every:g} s"
+            return (Finding(level="note", subject=self.name or "siemens_web", text=text),)
+
+    async def changes(
+        self, variables: tuple[Variable, ...], folder: Path
+    ) -> AsyncGenerator[tuple[Change, ...], None]:
+        """Every variable, asked again and again."""
+        names, addresses = [v.name for v in variables], [v.address for v in variables]
+        clock = asyncio.get_running_loop()
+        async with self._session(folder) as session:
+            due = clock.time()
+            while True:
+                said: list[tuple[Any, str]] = []
+                for k in range(0, len(addresses), s7_web.MOST):
+                    some = addresses[k : k + s7_web.MOST]
+                    said += s7_web.results(await session.post(s7_web.reading(some)), len(some))
+                yield tuple(Change(n, raw, doubt) for n, (raw, doubt) in zip(names, said, strict=True))
+                # What was asked late is not made up for.
+                due = max(due + self.every, clock.time())
+                await asyncio.sleep(due - clock.time())
+
+    async def browse(self) -> AsyncGenerator[Node, None]:
+        """The variables of the PLC's program, four levels down."""
+        async with self._session(Path()) as session:
+            waiting = [("", 0)]
+            while waiting:
+                address, depth = waiting.pop()
+                found = s7_web.result(await session.post(s7_web.browsing(address)))
+                for entry in found if isinstance(found, list) else ():
+                    name = str(entry.get("name", "")) if isinstance(entry, dict) else ""
+                    if not name:
+                        continue
+                    below = f"{address}.{name}" if address else f'"{name}"'
+                    if entry.get("has_children") and depth < DEEPEST:
+                        waiting.append((below, depth + 1))
+                    elif not entry.get("has_children"):
+                        yield Node(below, str(entry.get("datatype", "")), "", "")
+
+    @asynccontextmanager
+    async def _session(self, folder: Path) -> AsyncGenerator[_Session, None]:
+        import ssl
+
+        import httpx
+
+        trusted = None if self.ca is None else str(folder / self.ca)
+        context = ssl.create_default_context(cafile=trusted)
+        async with httpx.AsyncClient(verify=context, timeout=PATIENCE, trust_env=False) as client:
+            session = _Session(client, self.url.rstrip("/") + s7_web.PATH)
+            password = os.environ.get(self.password_env, "")
+            found = s7_web.result(await session.post(s7_web.login(self.user, password)))
+            token = found.get("token") if isinstance(found, dict) else None
+            if not isinstance(token, str):
+                raise ProtocolError("logged in without a token")
+            session.token = token
+            try:
+                yield session
+            finally:
+                # A PLC has few sessions, and keeps a forgotten one for minutes.
+                with contextlib.suppress(OSError, ProtocolError):
+                    await session.post(s7_web.logout())
+
+
+class _Session:
+    def __init__(self, client: httpx.AsyncClient, url: str) -> None:
+        self._client, self._url = client, url
+        self.token = ""
+
+    async def post(self, data: bytes) -> bytes:
+        """The answer to a request.
+
+        Raises:
+            OSError: There is none.
+            ProtocolError: It is too large, or no success.
+        """
+        import httpx
+
+        headers = {"Content-Type": "application/json"} | ({s7_web.TOKEN: self.token} if self.token else {})
+        try:
+            async with self._client.stream("POST", self._url, content=data, headers=headers) as answer:
+                if answer.status_code != httpx.codes.OK:
+                    raise ProtocolError(f"the PLC answers with HTTP {answer.status_code}")
+                found = bytearray()
+                async for chunk in answer.aiter_bytes():
+                    found += chunk
+                    if len(found) > LARGEST:
+                        raise ProtocolError(f"an answer of more than {LARGEST >> 20} MiB")
+                return bytes(found)
+        except httpx.TimeoutException as error:
+            raise TimeoutError("no answer in time") from error
+        except (httpx.HTTPError, httpx.InvalidURL) as error:
+            raise ConnectionError(str(error) or type(error).__name__) from error
+
+
+def _is_here(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return False

@@ -1,0 +1,210 @@
+"""A PLC asked through its web server, over real HTTP and HTTPS."""
+
+from __future__ import annotations
+
+import datetime
+import json
+from contextlib import contextmanager
+
+import httpx
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from live_story import wait_for
+from seerob.dictionary import Kind, Variable
+from seerob.emulators.siemens_web import SiemensWebServer
+from seerob.errors import InputError
+from seerob.live import Listener
+from seerob.protocols import ProtocolError
+from seerob.protocols.s7_web import reading, result, results
+from seerob.source import Target
+from seerob.sources.siemens_web import SiemensWeb
+
+SPEED = Variable(name="belt/speed", source="plc", address='"Belt".speed', unit="mm/s", timeout=1)
+RUNS = Variable(name="belt/runs", source="plc", address='"Belt".runs', type=Kind.BOOL, timeout=1)
+GONE = Variable(name="gone", source="plc", address='"Gone".x', unit="1", timeout=1)
+PROGRAM = {'"Belt".speed': lambda t: 250.0, '"Belt".runs': lambda t: True}
+TARGET = Target(name="", joints=(), units=(), lower=(), upper=(), velocity=(), variables=(SPEED, RUNS, GONE))
+
+
+@pytest.fixture(autouse=True)
+def password(monkeypatch):
+    monkeypatch.setenv("PLC_PASSWORD", "secret")
+
+
+def plc(**more):
+    return SiemensWebServer(PROGRAM, user="twin", password="secret", **more)
+
+
+def source(server, **more):
+    options = {
+        "name": "plc",
+        "url": server.url,
+        "user": "twin",
+        "password_env": "PLC_PASSWORD",
+        "every": 0.05,
+    }
+    return SiemensWeb(**(options | more))
+
+
+@contextmanager
+def listening(found, folder=""):
+    heard = []
+    target = Target(**{f: getattr(TARGET, f) for f in TARGET.__struct_fields__} | {"folder": str(folder)})
+    listener = Listener(found, target, heard.append)
+    listener.start()
+    try:
+        yield heard
+    finally:
+        listener.ask_to_stop()
+        assert listener.join(10)
+
+
+def good(heard):
+    return bool(heard) and "belt/speed" not in heard[-1].doubts and "belt/speed" in heard[-1].values
+
+
+def test_variables_arrive_and_the_session_is_given_back():
+    with plc() as server:
+        with listening(source(server)) as heard:
+            wait_for(lambda: good(heard), 20)
+            assert heard[-1].values == {"belt/speed": 0.25, "belt/runs": True}
+            assert "Address does not exist" in heard[-1].doubts["gone"]
+            assert len(server.sessions) == 1
+        assert server.sessions == set()
+
+
+def test_a_plc_that_is_switched_off_and_on_is_asked_again(monkeypatch):
+    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.02)
+    server = plc().start()
+    try:
+        with listening(source(server)) as heard:
+            for _ in range(3):
+                wait_for(lambda: good(heard), 20)
+                server.stop()
+                heard.clear()
+                server.start()
+            wait_for(lambda: good(heard), 20)
+            # A token that the PLC has forgotten is asked for anew.
+            server.sessions.clear()
+            wait_for(
+                lambda: (
+                    any("Permission denied" in s.doubts.get("gone", "") for s in heard) or server.sessions
+                ),
+                20,
+            )
+    finally:
+        server.stop()
+
+
+def signed(folder):
+    """A certificate of this machine's own, as a PLC makes one for itself."""
+    from ipaddress import ip_address
+
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes, serialization
+    from cryptography.hazmat.primitives.asymmetric import ec
+
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(x509.oid.NameOID.COMMON_NAME, "plc")])
+    now = datetime.datetime.now(datetime.UTC)
+    certificate = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(7)
+        .not_valid_before(now - datetime.timedelta(days=1))
+        .not_valid_after(now + datetime.timedelta(days=1))
+        .add_extension(x509.SubjectAlternativeName([x509.IPAddress(ip_address("127.0.0.1"))]), critical=False)
+        .add_extension(x509.BasicConstraints(ca=True, path_length=None), critical=True)
+        .sign(key, hashes.SHA256())
+    )
+    (folder / "plc.pem").write_bytes(certificate.public_bytes(serialization.Encoding.PEM))
+    (folder / "key.pem").write_bytes(
+        key.private_bytes(
+            serialization.Encoding.PEM,
+            serialization.PrivateFormat.PKCS8,
+            serialization.NoEncryption(),
+        )
+    )
+    return folder / "plc.pem", folder / "key.pem"
+
+
+def test_only_the_certificate_that_was_given_is_trusted(tmp_path):
+    with plc(certificate=signed(tmp_path)) as server:
+        with listening(source(server, ca="plc.pem"), tmp_path) as heard:
+            wait_for(lambda: good(heard), 20)
+        opened = source(server, ca="plc.pem").open(tmp_path, TARGET)
+        assert "asked from https" in opened.findings[1].text
+        said = " ".join(f.text for f in source(server).open(tmp_path, TARGET).findings)
+        assert "not reached at start" in said
+        assert "certificate verify failed" in said.lower()
+
+
+def test_a_wrong_password_is_said(monkeypatch):
+    monkeypatch.setenv("PLC_PASSWORD", "guessed")
+    with plc() as server:
+        said = " ".join(f.text for f in source(server).open(None, None).findings)
+        assert "Login failed" in said
+        assert server.sessions == set()
+
+
+def test_a_password_does_not_travel_unencrypted(tmp_path):
+    with pytest.raises(ValueError, match="unencrypted"):
+        SiemensWeb(url="http://192.168.0.1", user="a", password_env="PLC_PASSWORD")
+    wrong = SiemensWeb(url="https://192.168.0.1", user="a", password_env="SEEROB_NONE", ca="gone.pem")
+    bad = Variable(name="bad", source="plc", address=5, unit="1")
+    target = Target(name="", joints=(), units=(), lower=(), upper=(), velocity=(), variables=(bad,))
+    with pytest.raises(InputError) as caught:
+        wrong.open(tmp_path, target)
+    for part in ("bad.address", "SEEROB_NONE", "gone.pem"):
+        assert part in str(caught.value)
+
+
+def test_browsing_finds_what_can_be_read():
+    import asyncio
+
+    async def found(server):
+        return [node.address async for node in source(server).browse()]
+
+    with plc() as server:
+        assert sorted(asyncio.run(found(server))) == sorted(PROGRAM)
+
+
+def test_a_foreign_client_is_answered_as_the_standard_says():
+    with plc() as server:
+        url = f"{server.url}/api/jsonrpc"
+        answer = httpx.post(url, content=reading(["a"])).json()
+        assert answer == [{"jsonrpc": "2.0", "id": 0, "error": {"code": 2, "message": "Permission denied"}}]
+
+
+# -- answers ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (b"", "no JSON"),
+        (b"5", "no JSON-RPC"),
+        (b"{}", "without a result"),
+        (b'{"error": {"message": "no", "code": 4}}', "the PLC says: no"),
+        (b'{"error": 5}', "the PLC says"),
+    ],
+)
+def test_answers_that_are_none(data, says):
+    with pytest.raises(ProtocolError, match=says):
+        result(data)
+    with pytest.raises(ProtocolError):
+        results(data, 1)
+
+
+VALUES = st.none() | st.integers(-3, 3) | st.text(max_size=3) | st.just({"message": 5}) | st.just([[]])
+
+
+@given(st.lists(VALUES | st.dictionaries(st.sampled_from(["id", "result", "error"]), VALUES), max_size=5))
+def test_any_batch_is_an_outcome_per_question(answers):
+    found = results(json.dumps(answers).encode(), 3)
+    assert len(found) == 3
+    assert all(isinstance(why, str) for _, why in found)

@@ -10,6 +10,7 @@ import time
 import pytest
 from made_cells import make_cell
 
+from seerob.errors import SeerobError
 from seerob.recording import Recording
 
 
@@ -42,11 +43,19 @@ def live(tmp_path):
 
 
 def until_it_moves(out):
-    """Wait until the recording has begun."""
-    end = time.monotonic() + 20
-    while not (out / "run.mcap").exists() and time.monotonic() < end:
-        time.sleep(0.05)
-    time.sleep(0.6)
+    """Wait until half a second of the run is in the recording."""
+    end = time.monotonic() + 60
+    while not recorded(out) > 0.5:
+        assert time.monotonic() < end
+        time.sleep(0.1)
+
+
+def recorded(out):
+    """How much of a run that goes on can be read so far [s]."""
+    try:
+        return Recording.open(out / "run.mcap").duration
+    except (OSError, SeerobError):
+        return 0.0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -54,7 +63,7 @@ def test_one_signal_ends_the_run_with_recording_report_and_verdict(live, number)
     process, out = live
     until_it_moves(out)
     process.send_signal(number)
-    said, errors = process.communicate(timeout=60)
+    said, errors = process.communicate(timeout=180)
     assert (process.returncode, errors) == (1, "")
     assert "EXCEEDED" in said
     assert sorted(p.name for p in out.iterdir()) == ["report.html", "results.xlsx", "run.mcap"]
@@ -69,7 +78,7 @@ def test_a_second_signal_writes_no_report_but_loses_no_recording(live):
     process.send_signal(signal.SIGINT)
     time.sleep(0.05)
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=180)
     assert (process.returncode, errors) == (3, "stopped\n")
     assert not (out / "report.html").exists()
     assert Recording.open(out / "run.mcap").duration > 0.3

@@ -23,6 +23,7 @@ CLEARANCES = {
     "ur10_assembly": ("gripper", "table"),
     "iiwa_bench": ("fingers", "bench"),
     "two_robots": ("ur10", "ur5e"),
+    "guarded_cell": ("ur5e", "rack"),
 }
 """Two names of each that must never meet."""
 

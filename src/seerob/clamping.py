@@ -13,13 +13,13 @@ between links that are always near.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.distance import Per, Query
+from seerob.distance import Closests, Per, Query
 from seerob.kernels.shapes import Shapes
 from seerob.model import Mechanism, Model
 from seerob.transforms import Array
@@ -112,10 +112,13 @@ class PinchPairs:
             rotations: world_from_body of every body, shape (n, 3, 3).
             positions: Likewise [m], shape (n, 3).
         """
+        return self.asked(lambda query, per: query.ask(rotations, positions, per))
+
+    def asked(self, ask: Callable[[Query, Per], Closests]) -> tuple[Array, NDArray[np.int64]]:
+        """The same of what each query says now, such as `State.distances` tells."""
         distances, others = [np.zeros(0)], [np.zeros(0, np.int64)]
         for query, per in self.queries:
-            ask = query.per_body if per is Per.BODY else query.per_pair
-            found = ask(rotations, positions)
+            found = ask(query, per)
             distances.append(found.distance)
             others.append(found.body_a)
         return np.concatenate(distances), np.concatenate(others)
@@ -128,6 +131,8 @@ class PinchPairs:
     def per_body(self, clamped: Flags) -> Flags:
         """Of gaps (..., g, r), which moving bodies clamp: shape (..., b, r)."""
         found = np.zeros((*clamped.shape[:-2], len(self.moving), clamped.shape[-1]), bool)
+        if not clamped.any():
+            return found
         for side in (self.first, self.second):
             for gap in np.flatnonzero(side >= 0):
                 found[..., side[gap], :] |= clamped[..., gap, :]

@@ -21,10 +21,12 @@ COMMANDS = (
     "replay",
     "report",
     "swept",
+    "permissible",
     "kinds",
     "schema",
     "emulate",
     "probe",
+    "measure",
     "import_aml",
 )
 """One module each in `seerob.commands`, with ``HELP``, ``EXAMPLE``, ``add`` and ``run``."""

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from seerob.area_mounting import mount_sensor, mount_swept
+from seerob.body_list import listed
 from seerob.by_hand import by_hand, home
 from seerob.chains import assumed, couple, payload, placeholder, unknown_masses
 from seerob.contacts import add_contacts
@@ -20,17 +24,23 @@ from seerob.human import manikin, posture
 from seerob.model import Body, Frame, Mechanism, Model
 from seerob.model_io.description import Description, Link, Quantity
 from seerob.model_io.loader import load_robot
-from seerob.mounting import Mounting, extreme_points
+from seerob.mounting import Mounting
+from seerob.mounting import pose_matrix as pose_matrix  # noqa: PLC0414
 from seerob.snapshot import Finding
-from seerob.things import AREA_COLOR, PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, load_thing
-from seerob.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
-from seerob.workstation import Area, Human, Mounted, Pose, Robot, Tool, Workstation
+from seerob.things import AREA_COLOR, PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, MadeArea, load_thing
+from seerob.transforms import Array
+from seerob.variable_binding import Bound, bound
+from seerob.workstation import Area, Human, Mounted, Robot, Tool, Workstation
 
 Progress = Callable[[str], None]
 
 
 def compile_workstation(
-    station: Workstation, *, cache: Path | None = None, progress: Progress = lambda _: None
+    station: Workstation,
+    *,
+    cache: Path | None = None,
+    progress: Progress = lambda _: None,
+    made: Mapping[str, MadeArea] = MappingProxyType({}),
 ) -> Model:
     """Read every file that the workstation names and compile the twin.
 
@@ -38,11 +48,12 @@ def compile_workstation(
         station: From `seerob.reading.read`.
         cache: Folder for distance trees and convex pieces that take long to make.
         progress: Told what is being read.
+        made: Areas that are swept, by name.
 
     Raises:
         InputError: With every mistake in every file.
     """
-    return _Compiler(station, cache, progress).run()
+    return _Compiler(station, cache, progress, made).run()
 
 
 @dataclass
@@ -57,8 +68,10 @@ class _Chain:
 
 
 class _Compiler:
-    def __init__(self, station: Workstation, cache: Path | None, progress: Progress) -> None:
-        self.station = station
+    def __init__(
+        self, station: Workstation, cache: Path | None, progress: Progress, made: Mapping[str, MadeArea]
+    ) -> None:
+        self.station, self.made = station, made
         self.cache = cache
         self.progress = progress
         self.folder = Path(station.folder)
@@ -67,9 +80,11 @@ class _Compiler:
         self.chains: dict[str, _Chain] = {}
         self.carriers: dict[str, str] = {}
         self.file = next(iter(station.files), "workstation")
+        self.bound = Bound({}, {}, ())
 
     def run(self) -> Model:
-        self._option()
+        self.mounting.option(timestep=self.station.engine.timestep, gravity=self.station.engine.gravity)
+        self._try("", self._variables, None)
         for i, robot in enumerate(self.station.robots):
             self._try(f"robots[{i}]", self._robot, robot)
         for i, human in enumerate(self.station.humans):
@@ -81,9 +96,11 @@ class _Compiler:
         if not self.problems:
             for i, area in enumerate(self.station.areas):
                 self._try(f"areas[{i}]", self._area, area)
+            for i, sensor in enumerate(self.station.sensors):
+                self._try(f"sensors[{i}]", partial(mount_sensor, self.mounting, self.carriers), sensor)
         if self.problems:
             raise InputError(self.problems)
-        bodies = self._bodies()
+        bodies = listed(self.mounting)
         self._actuators()
         add_contacts(self.mounting, bodies, self.station.contacts, file=self.file, cache=self.cache)
         self.progress("compiling")
@@ -97,16 +114,16 @@ class _Compiler:
         try:
             build(table)
         except InputError as error:
-            self.problems += [p._replace(key=f"{key} ({p.key})" if p.key else key) for p in error.problems]
+            self.problems += [
+                p._replace(key=f"{key} ({p.key})" if p.key and key else p.key or key) for p in error.problems
+            ]
         except UnknownName as error:
             self.problems.append(Problem(self.file, key, str(error)))
 
-    def _option(self) -> None:
-        option, engine = self.mounting.spec.option, self.station.engine
-        option.timestep = engine.timestep
-        option.gravity = engine.gravity
-        # Damping of the controllers is integrated implicitly: stiff gains stay stable.
-        option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    def _variables(self, _: None) -> None:
+        self.bound = bound(self.station)
+        self.mounting.findings += self.bound.findings
+        self.mounting.files |= self.bound.files
 
     # -- robots and humans ------------------------------------------------------------------
 
@@ -154,7 +171,10 @@ class _Compiler:
             stature=human.stature,
             mass=human.mass,
             sex=human.sex,
-            lengths=human.lengths,
+            lengths=human.lengths if isinstance(human.lengths, str) else "drillis",
+            masses=human.masses if isinstance(human.masses, str) else "deleva",
+            own_lengths=None if isinstance(human.lengths, str) else human.lengths,
+            own_masses=None if isinstance(human.masses, str) else human.masses,
             hand=human.hand,
         )
         q = posture.posture(description, human.posture, joints=human.joints, file=f"{human.name}.joints")
@@ -197,7 +217,10 @@ class _Compiler:
     def _area(self, area: Area) -> None:
         if area.on is not None and not self.mounting.has(area.on):
             raise UnknownName("link, tool or bone", area.on, self.carriers)
-        self._thing(area, "area", area.on, pose_matrix(area.at), AREA_COLOR)
+        if area.swept is not None:
+            mount_swept(self.mounting, area, self.made, file=self.file)
+        else:
+            self._thing(area, "area", area.on, pose_matrix(area.at), AREA_COLOR)
 
     def _mount_all(self) -> None:
         """Mount tools and workpieces; what they are mounted on may come later in the file."""
@@ -278,31 +301,6 @@ class _Compiler:
                 biastype=mujoco.mjtBias.mjBIAS_AFFINE,
             )
 
-    def _bodies(self) -> tuple[Body, ...]:
-        """The bodies, with `mujoco` indices still to come: contacts are added by name first."""
-        bodies = []
-        for index, entry in enumerate(self.mounting.entries):
-            corners, radius = extreme_points(entry.solids)
-            notes = list(dict.fromkeys(solid.note for solid in entry.solids if solid.note))
-            bodies.append(
-                Body(
-                    index=index,
-                    name=entry.name,
-                    role=entry.role,
-                    owner=entry.owner,
-                    carrier=entry.carrier,
-                    mj=-1,
-                    solids=entry.solids,
-                    corners=corners,
-                    radius=radius,
-                    mass=entry.mass,
-                    mesh=entry.mesh,
-                    triangles=entry.triangles,
-                    note="; ".join(notes),
-                )
-            )
-        return tuple(bodies)
-
     def _model(self, mj: Any, bodies: Sequence[Body]) -> Model:
         numbered = tuple(replace(body, mj=_body_id(mj, body.name)) for body in bodies)
         frames = {
@@ -325,6 +323,7 @@ class _Compiler:
                 *(f for robot in self.station.robots for f in self._about(robot, mechanisms[robot.name])),
             ),
             files={**self.station.files, **self.mounting.files},
+            dictionary=self.bound.variables,
         )
 
     def _mechanism(self, mj: Any, name: str, bodies: tuple[Body, ...]) -> Mechanism:
@@ -382,13 +381,6 @@ class _Compiler:
         on = {full.partition("/")[2] for full in mounted if full.startswith(f"{name}/")}
         things = {thing: mass is not None for thing, mass in self._carried(name).items()}
         return unknown_masses(name, self.chains[name].description, loaded=on, things=things)
-
-
-def pose_matrix(pose: Pose) -> Array:
-    """Homogeneous matrix (4, 4) of a pose in the file."""
-    if pose.wxyz is not None:
-        return transform(rotation_from_wxyz(pose.wxyz), pose.position)
-    return transform(rotation_from_rpy(pose.rpy if pose.rpy is not None else (0.0, 0.0, 0.0)), pose.position)
 
 
 def _body_id(mj: Any, name: str) -> int:

@@ -133,6 +133,32 @@ class Speeds:
     """Reduced mass [kg]."""
 
 
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Moving surfaces (b) against all that a person can be hit at (k, the regions of a table among them)."""
+
+    v_r: Array
+    """Bounds on the speeds of the surfaces [m/s], shape (b,)."""
+    v_h: Array
+    """Likewise of the person [m/s], shape (k,)."""
+    near: NDArray[np.bool_]
+    """What could be hit by what, shape (b, k)."""
+    projected: Array
+    """Effective mass of each surface along its motion [kg], NaN where it stands still, shape (b,)."""
+    speeds: Speeds
+    clamped: NDArray[np.bool_]
+    """Shape (b, r)."""
+    rows: Array
+    """Surface that governs, shape (k,)."""
+    ranks: Array
+    """2 exceeded, 1 open, 0 within, shape (k,)."""
+
+    @property
+    def v(self) -> Array:
+        """Bounds on the relative speed [m/s], shape (b, k)."""
+        return self.v_r[:, None] + self.v_h
+
+
 def contact_input(
     name: str, shape: ContactShape, *, radius: float | None = None, area: float | None = None
 ) -> Input:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.distance import Query
+from seerob.distance import Per, Query, Reach
 from seerob.human.skeleton import without_side
 from seerob.human.skin import BODY_REGION
 from seerob.model import Mechanism, Model
@@ -63,8 +63,10 @@ class Person:
         self.bodies = model.human(human).bodies
         self._gap = model.gap(robot.moving, self.bodies)
         # Not the gap's own query: that measures pairs however far they are.
-        self._reach = horizon + self._gap.deviation
-        self._query = Query(model.shapes, robot.moving, self.bodies, cap=self._reach + 1e-6)
+        reach = float(np.nextafter(horizon + self._gap.deviation, np.inf))
+        self._query = Query(model.shapes, robot.moving, self.bodies, cap=reach)
+        self._names = [model.bodies[body].name for body in self.bodies]
+        self._close: NDArray[np.bool_] = np.zeros(len(self.bodies), bool)
         self._shape = len(robot.moving), len(self.bodies)
         self._member = np.zeros((len(self.bodies), len(REGIONS)), bool)
         for i, body in enumerate(self.bodies):
@@ -73,6 +75,12 @@ class Person:
                 self._member[i, REGIONS.index(FEET if region is None else region)] = True
             if bone in ("head", "neck"):
                 self._member[i, REGIONS.index(SENSITIVE)] = True
+
+    def hit(self, region: str) -> tuple[str, ...]:
+        """Full names of the bones of one of `REGIONS` that were within the horizon at the latest `near`."""
+        return tuple(
+            self._names[i] for i in np.flatnonzero(self._close & self._member[:, REGIONS.index(region)])
+        )
 
     def near(self, state: State, speed: float | None) -> tuple[NDArray[np.bool_], Array]:
         """What could be hit.
@@ -85,12 +93,13 @@ class Person:
             Per moving body and region, shape (b, len(REGIONS)), and bounds on the regions' speeds [m/s].
         """
         state.require(*self._gap.carriers)
-        found = self._query.per_pair(state.rotations, state.positions)
-        close: NDArray[np.bool_] = np.less_equal(found.distance.reshape(self._shape), self._reach)
+        found = state.distances(self._query, Per.WHETHER)
+        close: NDArray[np.bool_] = np.asarray(found.reach == Reach.WITHIN_CAP).reshape(self._shape)
+        self._close = np.asarray(close.any(axis=0))
         near: NDArray[np.bool_] = np.any(close[:, :, None] & self._member[None], axis=1)
         if speed is not None:
             return near, np.full(len(REGIONS), speed)
         reached = np.flatnonzero(close.any(axis=0))
         v = np.zeros(len(self.bodies))
-        v[reached] = [state.fastest_point(self.bodies[i])[0] for i in reached]
+        v[reached] = state.fastest_points(self.bodies)[0][reached]
         return near, np.asarray(np.max(v[:, None] * self._member, axis=0))

@@ -11,9 +11,10 @@ these values, so a body inside a machine can never read as far from it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +25,7 @@ from seerob.kernels.pairs import MESH
 from seerob.kernels.shapes import Indices, Shapes
 from seerob.transforms import Array
 
-__all__ = ["Closest", "Closests", "Per", "Query", "Reach", "Shapes"]
+__all__ = ["Closest", "Closests", "Per", "Query", "Reach", "Shapes", "Survey"]
 
 
 class Reach(IntEnum):
@@ -36,6 +37,8 @@ class Reach(IntEnum):
     """Cores intersect or one is inside a mesh: the overlap is at least this deep."""
     BEYOND_CAP = kernel.BEYOND_CAP
     """Not nearer than the query's cap, which is the value; no points."""
+    WITHIN_CAP = kernel.WITHIN_CAP
+    """Nearer than the query's cap, which is the value: more was not asked; no points."""
 
 
 class Per(StrEnum):
@@ -47,6 +50,8 @@ class Per(StrEnum):
     """All of a to each body of b."""
     PAIR = "pair"
     """Each body of a to each body of b, a-major."""
+    WHETHER = "whether"
+    """Of the same pairs, only whether they are nearer than the cap: far cheaper than how near."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +85,17 @@ class Closests:
     body_b: Indices
     reach: NDArray[np.int8]
     """Values of `Reach`."""
+
+    def of(self, *index: int | slice) -> Closests:
+        """Some of them."""
+        return Closests(
+            self.distance[index],
+            self.point_a[index],
+            self.point_b[index],
+            self.body_a[index],
+            self.body_b[index],
+            self.reach[index],
+        )
 
     def at(self, *index: int) -> Closest:
         """One of them."""
@@ -129,15 +145,30 @@ class Query:
                         rows.append((j, i, 1) if swap else (i, j, 0))
                         bodies.append((body_a, body_b))
                         groups.append((0, ib, ia * len(self.b) + ib))
-        self._pair = np.array(rows, np.int64)
-        self._bodies = np.array([*bodies, (-1, -1)], np.int64)  # The last row is pair -1.
-        self._used = np.unique(self._pair[:, :2])
-        counts = (1, len(self.b), len(self.a) * len(self.b))
-        self._groups = {
-            per: _Groups.of(np.array([g[k] for g in groups]), counts[k]) for k, per in enumerate(Per)
+        self._rows = np.array(rows, np.int64)
+        self._bodies = np.array(bodies, np.int64)
+        self._groups = np.array(groups, np.int64)
+        pairs = len(self.a) * len(self.b)
+        self._columns = {
+            Per.SETS: (0, 1),
+            Per.BODY: (1, len(self.b)),
+            Per.PAIR: (2, pairs),
+            Per.WHETHER: (2, pairs),
         }
-        self._memory = self._forget()
-        self._last = {per: np.full(counts[k], -1, np.int64) for k, per in enumerate(Per)}
+        self._alone: dict[Per, Survey] = {}
+
+    def _survey(self, per: Per) -> Survey:
+        if per not in self._alone:
+            self._alone[per] = Survey(self.shapes, [(self, per)])
+        return self._alone[per]
+
+    def members(self, per: Per) -> Members:
+        """Its pairs by group, in their order within each."""
+        column, count = self._columns[per]
+        order = np.argsort(self._groups[:, column], kind="stable")
+        # A group of bodies without solids is empty.
+        start = np.searchsorted(self._groups[order, column], np.arange(count + 1))
+        return Members(self._rows[order], self._bodies[order], start.astype(np.int64))
 
     def minimum(self, rotations: ArrayLike, positions: ArrayLike) -> Closest:
         """Where the two sets are nearest.
@@ -149,15 +180,20 @@ class Query:
         Raises:
             SimulationDiverged: A pose that is not finite.
         """
-        return self._ask(rotations, positions, Per.SETS).at(0)
+        return self.ask(rotations, positions, Per.SETS).at(0)
 
     def per_body(self, rotations: ArrayLike, positions: ArrayLike) -> Closests:
         """Where each body of b is nearest to all of a, in the order of ``b``; see `minimum`."""
-        return self._ask(rotations, positions, Per.BODY)
+        return self.ask(rotations, positions, Per.BODY)
 
     def per_pair(self, rotations: ArrayLike, positions: ArrayLike) -> Closests:
         """Where each body of a is nearest to each of b, shape (len(a)·len(b),), a-major; see `minimum`."""
-        return self._ask(rotations, positions, Per.PAIR)
+        return self.ask(rotations, positions, Per.PAIR)
+
+    def ask(self, rotations: ArrayLike, positions: ArrayLike, per: Per) -> Closests:
+        """One of the three; see `minimum`."""
+        (found,) = self._survey(per).ask(rotations, positions)
+        return found
 
     def batch(self, rotations: ArrayLike, positions: ArrayLike, per: Per = Per.SETS) -> Closests:
         """Answers for many samples in one compiled call that holds no lock; safe in threads.
@@ -173,48 +209,80 @@ class Query:
         Raises:
             SimulationDiverged: A pose that is not finite.
         """
-        last = np.full(len(self._last[per]), -1, np.int64)
-        return self._run(rotations, positions, per, self._forget(), last)
+        (found,) = self._survey(per).batch(rotations, positions)
+        return found
 
-    def _ask(self, rotations: ArrayLike, positions: ArrayLike, per: Per) -> Closests:
-        many = self._run(
-            np.asarray(rotations)[None], np.asarray(positions)[None], per, self._memory, self._last[per]
-        )
-        return Closests(
-            many.distance[0], many.point_a[0], many.point_b[0], many.body_a[0], many.body_b[0], many.reach[0]
-        )
 
-    def _forget(self) -> tuple[Array, Array, Indices]:
-        """Corners at the last call, bounds then, nearest triangles then: of a query never asked."""
+class Survey:
+    """Many questions about the same shapes, answered in one compiled call; see `Query`.
+
+    Each answer is that of its query asked alone, bit for bit; pairs of solids that several of them
+    ask for are measured once.
+    """
+
+    def __init__(self, shapes: Shapes, questions: Sequence[tuple[Query, Per]]) -> None:
+        """Bind.
+
+        Args:
+            shapes: Of all the queries.
+            questions: What is asked.
+        """
+        self.shapes = shapes
+        self.questions = tuple(questions)
+        # What is cheap to answer from pairs that are known comes last.
+        late = (Per.SETS, Per.WHETHER)
+        order = sorted(range(len(self.questions)), key=lambda k: self.questions[k][1] in late)
+        members = [self.questions[k][0].members(self.questions[k][1]) for k in order]
+        rows = np.concatenate([found.rows for found in members])
+        self._pair, pair = np.unique(rows[:, :2], axis=0, return_inverse=True)
+        self._members = np.column_stack([pair.ravel(), rows[:, 2]])
+        self._bodies = np.concatenate([*(found.bodies for found in members), [[-1, -1]]])
+        offsets = np.cumsum([0, *(len(found.rows) for found in members)])
+        starts = [found.start[:-1] + offset for found, offset in zip(members, offsets, strict=False)]
+        self._start = np.concatenate([*starts, offsets[-1:]]).astype(np.int64)
+        sizes = [len(found.start) - 1 for found in members]
+        self._caps = np.repeat([self.questions[k][0].cap for k in order], sizes)
+        self._whether = np.repeat([self.questions[k][1] is Per.WHETHER for k in order], sizes)
+        ends = np.cumsum([0, *sizes]).tolist()
+        columns = {k: slice(ends[i], ends[i + 1]) for i, k in enumerate(order)}
+        self._columns = [columns[k] for k in range(len(order))]
+        self._used = np.unique(self._pair)
+        self._memory = self._forget()
+
+    def ask(self, rotations: ArrayLike, positions: ArrayLike) -> list[Closests]:
+        """Answers for one set of poses, in the order of the questions; see `Query.minimum`."""
+        found = self._run(np.asarray(rotations)[None], np.asarray(positions)[None], self._memory)
+        return [found.of(0, columns) for columns in self._columns]
+
+    def batch(self, rotations: ArrayLike, positions: ArrayLike) -> list[Closests]:
+        """Answers for many samples, in the order of the questions; see `Query.batch`."""
+        found = self._run(rotations, positions, self._forget())
+        return [found.of(slice(None), columns) for columns in self._columns]
+
+    def _forget(self) -> Memory:
         solids, pairs = len(self.shapes.which), len(self._pair)
-        return (
+        return Memory(
             np.full((solids, 8, 3), np.inf),
             np.full(pairs, -np.inf),
+            np.full(pairs, np.inf),
             np.full((pairs, 2), -1, np.int64),
+            np.full(len(self._caps), -1, np.int64),
         )
 
-    def _run(
-        self,
-        rotations: ArrayLike,
-        positions: ArrayLike,
-        per: Per,
-        memory: tuple[Array, Array, Indices],
-        last: Indices,
-    ) -> Closests:
+    def _run(self, rotations: ArrayLike, positions: ArrayLike, memory: Memory) -> Closests:
         s = self.shapes
         R = np.ascontiguousarray(rotations, float)
         x = np.ascontiguousarray(positions, float)
         n = len(s.names)
         if R.shape[1:] != (n, 3, 3) or x.shape != (len(R), n, 3):
             raise ValueError(f"poses of {n} bodies expected, not rotations {R.shape} and positions {x.shape}")
-        groups = self._groups[per]
-        shape = len(R), len(groups.start) - 1
-        distance, points = np.empty(shape), np.full((*shape, 6), np.nan)
+        shape = len(R), len(self._caps)
+        distance, points = np.empty(shape), np.empty((*shape, 6))
         winner, reach = np.empty(shape, np.int64), np.empty(shape, np.int8)
         bad, body = kernel.nearest(
             R, x, s.which, s.local, s.ball, s.corners, s.radius, s.nodes, s.links, s.triangles, s.probes,
-            self._used, self._pair, groups.start, groups.members, self.cap,
-            *memory, last, distance, points, winner, reach,
+            self._used, self._pair, self._start, self._members, self._caps,
+            self._whether, *memory, distance, points, winner, reach,
         )  # fmt: skip
         if bad >= 0:
             self._memory = self._forget()
@@ -224,16 +292,30 @@ class Query:
         return Closests(distance, points[..., :3], points[..., 3:], bodies[..., 0], bodies[..., 1], reach)
 
 
-@dataclass(frozen=True, eq=False)
-class _Groups:
-    start: Indices
-    members: Indices
+class Memory(NamedTuple):
+    """What a query remembers of the last poses, to be fast; of one never asked at first."""
 
-    @classmethod
-    def of(cls, group: Indices, count: int) -> _Groups:
-        """Pairs of each group, ascending; a group of bodies without solids is empty."""
-        start = np.searchsorted(np.sort(group), np.arange(count + 1))
-        return cls(start.astype(np.int64), np.argsort(group, kind="stable"))
+    corners: Array
+    """Then, in the world [m], infinity before."""
+    low: Array
+    """Lower bound of each pair's distance then [m]."""
+    high: Array
+    """Upper bound likewise."""
+    first: Indices
+    """Triangles that were nearest, -1 before."""
+    last: Indices
+    """What won each group, -1 before."""
+
+
+class Members(NamedTuple):
+    """Pairs of solids by group."""
+
+    rows: Indices
+    """Solids, meshes first, and 1 where the first belongs to the second set, shape (k, 3)."""
+    bodies: Indices
+    """Of the first and of the second set, shape (k, 2)."""
+    start: Indices
+    """Where each group begins, shape (g + 1,)."""
 
 
 def _check_sets(shapes: Shapes, a: tuple[int, ...], b: tuple[int, ...], cap: float) -> None:

@@ -15,15 +15,20 @@ gains as applied forces diverge at a floating root. Torque limits clamp the whol
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
+from seerob.actuation import set_gains, set_torque_limits
+from seerob.compilation import pose_matrix
 from seerob.errors import InputError, SimulationDiverged
+from seerob.human.following import Following
 from seerob.inverse_kinematics import solve_pose
+from seerob.kernels import pull as kernel
 from seerob.model import Mechanism, Model
 from seerob.reference import Reference
-from seerob.samples import JointSample, PoseSample, Quality, Sample, SignalSample
+from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
 from seerob.state import Hearing, State
 from seerob.transforms import Array, rotation_from_wxyz
 
@@ -33,9 +38,18 @@ LARGEST_SPEED = {"rad": 30.0, "m": 10.0}
 """Above it two samples are a jump [rad/s or m/s]: no arm and no person at work moves like that."""
 WILD = 300.0
 """Above it the physics has lost a joint [rad/s or m/s]."""
-POSES_FOR_GAINS = 16
 POSE_TOLERANCE = 1e-4
 """Largest error of a solved Cartesian target [m or rad] that still counts as reached."""
+
+
+class Course(NamedTuple):
+    """Where every joint of the workstation is to be at each step of a tick and at its end, in rows."""
+
+    q: Array
+    """[rad or m]"""
+    v: Array
+    """Half a step earlier, as `mujoco.mj_step` counts."""
+    a: Array
 
 
 class Engine:
@@ -69,6 +83,8 @@ class Engine:
         self.model = model
         self.controllers = controllers
         engine = model.workstation.engine
+        # Without controllers there is nothing but physics that could move it.
+        self.physics = engine.physics or not controllers
         self._mj = model.mj.__copy__()
         self._mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         if not contacts:
@@ -102,13 +118,23 @@ class Engine:
             )
             for m in self._mechanisms
         }
-        self._dof = self._mj.jnt_dofadr[self._mj.actuator_trnid[:, 0]]
+        self._dof = self._mj.jnt_dofadr[self._mj.actuator_trnid[:, 0]].astype(np.int64)
         """Degree of freedom of each actuator."""
-        self._kp, self._kd = self._gains()
-        self._limits = self._torque_limits()
+        self._kp, self._kd = set_gains(
+            self._mj, self._wanted, self._mechanisms, engine, self._dof, controllers=controllers
+        )
+        self._limits = set_torque_limits(self._mj, self._mechanisms, self._dof)
         self._feedforward = np.zeros(self._mj.nv)
         self._before = np.zeros(self._mj.nv)
-        self._unreachable: dict[str, float] = {}
+        self._courses: dict[str, tuple[Array, Array, Array]] = {}
+        rows = self._steps + 1
+        self._course = Course(
+            np.tile(self._mj.qpos0, (rows, 1)), np.zeros((rows, self._mj.nv)), np.zeros((rows, self._mj.nv))
+        )
+        self._force = np.zeros(self._mj.nv)
+        self._almost = 0.999 * self._limits
+        self._followings: dict[str, Following] = {}
+        """By person that devices see."""
         self.signals: dict[str, dict[str, float | bool | str]] = {}
         self.state = State(model, self._shown, self._hearings)
         self._tick = 0
@@ -121,6 +147,9 @@ class Engine:
         for sample in samples:
             if isinstance(sample, SignalSample):
                 self.signals[sample.source] = sample.values
+                continue
+            if isinstance(sample, BodySample):
+                self._following(sample.target).hear(sample)
                 continue
             mechanism = self._target(sample)
             reason = "" if sample.quality is Quality.GOOD else f"its source says {sample.quality.value}"
@@ -145,6 +174,26 @@ class Engine:
                 jump = f"its samples jump at {sample.t:.3f} s" if reference.jumped else ""
                 hearing.heard.append((sample.t, reason or jump))
                 hearing.torques.append(_torques(sample))
+
+        for name, following in self._followings.items():
+            hearing = self._hearings[name]
+            hearing.driven = self.controllers
+            for found in following.until((self._tick + 1) * self._period):
+                self._references[name].take(found.t, found.q, None, anew=found.anew and self._tick > 0)
+                hearing.heard.append((found.t, found.reason))
+                hearing.torques.append(None)
+
+    def _following(self, name: str) -> Following:
+        """What captured motion of a person goes through.
+
+        Raises:
+            UnknownName: There is no such person.
+        """
+        if name not in self._followings:
+            human = self.model.human(name)
+            at = next(h.at for h in self.model.workstation.humans if h.name == name)
+            self._followings[name] = Following(human.description, pose_matrix(at))
+        return self._followings[name]
 
     def _target(self, sample: JointSample | PoseSample) -> Mechanism:
         """Robot or human that a sample drives.
@@ -198,48 +247,67 @@ class Engine:
             reference.forget(start)
         for hearing in self._hearings.values():
             hearing.forget(start)
-        for step in range(self._steps):
+        self._aim(start)
+        qvel = self._data.qvel
+        for step in range(self._steps if self.physics else 0):
             if self.controllers:
-                self._pull(start + step * self._dt)
-            self._before[:] = self._data.qvel
+                self._pull(step, start + step * self._dt)
+            self._before[:] = qvel
             mujoco.mj_step(self._mj, self._data)
-            # Not "> WILD": what is not a number must be caught too.
-            if self.controllers and not np.abs(self._data.qvel).max(initial=0.0) < WILD:
-                self._put_back(start + (step + 1) * self._dt)
+            if self.controllers and not kernel.tame(qvel, WILD):
+                self._put_back(step + 1, start + (step + 1) * self._dt)
         self._tick += 1
+        if not self.physics:
+            self._follow()
         self._check_finite()
         t = self._tick * self._period
         self._show(t)
-        self._note_errors(t)
+        self._note_errors()
         return self.state
 
-    def _pull(self, t: float) -> None:
-        wanted = self._wanted
+    def _follow(self) -> None:
+        """Put the twin on what was heard, with the velocities of that motion."""
+        t = self._tick * self._period
         for mechanism in self._mechanisms:
             reference = self._references[mechanism.name]
-            q, v, a = reference.at(t)
-            if reference.lands(t):
-                self._put(mechanism, q, v, a)
+            reference.lands(t)
+            self._put(mechanism, *reference.at(t))
+
+    def _aim(self, start: float) -> None:
+        """Where every joint is to be at each step of the tick that begins, and at its end."""
+        if not (self.controllers and self.physics):
+            return
+        t = np.array([start + step * self._dt for step in range(self._steps + 1)])
+        t[-1] = (self._tick + 1) * self._period
+        q_all, v_all, a_all = self._course
+        for mechanism in self._mechanisms:
+            q, v, a = self._courses[mechanism.name] = self._references[mechanism.name].course(t)
             # mj_step moves positions with the velocity at the end of the step, so its velocities
             # belong half a step earlier than its positions.
             before = v - 0.5 * self._dt * a
             if mechanism.name in self._coupled:
-                q = mechanism.coupling @ q + mechanism.offset
-                before, a = mechanism.coupling @ before, mechanism.coupling @ a
-            wanted.qpos[mechanism.q_address] = q
-            wanted.qvel[mechanism.v_address] = before
-            wanted.qacc[mechanism.v_address] = a
-        mujoco.mj_kinematics(self._mj, wanted)
-        mujoco.mj_comPos(self._mj, wanted)
-        mujoco.mj_comVel(self._mj, wanted)
-        mujoco.mj_passive(self._mj, wanted)
-        mujoco.mj_rne(self._mj, wanted, 1, self._feedforward)
-        # mj_rne knows neither rotor inertia nor passive forces. All damping is implicit: it acts on the
-        # velocity at the end of the step.
-        after = wanted.qvel + self._dt * wanted.qacc
-        torque = self._feedforward + self._mj.dof_armature * wanted.qacc - wanted.qfrc_passive
-        torque += self._mj.dof_damping * (after - wanted.qvel)
-        self._data.ctrl[:] = (wanted.qpos + (self._kd * after + torque) / self._kp)[self._dof]
+                q = q @ mechanism.coupling.T + mechanism.offset
+                before, a = before @ mechanism.coupling.T, a @ mechanism.coupling.T
+            q_all[:, mechanism.q_address] = q
+            v_all[:, mechanism.v_address] = before
+            a_all[:, mechanism.v_address] = a
+
+    def _pull(self, step: int, t: float) -> None:
+        wanted, mj = self._wanted, self._mj
+        for mechanism in self._mechanisms:
+            if self._references[mechanism.name].lands(t):
+                self._put(mechanism, *(part[step] for part in self._courses[mechanism.name]))
+        q, v, a = (part[step] for part in self._course)
+        wanted.qpos[:], wanted.qvel[:], wanted.qacc[:] = q, v, a
+        mujoco.mj_kinematics(mj, wanted)
+        mujoco.mj_comPos(mj, wanted)
+        mujoco.mj_comVel(mj, wanted)
+        mujoco.mj_passive(mj, wanted)
+        mujoco.mj_rne(mj, wanted, 1, self._feedforward)
+        kernel.command(
+            q, v, a, self._feedforward, wanted.qfrc_passive, mj.dof_armature, mj.dof_damping,
+            self._kp, self._kd, self._dt, self._dof, self._data.ctrl,
+        )  # fmt: skip
 
     def _place(self, t: float) -> None:
         for mechanism in self._mechanisms:
@@ -248,16 +316,16 @@ class Engine:
         self._show(t)
 
     def _put(self, mechanism: Mechanism, q: Array, v: Array, a: Array) -> None:
-        late = 0.5 * self._dt * a if self.controllers else np.zeros_like(a)
+        late = 0.5 * self._dt * a if self.controllers and self.physics else np.zeros_like(a)
         self._data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
         self._data.qvel[mechanism.v_address] = mechanism.coupling @ (v - late)
         self._before[mechanism.v_address] = mechanism.coupling @ (v - 3 * late)
 
-    def _put_back(self, t: float) -> None:
+    def _put_back(self, step: int, t: float) -> None:
         """Put what the physics has lost back to where it should be; its verdicts wait until it follows."""
         for mechanism in self._mechanisms:
-            if not np.abs(self._data.qvel[mechanism.v_address]).max(initial=0.0) < WILD:
-                self._put(mechanism, *self._references[mechanism.name].at(t))
+            if not kernel.tame(self._data.qvel[mechanism.v_address], WILD):
+                self._put(mechanism, *(part[step] for part in self._courses[mechanism.name]))
                 self._data.qacc_warmstart[mechanism.v_address] = 0.0
                 self._hearings[mechanism.name].lost = t
 
@@ -265,23 +333,24 @@ class Engine:
         shown, data = self._shown, self._data
         shown.qpos[:] = data.qpos
         shown.qvel[:] = data.qvel
-        if self.controllers and not data.ncon:
+        if self.controllers and self.physics and not data.ncon:
             # The velocities of mj_step belong half a step earlier than its positions (see _pull).
             shown.qvel += 0.5 * (data.qvel - self._before)
         self.state.refresh(t)
 
-    def _note_errors(self, t: float) -> None:
-        if not self.controllers:
+    def _note_errors(self) -> None:
+        if not (self.controllers and self.physics):
             return
-        force = np.zeros(self._mj.nv)
-        force[self._dof] = np.abs(self._data.actuator_force)
+        off = np.abs(self._data.qpos - self._course.q[-1])
+        self._force[self._dof] = np.abs(self._data.actuator_force)
+        reached = self._force >= self._almost
         for mechanism in self._mechanisms:
-            q, _, _ = self._references[mechanism.name].at(t)
-            wanted = mechanism.coupling @ q + mechanism.offset
             hearing = self._hearings[mechanism.name]
-            hearing.error = float(np.abs(self._data.qpos[mechanism.q_address] - wanted).max(initial=0.0))
-            own = mechanism.v_address
-            hearing.saturated = bool((force[own] >= 0.999 * self._limits[own]).any())
+            hearing.error = float(off[mechanism.q_address].max(initial=0.0))
+            hearing.saturated = bool(reached[mechanism.v_address].any())
+        for name, following in self._followings.items():
+            q = self.state.joint_positions(self.model.mechanisms[name])
+            self._hearings[name].bones = following.errors(self.state.t, q)
 
     def _check_finite(self) -> None:
         if np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qvel).all():
@@ -296,53 +365,6 @@ class Engine:
                     "lower engine.bandwidth or check masses and samples"
                 )
         raise SimulationDiverged(f"a velocity is not finite after {self._tick * self._period:.3f} s")
-
-    # -- set-up -----------------------------------------------------------------------------
-
-    def _gains(self) -> tuple[Array, Array]:
-        """Proportional and derivative gain per degree of freedom; also written into the actuators."""
-        largest = np.zeros(self._mj.nv)
-        matrix = np.zeros((self._mj.nv, self._mj.nv))
-        random = np.random.default_rng(0)
-        data = self._wanted
-        for pose in range(POSES_FOR_GAINS):
-            for m in self._mechanisms:
-                low = np.clip(m.lower, -np.pi, np.pi)
-                high = np.clip(m.upper, -np.pi, np.pi)
-                q = m.home if pose == 0 or m.role == "human" else random.uniform(low, high)
-                data.qpos[m.q_address] = m.coupling @ q + m.offset
-            mujoco.mj_kinematics(self._mj, data)
-            mujoco.mj_comPos(self._mj, data)
-            mujoco.mj_makeM(self._mj, data)
-            mujoco.mj_fullM(self._mj, data, matrix)
-            largest = np.maximum(largest, np.diag(matrix))
-        engine = self.model.workstation.engine
-        omega = np.full(self._mj.nv, 2 * np.pi * engine.bandwidth)
-        for m in self._mechanisms:
-            if m.role == "human":
-                omega[m.v_address] = 2 * np.pi * engine.human_bandwidth
-        kp, kd = omega**2 * largest, 2 * omega * largest
-        if self.controllers:
-            self._mj.actuator_gainprm[:, 0] = kp[self._dof]
-            self._mj.actuator_biasprm[:, 1] = -kp[self._dof]
-            self._mj.actuator_biasprm[:, 2] = -kd[self._dof]
-        else:
-            self._mj.actuator_gainprm[:] = 0.0
-            self._mj.actuator_biasprm[:] = 0.0
-        return kp, kd
-
-    def _torque_limits(self) -> Array:
-        limits = np.full(self._mj.nv, np.inf)
-        for m in self._mechanisms:
-            for column, limit in enumerate(m.effort_limits):
-                if limit is not None and limit.value > 0:
-                    own = m.v_address[m.coupling[:, column] != 0]
-                    limits[own] = limit.value
-        ranges = limits[self._dof]
-        limited = np.isfinite(ranges)
-        self._mj.actuator_forcelimited[:] = limited
-        self._mj.actuator_forcerange[limited] = np.column_stack([-ranges[limited], ranges[limited]])
-        return limits
 
 
 def _largest_speed(mechanism: Mechanism) -> Array:

@@ -31,11 +31,14 @@ def gravity(state: State, mechanism: Mechanism) -> Array:
     mj, data = state.model.mj, state.data
     joints = mj.dof_jntid[mechanism.v_address]
     bodies = mj.jnt_bodyid[joints]
-    weight = mj.body_subtreemass[bodies, None] * mj.opt.gravity
-    arms = data.subtree_com[bodies] - data.xanchor[joints]
+    gravity = mj.opt.gravity
+    gx, gy, gz = gravity.tolist()
+    x, y, z = (data.subtree_com[bodies] - data.xanchor[joints]).T
     turns = mj.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE
-    moved = np.where(turns[:, None], np.cross(data.xaxis[joints], arms), data.xaxis[joints])
-    return np.asarray(mechanism.coupling.T @ -np.einsum("ij,ij->i", weight, moved))
+    # (axis × arm) · g is axis · (arm × g) of a joint that turns; one that slides falls along its axis.
+    moments = np.stack([y * gz - z * gy, z * gx - x * gz, x * gy - y * gx], axis=1)
+    falls = (data.xaxis[joints] * np.where(turns[:, None], moments, gravity)).sum(axis=1)
+    return np.asarray(mechanism.coupling.T @ -(mj.body_subtreemass[bodies] * falls))
 
 
 def bias(state: State, mechanism: Mechanism) -> Array:

@@ -269,7 +269,7 @@ class Listening:
         """What is heard from now on, once all that drive something were, or when that takes too long."""
         end = time.monotonic() + patience
         self.take()
-        heard: dict[tuple[str, str], Sample] = {}
+        heard: dict[tuple[str, ...], Sample] = {}
         while time.monotonic() < end:
             heard |= {key(sample): sample for sample in self.take()}
             spoke = {sample.source for sample in heard.values() if not isinstance(sample, SignalSample)}

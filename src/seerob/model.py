@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.dictionary import Variable
 from seerob.distance import Query, Shapes
 from seerob.errors import UnknownName
 from seerob.geometry import Solid
@@ -159,6 +160,8 @@ class Model:
     findings: tuple[Finding, ...]
     files: dict[str, bytes]
     """The workstation file and every file it names, by the name that it gives them."""
+    dictionary: dict[str, Variable] = field(default_factory=dict)
+    """Variables of controllers and machines by their names here."""
     _gaps: dict[tuple[tuple[int, ...], tuple[int, ...]], Gap] = field(default_factory=dict)
 
     @property

@@ -13,8 +13,9 @@ import numpy as np
 from seerob.geometry import Mesh, Solid
 from seerob.model_io import glb
 from seerob.model_io.description import Inertial, Joint, JointKind, Quantity
+from seerob.quantities import Pose
 from seerob.snapshot import Finding
-from seerob.transforms import Array, wxyz_from_rotation
+from seerob.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform, wxyz_from_rotation
 
 TINY = 2e-15
 """MuJoCo wants more than 1e-15 kg on a body with a joint; this changes no digit of a mass matrix."""
@@ -51,6 +52,13 @@ class Mounting:
         self.spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
         self.spec.compiler.fusestatic = False
         self.spec.compiler.autolimits = False
+
+    def option(self, *, timestep: float, gravity: Sequence[float]) -> None:
+        """Set how the physics is integrated: time step [s] and gravity [m/s²] (3,)."""
+        self.spec.option.timestep = timestep
+        self.spec.option.gravity = gravity
+        # Damping of the controllers is integrated implicitly: stiff gains stay stable.
+        self.spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 
     def body(self, name: str, parent: str | None, parent_from_body: Array) -> Any:
         """Add a body; ``parent`` None is the world."""
@@ -114,6 +122,13 @@ class Mounting:
         self.meshes[digest] = content
         triangles = sum(len(mesh.faces) for mesh in display)
         self.entries.append(Entry(name, role, owner, carrier, tuple(solids), mass, digest, triangles))
+
+
+def pose_matrix(pose: Pose) -> Array:
+    """Homogeneous matrix (4, 4) of a pose in the file."""
+    if pose.wxyz is not None:
+        return transform(rotation_from_wxyz(pose.wxyz), pose.position)
+    return transform(rotation_from_rpy(pose.rpy if pose.rpy is not None else (0.0, 0.0, 0.0)), pose.position)
 
 
 def extreme_points(solids: Sequence[Solid]) -> tuple[Array, float]:

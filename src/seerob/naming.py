@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from seerob.errors import Problem, suggestion
 
-NAMED = ("robots", "tools", "workpieces", "parts", "areas", "humans")
+NAMED = ("robots", "tools", "workpieces", "parts", "areas", "sensors", "humans")
 """Tables whose entries have a name that is theirs alone."""
 
 Entries = Mapping[str, Mapping[int, Any]]
@@ -66,8 +66,8 @@ def _mounts(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Pro
     on = {
         thing.name: thing.on for group in ("tools", "workpieces") for thing in entries.get(group, {}).values()
     }
-    for group in ("tools", "workpieces", "areas"):
-        carriers = [*robots, *people] if group == "areas" else robots
+    for group in ("tools", "workpieces", "areas", "sensors"):
+        carriers = [*robots, *people] if group in ("areas", "sensors") else robots
         for i, thing in entries.get(group, {}).items():
             at, steps = thing.on, 0
             while at in on and steps <= len(on):
@@ -88,7 +88,7 @@ def _mounts(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Pro
 
 def _sources(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Problem]:
     kinds = {n.name: n.table.removesuffix("s") for n in names if n.table in ("robots", "humans")}
-    driven: dict[str, str] = {}
+    driven: dict[str, int] = {}
     for i, source in entries.get("sources", {}).items():
         target = source.target()
         key = f"sources[{i}]" + "".join(f".{field}" for field, _ in _fields_with(source, target))
@@ -103,9 +103,9 @@ def _sources(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Pr
             yield Problem(
                 file, key, f"no {wanted or 'robot or human'} named {target!r}", suggestion(target, fitting)
             )
-        elif target in driven:
-            yield Problem(file, key, f"{target!r} is already driven by {driven[target]}", "keep one")
-        driven.setdefault(target, f"sources[{i}]")
+        elif target in driven and not (source.shares and entries["sources"][driven[target]].shares):
+            yield Problem(file, key, f"{target!r} is already driven by sources[{driven[target]}]", "keep one")
+        driven.setdefault(target, i)
 
 
 def _subjects(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Problem]:

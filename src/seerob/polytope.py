@@ -21,6 +21,7 @@ from itertools import combinations
 import numpy as np
 
 from seerob.kernels import polytope as kernel
+from seerob.kernels.axes import principal_axes
 from seerob.transforms import Array
 
 SINGULAR = 1e-9
@@ -170,8 +171,10 @@ def _undriven(N: Array) -> Array:
     """Orthonormal columns perpendicular to every normal, shape (3, d)."""
     if not len(N):
         return np.eye(3)
-    axes, sigma, _ = np.linalg.svd(N.T, full_matrices=True)
-    return np.asarray(axes[:, int((sigma > SINGULAR * sigma[0]).sum()) :])
+    sigma, axes = np.empty((1, 3)), np.empty((1, 3, 3))
+    principal_axes(N.T[None].copy(), sigma, axes)
+    driven = int((sigma[0] > SINGULAR * sigma[0, 0]).sum())
+    return np.asarray(axes[0][:, driven:])
 
 
 def _corners_of_section(N: Array, low: Array, high: Array) -> Array:

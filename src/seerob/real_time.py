@@ -59,8 +59,8 @@ def hear(
     heard = listening.first()
     origin = max((sample.t for sample in heard), default=time.monotonic() - listening.delay)
     clock.begin(origin + listening.delay)
-    newest: dict[tuple[str, str], float] = {}
-    doubtful: set[tuple[str, str]] = set()
+    newest: dict[tuple[str, ...], float] = {}
+    doubtful: set[tuple[str, ...]] = set()
     slipped = clock.slipped
     for samples in recorded:
         if clock.slipped > slipped:

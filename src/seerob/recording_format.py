@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from seerob.samples import JointSample, PoseSample, SignalSample
+from seerob.samples import BodySample, JointSample, PoseSample, SignalSample
 from seerob.snapshot import Basis
 
 VERSION = "1"
@@ -43,7 +43,7 @@ class Tick(Struct, frozen=True, kw_only=True):
     seq: int
     t: float
     """Run time [s]."""
-    samples: tuple[JointSample | PoseSample | SignalSample, ...] = ()
+    samples: tuple[JointSample | PoseSample | BodySample | SignalSample, ...] = ()
 
 
 class BasisChange(Struct, frozen=True, kw_only=True):

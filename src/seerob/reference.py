@@ -18,8 +18,12 @@ from __future__ import annotations
 from bisect import bisect_right
 
 import numpy as np
+from numpy.typing import NDArray
 
+from seerob.kernels.pull import along
 from seerob.transforms import Array
+
+Knots = tuple[Array, Array, Array, NDArray[np.bool_]]
 
 MAX_KEPT = 4096
 """Samples kept at most: many times what a fast source sends within one tick."""
@@ -46,6 +50,7 @@ class Reference:
         self._points: list[Array] = [home.astype(float).copy()]
         self._velocities: list[Array] = [self._zero]
         self._guessed = [True]
+        self._knots: Knots | None = None
 
     @property
     def newest(self) -> Array:
@@ -67,6 +72,7 @@ class Reference:
             anew: After a silence: nobody knows how it came there, so the twin is put there at once and
                 set in motion when its instant has come.
         """
+        self._knots = None
         if anew and t > self.until:
             self._times, self._jumps, self._landings = [], [], [-np.inf, t]
         if not self._times:
@@ -125,6 +131,7 @@ class Reference:
 
     def _drop(self, count: int) -> None:
         if count > 0:
+            self._knots = None
             oldest = self._times[count]
             self._jumps = [jump for jump in self._jumps if jump >= oldest]
             for kept in (self._times, self._points, self._velocities, self._guessed):
@@ -132,22 +139,19 @@ class Reference:
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
         """Position [rad or m], velocity and acceleration at ``t`` [s], each of shape (n,)."""
-        times = self._times
-        if not times or t < times[0]:
-            return self._points[0], self._zero, self._zero
-        k = bisect_right(times, t) - 1
-        if k == len(times) - 1:
-            after, v = t - times[k], self._velocities[k]
-            moving = after == 0 or after < self._coast
-            return self._points[k] + min(after, self._coast) * v, v if moving else self._zero, self._zero
-        if times[k + 1] in self._jumps:
-            return self._points[k], self._zero, self._zero
-        T = times[k + 1] - times[k]
-        s = (t - times[k]) / T
-        q0, chord = self._points[k], self._points[k + 1] - self._points[k]
-        # The cubic in powers of s about q0.
-        a, b = T * self._velocities[k], T * self._velocities[k + 1]
-        c2, c3 = 3 * chord - 2 * a - b, a + b - 2 * chord
-        q = q0 + s * (a + s * (c2 + s * c3))
-        v = (a + s * (2 * c2 + s * 3 * c3)) / T
-        return q, v, (2 * c2 + 6 * s * c3) / (T * T)
+        q, v, a = self.course(np.array([t]))
+        return q[0], v[0], a[0]
+
+    def course(self, t: Array) -> tuple[Array, Array, Array]:
+        """Position [rad or m], velocity and acceleration at many instants [s] (m,), each of shape (m, n)."""
+        if self._knots is None:
+            self._knots = (
+                # Before the first sample it waits at home.
+                np.array(self._times or [np.inf]),
+                np.array(self._points),
+                np.array(self._velocities),
+                np.array([instant in self._jumps for instant in self._times or [np.inf]]),
+            )
+        found = np.empty((3, len(t), self._zero.shape[0]))
+        along(*self._knots, self._coast, t, found[0], found[1], found[2])
+        return found[0], found[1], found[2]

@@ -96,6 +96,15 @@ def target(model: Model, name: str) -> Target | None:
     )
 
 
+def source_target(model: Model, source: Source) -> Target | None:
+    """What a source needs to know: of what it drives, or of the variables that it reads."""
+    driven = target(model, source.target())
+    variables = tuple(v for v in model.dictionary.values() if v.source == source.name)
+    if not source.reads_variables:
+        return driven
+    return replace(driven or Target(), variables=variables, folder=str(model.folder))
+
+
 def _world_from_base(model: Model, name: str) -> Matrix4 | None:
     station = model.workstation
     places = {**{r.name: r.base for r in station.robots}, **{h.name: h.at for h in station.humans}}
@@ -122,7 +131,7 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
             )
             problems.append(Problem(file, f"sources[{i}].timeout", what, "give a longer one"))
         try:
-            opened.append((source, source.open(model.folder, target(model, source.target()))))
+            opened.append((source, source.open(model.folder, source_target(model, source))))
         except InputError as error:
             problems += error.problems
     if problems:
@@ -177,11 +186,22 @@ def scene(
                 limit=getattr(b.criterion, "limit", None),
                 at_most=b.criterion.at_most,
                 basis=b.basis,
+                levels=getattr(b.criterion, "levels", ()),
             )
             for b in bound
         ),
-        findings=(*model.findings, *findings),
+        findings=tuple(dict.fromkeys((*model.findings, *_without_physics(model), *findings))),
     )
+
+
+def _without_physics(model: Model) -> tuple[Finding, ...]:
+    if model.workstation.engine.physics:
+        return ()
+    text = (
+        "engine.physics = false: the twin is put where the samples say; whether torque limits and contacts "
+        "allow that motion is not looked at"
+    )
+    return (Finding(level="note", subject="engine", text=text),)
 
 
 # -- feeds: what is heard for each tick ---------------------------------------------------------
@@ -258,6 +278,7 @@ def snapshot(state: State, seq: int, results: tuple[Result, ...]) -> Snapshot:
         poses=state.poses(),
         joints={m.name: tuple(state.joint_positions(m).tolist()) for m in mechanisms},
         tracking={m.name: state.hearings[m.name].error for m in mechanisms},
+        bones={m.name: bones for m in mechanisms if (bones := state.hearings[m.name].bones)},
         results=results,
     )
 
@@ -273,7 +294,9 @@ def warm_up(model: Model) -> None:
     Engine(model).tick()
 
 
-def ticks(engine: Engine, judge: Judge, feed: Feed) -> Iterator[tuple[Snapshot, tuple[Sample, ...]]]:
+def ticks(
+    engine: Engine, judge: Callable[[State], tuple[Result, ...]], feed: Feed
+) -> Iterator[tuple[Snapshot, tuple[Sample, ...]]]:
     """The road: for each tick what goes out, and the samples it was made from."""
     for seq, samples in enumerate(feed):
         engine.take(samples)
@@ -337,11 +360,12 @@ def run(
     """
     # What is shown is a delay old: silence shows that much earlier, so that it shows within the time-out.
     delay = delay_of(model.workstation.sources)
-    driven = {
-        source.target(): source.timeout - (delay if isinstance(source, LiveSource) else 0.0)
-        for source in model.workstation.sources
-        if source.target()
-    }
+    driven: dict[str, float] = {}
+    for source in model.workstation.sources:
+        if source.target():
+            timeout = source.timeout - (delay if isinstance(source, LiveSource) else 0.0)
+            # Devices that complement one another may fall silent one by one.
+            driven[source.target()] = max(timeout, driven.get(source.target(), timeout))
     log = ResultLog(scene.criteria)
     begun = time.perf_counter()
     count, t = 0, 0.0

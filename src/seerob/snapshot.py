@@ -10,19 +10,65 @@ from enum import StrEnum
 
 from msgspec import Struct
 
-Vec3 = tuple[float, float, float]
-Vec4 = tuple[float, float, float, float]
+from seerob.markers import (
+    Arrow,
+    Box,
+    Ellipsoid,
+    Highlight,
+    Hull,
+    Label,
+    Marker,
+    Polyline,
+    Prism,
+    Rays,
+    Segment,
+    Sphere,
+    Vec3,
+    Vec4,
+)
+from seerob.verdict import Verdict
+
+__all__ = [
+    "PROTOCOL",
+    "Arrow",
+    "Aspect",
+    "Basis",
+    "Box",
+    "Command",
+    "CriterionInfo",
+    "Ellipsoid",
+    "Finding",
+    "Hello",
+    "Highlight",
+    "History",
+    "Hull",
+    "Input",
+    "JointInfo",
+    "Label",
+    "Level",
+    "Marker",
+    "MechanismInfo",
+    "Node",
+    "Origin",
+    "Polyline",
+    "Prism",
+    "Rays",
+    "Result",
+    "Row",
+    "RowState",
+    "Scene",
+    "Segment",
+    "Snapshot",
+    "Sphere",
+    "Trace",
+    "Transport",
+    "Vec3",
+    "Vec4",
+    "Verdict",
+]
 
 PROTOCOL = "seerob.v1.msgpack"
 """WebSocket sub-protocol; the server refuses any other."""
-
-
-class Verdict(StrEnum):
-    """What a limit says of a value. An evaluation, never a certificate."""
-
-    WITHIN = "within"
-    EXCEEDED = "exceeded"
-    UNDECIDED = "undecided"
 
 
 class Origin(StrEnum):
@@ -77,89 +123,65 @@ class Finding(Struct, frozen=True, kw_only=True):
     text: str
 
 
-# -- markers: a closed set; a new criterion draws with these ------------------------------------
-
-
-class Arrow(Struct, frozen=True, kw_only=True, tag="arrow"):
-    """A vector at a point."""
-
-    origin: Vec3
-    vector: Vec3
-    """From tail to tip [m as drawn]."""
-    label: str = ""
-    verdict: Verdict | None = None
-
-
-class Segment(Struct, frozen=True, kw_only=True, tag="segment"):
-    """A line between two points, such as a shortest distance."""
-
-    start: Vec3
-    end: Vec3
-    label: str = ""
-    verdict: Verdict | None = None
-
-
-class Sphere(Struct, frozen=True, kw_only=True, tag="sphere"):
-    """A translucent ball."""
-
-    center: Vec3
-    radius: float
-    label: str = ""
-    verdict: Verdict | None = None
-
-
-class Ellipsoid(Struct, frozen=True, kw_only=True, tag="ellipsoid"):
-    """A translucent ellipsoid."""
-
-    center: Vec3
-    wxyz: Vec4
-    """Orientation of the half axes in the world."""
-    radii: Vec3
-    """Half axes [m as drawn]."""
-    label: str = ""
-    verdict: Verdict | None = None
-
-
-class Box(Struct, frozen=True, kw_only=True, tag="box"):
-    """A translucent box."""
-
-    center: Vec3
-    wxyz: Vec4
-    size: Vec3
-    """Full edge lengths [m]."""
-    label: str = ""
-    verdict: Verdict | None = None
-
-
-class Hull(Struct, frozen=True, kw_only=True, tag="hull"):
-    """A translucent closed surface, convex or not."""
-
-    vertices: tuple[Vec3, ...]
-    faces: tuple[tuple[int, int, int], ...]
-    label: str = ""
-    verdict: Verdict | None = None
-
-
-class Label(Struct, frozen=True, kw_only=True, tag="label"):
-    """Text at a point."""
-
-    position: Vec3
-    text: str
-    verdict: Verdict | None = None
-
-
-class Highlight(Struct, frozen=True, kw_only=True, tag="highlight"):
-    """A whole body shown in the colour of a verdict."""
-
-    body: str
-    """Full name of the node."""
-    verdict: Verdict | None = None
-
-
-Marker = Arrow | Segment | Sphere | Ellipsoid | Box | Hull | Label | Highlight
-
-
 # -- results ------------------------------------------------------------------------------------
+
+
+class RowState(StrEnum):
+    """Why a row has, or has not, a figure to compare."""
+
+    JUDGED = "judged"
+    FORBIDDEN = "forbidden"
+    """Contact is not permitted, whatever the figure."""
+    NO_LIMIT = "no_limit"
+    """No limit is available for this place."""
+    EXCLUDED = "excluded"
+    """Kept out by measures that are not evaluated here."""
+    NOT_ASSESSED = "not_assessed"
+    """What it needs is not measured or was not entered; never a least score."""
+
+
+class Aspect(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One figure behind a row: an angle of a component, the speed that one of several limits allows."""
+
+    name: str
+    value: float | None = None
+    """None when it is not known or not measured."""
+    unit: str = ""
+    limit: float | None = None
+    band: str = ""
+    """Of the method, that the value falls into, with its thresholds: ``20° to 45°``."""
+
+
+class Row(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One line about a place of a person's body: for body map, posture panel and manikin.
+
+    A component of a score (with `scale`) or a body area with a limit of its own.
+    """
+
+    name: str
+    """Without its side: ``upper arm``, ``Palm``; ``score`` for the total of a side or of the whole."""
+    group: str = ""
+    """Body region or table of the method that it belongs to."""
+    side: str = ""
+    """``left`` or ``right``; empty for the middle or where both sides are meant."""
+    state: RowState = RowState.JUDGED
+    value: float | None = None
+    unit: str = ""
+    limit: float | None = None
+    """Greatest admissible value, in ``unit``."""
+    scale: tuple[float, float] | None = None
+    """Best and worst score that there can be; None for a quantity."""
+    interval: tuple[float, float] | None = None
+    verdict: Verdict | None = None
+    reason: str = ""
+    """What governs, or why there is no verdict."""
+    areas: tuple[int, ...] = ()
+    """Numbers of specific body areas, ISO/TS 15066:2016 Table A.2, 1 to 29."""
+    bones: tuple[str, ...] = ()
+    """Full names of the nodes that it speaks of: ``operator/right_hand``."""
+    aspects: tuple[Aspect, ...] = ()
+    inputs: tuple[str, ...] = ()
+    """Names of the inputs of the basis that its limit comes from."""
 
 
 class Result(Struct, frozen=True, kw_only=True):
@@ -184,6 +206,8 @@ class Result(Struct, frozen=True, kw_only=True):
     parts: tuple[Result, ...] = ()
     """The same per link or body area; the worst one gives the verdict."""
     markers: tuple[Marker, ...] = ()
+    rows: tuple[Row, ...] = ()
+    """The same by places of a person's body, where a criterion has them."""
     basis: Basis | None = None
     """None on parts, which share their parent's, and on the wire, where it is sent once."""
     t: float | None = None
@@ -202,6 +226,9 @@ class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot"):
     """Joint positions of the twin per robot and human [rad or m]."""
     tracking: dict[str, float] = {}
     """Largest joint error between the twin and what was heard, per robot and human [rad or m]."""
+    bones: dict[str, dict[str, tuple[float | None, float | None]]] = {}
+    """Of people that devices see: bone → how far the twin's bone is from the device's, position [m] and
+    angle [rad]; null where the device has none."""
     results: tuple[Result, ...] = ()
 
 
@@ -228,6 +255,15 @@ class Node(Struct, frozen=True, kw_only=True):
     """What to know of its geometry: ``envelope, not the maker's mesh``."""
 
 
+class Level(Struct, frozen=True, kw_only=True):
+    """A class of scores that a method acts upon, such as an action level."""
+
+    up_to: float
+    """Highest score that belongs to it."""
+    name: str
+    """``action level 2``."""
+
+
 class CriterionInfo(Struct, frozen=True, kw_only=True):
     """A criterion of this run."""
 
@@ -243,6 +279,8 @@ class CriterionInfo(Struct, frozen=True, kw_only=True):
     limit: float | None = None
     at_most: bool = True
     basis: Basis | None = None
+    levels: tuple[Level, ...] = ()
+    """Classes of the scores, the lowest first; empty when the method has none."""
 
 
 class JointInfo(Struct, frozen=True, kw_only=True):

@@ -31,15 +31,16 @@ Matrix4 = tuple[Row4, Row4, Row4, Row4]
 class Target(Struct, frozen=True, kw_only=True):
     """What a source needs to know of the robot or human it drives."""
 
-    name: str
-    joints: tuple[str, ...]
+    name: str = ""
+    """Empty for a source of variables, which drives nothing."""
+    joints: tuple[str, ...] = ()
     """Joint names in order."""
-    units: tuple[str, ...]
+    units: tuple[str, ...] = ()
     """``rad`` or ``m`` per joint."""
-    lower: tuple[float, ...]
+    lower: tuple[float, ...] = ()
     """Position limits [rad or m]; -inf where there is none."""
-    upper: tuple[float, ...]
-    velocity: tuple[float | None, ...]
+    upper: tuple[float, ...] = ()
+    velocity: tuple[float | None, ...] = ()
     """Speed limits [rad/s or m/s]; None where nobody stated one."""
     description: Description | None = None
     """Its links and joints, for sources that need lengths (where a person's feet are)."""
@@ -71,6 +72,8 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Made from the kind and the target when not given."""
     shares: ClassVar[bool] = False
     """Whether several sources of its sort may drive the same target."""
+    reads_variables: ClassVar[bool] = False
+    """Whether it reads variables of the workstation's dictionary."""
 
     timeout: Annotated[float, _seconds] = 0.2
     """Age at which what it said no longer counts [s]: dependent verdicts turn UNDECIDED."""

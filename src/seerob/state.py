@@ -12,12 +12,16 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
-from seerob.distance import Closest, Closests
+from seerob.distance import Closest, Closests, Per, Query
 from seerob.errors import Undecided
-from seerob.kernels.speed import fastest, stacked
+from seerob.kernels.speed import fastest, placed, stacked, velocities
 from seerob.model import Frame, Gap, Mechanism, Model
+from seerob.surveying import Surveyor
 from seerob.transforms import Array
+
+Indices = NDArray[np.int64]
 
 SLACK = 1e-9
 """Instants that differ by less are the same [s]: a source's clock and the run's are sums of decimals."""
@@ -40,6 +44,9 @@ class Hearing:
     """Measured joint torques of the same samples [N·m or N], each (n,); None where there were none."""
     error: float = 0.0
     """Largest joint error between twin and reference [rad or m]."""
+    bones: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
+    """Of a person that devices see: bone → how far the twin's is from the device's, position [m] and angle
+    [rad]; None where none was seen."""
     lost: float = -np.inf
     """When the physics last lost it, so that it was put back [s]."""
     saturated: bool = False
@@ -68,6 +75,40 @@ class Hearing:
         return next((reason for _, reason in self.heard[k - 1 : k + 1] if reason), "")
 
 
+@dataclass(frozen=True, eq=False)
+class _Columns:
+    """Where the joints of a mechanism are among all of the workstation, bound once."""
+
+    own_q: Indices
+    """Of the commanded joints, in ``MjData.qpos``."""
+    own_v: Indices
+    """Likewise in ``MjData.qvel``."""
+    all_v: Indices | slice
+    coupling: Array | None
+    """None where every joint is commanded itself."""
+
+    @classmethod
+    def of(cls, mechanism: Mechanism) -> _Columns:
+        v, n = mechanism.v_address, len(mechanism.v_address)
+        in_turn = n > 0 and np.array_equal(v, v[0] + np.arange(n))
+        return cls(
+            mechanism.q_address[mechanism.own],
+            v[mechanism.own],
+            slice(int(v[0]), int(v[0]) + n) if in_turn else v,
+            None if np.array_equal(mechanism.coupling, np.eye(n)) else mechanism.coupling,
+        )
+
+    def of_rows(self, every: Array) -> Array:
+        """Columns of the commanded joints, (r, nv) to (r, n)."""
+        own = every[:, self.all_v]
+        return own.copy() if self.coupling is None else own @ self.coupling
+
+    def of_matrix(self, every: Array) -> Array:
+        """Block of the commanded joints, (nv, nv) to (n, n)."""
+        own = every[self.all_v][:, self.all_v]
+        return own.copy() if self.coupling is None else self.coupling.T @ own @ self.coupling
+
+
 class State:
     """A view of the engine's `mujoco.MjData`; never keep one beyond its tick."""
 
@@ -87,11 +128,17 @@ class State:
         """World position of the bodies' origins [m]."""
         self.quaternions = np.zeros((n, 4))
         self._period = model.workstation.engine.tick
-        self._tracking_limit = model.workstation.engine.tracking_limit
+        engine = model.workstation.engine
+        self._tracking_limits = {"robot": engine.tracking_limit, "human": engine.human_tracking_limit}
         self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
         self._cache: dict[Any, Any] = {}
-        self._jacp, self._jacr = np.zeros((3, model.mj.nv)), np.zeros((3, model.mj.nv))
-        self._mj_roots = model.mj.body_rootid[self._mj_ids]
+        self._jacobian = np.zeros((6, model.mj.nv))
+        self._columns = {m.name: _Columns.of(m) for m in model.mechanisms.values()}
+        self._mj_roots = model.mj.body_rootid[self._mj_ids].astype(np.int64)
+        # Views that MuJoCo writes through; to ask the data for them takes longer than to use them.
+        self._xmat, self._xpos, self._xquat = data.xmat, data.xpos, data.xquat
+        self._surveyor = Surveyor(model.shapes)
+        self._carriers: dict[tuple[int, ...], tuple[Indices, tuple[str, ...]]] = {}
         self._corners = stacked([body.corners for body in model.bodies])
         self._reach = np.array([body.radius + body.deviation for body in model.bodies])
 
@@ -103,10 +150,17 @@ class State:
         mujoco.mj_comPos(mj, data)
         mujoco.mj_comVel(mj, data)
         self.t = t
-        self.rotations[:] = data.xmat[self._mj_ids].reshape(-1, 3, 3)
-        self.positions[:] = data.xpos[self._mj_ids]
-        self.quaternions[:] = data.xquat[self._mj_ids]
+        placed(
+            self._xmat,
+            self._xpos,
+            self._xquat,
+            self._mj_ids,
+            self.rotations,
+            self.positions,
+            self.quaternions,
+        )
         self._cache.clear()
+        self._surveyor.forget()
 
     def poses(self) -> bytes:
         """Little-endian float32, seven per body: position [m], quaternion w first."""
@@ -133,12 +187,10 @@ class State:
             return f"{name}: {reason}"
         if hearing.lost > self.t - 2 * self._period:
             return f"{name}: the physics could not follow what was heard"
-        if hearing.error > self._tracking_limit:
+        limit = self._tracking_limits[self.model.mechanisms[name].role]
+        if hearing.error > limit:
             why = " (a torque limit is reached)" if hearing.saturated else ""
-            return (
-                f"{name}: the twin is off by {hearing.error:.3g} rad or m, "
-                f"more than {self._tracking_limit:g}{why}"
-            )
+            return f"{name}: the twin is off by {hearing.error:.3g} rad or m, more than {limit:g}{why}"
         return ""
 
     # -- joints -----------------------------------------------------------------------------
@@ -150,12 +202,12 @@ class State:
 
     def joint_positions(self, mechanism: Mechanism) -> Array:
         """The same without asking whether it was heard: for the picture, never for a verdict."""
-        return np.asarray(self.data.qpos[mechanism.q_address[mechanism.own]])
+        return np.asarray(self.data.qpos[self._columns[mechanism.name].own_q])
 
     def qd(self, mechanism: Mechanism) -> Array:
         """Joint velocities of the twin [rad/s or m/s], shape (n,)."""
         self.require(mechanism.name)
-        return np.asarray(self.data.qvel[mechanism.v_address[mechanism.own]])
+        return np.asarray(self.data.qvel[self._columns[mechanism.name].own_v])
 
     def measured_torques(self, mechanism: Mechanism) -> Array:
         """Joint torques that its source measured, between samples as positions are [N·m or N], shape (n,).
@@ -190,17 +242,20 @@ class State:
                 mujoco.mj_makeM(self.model.mj, self.data)
                 mujoco.mj_fullM(self.model.mj, self.data, self._full_mass_matrix)
                 self._cache["M"] = self._full_mass_matrix
-            block = self._full_mass_matrix[np.ix_(mechanism.v_address, mechanism.v_address)]
-            self._cache[key] = mechanism.coupling.T @ block @ mechanism.coupling
+            self._cache[key] = self._columns[mechanism.name].of_matrix(self._full_mass_matrix)
         return np.asarray(self._cache[key])
 
     # -- kinematics -------------------------------------------------------------------------
 
     def pose(self, frame: Frame) -> tuple[Array, Array]:
         """World rotation (3, 3) and position (3,) [m] of a frame."""
-        rotation = self.data.xmat[frame.mj].reshape(3, 3)
-        position = self.data.xpos[frame.mj] + rotation @ frame.body_from_frame[:3, 3]
-        return rotation @ frame.body_from_frame[:3, :3], position
+        key = ("pose", id(frame))
+        if key not in self._cache:
+            rotation = self._xmat[frame.mj].reshape(3, 3)
+            position = self._xpos[frame.mj] + rotation @ frame.body_from_frame[:3, 3]
+            self._cache[key] = rotation @ frame.body_from_frame[:3, :3], position
+        rotation, position = self._cache[key]
+        return rotation, position
 
     def jacobian(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> Array:
         """Jacobian of a point of a frame, linear rows first, world axes, shape (6, n).
@@ -217,9 +272,9 @@ class State:
             rotation, position = self.pose(frame)
             if offset is not None:
                 position = position + rotation @ offset
-            mujoco.mj_jac(self.model.mj, self.data, self._jacp, self._jacr, position, frame.mj)
-            every = np.vstack([self._jacp, self._jacr])[:, mechanism.v_address]
-            self._cache[key] = every @ mechanism.coupling
+            every = self._jacobian
+            mujoco.mj_jac(self.model.mj, self.data, every[:3], every[3:], position, frame.mj)
+            self._cache[key] = self._columns[mechanism.name].of_rows(every)
         return np.asarray(self._cache[key])
 
     def body_velocity(self, index: int) -> tuple[Array, Array]:
@@ -236,11 +291,12 @@ class State:
     def _velocities(self) -> tuple[Array, Array]:
         """Linear and angular velocities of all bodies at their origins, shape (n, 3) each."""
         if "v" not in self._cache:
-            twist = self.data.cvel[self._mj_ids]
-            # MuJoCo's twists are rotation first, and at the centre of mass of the whole tree.
-            arm = self.positions - self.data.subtree_com[self._mj_roots]
-            angular = np.ascontiguousarray(twist[:, :3])
-            self._cache["v"] = twist[:, 3:] + np.cross(angular, arm), angular
+            data = self.data
+            linear, angular = np.empty((2, *self.positions.shape))
+            velocities(
+                data.cvel, data.subtree_com, self.positions, self._mj_ids, self._mj_roots, linear, angular
+            )
+            self._cache["v"] = linear, angular
         linear, angular = self._cache["v"]
         return linear, angular
 
@@ -253,6 +309,20 @@ class State:
             Speed [m/s], the corner in the world [m] (3,), its velocity [m/s] (3,).
         """
         self._require_carrier(index)
+        speed, point, velocity = self._fastest()
+        return float(speed[index]), point[index], velocity[index]
+
+    def fastest_points(self, bodies: tuple[int, ...]) -> tuple[Array, Array, Array]:
+        """The same of several bodies: speeds (b,), corners (b, 3) and their velocities (b, 3)."""
+        if bodies not in self._carriers:
+            names = dict.fromkeys(self.model.bodies[i].carrier for i in bodies)
+            self._carriers[bodies] = np.array(bodies, np.int64), tuple(filter(None, names))
+        rows, carriers = self._carriers[bodies]
+        self.require(*carriers)
+        speed, point, velocity = self._fastest()
+        return speed[rows], point[rows], velocity[rows]
+
+    def _fastest(self) -> tuple[Array, Array, Array]:
         if "fastest" not in self._cache:
             n = len(self.positions)
             speed, point, velocity = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
@@ -263,24 +333,20 @@ class State:
             )  # fmt: skip
             self._cache["fastest"] = speed, point, velocity
         speed, point, velocity = self._cache["fastest"]
-        return float(speed[index]), point[index], velocity[index]
+        return speed, point, velocity
 
     # -- distances --------------------------------------------------------------------------
 
     def closest(self, gap: Gap) -> Closest:
         """Where two sets are nearest."""
         self.require(*gap.carriers)
-        key = ("closest", id(gap))
-        if key not in self._cache:
-            self._cache[key] = gap.query.minimum(self.rotations, self.positions)
-        found: Closest = self._cache[key]
-        return found
+        return self.distances(gap.query, Per.SETS).at(0)
 
     def closest_per_body(self, gap: Gap) -> Closests:
         """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``."""
         self.require(*gap.carriers)
-        key = ("closest per body", id(gap))
-        if key not in self._cache:
-            self._cache[key] = gap.query.per_body(self.rotations, self.positions)
-        found: Closests = self._cache[key]
-        return found
+        return self.distances(gap.query, Per.BODY)
+
+    def distances(self, query: Query, per: Per) -> Closests:
+        """What a query says now; whoever asks requires what it depends on."""
+        return self._surveyor.ask(query, per, self.rotations, self.positions)

@@ -17,6 +17,9 @@ from seerob.errors import InputError, Problem
 from seerob.filing import SOURCES, source_files
 from seerob.live import Listening, LiveSource
 from seerob.model import Model
+from seerob.permissible import evaluation
+from seerob.permissible.evaluation import PermissibleSpeed, Say, Wish
+from seerob.permissible.joint_limits import Given, joint_limits
 from seerob.reading import read
 from seerob.real_time import Clock, hear, require_recorded
 from seerob.recording import Recording
@@ -24,6 +27,7 @@ from seerob.run import Bound, Feed, Summary
 from seerob.sink import Sink, Writer
 from seerob.snapshot import Scene
 from seerob.source import Opened, Source
+from seerob.things import MadeArea
 from seerob.workstation import FILE_NAME, Workstation
 
 
@@ -44,7 +48,21 @@ class Station:
             InputError: With every mistake in every file that it names.
         """
         self.workstation = workstation
-        self.model: Model = compile_workstation(workstation, cache=cache, progress=progress)
+        made = self._swept_areas(cache, progress)
+        self.model: Model = compile_workstation(workstation, cache=cache, progress=progress, made=made)
+
+    def _swept_areas(self, cache: Path | None, progress: Progress) -> dict[str, MadeArea]:
+        """Areas that are swept, from a run of the same workstation without them."""
+        if not any(area.swept for area in self.workstation.areas):
+            return {}
+        from seerob.swept_areas import make, without_swept
+
+        bare = Station(without_swept(self.workstation), cache=cache, progress=progress)
+
+        def run(writer: Writer) -> None:
+            bare.run(writers=[writer])
+
+        return make(self.workstation, bare.model, bare.bound, bare.files, run, cache=cache, progress=progress)
 
     @cached_property
     def bound(self) -> tuple[Bound, ...]:
@@ -74,6 +92,7 @@ class Station:
         station = self.workstation
         named = [getattr(source, "file", None) for source in station.sources]
         named += [getattr(rule, "limits", None) for rule in (*station.safety, *station.ergonomics)]
+        named += [getattr(rule, "table", None) for rule in station.ergonomics]
         references = [name for name in named if isinstance(name, str)]
         return {**self.model.files, **source_files(references, folder=self.model.folder)}
 
@@ -158,7 +177,7 @@ class Station:
         with ExitStack() as until_the_end:
             if clock and heard:
                 road.warm_up(self.model)
-                targets = [(source, road.target(self.model, source.target())) for source in heard]
+                targets = [(source, road.source_target(self.model, source)) for source in heard]
                 feed = hear(feed, until_the_end.enter_context(Listening(targets)), clock)
             opened = self.open_sinks(sinks, Path(folder or "."), scene) if sinks else []
             return road.run(
@@ -171,6 +190,81 @@ class Station:
                 stop=stop,
                 progress=progress,
             )
+
+    def permissible_speed(
+        self,
+        robot: str | None = None,
+        *,
+        wish: Wish | None = None,
+        velocity: Given = None,
+        acceleration: Given = None,
+        jerk: Given = None,
+        folder: Path | str | None = None,
+        sinks: Sequence[Sink] = (),
+        writers: Sequence[Writer] = (),
+        ready: Callable[[PermissibleSpeed], None] = lambda found: None,
+        say: Say = lambda what, share: None,
+    ) -> PermissibleSpeed:
+        """How fast a robot may go along its path, a motion that keeps to it, and the criteria asked of that.
+
+        Args:
+            robot: Its name; the only robot when not given.
+            wish: Whose ceilings count, tolerances and spacings.
+            velocity: Limits of the joints, one for all or one each, instead of the robot's [rad/s or m/s].
+            acceleration: Likewise [rad/s² or m/s²]; never assumed.
+            jerk: Likewise [rad/s³ or m/s³]; never assumed.
+            folder: Where ``sinks`` write.
+            sinks: Of the run of the rescaled motion.
+            writers: Sinks that are open already, of the same run.
+            ready: Told what was found before the rescaled motion is run.
+            say: Told what is done and which share of it, 0 to 1; what it raises stops the work.
+
+        Raises:
+            InputError: A limit that nobody gave, no criterion that limits the speed, a live source, or not
+                exactly one source of the robot's joint positions.
+        """
+        require_recorded(self.workstation)
+        names = [r.name for r in self.workstation.robots]
+        if robot is None and len(names) != 1:
+            what = f"missing, and there are {len(names)} robots"
+            raise InputError.at(
+                "permissible speed", "robot", what, f"name one of {', '.join(names) or 'none'}"
+            )
+        subject = self.model.robot(names[0] if robot is None else robot)
+        motion = evaluation.given_motion(self.sources, subject.name)
+        file = next(iter(self.workstation.files), "workstation")
+        own = next(r for r in self.workstation.robots if r.name == subject.name)
+        asked = {"acceleration": acceleration, "jerk": jerk}
+        limits = joint_limits(
+            subject,
+            velocity=velocity,
+            acceleration=own.acceleration_limits if acceleration is None else acceleration,
+            jerk=own.jerk_limits if jerk is None else jerk,
+            file=file,
+            written=[key for key, value in asked.items() if value is None],
+        )
+        seen = evaluation.witness(self.model, self.sources, self.bound, self.scene().criteria, say)
+
+        def again(feed: Feed, duration: float) -> Summary:
+            def told(t: float) -> None:
+                say("the rescaled motion", min(1.0, t / duration))
+
+            scene = self.scene()
+            return self.run(
+                folder=folder, sinks=sinks, writers=writers, feed=feed, scene=scene, progress=told
+            )
+
+        return evaluation.evaluation(
+            self.model,
+            self.sources,
+            seen=seen,
+            motion=motion,
+            limits=limits,
+            wish=wish or evaluation.Wish(),
+            again=again,
+            ready=ready,
+            say=say,
+        )
 
     def replay(
         self,

@@ -142,7 +142,7 @@ def _given(name: str, value: float, unit: str) -> Input:
 
 def fastest(state: State, gap: Gap) -> Array:
     """Speed of the fastest point of each moving part [m/s], shape (n,)."""
-    return np.array([state.fastest_point(i)[0] for i in gap.b])
+    return state.fastest_points(gap.b)[0]
 
 
 def _timed(stop: Stop, gap: Gap) -> StopModel:

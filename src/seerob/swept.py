@@ -98,6 +98,8 @@ class Sweep:
         self.moving = Moving(model, bodies)
         self._cores: tuple[Core, ...] | None = None
         self.dilation = 0.0
+        self.beyond = np.zeros(len(self.moving.cores))
+        """How far each solid is dilated from now on, beside what motion asks for [m], shape (ns,)."""
         self.stamps = 0
         self._total = 0.0
         self._last: tuple[Array, Array | None] | None = None
@@ -119,10 +121,9 @@ class Sweep:
     def start(self, qpos: Array, qvel: Array | None = None) -> None:
         """Mark the bodies where they are now; what they did before is not known."""
         rotations, positions = self.moving.place(qpos)
-        none = np.zeros(len(self.moving.cores))
-        self.grid.cover(*self.moving.box(rotations, positions, none))
-        for core in range(len(none)):
-            self._queue[core].append((rotations[core].copy(), positions[core].copy(), 0.0))
+        self.grid.cover(*self.moving.box(rotations, positions, self.beyond))
+        for core, beyond in enumerate(self.beyond.tolist()):
+            self._queue[core].append((rotations[core].copy(), positions[core].copy(), beyond))
         self._last = qpos.copy(), None if qvel is None else qvel.copy()
         self.flush()
 
@@ -150,7 +151,7 @@ class Sweep:
             address = self._joints.v_address
             bend = CUBIC * (np.abs(speed[address] * period - delta) + np.abs(qvel[address] * period - delta))
         middle = self._bounded(before, qpos, 0.5, np.abs(delta) / 2 + bend)
-        self.grid.cover(*self.moving.box(*middle))
+        self.grid.cover(*self.moving.box(middle[0], middle[1], middle[2] + self.beyond))
         goal = self.slack * self.grid.pitch
         pieces = np.exp2(np.ceil(np.log2(np.maximum(middle[2] / goal, 1.0)))).astype(np.int64)
         pieces = np.minimum(pieces, FINEST)
@@ -163,7 +164,8 @@ class Sweep:
                     made = self._bounded(before, qpos, (piece + 0.5) / m, np.abs(delta) / (2 * m) + bend)
                 rotations, positions, reach = made
                 for core in chosen:
-                    self._queue[core].append((rotations[core], positions[core], float(reach[core])))
+                    wide = float(reach[core] + self.beyond[core])
+                    self._queue[core].append((rotations[core], positions[core], wide))
         self._last = qpos.copy(), None if qvel is None else qvel.copy()
 
     def flush(self) -> None:

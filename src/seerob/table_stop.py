@@ -84,7 +84,7 @@ def _by_tool_speed(
         share = _payload_share(table, robot, load)
         if not share <= 1 + 1e-9:
             raise Undecided(f"payload is {share:.3g} of the rated payload, at which the stopping table ends")
-        v = np.array([state.fastest_point(i)[0] for i in gap.b])
+        v = state.fastest_points(gap.b)[0]
         # Any point counts as the tool's: the fastest decides for all.
         top = float(v.max())
         return lambda scale: course(
@@ -125,7 +125,7 @@ def _by_joint(
 
     def courses(state: State) -> At:
         speeds = np.abs(state.qd(robot))
-        v = np.array([state.fastest_point(i)[0] for i in gap.b])
+        v = state.fastest_points(gap.b)[0]
         levers = [_levers(state, robot, chain, index) for chain, index in zip(chains, gap.b, strict=True)]
         extension = _extension(state, robot) / table.reach if table.reach is not None else 1.0
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from seerob.errors import InputError, Problem
+from seerob.floor_polygon import prism_mesh
 from seerob.geometry import Mesh, Solid, capsule
 from seerob.model_io import detail, lint, mass_properties, shapes
 from seerob.model_io.description import Inertial, Link
@@ -48,6 +49,16 @@ class LoadedThing:
     """Of all pieces together, in the thing's frame; None when nobody gave a mass or a density."""
     findings: tuple[Finding, ...]
     files: dict[str, bytes]
+
+
+@dataclass(frozen=True, eq=False)
+class MadeArea:
+    """An area that was made from a motion, in the world's frame."""
+
+    mesh: Mesh
+    note: str
+    """What of it is not as it looks."""
+    findings: tuple[Finding, ...]
 
 
 def load_thing(
@@ -117,9 +128,18 @@ def _piece(name: str, mesh: Mesh) -> Piece:
     return Piece(name, (display,), (Solid(mesh=detail.physics_mesh(mesh), name=name),))
 
 
+def _round(shape: Shape | None) -> tuple[float, float] | None:
+    """Radius and length along z of a ball or capsule [m]; None for any other shape."""
+    if shape is None:
+        return None
+    return (shape.sphere, 0.0) if shape.sphere is not None else shape.capsule
+
+
 def _simple(shape: Shape, color: Color) -> tuple[Piece, list[Mesh]]:
-    if shape.sphere is not None:
-        solid = capsule(np.zeros(3), np.zeros(3), shape.sphere)
+    rounded = _round(shape)
+    if rounded is not None:
+        end = np.array([0.0, 0.0, rounded[1] / 2])
+        solid = capsule(-end, end, rounded[0])
         from seerob.model_io.glb import solid_mesh
 
         mesh = solid_mesh(solid, color=color)
@@ -127,6 +147,10 @@ def _simple(shape: Shape, color: Color) -> tuple[Piece, list[Mesh]]:
     if shape.box is not None:
         half = np.array(shape.box) / 2
         mesh = shapes.box_mesh(-half, half, color=color)
+        return Piece("", (mesh,), (Solid(mesh=mesh),)), [mesh]
+    if shape.polygon is not None:
+        assert shape.height is not None
+        mesh = prism_mesh(shape.polygon, *shape.height, color)
         return Piece("", (mesh,), (Solid(mesh=mesh),)), [mesh]
     assert shape.cylinder is not None
     radius, height = shape.cylinder
@@ -157,14 +181,26 @@ def _inertial(thing: Thing, meshes: list[Mesh], source: str) -> tuple[Inertial, 
 
 def _spread(thing: Thing, meshes: list[Mesh]) -> tuple[Inertial, tuple[Finding, ...]]:
     """Mass properties at uniform density, and what was noticed."""
-    if thing.shape is None or thing.shape.sphere is None:
+    rounded = _round(thing.shape)
+    if rounded is None:
         return mass_properties.from_shape(meshes, density=thing.density, mass=thing.mass, subject=thing.name)
-    radius = thing.shape.sphere
-    mass, origin, source = thing.mass, Origin.GIVEN, "sphere, shape in the workstation file"
+    volume, moments = _capsule(*rounded)
+    what = "capsule" if rounded[1] else "sphere"
+    mass, origin, source = thing.mass, Origin.GIVEN, f"{what}, shape in the workstation file"
     if mass is None:
-        mass = float(4 / 3 * np.pi * radius**3 * (thing.density or 0.0))
-        origin, source = Origin.ESTIMATED, f"{thing.density:g} kg/m³ × volume of the sphere"
-    return Inertial(mass, np.zeros(3), np.eye(3) * 0.4 * mass * radius**2, origin, source), ()
+        mass = volume * (thing.density or 0.0)
+        origin, source = Origin.ESTIMATED, f"{thing.density:g} kg/m³ × volume of the {what}"
+    return Inertial(mass, np.zeros(3), np.diag(mass * moments), origin, source), ()
+
+
+def _capsule(radius: float, length: float) -> tuple[float, Array]:
+    """Volume [m³] and moments of inertia about the centre per mass [m²] (3,) of a capsule along z."""
+    middle, ends = np.pi * radius**2 * length, 4 / 3 * np.pi * radius**3
+    across = middle * (length**2 / 12 + radius**2 / 4)
+    across += ends * (0.4 * radius**2 + length**2 / 4 + 3 / 8 * length * radius)
+    along = middle * radius**2 / 2 + ends * 0.4 * radius**2
+    volume = float(middle + ends)
+    return volume, np.array([across, across, along]) / volume
 
 
 def _odd(thing: Thing, solids: tuple[Solid, ...], meshes: list[Mesh]) -> tuple[Finding, ...]:
@@ -181,8 +217,9 @@ def _odd(thing: Thing, solids: tuple[Solid, ...], meshes: list[Mesh]) -> tuple[F
 
 def _odd_mass(mass: float, thing: Thing, meshes: list[Mesh]) -> str:
     """What is odd about a mass in this shape, whose hull bounds its volume where it is not closed."""
-    if thing.shape is not None and thing.shape.sphere is not None:
-        return lint.odd_mass(mass, 4 / 3 * np.pi * thing.shape.sphere**3, exact=True)
+    rounded = _round(thing.shape)
+    if rounded is not None:
+        return lint.odd_mass(mass, _capsule(*rounded)[0], exact=True)
     mesh, _ = joined([m for m in meshes if len(m.faces)])
     hull = _hull_volume(mesh)
     volume = signed_volume(mesh) if is_closed(mesh) else 0.0

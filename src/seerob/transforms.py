@@ -5,6 +5,8 @@ Positions are in metres, angles in radians, quaternions are unit and ordered w, 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -39,22 +41,38 @@ def wxyz_from_rotation(rotation: ArrayLike) -> Array:
     Returns:
         Quaternion w, x, y, z, shape (4,).
     """
-    m = np.asarray(rotation, float)
+    m = np.asarray(rotation, float).tolist()
     # Shepperd's method: divide by the largest of the four, so that nothing cancels.
-    squares = np.array([m.trace(), m[0, 0], m[1, 1], m[2, 2]])
-    largest = int(squares.argmax())
-    q = np.zeros(4)
-    if largest == 0:
-        q[:] = 1 + m.trace(), m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
-    else:
+    trace = m[0][0] + m[1][1] + m[2][2]
+    squares = [trace, m[0][0], m[1][1], m[2][2]]
+    largest = squares.index(max(squares))
+    q = [1 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]]
+    if largest > 0:
         i = largest - 1
         j, k = (i + 1) % 3, (i + 2) % 3
-        q[0] = m[k, j] - m[j, k]
-        q[1 + i] = 1 + m[i, i] - m[j, j] - m[k, k]
-        q[1 + j] = m[j, i] + m[i, j]
-        q[1 + k] = m[k, i] + m[i, k]
-    q /= np.linalg.norm(q)
-    return -q if q[0] < 0 else q
+        q[0] = m[k][j] - m[j][k]
+        q[1 + i] = 1 + m[i][i] - m[j][j] - m[k][k]
+        q[1 + j] = m[j][i] + m[i][j]
+        q[1 + k] = m[k][i] + m[i][k]
+    length = math.sqrt(sum(x * x for x in q))
+    if q[0] < 0:
+        length = -length
+    return np.array(q) / length
+
+
+def turned(rotation: ArrayLike, wxyz: ArrayLike) -> Array:
+    """Quaternions of ``rotation`` times each rotation that is given.
+
+    Args:
+        rotation: Rotation matrix, shape (3, 3).
+        wxyz: Quaternions, w first, shape (..., 4); NaN stays NaN.
+
+    Returns:
+        Quaternions, w first, of the same lengths, shape (..., 4).
+    """
+    a, b, c, d = wxyz_from_rotation(rotation)
+    left = np.array([[a, -b, -c, -d], [b, a, -d, c], [c, d, a, -b], [d, -c, b, a]])
+    return np.asarray(np.asarray(wxyz, float) @ left.T)
 
 
 def rotation_from_rpy(rpy: ArrayLike) -> Array:

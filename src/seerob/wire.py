@@ -1,8 +1,8 @@
 """Writes ``web/src/wire.ts``, the page's types, from `seerob.snapshot`: one fact, one place.
 
 ``python -m seerob.wire`` writes the file, ``python -m seerob.wire --check`` fails when it is stale.
-Structs become interfaces (tagged ones carry ``type``), enums unions of strings, ``bytes``
-``Uint8Array``; docstrings of classes and fields go along as JSDoc.
+Structs become interfaces (tagged ones carry ``type``; what a default leaves out is optional), enums unions
+of strings, ``bytes`` ``Uint8Array``; docstrings of classes and fields go along as JSDoc.
 """
 
 from __future__ import annotations
@@ -22,13 +22,16 @@ from typing import Any, get_args, get_origin, get_type_hints
 import msgspec
 from msgspec import Struct
 
-from seerob import snapshot
+from seerob import markers, snapshot, verdict
 from seerob.errors import InputError
 
 FROM_SERVER = (snapshot.Hello, snapshot.Scene, snapshot.History, snapshot.Transport, snapshot.Snapshot)
 """Messages that a page receives."""
 FROM_PAGE = (snapshot.Command,)
 """Messages that a page sends; what has a default may be left out."""
+
+SOURCES = (verdict, markers, snapshot)
+"""Modules whose types go over the wire; `seerob.snapshot` has the names of all of them."""
 
 FILE = Path(__file__).resolve().parents[2] / "web" / "src" / "wire.ts"
 HEAD = "// Written by `python -m seerob.wire` from src/seerob/snapshot.py. Do not edit.\n"
@@ -59,7 +62,7 @@ def _declarations(*, docs: bool) -> Iterator[str]:
             continue
         if isinstance(thing, (GenericAlias, UnionType)):
             yield f"export type {name} = {_type(thing, {k: v for k, v in aliases.items() if v != name})};\n"
-        elif not inspect.isclass(thing) or thing.__module__ != snapshot.__name__:
+        elif not inspect.isclass(thing) or thing.__module__ not in {source.__name__ for source in SOURCES}:
             continue
         elif issubclass(thing, StrEnum):
             yield _enum(thing, docs=docs)
@@ -88,13 +91,14 @@ def _interface(cls: type[Struct], aliases: dict[Any, str], *, docs: bool) -> str
     told = _field_docs(cls) if docs else {}
     hints = get_type_hints(cls)
     lines = [f"export interface {cls.__name__} {{\n"]
-    tag = cls.__struct_config__.tag
+    config = cls.__struct_config__
+    tag = config.tag
     if tag is not None:
         lines.append(f"  type: {_string(str(tag))};\n")
     for field in msgspec.structs.fields(cls):
         if field.name in told:
             lines.append(_comment(told[field.name], indent="  "))
-        optional = "?" if cls in FROM_PAGE and not field.required else ""
+        optional = "?" if not field.required and (cls in FROM_PAGE or config.omit_defaults) else ""
         lines.append(f"  {field.encode_name}{optional}: {_type(hints[field.name], aliases)};\n")
     lines.append("}\n")
     return (_comment(inspect.getdoc(cls) or "") if docs else "") + "".join(lines)

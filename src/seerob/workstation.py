@@ -11,83 +11,62 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Struct
 
 from seerob.errors import InputError
+from seerob.floor_polygon import check_polygon
+from seerob.quantities import (
+    Coordinate,
+    Corners,
+    Density,
+    Length,
+    Mass,
+    Name,
+    PathName,
+    Radian,
+    Radians,
+    Share,
+    unit,
+)
+from seerob.quantities import Metres3 as Metres3  # noqa: PLC0414
+from seerob.quantities import Pose as Pose  # noqa: PLC0414
+from seerob.sensor_tables import Sensor
+from seerob.task_phase import TaskPhase
 
 MAX_FILE_SIZE = 4 << 20
 """A workstation file larger than this [byte] is not one."""
 
 FILE_NAME = "workstation.toml"
 
-
-def _unit(unit: str, **limits: Any) -> Any:
-    return Meta(extra={"unit": unit}, extra_json_schema={"x-unit": unit}, **limits)
-
-
-Metre = Annotated[float, _unit("m")]
-Length = Annotated[float, _unit("m", gt=0, le=1000)]
-Mass = Annotated[float, _unit("kg", gt=0, le=1e6)]
-Density = Annotated[float, _unit("kg/m³", gt=0, le=1e5)]
-Inertia = Annotated[float, _unit("kg·m²")]
-Seconds = Annotated[float, _unit("s", gt=0)]
-Radian = Annotated[float, _unit("rad")]
-Hertz = Annotated[float, _unit("Hz", gt=0)]
-Coordinate = Annotated[float, Meta(ge=-1000, le=1000)]
-Metres3 = Annotated[tuple[Coordinate, Coordinate, Coordinate], _unit("m")]
-Radians3 = Annotated[tuple[float, float, float], _unit("rad")]
-Radians = Annotated[tuple[float, ...], _unit("rad")]
-Share = Annotated[float, Meta(ge=0, le=1)]
-Name = Annotated[
-    str,
-    Meta(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=80, description="letters, digits, '_', '.' and '-' only"),
-]
-PathName = Annotated[
-    str,
-    Meta(
-        pattern=r"^[A-Za-z0-9_.\-]+(/[A-Za-z0-9_.\-]+)*$",
-        max_length=200,
-        description="letters, digits, '_', '.', '-', and '/' between them only",
-    ),
-]
+MAX_SIZE = 1000.0
+"""Of a simple shape [m]."""
 
 
 class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Base of every table."""
-
-
-class Pose(_Table, frozen=True, kw_only=True):
-    """Where something is: a position and one way of giving an orientation."""
-
-    position: Metres3 = (0.0, 0.0, 0.0)
-    rpy: Radians3 | None = None
-    """Roll, pitch, yaw about the fixed x, y, z axes [rad]; write ``rpy_deg`` for degrees."""
-    wxyz: tuple[float, float, float, float] | None = None
-    """Unit quaternion, w first."""
-
-    def __post_init__(self) -> None:
-        if self.rpy is not None and self.wxyz is not None:
-            raise ValueError("rpy and wxyz are both given: keep one")
-        if self.wxyz is not None and abs(sum(x * x for x in self.wxyz) - 1.0) > 1e-3:
-            raise ValueError(f"wxyz = {list(self.wxyz)} is not a unit quaternion")
+    """Base of every table; the linter knows a struct by its base in the same file."""
 
 
 class Engine(_Table, frozen=True, kw_only=True):
     """How the twin is moved."""
 
-    timestep: Annotated[float, _unit("s", ge=0.001, le=0.002)] = 0.002
+    timestep: Annotated[float, unit("s", ge=0.001, le=0.002)] = 0.002
     """Physics step [s]: 500 to 1 000 Hz."""
-    tick: Annotated[float, _unit("s", gt=0, le=0.01)] = 0.01
+    tick: Annotated[float, unit("s", gt=0, le=0.01)] = 0.01
     """Period of results [s]: 100 Hz or more, a whole number of steps."""
-    bandwidth: Annotated[float, _unit("Hz", ge=1, le=60)] = 20.0
+    bandwidth: Annotated[float, unit("Hz", ge=1, le=60)] = 20.0
     """Natural frequency of the critically damped controllers that pull robots [Hz]."""
-    human_bandwidth: Annotated[float, _unit("Hz", ge=1, le=40)] = 10.0
+    human_bandwidth: Annotated[float, unit("Hz", ge=1, le=40)] = 10.0
     """The same for people [Hz]."""
-    gravity: Annotated[tuple[Coordinate, Coordinate, Coordinate], _unit("m/s²")] = (0.0, 0.0, -9.81)
+    gravity: Annotated[tuple[Coordinate, Coordinate, Coordinate], unit("m/s²")] = (0.0, 0.0, -9.81)
     """[m/s²]"""
-    tracking_limit: Annotated[float, _unit("rad", gt=0)] = 0.01
+    tracking_limit: Annotated[float, unit("rad", gt=0)] = 0.01
     """Joint error [rad or m] beyond which the twin does not follow what was heard: verdicts that
     depend on it turn UNDECIDED."""
+    human_tracking_limit: Annotated[float, unit("rad", gt=0)] = 0.05
+    """The same for people [rad or m]: about what devices that see people are good to."""
+    physics: bool = True
+    """Whether forces move the twin toward the samples. Without, it is put on the motion through them at every
+    tick: for long recordings, several times as fast, and blind to torque limits and contacts."""
 
     def __post_init__(self) -> None:
         steps = self.tick / self.timestep
@@ -113,12 +92,16 @@ class Robot(_Table, frozen=True, kw_only=True):
     """Link that is its point of interest; its last mounted tool's ``tcp`` when not given."""
     q: Radians | None = None
     """Joint positions [rad or m] where it stands when no source drives it."""
-    rotor_inertia: Annotated[tuple[float, ...], _unit("kg·m²")] | None = None
+    rotor_inertia: Annotated[tuple[float, ...], unit("kg·m²")] | None = None
     """Rotor inertia seen at each joint [kg·m²]; unknown when not given."""
-    torque_limits: Annotated[tuple[float, ...], _unit("N·m")] | None = None
+    torque_limits: Annotated[tuple[float, ...], unit("N·m")] | None = None
     """Largest torque per joint [N·m], instead of the description's."""
-    velocity_limits: Annotated[tuple[float, ...], _unit("rad/s")] | None = None
+    velocity_limits: Annotated[tuple[float, ...], unit("rad/s")] | None = None
     """Largest speed per joint [rad/s], instead of the description's."""
+    acceleration_limits: Annotated[tuple[float, ...], unit("rad/s²")] | None = None
+    """Largest acceleration per joint [rad/s²], for a rescaled motion; never assumed."""
+    jerk_limits: Annotated[tuple[float, ...], unit("rad/s³")] | None = None
+    """Largest jerk per joint [rad/s³], likewise."""
     masses: dict[str, Body] = {}
     """Mass properties by hand, per link name."""
 
@@ -129,7 +112,7 @@ class Body(_Table, frozen=True, kw_only=True):
     mass: Mass
     com: Metres3 | None = None
     """Centre of mass in the link's frame [m]; from the shape at uniform density when not given."""
-    inertia: Annotated[tuple[float, float, float, float, float, float], _unit("kg·m²")] | None = None
+    inertia: Annotated[tuple[float, float, float, float, float, float], unit("kg·m²")] | None = None
     """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]; from the shape when not given."""
     source: str = "workstation file"
 
@@ -137,20 +120,35 @@ class Body(_Table, frozen=True, kw_only=True):
 class Shape(_Table, frozen=True, kw_only=True):
     """A simple shape instead of a mesh file, centred at the origin of its frame."""
 
-    box: Annotated[tuple[float, float, float], _unit("m")] | None = None
+    box: Annotated[tuple[float, float, float], unit("m")] | None = None
     """Edge lengths [m]."""
     sphere: Length | None = None
     """Radius [m]."""
-    cylinder: Annotated[tuple[float, float], _unit("m")] | None = None
+    cylinder: Annotated[tuple[float, float], unit("m")] | None = None
     """Radius and height along z [m]."""
+    capsule: Annotated[tuple[float, float], unit("m")] | None = None
+    """Radius, and length along z between the centres of its two half balls [m]."""
+    polygon: Corners | None = None
+    """Corners (x, y) of a floor plan, in either sense, concave or not, extruded along z [m]; not centred."""
+    height: Annotated[tuple[Coordinate, Coordinate], unit("m")] | None = None
+    """Lower and upper end along z of what is extruded from ``polygon`` [m]."""
 
     def __post_init__(self) -> None:
-        given = [x for x in (self.box, self.sphere, self.cylinder) if x is not None]
-        if len(given) != 1:
-            raise ValueError("give exactly one of box, sphere, cylinder")
+        given = [x for x in (self.box, self.sphere, self.cylinder, self.capsule) if x is not None]
+        if len(given) + (self.polygon is not None) != 1:
+            raise ValueError("give exactly one of box, sphere, cylinder, capsule, polygon")
+        if (self.polygon is None) != (self.height is None):
+            raise ValueError("polygon and height = [lower, upper] belong together")
+        if self.polygon is not None and self.height is not None:
+            check_polygon(self.polygon)
+            if self.height[0] >= self.height[1]:
+                raise ValueError(f"height = {list(self.height)} is no interval: the lower end comes first")
+            return
         sizes = (given[0],) if isinstance(given[0], float) else given[0]
         if min(sizes) <= 0:
             raise ValueError(f"sizes must be larger than 0 m, not {list(sizes)}")
+        if max(sizes) > MAX_SIZE:
+            raise ValueError(f"sizes must be at most {MAX_SIZE:g} m, not {list(sizes)}")
 
 
 class Thing(_Table, frozen=True, kw_only=True):
@@ -169,7 +167,7 @@ class Thing(_Table, frozen=True, kw_only=True):
     mass: Mass | None = None
     com: Metres3 | None = None
     """Centre of mass in its own frame [m]."""
-    inertia: Annotated[tuple[float, float, float, float, float, float], _unit("kg·m²")] | None = None
+    inertia: Annotated[tuple[float, float, float, float, float, float], unit("kg·m²")] | None = None
     """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]."""
     density: Density | None = None
     """Uniform density [kg/m³] to compute the mass from the shape."""
@@ -209,14 +207,49 @@ class Part(Thing, frozen=True, kw_only=True):
     """Something of the environment that stands still."""
 
 
+class SweptArea(_Table, frozen=True, kw_only=True):
+    """An area made when the workstation is read, from what something sweeps or can reach."""
+
+    of: str
+    """What sweeps: a robot with everything on it, a tool, a link; wildcards allowed."""
+    voxel: Length = 0.05
+    """Edge of a voxel [m]."""
+    reach: bool = False
+    """All that the joint limits allow, instead of the motion of the sources."""
+    start: Annotated[float, unit("s", ge=0)] = 0.0
+    """Begin of the part of the motion to take [s]."""
+    end: Annotated[float, unit("s", ge=0)] | None = None
+    """End of it [s]; that of the motion when not given."""
+    margin: Annotated[float, unit("m", ge=0, le=10)] = 0.0
+    """Dilated by this [m]."""
+    separation: str | None = None
+    """Name of a criterion of kind ``separation``: dilated, at every instant, by its S_p too. Who is outside
+    is farther from every swept part than its protective separation distance was when it was there."""
+
+    def __post_init__(self) -> None:
+        if self.end is not None and self.end < self.start:
+            raise ValueError(f"end = {self.end:g} s is before start = {self.start:g} s: begin before the end")
+        if self.reach and (self.start or self.end is not None or self.separation is not None):
+            raise ValueError(
+                "reach takes no part of a motion and no S_p: leave out start, end and separation"
+            )
+
+
 class Area(Thing, frozen=True, kw_only=True):
     """A safety area: a shape that is watched, not touched."""
 
+    swept: SweptArea | None = None
+    """Instead of a mesh or a shape: what something sweeps."""
     on: str | None = None
     """Full name of the link, tool or bone that carries it; stands still when not given."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        if self.swept is None:
+            super().__post_init__()
+        elif self.mesh is not None or self.shape is not None:
+            raise ValueError("give exactly one of mesh, shape, swept")
+        elif self.on is not None or self.at != Pose():
+            raise ValueError("what is swept lies in the world: leave out on and at")
         if self.mass is not None or self.density is not None:
             raise ValueError("an area has no mass")
 
@@ -225,15 +258,19 @@ class Human(_Table, frozen=True, kw_only=True):
     """A person."""
 
     name: Name
-    stature: Annotated[float, _unit("m", ge=1.2, le=2.3)]
+    stature: Annotated[float, unit("m", ge=1.2, le=2.3)]
     """[m]"""
-    mass: Annotated[float, _unit("kg", ge=30, le=250)]
+    mass: Annotated[float, unit("kg", ge=30, le=250)]
     """[kg]"""
     sex: Literal["male", "female"]
     hand: Literal["right", "left"] = "right"
     """Dominant hand."""
-    lengths: Literal["drillis", "deleva"] = "drillis"
-    """Data set that segment lengths are taken from."""
+    lengths: Literal["drillis", "deleva"] | dict[str, Length] = "drillis"
+    """Data set that segment lengths are taken from; or lengths by hand [m], ``{ forearm = 0.26, … }``, the
+    others then from ``drillis`` so that the chain ends at the stature."""
+    masses: Literal["deleva", "zatsiorsky"] | dict[str, Mass] = "deleva"
+    """Data set of segment masses; or masses by hand [kg], ``{ thigh = 9.5, … }``, the others then from
+    ``deleva`` so that all weigh the body mass."""
     at: Pose = Pose()
     """Where the person stands: the point on the floor between the feet."""
     posture: str = "standing"
@@ -255,13 +292,17 @@ class Workstation(_Table, frozen=True, kw_only=True):
     edition: Literal["ISO 10218-2:2025", "ISO/TS 15066:2016"] = "ISO/TS 15066:2016"
     """Edition of the norm that limits are taken from."""
     description: str = ""
+    variables: str | None = None
+    """Dictionary of the variables of controllers and machines, a TOML file beside this one."""
     engine: Engine = Engine()
     robots: tuple[Robot, ...] = ()
     tools: tuple[Tool, ...] = ()
     workpieces: tuple[Workpiece, ...] = ()
     parts: tuple[Part, ...] = ()
     areas: tuple[Area, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
     humans: tuple[Human, ...] = ()
+    phases: tuple[TaskPhase, ...] = ()
     contacts: tuple[Contact, ...] = ()
     sources: tuple[Any, ...] = ()
     """`Source`s, each of the type that its ``kind`` names."""
@@ -284,7 +325,9 @@ TABLES: dict[str, type[Struct]] = {
     "workpieces": Workpiece,
     "parts": Part,
     "areas": Area,
+    "sensors": Sensor,
     "humans": Human,
+    "phases": TaskPhase,
     "contacts": Contact,
 }
 """Lists of tables and the type of their entries."""

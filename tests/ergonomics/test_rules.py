@@ -15,8 +15,9 @@ from seerob.human.angles import Angles, angles
 from seerob.human.posture import posture
 from seerob.human.skeleton import JOINTS, bone_poses, mirrored
 from seerob.run import Judge, bind
+from seerob.scoring.bands import band_of
 from seerob.scoring.owas import Legs
-from seerob.snapshot import Origin, Verdict
+from seerob.snapshot import Origin, RowState, Verdict
 
 STILL = np.zeros(len(JOINTS))
 HUMAN = """
@@ -319,3 +320,72 @@ def test_the_twin_is_asked_for_the_angles_that_its_joints_have(tmp_path):
     expected = angles(*bone_poses(PERSON, q))
     for field in fields(Angles):
         assert getattr(found, field.name) == pytest.approx(getattr(expected, field.name), abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["rula", "reba"])
+def test_rows_say_what_the_parts_say_with_bands_and_bones(tmp_path, kind):
+    method = {"rula": rula.METHOD, "reba": reba.METHOD}[kind]
+    more = 'action_level = 2\naccuracy_deg = 2\nunmeasured = ["left_hand"]'
+    result = at(station(tmp_path, table(kind, more=more)), posture(PERSON, "reach_high"))[kind]
+    named = {(row.side, row.name): row for row in result.rows}
+    assert {name for _, name in named} == {"score", *method.least}
+    for (side, name), row in named.items():
+        if name == "score":
+            continue
+        part = parts(result)[f"{side} {name}".strip()]
+        assert (row.value, row.interval) == (part.value, part.interval)
+        assert row.scale == (method.least[name], method.most[name])
+        if row.value is not None:
+            assert row.scale[0] <= row.interval[0] <= row.value <= row.interval[1] <= row.scale[1]
+    totals = [named[side, "score"] for side in ("right", "left", "")]
+    assert [r.scale for r in totals] == [(1, method.levels[-1])] * 3
+    assert totals[2].verdict is result.verdict
+    wrist = named["left", "wrist"]
+    assert (wrist.state, wrist.value) == (RowState.NOT_ASSESSED, None)
+    assert all(aspect.value is None and not aspect.band for aspect in wrist.aspects)
+    arm = named["right", "upper arm"]
+    assert arm.bones == ("op/right_upper_arm",)
+    flexion = arm.aspects[0]
+    assert (flexion.name, flexion.unit) == ("shoulder flexion", "rad")
+    assert flexion.band == ("beyond 90°" if flexion.value >= np.pi / 2 else "45° to 90°")
+
+
+@pytest.mark.parametrize("kind", RULES)
+def test_rows_of_nobody_entered_anything_are_not_assessed(tmp_path, kind):
+    result = results_at(station(tmp_path, table(kind, phases="")))[kind]
+    assert {r.name for r in result.rows if r.state is RowState.NOT_ASSESSED} >= {"score", "legs"}
+    for row in result.rows:
+        assert (row.value is None) == (row.state is RowState.NOT_ASSESSED)
+
+
+def test_a_joint_with_an_accuracy_of_its_own_opens_only_its_components(tmp_path):
+    q = posture(PERSON, {"both_elbow_flexion": np.radians(80), "both_elbow_pronation": np.radians(90)})
+    more = "accuracy_deg = 0\njoint_accuracy = { wrist_deg = 20 }"
+    result = at(station(tmp_path, table("rula", more=more)), q)["rula"]
+    open_parts = {name for name, part in parts(result).items() if part.interval[0] != part.interval[1]}
+    assert {"right wrist", "left wrist"} <= open_parts <= {"right wrist", "left wrist", "right", "left"}
+    assert parts(result)["right wrist"].interval == (1, 4)
+    named = {i.name: i.value for i in station(tmp_path, table("rula", more=more)).bound[0].basis.inputs}
+    assert named["accuracy of the wrist"] == 20
+
+
+@pytest.mark.parametrize(
+    ("angle", "edges", "expected"),
+    [
+        (-30, (-20, 20, 45), "below −20°"),
+        (20, (-20, 20, 45), "20° to 45°"),
+        (19, (-20, 20, 45), "−20° to 20°"),
+        (50, (-20, 20, 45), "beyond 45°"),
+        (np.nan, (20,), ""),
+        (5, (), ""),
+    ],
+)
+def test_bands_are_named(angle, edges, expected):
+    assert band_of(np.radians(angle), [np.radians(e) for e in edges]) == expected
+
+
+def test_every_action_level_is_announced_with_its_highest_score(tmp_path):
+    infos = {info.name: info for info in all_rules(tmp_path).scene().criteria}
+    assert [level.up_to for level in infos["rula"].levels] == [2, 4, 6, 7]
+    assert [level.name for level in infos["reba"].levels] == [f"action level {k}" for k in range(5)]
+    assert [level.up_to for level in infos["owas"].levels] == [1, 2, 3, 4]

@@ -9,6 +9,7 @@ from made_postures import PERSON, UNSUPPORTED, made_angles, random_q
 from seerob.human.angles import angles
 from seerob.human.skeleton import bone_poses, mirrored
 from seerob.scoring import reba, rula
+from seerob.scoring.measured import Measured
 from seerob.scoring.owas import OwasThresholds, arm_codes, back_codes, category_span, leg_codes, only, owas
 from seerob.scoring.shoulder import ArmPolicy, arm_score
 from seerob.scoring.spans import Span, beyond, exactly, graded
@@ -102,8 +103,8 @@ def test_an_arm_that_is_off_by_its_accuracy_stays_in_its_span(policy):
             object.__setattr__(made, name, np.broadcast_to(value[..., None], shape))
         return made
 
-    span = arm_score(arm(directions), rula.upper_arm, policy, delta)
-    scores = arm_score(arm(near), rula.upper_arm, policy)
+    span = arm_score(Measured(arm(directions), delta), rula.upper_arm, policy)
+    scores = arm_score(Measured(arm(near)), rula.upper_arm, policy)
     off = inside[..., None] & ((scores.high < span.low) | (scores.low > span.high))
     assert not off.any()
     assert (span.low < span.high).mean() < 0.8  # it does not simply say "anything"
@@ -255,7 +256,7 @@ def test_an_arm_toward_the_body_is_neither_abducted_nor_raised(method, angle):
 
 def test_an_arm_that_points_sideways_has_any_flexion():
     aside = made_angles(shoulder_flexion=170, shoulder_abduction=85, shoulder_elevation=91)
-    span = arm_score(aside, rula.upper_arm, ArmPolicy.PROJECTION, np.radians(8))
+    span = arm_score(Measured(aside, np.radians(8)), rula.upper_arm, ArmPolicy.PROJECTION)
     assert (span.low.tolist(), span.high.tolist()) == ([1, 1], [4, 4])
-    sure = arm_score(aside, rula.upper_arm, ArmPolicy.PROJECTION, np.radians(4))
+    sure = arm_score(Measured(aside, np.radians(4)), rula.upper_arm, ArmPolicy.PROJECTION)
     assert (sure.low.tolist(), sure.high.tolist()) == ([4, 4], [4, 4])

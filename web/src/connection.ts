@@ -30,6 +30,8 @@ const LIVE_POINTS = 40_000;
 export interface PoseFeed {
   /** The newest block, once; valid until the next call. */
   read(): Float32Array | null;
+  /** Run time of the block that `read` returned last [s]. */
+  readonly t: number;
 }
 
 export interface ConnectionEvents {
@@ -100,7 +102,7 @@ export class Connection {
         tracesRevision.value += 1;
         return;
       case "poses":
-        this.posted?.put(message.buffer);
+        this.posted?.put(message.buffer, message.t);
         return;
       case "frame":
         this.show(message.frame);
@@ -147,12 +149,15 @@ export class Connection {
 
 /** Poses that came by message, where memory cannot be shared. */
 class PostedPoses implements PoseFeed {
+  t = Number.NaN;
   private newest: Float32Array | null = null;
+  private newestT = Number.NaN;
   private shown: Float32Array | null = null;
 
   constructor(private readonly recycle: (buffer: ArrayBuffer) => void) {}
 
-  put(buffer: ArrayBuffer): void {
+  put(buffer: ArrayBuffer, t: number): void {
+    this.newestT = t;
     if (this.newest) this.recycle(this.newest.buffer as ArrayBuffer);
     this.newest = new Float32Array(buffer);
   }
@@ -161,6 +166,7 @@ class PostedPoses implements PoseFeed {
     if (!this.newest) return null;
     if (this.shown) this.recycle(this.shown.buffer as ArrayBuffer);
     this.shown = this.newest;
+    this.t = this.newestT;
     this.newest = null;
     return this.shown;
   }

@@ -1,4 +1,4 @@
-// What a whole recording holds that is worse than the instant on screen.
+// What a run holds that is worse than the instant on screen: a recording at any time, a live run so far.
 
 import type { Span, Trace } from "./traces";
 import type { State } from "./verdicts";
@@ -7,6 +7,8 @@ export interface Elsewhere {
   verdict: Span["verdict"];
   /** Criteria that have it at some other time, in the order of the traces. */
   criteria: readonly string[];
+  /** The one that had it last, and until when [s]. */
+  latest: { name: string; end: number };
 }
 
 /** The worst verdict of the traces where it is worse than what is shown; null where it is not. */
@@ -15,8 +17,21 @@ export function worseElsewhere(traces: Iterable<Trace>, shown: State): Elsewhere
   const all = [...traces];
   const undecided = shown === "undecided" || shown === "missing";
   for (const verdict of undecided ? (["exceeded"] as const) : (["exceeded", "undecided"] as const)) {
-    const criteria = all.filter((trace) => trace.spans.some((span) => span.verdict === verdict));
-    if (criteria.length > 0) return { verdict, criteria: criteria.map((trace) => trace.name) };
+    const found = all.flatMap((trace) => {
+      const span = trace.spans.findLast((s) => s.verdict === verdict);
+      return span ? [{ name: trace.name, end: span.end }] : [];
+    });
+    if (found.length === 0) continue;
+    const latest = found.reduce((a, b) => (b.end > a.end ? b : a));
+    return { verdict, criteria: found.map(({ name }) => name), latest };
   }
   return null;
+}
+
+/** How long ago, in words that a glance takes in. */
+export function ago(seconds: number): string {
+  if (seconds < 1) return "just now";
+  if (seconds < 90) return `${Math.floor(seconds)} s ago`;
+  if (seconds < 5400) return `${Math.floor(seconds / 60)} min ago`;
+  return `${Math.floor(seconds / 3600)} h ago`;
 }

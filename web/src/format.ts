@@ -14,8 +14,7 @@ export function formatNumber(value: number | null, like: number | null = null): 
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
   const size = Math.abs(value);
   if (size !== 0 && (size < 5e-4 || size >= 1e6)) return value.toExponential(2).replaceAll("-", "−");
-  const text = value.toFixed(decimalsFor(Math.abs(like ?? value)));
-  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
+  return formatFixed(value, decimalsFor(Math.abs(like ?? value)));
 }
 
 export function formatQuantity(value: number | null, unit: string, like: number | null = null): string {
@@ -49,8 +48,10 @@ export function formatJoint(value: number, unit: string): string {
     : `${formatFixed(value, 4)}${NO_BREAK}${unit}`;
 }
 
-function formatFixed(value: number, decimals: number): string {
-  return value.toFixed(decimals).replace("-", "−");
+/** A number with so many decimals and a true minus. */
+export function formatFixed(value: number, decimals: number): string {
+  const text = value.toFixed(decimals);
+  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
 }
 
 /** The part of a full name below its owner: `ur10/forearm_link` → `forearm_link`. */

@@ -19,6 +19,8 @@ declare global {
       readonly t: number;
       /** Position and quaternion (x, y, z, w) of a body as three.js has it, y up; null for an unknown name. */
       pose(name: string): { position: number[]; quaternion: number[] } | null;
+      /** Colour of a score that a body is shown in, 0xrrggbb; null for its own or a verdict's. */
+      tint(name: string): number | null;
       /** Where a point of the world (z up) [m] is on the screen [px]. */
       project(point: [number, number, number]): [number, number];
     };
@@ -41,13 +43,14 @@ function begin(element: HTMLElement): void {
   };
   viewer.stage.run((time) => {
     connection.tick(time);
-    viewer.tick();
+    viewer.tick(time);
   });
   window.seerob = {
     get t() {
       return now.value;
     },
     pose: (name) => viewer.poseOf(name),
+    tint: (name) => viewer.bodies.byName.get(name)?.tint ?? null,
     project: (point) => viewer.project(point),
   };
 }

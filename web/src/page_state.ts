@@ -77,10 +77,10 @@ export const overall = computed<State>(() => {
   return worstState(rows.value.map((row) => row.state));
 });
 
-/** What a recording holds at other times that is worse than what is shown; null while live. */
+/** What a recording holds at other times, or a live run held so far, that is worse than what is shown. */
 export const elsewhere = computed<Elsewhere | null>(() => {
   // Traces are changed in place: only the revision tells.
-  if (tracesRevision.value < 0 || isLive.value) return null;
+  if (tracesRevision.value < 0) return null;
   return worseElsewhere(traces.values(), overall.value);
 });
 

@@ -69,6 +69,15 @@ export class TimeControl {
     this.seek(t);
   }
 
+  /** To an instant that was looked up: whether it can still be shown. A live run keeps the last minutes. */
+  visit(t: number): boolean {
+    const { start } = reach.value;
+    if (isLive.value && t < start - 0.1) return false;
+    if (!isLive.value && transport.value.playing) this.command("pause");
+    this.seek(t);
+    return true;
+  }
+
   private command(action: Action, value: number | null = null): void {
     this.send({ kind: "command", action, value });
   }

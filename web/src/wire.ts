@@ -10,7 +10,124 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "cf3c11c1b6fd31e0";
+export const SCHEMA = "12ea4272cab5a876";
+
+/** A vector at a point. */
+export interface Arrow {
+  type: "arrow";
+  origin: Vec3;
+  /** From tail to tip [m as drawn]. */
+  vector: Vec3;
+  label: string;
+  verdict: Verdict | null;
+}
+
+/** A translucent box. */
+export interface Box {
+  type: "box";
+  center: Vec3;
+  wxyz: Vec4;
+  /** Full edge lengths [m]. */
+  size: Vec3;
+  label: string;
+  verdict: Verdict | null;
+}
+
+/** A translucent ellipsoid. */
+export interface Ellipsoid {
+  type: "ellipsoid";
+  center: Vec3;
+  /** Orientation of the half axes in the world. */
+  wxyz: Vec4;
+  /** Half axes [m as drawn]. */
+  radii: Vec3;
+  label: string;
+  verdict: Verdict | null;
+}
+
+/** A whole body shown in the colour of a verdict. */
+export interface Highlight {
+  type: "highlight";
+  /** Full name of the node. */
+  body: string;
+  verdict: Verdict | null;
+}
+
+/** A translucent closed surface, convex or not. */
+export interface Hull {
+  type: "hull";
+  vertices: Vec3[];
+  faces: [number, number, number][];
+  label: string;
+  verdict: Verdict | null;
+}
+
+/** Text at a point. */
+export interface Label {
+  type: "label";
+  position: Vec3;
+  text: string;
+  verdict: Verdict | null;
+}
+
+export type Marker = Arrow | Segment | Sphere | Ellipsoid | Box | Hull | Polyline | Prism | Rays | Label | Highlight;
+
+/** A line through points, such as the edge of a field on the floor or a path. */
+export interface Polyline {
+  type: "polyline";
+  points: Vec3[];
+  /** Whether the last point is joined to the first. */
+  closed: boolean;
+  label: string;
+  verdict: Verdict | null;
+}
+
+/** A translucent extruded polygon, convex or not, such as a floor area with a height. */
+export interface Prism {
+  type: "prism";
+  /** Corners x, y in its frame [m], either way round, without crossing itself. */
+  outline: [number, number][];
+  lower: number;
+  /** Between which z of its frame it reaches [m]. */
+  upper: number;
+  position: Vec3;
+  /** Its frame in the world. */
+  wxyz: Vec4;
+  label: string;
+  verdict: Verdict | null;
+}
+
+/** What a sensor sees: beams that end where something is in their way, or at their range. */
+export interface Rays {
+  type: "rays";
+  /** One for all of them, such as a scanner's, or one each, such as a light curtain's. */
+  starts: Vec3[];
+  ends: Vec3[];
+  /** Indices of those that end on something that is to be detected; drawn solid, the others faint. */
+  hits: number[];
+  /** Whether the surface between neighbouring beams is filled: a fan, or a sheet. */
+  filled: boolean;
+  label: string;
+  verdict: Verdict | null;
+}
+
+/** A line between two points, such as a shortest distance. */
+export interface Segment {
+  type: "segment";
+  start: Vec3;
+  end: Vec3;
+  label: string;
+  verdict: Verdict | null;
+}
+
+/** A translucent ball. */
+export interface Sphere {
+  type: "sphere";
+  center: Vec3;
+  radius: number;
+  label: string;
+  verdict: Verdict | null;
+}
 
 export type Vec3 = [number, number, number];
 
@@ -72,83 +189,63 @@ export interface Finding {
   text: string;
 }
 
-/** A vector at a point. */
-export interface Arrow {
-  type: "arrow";
-  origin: Vec3;
-  /** From tail to tip [m as drawn]. */
-  vector: Vec3;
-  label: string;
-  verdict: Verdict | null;
+/**
+ * Why a row has, or has not, a figure to compare.
+ *
+ * - `forbidden`: Contact is not permitted, whatever the figure.
+ * - `no_limit`: No limit is available for this place.
+ * - `excluded`: Kept out by measures that are not evaluated here.
+ * - `not_assessed`: What it needs is not measured or was not entered; never a least score.
+ */
+export type RowState =
+  | "judged"
+  | "forbidden"
+  | "no_limit"
+  | "excluded"
+  | "not_assessed";
+
+/** One figure behind a row: an angle of a component, the speed that one of several limits allows. */
+export interface Aspect {
+  name: string;
+  /** None when it is not known or not measured. */
+  value?: number | null;
+  unit?: string;
+  limit?: number | null;
+  /** Of the method, that the value falls into, with its thresholds: `20° to 45°`. */
+  band?: string;
 }
 
-/** A line between two points, such as a shortest distance. */
-export interface Segment {
-  type: "segment";
-  start: Vec3;
-  end: Vec3;
-  label: string;
-  verdict: Verdict | null;
+/**
+ * One line about a place of a person's body: for body map, posture panel and manikin.
+ *
+ * A component of a score (with `scale`) or a body area with a limit of its own.
+ */
+export interface Row {
+  /** Without its side: `upper arm`, `Palm`; `score` for the total of a side or of the whole. */
+  name: string;
+  /** Body region or table of the method that it belongs to. */
+  group?: string;
+  /** `left` or `right`; empty for the middle or where both sides are meant. */
+  side?: string;
+  state?: RowState;
+  value?: number | null;
+  unit?: string;
+  /** Greatest admissible value, in `unit`. */
+  limit?: number | null;
+  /** Best and worst score that there can be; None for a quantity. */
+  scale?: [number, number] | null;
+  interval?: [number, number] | null;
+  verdict?: Verdict | null;
+  /** What governs, or why there is no verdict. */
+  reason?: string;
+  /** Numbers of specific body areas, ISO/TS 15066:2016 Table A.2, 1 to 29. */
+  areas?: number[];
+  /** Full names of the nodes that it speaks of: `operator/right_hand`. */
+  bones?: string[];
+  aspects?: Aspect[];
+  /** Names of the inputs of the basis that its limit comes from. */
+  inputs?: string[];
 }
-
-/** A translucent ball. */
-export interface Sphere {
-  type: "sphere";
-  center: Vec3;
-  radius: number;
-  label: string;
-  verdict: Verdict | null;
-}
-
-/** A translucent ellipsoid. */
-export interface Ellipsoid {
-  type: "ellipsoid";
-  center: Vec3;
-  /** Orientation of the half axes in the world. */
-  wxyz: Vec4;
-  /** Half axes [m as drawn]. */
-  radii: Vec3;
-  label: string;
-  verdict: Verdict | null;
-}
-
-/** A translucent box. */
-export interface Box {
-  type: "box";
-  center: Vec3;
-  wxyz: Vec4;
-  /** Full edge lengths [m]. */
-  size: Vec3;
-  label: string;
-  verdict: Verdict | null;
-}
-
-/** A translucent closed surface, convex or not. */
-export interface Hull {
-  type: "hull";
-  vertices: Vec3[];
-  faces: [number, number, number][];
-  label: string;
-  verdict: Verdict | null;
-}
-
-/** Text at a point. */
-export interface Label {
-  type: "label";
-  position: Vec3;
-  text: string;
-  verdict: Verdict | null;
-}
-
-/** A whole body shown in the colour of a verdict. */
-export interface Highlight {
-  type: "highlight";
-  /** Full name of the node. */
-  body: string;
-  verdict: Verdict | null;
-}
-
-export type Marker = Arrow | Segment | Sphere | Ellipsoid | Box | Hull | Label | Highlight;
 
 /**
  * What one criterion says at one instant.
@@ -172,6 +269,8 @@ export interface Result {
   /** The same per link or body area; the worst one gives the verdict. */
   parts: Result[];
   markers: Marker[];
+  /** The same by places of a person's body, where a criterion has them. */
+  rows: Row[];
   /** None on parts, which share their parent's, and on the wire, where it is sent once. */
   basis: Basis | null;
   /** Instant it speaks of [s] when that is not the snapshot's (a criterion with a period). */
@@ -190,6 +289,11 @@ export interface Snapshot {
   joints: Record<string, number[]>;
   /** Largest joint error between the twin and what was heard, per robot and human [rad or m]. */
   tracking: Record<string, number>;
+  /**
+   * Of people that devices see: bone → how far the twin's bone is from the device's, position [m] and
+   * angle [rad]; null where the device has none.
+   */
+  bones: Record<string, Record<string, [number | null, number | null]>>;
   results: Result[];
 }
 
@@ -212,6 +316,14 @@ export interface Node {
   note: string;
 }
 
+/** A class of scores that a method acts upon, such as an action level. */
+export interface Level {
+  /** Highest score that belongs to it. */
+  up_to: number;
+  /** `action level 2`. */
+  name: string;
+}
+
 /** A criterion of this run. */
 export interface CriterionInfo {
   name: string;
@@ -226,6 +338,8 @@ export interface CriterionInfo {
   limit: number | null;
   at_most: boolean;
   basis: Basis | null;
+  /** Classes of the scores, the lowest first; empty when the method has none. */
+  levels: Level[];
 }
 
 /** One joint of a robot or human. */

@@ -58,11 +58,13 @@ test("the table says values, units, limits and words; UNDECIDED gives its reason
 });
 
 test("the worst comes first and the pill names it", async () => {
-  const states = await page.locator("tr[data-criterion] .badge").allInnerTexts();
-  const rank = ["exceeded", "undecided", "no result", "within, close", "within", "informs"];
-  const ranks = states.map((text) => rank.findIndex((word) => text.trim().endsWith(word)));
-  assert.ok(!ranks.includes(-1), `${states}`);
-  assert.equal(ranks[0], Math.min(...ranks));
+  // Rows change their order at most twice a second, so for a moment the worst may be below.
+  await page.waitForFunction(() => {
+    const rank = ["exceeded", "undecided", "no result", "within, close", "within", "informs"];
+    const badges = [...document.querySelectorAll("tr[data-criterion] .badge")];
+    const ranks = badges.map((badge) => rank.findIndex((word) => badge.textContent.trim().endsWith(word)));
+    return !ranks.includes(-1) && ranks[0] === Math.min(...ranks);
+  });
   assert.match(await page.locator("output.pill").innerText(), /LIMIT EXCEEDED|UNDECIDED/);
 });
 
@@ -108,11 +110,37 @@ test("looking back shows an earlier instant; L follows again", async () => {
   await page.keyboard.press("Shift+ArrowLeft");
   await page.waitForFunction((t) => window.seerob.t < t - 0.5, held);
   const back = await settled(page);
-  assert.ok(Math.abs(back - (held - 1)) < 0.1, `${back} is not a second before ${held}`);
+  // The first snapshot that was kept from a second before on; a loaded machine receives few.
+  assert.ok(back >= held - 1.001 && back < held - 0.5, `${back} is not a second before ${held}`);
   await assertShown(page, served, back);
   await page.keyboard.press("l");
   await page.waitForFunction((t) => window.seerob.t > t + 0.2, held);
   assert.equal(await page.locator(".behind").count(), 0);
+});
+
+test("what was worse before is named beside what is now, and a click goes to its worst instant", async () => {
+  await page.keyboard.press("l");
+  // Something exceeded goes by every few seconds; the note is there while nothing is.
+  const found = await page.waitForFunction(() => {
+    const text = document.querySelector(".pill")?.textContent ?? "";
+    const told = text.match(/NOW.*exceeded (?:just now|\d+ (?:s|min) ago): ([a-z ]+?)(?: \+\d+)*$/);
+    if (!told) return null;
+    document.querySelector(".pill-elsewhere").click();
+    return told[1];
+  });
+  const named = await found.jsonValue();
+  await page.waitForSelector(".visited");
+  const seen = await page.locator(".visited").innerText();
+  assert.ok(seen.includes(`Worst of ${named}: `), seen);
+  assert.match(seen, /at \d+:\d\d\.\d\d/);
+  if (seen.includes("older than")) {
+    await page.getByRole("button", { name: "Close" }).click();
+  } else {
+    const { results } = await served.tell(`snapshot ${await settled(page)}`);
+    assert.equal(results.find((r) => r.name === named).verdict, "exceeded");
+    await page.getByRole("button", { name: "back to live" }).click();
+  }
+  await page.waitForFunction(() => !document.querySelector(".visited, .behind"));
 });
 
 test("findings are one click away", async () => {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import made_up_person
 import numpy as np
 
 from seerob.model_io.glb import glb_bytes, mesh_hash
@@ -161,6 +162,7 @@ def workstation() -> tuple[Scene, dict[str, bytes]]:
         _criterion("effective mass", "effective_mass", "kg", limit=5.0),
         _criterion("manipulability", "manipulability", ""),
         _criterion("work area", "area", "m", at_most=False, limit=0.0),
+        *made_up_person.criteria(),
     )
     findings = (
         Finding(level="assumed", subject="ur10/tool0", text="no payload given; 0 kg assumed"),
@@ -308,5 +310,5 @@ def snapshot(seq: int, t: float) -> Snapshot:
         poses=np.array(block, "<f4").tobytes(),
         joints={"ur10": joints(t)},
         tracking={"ur10": 1e-4},
-        results=results,
+        results=(*results, *made_up_person.results(t, speed, distance)),
     )

@@ -146,6 +146,41 @@ test("a hull, on its surface, hatched where it is undecided", async () => {
   );
 });
 
+test("a polyline, on its legs, closed where it says so", async () => {
+  const { points, verdict } = marker("scanner", "polyline");
+  const middle = (a, b) => a.map((x, i) => (x + b[i]) / 2);
+  await page.getByRole("button", { name: "Top", exact: true }).click();
+  await assertDrawn("scanner", middle(points[0], points[1]), verdict);
+  await assertDrawn("scanner", middle(points[3], points[0]), verdict);
+  await page.getByRole("button", { name: "3D", exact: true }).click();
+});
+
+test("a concave prism fills what it encloses and not its notch", async () => {
+  const { verdict } = marker("scanner", "prism");
+  await page.getByRole("button", { name: "Top", exact: true }).click();
+  await assertDrawn("scanner", [-1.2, -0.75, 0.5], verdict);
+  const notch = await changed("scanner", [-1.2, 0.12, 0.5]);
+  await page.getByRole("button", { name: "3D", exact: true }).click();
+  // Only edges far below may cross it: the whole picture would change if it were filled.
+  assert.ok(notch.length < 0.2 * (2 * AROUND_PX) ** 2, `${notch.length} pixels changed in the notch`);
+});
+
+test("rays: what hits is strong, what passes is faint, and the fan between them is filled", async () => {
+  const { starts, ends, hits, verdict } = marker("scanner", "rays");
+  await page.getByRole("button", { name: "Top", exact: true }).click();
+  const along = (k) => ends[k].map((x, i) => starts[0][i] + 0.6 * (x - starts[0][i]));
+  const redness = async (k) => {
+    const pairs = await changed("scanner", along(k));
+    assert.ok(pairs.length > 100, `${pairs.length} pixels changed`);
+    const gains = pairs.map(([[r, g], [r0, g0]]) => r - g - (r0 - g0)).sort((a, b) => b - a);
+    return gains[20];
+  };
+  assert.equal(verdict, "exceeded");
+  const [hit, pass] = [await redness(hits[1]), await redness(3)];
+  await page.getByRole("button", { name: "3D", exact: true }).click();
+  assert.ok(hit > 1.5 * pass, `${hit} for a hit, ${pass} for none`);
+});
+
 test("a label is written, as text whatever it says", async () => {
   const { position } = marker("work area", "label");
   const pairs = await changed("work area", plus(position, [0, 0, 0.05]));

@@ -3,7 +3,6 @@ import { test } from "node:test";
 import { load } from "./source.mjs";
 
 const { Trace, neighbourViolation } = await load("traces");
-const { worseElsewhere } = await load("elsewhere");
 const { windowOf } = await load("plots/window");
 
 function traceOf(points, capacity, name = "x") {
@@ -84,24 +83,4 @@ test("a plot's window shows every extremum and leaves gaps where there was no va
     zoomed,
     Array.from({ length: 12 }, (_, i) => 99 + i),
   );
-});
-
-test("what is worse at another time than now is named, and nothing that is not worse", () => {
-  const of = (name, ...verdicts) =>
-    traceOf(
-      verdicts.map((v, i) => [i * 0.1, 1, 2, v]),
-      100,
-      name,
-    );
-  const fine = of("energy", 0, 0, 255);
-  const doubtful = of("mass", 0, 2, 0);
-  const beyond = of("separation", 0, 1, 2, 0);
-  const exceeded = { verdict: "exceeded", criteria: ["separation"] };
-  for (const shown of ["within", "close", "none", "undecided", "missing"]) {
-    assert.deepEqual(worseElsewhere([fine, doubtful, beyond], shown), exceeded);
-  }
-  assert.equal(worseElsewhere([fine, doubtful, beyond], "exceeded"), null);
-  assert.deepEqual(worseElsewhere([fine, doubtful], "within"), { verdict: "undecided", criteria: ["mass"] });
-  assert.equal(worseElsewhere([fine, doubtful], "undecided"), null);
-  assert.equal(worseElsewhere([fine], "within"), null);
 });

@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { load } from "./source.mjs";
 
 const { margin, stateOf, worstState, STATE_WORDS, STATE_ICONS, VERDICT_TEXT } = await load("verdicts");
-const { formatNumber, formatTime, formatPercent, formatQuantity } = await load("format");
+const { formatFixed, formatNumber, formatTime, formatPercent, formatQuantity } = await load("format");
 
 test("numbers have three digits, a true minus, and the limit's decimals", () => {
   assert.equal(formatNumber(0.12345), "0.123");
@@ -13,6 +13,8 @@ test("numbers have three digits, a true minus, and the limit's decimals", () => 
   assert.equal(formatNumber(-0.0001, 1), "−1.00e−4");
   assert.equal(formatNumber(0.9, 100), "1");
   assert.equal(formatNumber(-0.004, 10), "0.0");
+  assert.equal(formatFixed(-0.004, 0), "0");
+  assert.equal(formatFixed(-12.5, 1), "−12.5");
   assert.equal(formatNumber(null), "–");
   assert.equal(formatQuantity(0.61, "m"), "0.610\u00a0m");
   assert.equal(formatPercent(-0.123), "−12\u00a0%");

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from seerob.commands import (
     OUT,
@@ -19,6 +21,12 @@ from seerob.commands import (
 )
 from seerob.commands.progress import announced, progress
 from seerob.commands.sinks import file_of, refuse_existing, sinks_of, tell_files
+from seerob.errors import InputError
+
+if TYPE_CHECKING:
+    from seerob.permissible.between_samples import Bound
+    from seerob.sink import Writer
+    from seerob.station import Station
 
 HELP = "evaluate a workstation as fast as possible; write recording, report and tables"
 EXAMPLE = "seerob assess my_cell"
@@ -28,6 +36,8 @@ def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     add_workstation(sub)
     add_output(sub)
+    text = "also bounds on distances and speeds that hold at every instant between the samples"
+    sub.add_argument("--between-samples", action="store_true", help=text)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -43,14 +53,47 @@ def run(options: argparse.Namespace) -> int:
     if not options.json:
         describe(station)
         tell(scene.findings)
+    bounds = _bounds(station) if options.between_samples else []
     with progress(station.duration, f"{station.duration:.1f} s of motion") as tick:
-        writers = announced(station.open_sinks(sinks, folder, scene), list(map(file_of, sinks)), tick.say)
+        opened = station.open_sinks(sinks, folder, scene)
+        if bounds:
+            add_section(opened, bounds)
+        writers = announced(opened, list(map(file_of, sinks)), tick.say)
         summary = station.run(writers=writers, scene=scene, progress=tick)
         moving, writing = tick.moving, tick.writing
     if options.json:
-        OUT.print(results_json(summary, folder=str(folder)), markup=False)
+        more = {"bounds": [bound.figures() for bound in bounds]} if options.between_samples else {}
+        OUT.print(results_json(summary, folder=str(folder), **more), markup=False)
         return exit_code(summary.verdict)
     line("ran", f"{summary.duration:.1f} s of motion in {moving:.1f} s, then wrote for {writing:.1f} s")
     tell_results(summary)
+    for bound in bounds:
+        line("bound", bound.sentence())
     tell_files(sinks, folder)
     return exit_code(summary.verdict)
+
+
+def _bounds(station: Station) -> list[Bound]:
+    """Bounds between samples.
+
+    Raises:
+        InputError: Somebody moves by anything but joint positions, or nobody moves.
+    """
+    from seerob.permissible.bounds import MOST, motions_of, wanted_bounds
+
+    motions = motions_of(station.sources)
+    if not motions:
+        what = "no source of joint positions" if motions is None or not station.sources else "nobody moves"
+        remedy = "give joint trajectories: between poses of a tool the motion is not known"
+        raise InputError.at("seerob assess", "--between-samples", what, remedy)
+    return wanted_bounds(station.model, motions, most=MOST)
+
+
+def add_section(writers: Sequence[Writer], bounds: Sequence[Bound]) -> None:
+    """Add the bounds to the report, if there is one."""
+    from seerob.permissible.summary import bounds_section
+    from seerob.sinks.dossier import DossierWriter
+
+    for writer in writers:
+        if isinstance(writer, DossierWriter):
+            writer.sections.append(bounds_section(bounds))

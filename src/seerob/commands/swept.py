@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterable
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from seerob.commands import Exit, add_workstation, compiled, describe, line, tell
 from seerob.commands.progress import progress
 from seerob.errors import InputError
 
 if TYPE_CHECKING:
-    from seerob.samples import Sample
-    from seerob.snapshot import Snapshot
     from seerob.station import Station
     from seerob.transforms import Array
 
@@ -104,33 +98,6 @@ def _subject(station: Station, name: str | None) -> str:
     return robots[0]
 
 
-class _Path:
-    """A writer that keeps the twin's joint positions."""
-
-    def __init__(self, start: float, end: float) -> None:
-        self.start, self.end = start - 1e-9, end + 1e-9
-        self.joints: list[dict[str, tuple[float, ...]]] = []
-        self.off: dict[str, float] = {}
-        """Largest distance of each twin from what was heard [rad or m]."""
-
-    def write(self, snapshot: Snapshot, samples: Iterable[Sample]) -> None:
-        if self.start <= snapshot.t <= self.end:
-            self.joints.append(snapshot.joints)
-            for name, error in snapshot.tracking.items():
-                self.off[name] = max(self.off.get(name, 0.0), error)
-
-    def close(self) -> None:
-        pass
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-
 def _motion(station: Station, start: float, end: float | None) -> dict[str, Array]:
     """Where the twin's joints were at every tick of a part of the run."""
     last = station.duration if end is None else end
@@ -138,7 +105,9 @@ def _motion(station: Station, start: float, end: float | None) -> dict[str, Arra
         raise InputError.at(
             "seerob swept", "--from", f"{start:g} s is after {last:g} s", "begin before the end"
         )
-    path = _Path(start, last)
+    from seerob.swept_areas import MotionRecord
+
+    path = MotionRecord(start, last)
     with progress(station.duration, f"{station.duration:.1f} s of motion") as tick:
         station.run(writers=[path], progress=tick, stop=lambda: False)
     if not path.joints:
@@ -153,4 +122,4 @@ def _motion(station: Station, start: float, end: float | None) -> dict[str, Arra
     for name in station.model.mechanisms:
         if name not in driven:
             line("note", f"{name}: no source drives it; it stands still", "dim")
-    return {name: np.array([joints[name] for joints in path.joints]) for name in path.joints[0]}
+    return path.motion()

@@ -6,10 +6,10 @@ import math
 from dataclasses import replace
 from typing import Annotated, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, structs
 
 from seerob.criterion import Criterion, Evaluate, judge
-from seerob.errors import InputError, Problem
+from seerob.errors import InputError, Problem, UnknownName
 from seerob.model import Model
 from seerob.provenance import given, limit
 from seerob.scoring import niosh as method
@@ -50,7 +50,9 @@ class LiftEnd(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Lift(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One lifting task."""
 
-    load: Kilograms
+    phase: str = ""
+    """Title of one of ``[[phases]]``: load and coupling are taken from it where they are not given here."""
+    load: Kilograms | None = None
     """Mass on average [kg]."""
     heaviest: Kilograms | None = None
     """Greatest mass [kg]; the average when not given. A lift on its own is judged by it."""
@@ -62,11 +64,17 @@ class Lift(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The load is held back or placed with care at the destination: both ends count."""
     per_minute: Annotated[float, Meta(ge=0)]
     """Lifts per minute, averaged over 15 min."""
-    coupling: method.Grip
+    coupling: method.Grip | None = None
     """How well the object can be held."""
 
+    def missing(self) -> tuple[str, ...]:
+        """What nobody entered."""
+        return tuple(name for name in ("load", "coupling") if getattr(self, name) is None)
+
     def task(self) -> method.Task:
-        """As the equation takes it."""
+        """As the equation takes it, of a lift of which nothing is missing."""
+        assert self.load is not None
+        assert self.coupling is not None
         ends = [
             method.End(H=e.horizontal, V=e.vertical, A=e.asymmetry) for e in (self.origin, self.destination)
         ]
@@ -108,15 +116,41 @@ class Niosh(Criterion, frozen=True, kw_only=True):
             InputError: The equation does not apply.
         """
         model.human(self.human)
-        self._refuse()
-        result = self._result()
+        lifts = self.entered(model)
+        self._refuse(lifts)
+        result = self._result(lifts)
 
         def evaluate(state: State) -> Result:
             return result
 
         return evaluate
 
-    def _refuse(self) -> None:
+    def entered(self, model: Model) -> tuple[Lift, ...]:
+        """The lifts with what they take from the phases that every rule shares.
+
+        Raises:
+            UnknownName: A lift names a phase that does not exist.
+        """
+        phases = {
+            phase.title: phase
+            for phase in reversed(model.workstation.phases)
+            if phase.title and phase.human in ("", self.human)
+        }
+        found = []
+        for lift in self.lifts:
+            if not lift.phase:
+                found.append(lift)
+                continue
+            if lift.phase not in phases:
+                raise UnknownName("phase", lift.phase, phases)
+            phase = phases[lift.phase]
+            grip = next((grip for grip in method.Grip if grip == phase.coupling), None)
+            load = phase.load if lift.load is None else lift.load
+            coupling = grip if lift.coupling is None else lift.coupling
+            found.append(structs.replace(lift, load=load, coupling=coupling))
+        return tuple(found)
+
+    def _refuse(self, lifts: tuple[Lift, ...]) -> None:
         problems = [
             Problem(
                 self.name,
@@ -126,18 +160,22 @@ class Niosh(Criterion, frozen=True, kw_only=True):
             )
             for what in self.exclusions
         ]
-        if not self.lifts:
+        if not lifts:
             problems.append(Problem(self.name, "lifts", "there is none", "describe at least one lift"))
-        for i, lift in enumerate(self.lifts):
-            if lift.heaviest is not None and lift.heaviest < lift.load:
+        for i, lift in enumerate(lifts):
+            if lift.heaviest is not None and lift.load is not None and lift.heaviest < lift.load:
                 what = f"{lift.heaviest:g} kg is less than the average of {lift.load:g} kg"
                 problems.append(Problem(self.name, f"lifts[{i}].heaviest", what, "give the greatest mass"))
         if problems:
             raise InputError(problems)
 
-    def _result(self) -> Result:
+    def _result(self, lifts: tuple[Lift, ...]) -> Result:
+        absent = [f"{what} of lift {i + 1}" for i, lift in enumerate(lifts) for what in lift.missing()]
+        if absent:
+            reason = f"not entered: {', '.join(absent)}"
+            return Result(name=self.name, limit=self.limit, verdict=Verdict.UNDECIDED, reason=reason)
         spell = method.duration(self.work, self.recovery)
-        tasks = [lift.task() for lift in self.lifts]
+        tasks = [lift.task() for lift in lifts]
         if len(tasks) == 1:
             # The composite index takes the greatest mass only from the second task on.
             tasks = [replace(tasks[0], average=tasks[0].heaviest)]
@@ -192,24 +230,24 @@ class Niosh(Criterion, frozen=True, kw_only=True):
                 source="DHHS (NIOSH) 94-110, revised 9/2021, public sources that agree (2+)",
             ),
         ]
-        for i, lift in enumerate(self.lifts):
-            task, of = lift.task(), f" of lift {i + 1}" if len(self.lifts) > 1 else ""
-            found += [given(f"load{of}", task.average, "kg"), given(f"heaviest{of}", task.heaviest, "kg")]
-            for name, end in (("origin", task.origin), ("destination", task.destination)):
+        for i, lift in enumerate(self.entered(model)):
+            of = f" of lift {i + 1}" if len(self.lifts) > 1 else ""
+            origin = f"phase {lift.phase!r}" if lift.phase else "workstation file"
+            heaviest = lift.load if lift.heaviest is None else lift.heaviest
+            for name, value, unit in (
+                ("load", lift.load, "kg"),
+                ("heaviest", heaviest, "kg"),
+                ("coupling", None if lift.coupling is None else lift.coupling.value, ""),
+            ):
+                known = Origin.MISSING if value is None else Origin.GIVEN
+                found.append(Input(name=name + of, value=value, unit=unit, origin=known, source=origin))
+            for name, end in (("origin", lift.origin), ("destination", lift.destination)):
                 found += [
-                    given(f"H at the {name}{of}", end.H, "m"),
-                    given(f"V at the {name}{of}", end.V, "m"),
-                    given(f"A at the {name}{of}", end.A, "rad"),
+                    given(f"H at the {name}{of}", end.horizontal, "m"),
+                    given(f"V at the {name}{of}", end.vertical, "m"),
+                    given(f"A at the {name}{of}", end.asymmetry, "rad"),
                 ]
-            found += [
-                given(f"lifts per minute{of}", task.frequency, "1/min"),
-                Input(
-                    name=f"coupling{of}",
-                    value=task.grip.value,
-                    origin=Origin.GIVEN,
-                    source="workstation file",
-                ),
-            ]
+            found.append(given(f"lifts per minute{of}", lift.per_minute, "1/min"))
         return Basis(
             formula="LI = L/RWL, RWL = 23 kg · HM · VM · DM · AM · FM · CM; CLI = STLI_1 + Σ FILI_n "
             "(1/FM_1..n - 1/FM_1..n-1)",

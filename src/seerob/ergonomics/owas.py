@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Literal, Self
 
 import numpy as np
-from msgspec import Meta
 
 from seerob import provenance
-from seerob.criterion import Criterion, Evaluate, judge, judge_interval
+from seerob.criterion import Evaluate, judge, judge_interval
 from seerob.ergonomic_posture import bind_posture
 from seerob.human.angles import Angles
 from seerob.human.skeleton import SIDES
 from seerob.model import Model
+from seerob.posture_rule import PostureRule
 from seerob.scoring import owas as method
 from seerob.scoring.basis import ACCURACY_NOTE, chosen, entered, posture_quality
-from seerob.scoring.phases import Kilograms, Phase, check_order, phase_at
+from seerob.scoring.measured import Accuracy
+from seerob.scoring.phases import Kilograms, Phase, TaskPhase, phase_at, shared_phases
 from seerob.scoring.published import published
+from seerob.scoring.score_rows import aspects, total_row
 from seerob.scoring.spans import Span
-from seerob.snapshot import Basis, Highlight, Input, Origin, Result, Verdict
+from seerob.snapshot import Basis, Highlight, Input, Level, Origin, Result, Row, RowState, Verdict
 from seerob.state import State
 
 NEUTRAL = {"back": 1, "arms": 1, "legs": 2, "load": 1}
@@ -28,6 +30,12 @@ BONES_OF = {
     "back": ("lumbar", "thorax"),
     "arms": tuple(f"{side}_upper_arm" for side in SIDES),
     "legs": tuple(f"{side}_{bone}" for side in SIDES for bone in ("thigh", "shank")),
+    "load": (),
+}
+ANGLES_OF = {
+    "back": ("trunk_flexion", "trunk_twist", "trunk_side_bend"),
+    "arms": ("arm_rise",),
+    "legs": ("knee_flexion", "foot_rise", "shank_tilt"),
     "load": (),
 }
 
@@ -40,49 +48,58 @@ class OwasPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
     legs: method.Legs | None = None
     """How the legs are used; ``posture`` estimates it for somebody who stands or kneels."""
 
+    @classmethod
+    def from_task(cls, task: TaskPhase) -> Self:
+        """See `Phase.from_task`."""
+        return cls(
+            title=task.title,
+            start=task.start,
+            end=task.end,
+            cycle=task.cycle,
+            load=task.load,
+            legs=next((code for code in method.Legs if code == task.legs), None),
+        )
 
-class Owas(Criterion, frozen=True, kw_only=True):
+
+class Owas(PostureRule, frozen=True, kw_only=True):
     """OWAS action category of a person's posture."""
 
-    human: str
-    """Who is judged."""
     action_category: Literal[1, 2, 3, 4] | None = None
     """Highest admissible action category."""
     phases: tuple[OwasPhase, ...] = ()
-    """Phases of the task, each from its `start` on."""
+    """Phases of the task, each from its `start` on; without any, those of ``[[phases]]``."""
     thresholds: method.OwasThresholds = method.OwasThresholds()
     """Where a posture counts as bent, twisted and so on."""
-    accuracy: Annotated[float, Meta(ge=0, lt=np.pi / 2, extra={"unit": "rad"})] | None = None
-    """How far each angle of the posture may be off [rad]; the verdict then is of the whole interval."""
-    unmeasured: tuple[str, ...] = ()
-    """Bones that the source does not measure, such as ``"right_shank"``: what needs them is not assessed."""
-
-    def __post_init__(self) -> None:
-        check_order(self.phases)
 
     @property
     def limit(self) -> int | None:
         """Greatest admissible action category."""
         return self.action_category
 
-    def subjects(self) -> tuple[str, ...]:
-        """The person."""
-        return (self.human,)
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """Action categories, the lowest first."""
+        return tuple(Level(up_to=k, name=f"action category {k}") for k in range(1, 5))
+
+    def entered(self, model: Model) -> tuple[OwasPhase, ...]:
+        """Phases of the rule, or else those that every rule shares."""
+        return shared_phases(model, self.human, self.phases, OwasPhase.from_task)
 
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         read = bind_posture(model, self.human, self.unmeasured)
+        phases, unknown, error = self.entered(model), OwasPhase(), self.error()
 
         def evaluate(state: State) -> Result:
             angles = read(state)
-            phase = phase_at(self.phases, state.t, OwasPhase())
+            phase = phase_at(phases, state.t, unknown)
             measured = self.codes(angles, phase)
-            spread = None if self.accuracy is None else self.codes(angles, phase, self.accuracy)
-            return self._result(measured, spread)
+            spread = None if error is None else self.codes(angles, phase, error)
+            return self._result(angles, measured, spread)
 
         return evaluate
 
-    def codes(self, angles: Angles, phase: OwasPhase, accuracy: float = 0.0) -> dict[str, method.Possible]:
+    def codes(self, angles: Angles, phase: OwasPhase, accuracy: Accuracy = 0.0) -> dict[str, method.Possible]:
         """Possible codes of postures in a phase, each of shape (..., number of codes)."""
         if phase.legs is None:
             legs = np.ones(7, bool)
@@ -98,7 +115,10 @@ class Owas(Criterion, frozen=True, kw_only=True):
         }
 
     def _result(
-        self, measured: Mapping[str, method.Possible], spread: Mapping[str, method.Possible] | None
+        self,
+        angles: Angles,
+        measured: Mapping[str, method.Possible],
+        spread: Mapping[str, method.Possible] | None,
     ) -> Result:
         span = method.category_span(**measured)
         reach = span if spread is None else method.category_span(**spread)
@@ -133,6 +153,44 @@ class Owas(Criterion, frozen=True, kw_only=True):
                 for key in drivers
                 for bone in BONES_OF[key]
             ),
+            rows=(
+                total_row(
+                    "",
+                    (int(span.low), int(span.high)),
+                    None if spread is None else (low, high),
+                    (1, 4),
+                    self.limit,
+                    verdict,
+                ),
+                *(
+                    self._row(key, angles, measured[key], None if spread is None else spread[key])
+                    for key in measured
+                ),
+            ),
+        )
+
+    def _row(
+        self, key: str, angles: Angles, measured: method.Possible, spread: method.Possible | None
+    ) -> Row:
+        part, t = _part(key, measured, spread), self.thresholds
+        edges = {
+            "trunk_flexion": (-t.bent, t.bent),
+            "trunk_twist": (-t.twisted, t.twisted),
+            "trunk_side_bend": (-t.side_bent, t.side_bent),
+            "arm_rise": (0.0,),
+            "knee_flexion": (t.knee_bent,),
+            "foot_rise": (t.foot_rise,),
+            "shank_tilt": (t.kneeling,),
+        }
+        return Row(
+            name=key,
+            state=RowState.NOT_ASSESSED if part.value is None else RowState.JUDGED,
+            value=part.value,
+            scale=(1.0, float(method.CODES[key])),
+            interval=part.interval,
+            reason=part.reason,
+            bones=tuple(f"{self.human}/{bone}" for bone in BONES_OF[key]),
+            aspects=aspects(angles, ANGLES_OF[key], None, edges),
         )
 
     def _drivers(self, measured: Mapping[str, method.Possible], span: Span) -> list[str]:
@@ -153,9 +211,9 @@ class Owas(Criterion, frozen=True, kw_only=True):
             "public sources that agree (2+), backs 1 and 2 from one and from memory (1 + M)",
             inputs=(
                 *provenance.motion(model, self.human),
-                *entered(self.phases, OwasPhase()),
+                *entered(self.entered(model), OwasPhase()),
                 *chosen(self.thresholds, method.OwasThresholds()),
-                *posture_quality(self.accuracy, self.unmeasured),
+                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
                 Input(
                     name="arm at or above shoulder level",
                     value="elbow or wrist at the height of the shoulder's joint or above",
@@ -166,7 +224,7 @@ class Owas(Criterion, frozen=True, kw_only=True):
             ),
             not_modelled=(
                 "shares of time: the category is of one posture",
-                *((ACCURACY_NOTE,) if self.accuracy is not None else ()),
+                *((ACCURACY_NOTE,) if self.error() is not None else ()),
             ),
         )
 

@@ -3,27 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
-
-import numpy as np
-from msgspec import Meta
+from typing import ClassVar, Literal, Self
 
 from seerob import provenance
-from seerob.criterion import Criterion, Evaluate
-from seerob.ergonomic_posture import bind_posture
 from seerob.human.angles import Angles
 from seerob.model import Model
+from seerob.posture_rule import ScoredPosture
 from seerob.scoring import reba as method
-from seerob.scoring.basis import ACCURACY_NOTE, PROJECTION_NOTE, choices, entered
-from seerob.scoring.judgement import Method, judged
-from seerob.scoring.phases import Kilograms, Phase, Sides, check_order, on_sides, phase_at
+from seerob.scoring.bands import reba_edges
+from seerob.scoring.basis import (
+    ACCURACY_NOTE,
+    PROJECTION_NOTE,
+    choices,
+    entered,
+    posture_quality,
+    watched,
+)
+from seerob.scoring.held_work import Watch, activity
+from seerob.scoring.judgement import Method
+from seerob.scoring.measured import Accuracy, Measured
+from seerob.scoring.phases import Kilograms, Phase, Sides, Stance, TaskPhase, on_sides
 from seerob.scoring.published import Ints, published
 from seerob.scoring.rula import one_foot_up
-from seerob.scoring.shoulder import ArmPolicy
 from seerob.scoring.spans import Span, answer, between, exactly
-from seerob.scoring.thresholds import Thresholds
-from seerob.snapshot import Basis, Result
-from seerob.state import State
+from seerob.snapshot import Basis
+
+Bearing = Literal["bilateral", "walking", "unilateral", "sitting", "posture"]
+_STANCES: Mapping[Stance | None, Bearing] = {
+    "sitting": "sitting",
+    "standing": "bilateral",
+    "both_knees_bent": "bilateral",
+    "walking": "walking",
+    "one_leg": "unilateral",
+    "one_knee_bent": "unilateral",
+    "posture": "posture",
+}
+"""How the legs are used → how the weight is borne; kneeling, lying and climbing have no row in REBA."""
 
 
 class RebaPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -37,14 +52,32 @@ class RebaPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How well the load can be held; not needed for a load of 0."""
     supported_arms: Sides | None = None
     """Arms that are supported, helped by gravity, or on which the person leans."""
-    legs: Literal["bilateral", "unilateral", "sitting", "posture"] | None = None
-    """Weight on both legs (or walking), on one or unstable, sitting; ``posture``: standing, from the feet."""
+    legs: Bearing | None = None
+    """Weight on both legs, walking, on one or unstable, sitting; ``posture``: standing, from the feet."""
     static: bool | None = None
     """One or more parts of the body held longer than 1 min."""
     repeated: bool | None = None
     """Small movements repeated more than 4 times per minute, walking apart."""
     rapid: bool | None = None
     """Rapid large changes of posture, or an unstable base."""
+
+    @classmethod
+    def from_task(cls, task: TaskPhase) -> Self:
+        """See `Phase.from_task`."""
+        return cls(
+            title=task.title,
+            start=task.start,
+            end=task.end,
+            cycle=task.cycle,
+            load=task.load,
+            shock=None if task.load_use is None else task.load_use == "shock",
+            coupling=None if task.coupling is None else method.Coupling(task.coupling),
+            supported_arms=task.supported_arms,
+            legs=_STANCES.get(task.legs),
+            static=task.static,
+            repeated=task.repeated,
+            rapid=task.rapid,
+        )
 
 
 def _final(scores: Mapping[str, Ints]) -> Ints:
@@ -53,75 +86,51 @@ def _final(scores: Mapping[str, Ints]) -> Ints:
 
 _TABLE = published("reba")
 METHOD = Method(
-    grand=_final, least=method.LEAST, levels=_TABLE["levels"], actions=_TABLE["actions"], first_level=0
+    grand=_final,
+    least=method.LEAST,
+    most=method.MOST,
+    edges=reba_edges,
+    levels=_TABLE["levels"],
+    actions=_TABLE["actions"],
+    first_level=0,
 )
+STATIC = 60.0
+"""How long a part of the body is held to be static [s]."""
+REPEATED = 5
+"""Movements per minute from which on work is repeated: more than 4."""
+_BEARING: Mapping[str | None, Span] = {
+    "bilateral": exactly(1),
+    "walking": exactly(1),
+    "sitting": exactly(1),
+    "unilateral": exactly(2),
+    None: between(1, 2),
+}
 
 
-class Reba(Criterion, frozen=True, kw_only=True):
+class Reba(ScoredPosture, frozen=True, kw_only=True):
     """REBA score of a person, the worse of both sides."""
 
-    human: str
-    """Who is judged."""
+    METHOD: ClassVar[Method] = METHOD
+    PHASE: ClassVar[type[RebaPhase]] = RebaPhase
+
     action_level: Literal[0, 1, 2, 3, 4] | None = None
     """Highest admissible action level; the limit is its highest score: 1, 3, 7, 10, 15."""
     phases: tuple[RebaPhase, ...] = ()
-    """Phases of the task, each from its `start` on."""
-    thresholds: Thresholds = Thresholds()
-    """Where a posture counts as twisted, raised, upright and so on."""
-    arm: ArmPolicy = ArmPolicy.PROJECTION
-    """Which angle stands for the flexion of an upper arm."""
-    accuracy: Annotated[float, Meta(ge=0, lt=np.pi / 2, extra={"unit": "rad"})] | None = None
-    """How far each angle of the posture may be off [rad]; the verdict then is of the whole interval."""
-    unmeasured: tuple[str, ...] = ()
-    """Bones that the source does not measure, such as ``"right_hand"``: what needs them is not assessed."""
+    """Phases of the task, each from its `start` on; without any, those of ``[[phases]]``."""
 
-    def __post_init__(self) -> None:
-        check_order(self.phases)
+    def watch(self) -> Watch | None:
+        """See `ScoredPosture.watch`."""
+        return None if self.detect is None else Watch(self.detect, hold=STATIC, count=REPEATED)
 
-    @property
-    def limit(self) -> int | None:
-        """Greatest admissible score."""
-        return None if self.action_level is None else METHOD.levels[self.action_level]
-
-    def subjects(self) -> tuple[str, ...]:
-        """The person."""
-        return (self.human,)
-
-    def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
-        read = bind_posture(model, self.human, self.unmeasured)
-
-        def evaluate(state: State) -> Result:
-            angles = read(state)
-            phase = phase_at(self.phases, state.t, RebaPhase())
-            return judged(
-                METHOD,
-                name=self.name,
-                human=self.human,
-                limit=self.limit,
-                angles=angles,
-                components=self.components(angles, phase),
-                spread=None if self.accuracy is None else self.components(angles, phase, self.accuracy),
-            )
-
-        return evaluate
-
-    def components(self, angles: Angles, phase: RebaPhase, accuracy: float = 0.0) -> dict[str, Span]:
-        """Component scores of postures in a phase, in the order of `method.LEAST`.
-
-        Args:
-            angles: Of the postures.
-            phase: What was entered.
-            accuracy: Of each angle [rad].
-
-        Returns:
-            Shapes (..., 2) of sided components and (...) of central ones.
-        """
-        legs = {"bilateral": exactly(1), "sitting": exactly(1), "unilateral": exactly(2), None: between(1, 2)}
+    def components(
+        self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: Watch | None = None
+    ) -> dict[str, Span]:
+        """See `ScoredPosture.components`."""
+        assert isinstance(phase, RebaPhase)
         bearing = (
-            exactly(1) + one_foot_up(angles, self.thresholds, accuracy)
+            exactly(1) + one_foot_up(Measured(angles, accuracy), self.thresholds)
             if phase.legs == "posture"
-            else legs[phase.legs]
+            else _BEARING[phase.legs]
         )
         found = method.posture_components(
             angles,
@@ -134,11 +143,16 @@ class Reba(Criterion, frozen=True, kw_only=True):
         )
         empty = phase.load == 0
         grip = method.Coupling.GOOD if empty and phase.coupling is None else phase.coupling
+        static, repeated = answer(phase.static), answer(phase.repeated)
+        if watch is not None:
+            seen = activity(watch, walking=phase.legs == "walking")
+            static = seen[0] if phase.static is None else static
+            repeated = seen[1] if phase.repeated is None else repeated
         return {
             **found,
             "load": method.load(phase.load, False if empty and phase.shock is None else phase.shock),
             "coupling": method.coupling(grip),
-            "activity": answer(phase.static) + answer(phase.repeated) + answer(phase.rapid),
+            "activity": static + repeated + answer(phase.rapid),
         }
 
     def basis(self, model: Model) -> Basis:
@@ -149,14 +163,18 @@ class Reba(Criterion, frozen=True, kw_only=True):
             "agree (2+)",
             inputs=(
                 *provenance.motion(model, self.human),
-                *entered(self.phases, RebaPhase()),
-                *choices(self.thresholds, self.arm, self.accuracy, self.unmeasured),
+                *entered(self.entered(model), RebaPhase()),
+                *watched(self.detect, STATIC, REPEATED),
+                *choices(self.thresholds, self.arm),
+                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
                 *(() if self.limit is None else provenance.limit(self.limit, "")),
             ),
             not_modelled=(
-                "static, repeated and rapid activity are entered, not detected",
+                "static, repeated and rapid activity are entered, not detected"
+                if self.detect is None
+                else "rapid large changes of posture are entered, not detected",
                 "the coupling of both hands is the same",
                 PROJECTION_NOTE,
-                *((ACCURACY_NOTE,) if self.accuracy is not None else ()),
+                *((ACCURACY_NOTE,) if self.error() is not None else ()),
             ),
         )

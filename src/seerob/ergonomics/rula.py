@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
-
-import numpy as np
-from msgspec import Meta
+from typing import ClassVar, Literal, Self
 
 from seerob import provenance
-from seerob.criterion import Criterion, Evaluate
-from seerob.ergonomic_posture import bind_posture
 from seerob.human.angles import Angles
 from seerob.model import Model
+from seerob.posture_rule import ScoredPosture
 from seerob.scoring import rula as method
-from seerob.scoring.basis import ACCURACY_NOTE, PROJECTION_NOTE, choices, entered
-from seerob.scoring.judgement import Method, judged
-from seerob.scoring.phases import Kilograms, Phase, Sides, check_order, on_sides, phase_at
+from seerob.scoring.bands import rula_edges
+from seerob.scoring.basis import (
+    ACCURACY_NOTE,
+    PROJECTION_NOTE,
+    choices,
+    entered,
+    posture_quality,
+    watched,
+)
+from seerob.scoring.held_work import Watch, muscle_use
+from seerob.scoring.judgement import Method
+from seerob.scoring.measured import Accuracy
+from seerob.scoring.phases import Kilograms, Phase, Sides, TaskPhase, on_sides
 from seerob.scoring.published import Ints, published
-from seerob.scoring.shoulder import ArmPolicy
 from seerob.scoring.spans import Span, answer, between, exactly
-from seerob.scoring.thresholds import Thresholds
-from seerob.snapshot import Basis, Input, Origin, Result
-from seerob.state import State
+from seerob.snapshot import Basis, Input, Origin
 
 
 class RulaPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -45,6 +48,32 @@ class RulaPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
     legs: Literal["balanced", "unbalanced", "posture"] | None = None
     """Legs and feet well supported and evenly loaded, or not; ``posture`` estimates it."""
 
+    @classmethod
+    def from_task(cls, task: TaskPhase) -> Self:
+        """See `Phase.from_task`."""
+        legs: Literal["balanced", "unbalanced", "posture"] | None = None
+        if task.balanced is not None:
+            legs = "balanced" if task.balanced else "unbalanced"
+        elif task.legs in ("one_leg", "one_knee_bent"):
+            legs = "unbalanced"
+        elif task.legs == "posture":
+            legs = "posture"
+        return cls(
+            title=task.title,
+            start=task.start,
+            end=task.end,
+            cycle=task.cycle,
+            load=task.load,
+            load_use=None if task.load_use is None else method.LoadUse(task.load_use),
+            hand=task.hand,
+            muscle_arms=task.muscle_arms,
+            muscle_body=task.muscle_body,
+            supported_arms=task.supported_arms,
+            # RULA's row is of somebody who sits; a trunk that leans while standing has none.
+            back_supported=task.back_supported if task.legs in ("sitting", None) else False,
+            legs=legs,
+        )
+
 
 def _grand(scores: Mapping[str, Ints]) -> Ints:
     return method.rula(*(scores[key] for key in method.LEAST)).grand
@@ -52,90 +81,68 @@ def _grand(scores: Mapping[str, Ints]) -> Ints:
 
 _TABLE = published("rula")
 METHOD = Method(
-    grand=_grand, least=method.LEAST, levels=_TABLE["levels"], actions=_TABLE["actions"], first_level=1
+    grand=_grand,
+    least=method.LEAST,
+    most=method.MOST,
+    edges=rula_edges,
+    levels=_TABLE["levels"],
+    actions=_TABLE["actions"],
+    first_level=1,
 )
+REPEATED = 4
+"""Movements per minute from which on work is repeated; the paper says more than 4, the worksheets 4."""
+_LEGS: Mapping[str | None, Span | None] = {
+    "balanced": exactly(1),
+    "unbalanced": exactly(2),
+    "posture": None,
+    None: between(1, 2),
+}
 
 
-class Rula(Criterion, frozen=True, kw_only=True):
+class Rula(ScoredPosture, frozen=True, kw_only=True):
     """RULA grand score of a person, the worse of both sides."""
 
-    human: str
-    """Who is judged."""
+    METHOD: ClassVar[Method] = METHOD
+    PHASE: ClassVar[type[RulaPhase]] = RulaPhase
+
     profile: method.Profile = method.Profile.ORIGINAL_1993
     """Publication that decides where they differ: the force score above 10 kg, and how long is static."""
     action_level: Literal[1, 2, 3, 4] | None = None
     """Highest admissible action level; the limit is its highest score: 2, 4, 6, 7."""
     phases: tuple[RulaPhase, ...] = ()
-    """Phases of the task, each from its `start` on."""
-    thresholds: Thresholds = Thresholds()
-    """Where a posture counts as twisted, raised, upright and so on."""
-    arm: ArmPolicy = ArmPolicy.PROJECTION
-    """Which angle stands for the flexion of an upper arm."""
-    accuracy: Annotated[float, Meta(ge=0, lt=np.pi / 2, extra={"unit": "rad"})] | None = None
-    """How far each angle of the posture may be off [rad]; the verdict then is of the whole interval."""
-    unmeasured: tuple[str, ...] = ()
-    """Bones that the source does not measure, such as ``"right_hand"``: what needs them is not assessed."""
+    """Phases of the task, each from its `start` on; without any, those of ``[[phases]]``."""
 
-    def __post_init__(self) -> None:
-        check_order(self.phases)
+    def watch(self) -> Watch | None:
+        """See `ScoredPosture.watch`."""
+        return None if self.detect is None else Watch(self.detect, hold=self.profile.static, count=REPEATED)
 
-    @property
-    def limit(self) -> int | None:
-        """Greatest admissible grand score."""
-        return None if self.action_level is None else METHOD.levels[self.action_level - 1]
-
-    def subjects(self) -> tuple[str, ...]:
-        """The person."""
-        return (self.human,)
-
-    def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
-        read = bind_posture(model, self.human, self.unmeasured)
-
-        def evaluate(state: State) -> Result:
-            angles = read(state)
-            phase = phase_at(self.phases, state.t, RulaPhase())
-            return judged(
-                METHOD,
-                name=self.name,
-                human=self.human,
-                limit=self.limit,
-                angles=angles,
-                components=self.components(angles, phase),
-                spread=None if self.accuracy is None else self.components(angles, phase, self.accuracy),
-            )
-
-        return evaluate
-
-    def components(self, angles: Angles, phase: RulaPhase, accuracy: float = 0.0) -> dict[str, Span]:
-        """Component scores of postures in a phase, in the order of `method.LEAST`.
-
-        Args:
-            angles: Of the postures.
-            phase: What was entered.
-            accuracy: Of each angle [rad].
-
-        Returns:
-            Shapes (..., 2) of sided components and (...) of central ones.
-        """
-        legs = {"balanced": exactly(1), "unbalanced": exactly(2), "posture": None, None: between(1, 2)}
+    def components(
+        self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: Watch | None = None
+    ) -> dict[str, Span]:
+        """See `ScoredPosture.components`."""
+        assert isinstance(phase, RulaPhase)
         found = method.posture_components(
             angles,
             thresholds=self.thresholds,
             supported=on_sides(phase.supported_arms),
             back_supported=phase.back_supported,
-            legs=legs[phase.legs],
+            legs=_LEGS[phase.legs],
             accuracy=accuracy,
             policy=self.arm,
         )
         use = method.LoadUse.INTERMITTENT if phase.load == 0 and phase.load_use is None else phase.load_use
         force = method.force(phase.load, use, self.profile)
         carries = on_sides(phase.hand)
+        arms, body = answer(phase.muscle_arms), answer(phase.muscle_body)
+        if watch is not None:
+            seen = muscle_use(watch)
+            arms = seen[0] if phase.muscle_arms is None else arms
+            body = seen[1] if phase.muscle_body is None else body
         return {
             **found,
-            "muscle use of the arms": answer(phase.muscle_arms),
+            "muscle use of the arms": arms,
             "force of the arms": Span(force.low * carries.low, force.high * carries.high),
-            "muscle use of the body": answer(phase.muscle_body),
+            "muscle use of the body": body,
             "force of the body": force,
         }
 
@@ -154,17 +161,25 @@ class Rula(Criterion, frozen=True, kw_only=True):
                     origin=Origin.CHOICE if usual else Origin.GIVEN,
                     source="option profile, original1993 when not given",
                 ),
-                *entered(self.phases, RulaPhase()),
-                *choices(self.thresholds, self.arm, self.accuracy, self.unmeasured),
+                *entered(self.entered(model), RulaPhase()),
+                *watched(self.detect, self.profile.static, REPEATED),
+                *choices(self.thresholds, self.arm),
+                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
                 *(() if self.limit is None else provenance.limit(self.limit, "")),
             ),
             not_modelled=(
                 "fingers, vibration, duration of the task: RULA does not ask",
-                "static and repeated postures are entered, not detected "
-                f"(static in this profile: longer than {self.profile.static:g} s)",
+                *(
+                    (
+                        "static and repeated postures are entered, not detected "
+                        f"(static in this profile: longer than {self.profile.static:g} s)",
+                    )
+                    if self.detect is None
+                    else ()
+                ),
                 "less than 2 kg, static or repeated, has no row in the method and counts as force 0",
                 "an extended trunk has no row in the method and counts as 2",
                 PROJECTION_NOTE,
-                *((ACCURACY_NOTE,) if self.accuracy is not None else ()),
+                *((ACCURACY_NOTE,) if self.error() is not None else ()),
             ),
         )

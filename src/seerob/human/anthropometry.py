@@ -9,6 +9,7 @@ with their sources are ``data/*.toml``. What has no published source is a choice
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -16,6 +17,7 @@ import numpy as np
 
 from seerob.errors import InputError, Problem, UnknownName
 from seerob.human import zatsiorsky
+from seerob.human.by_hand import with_lengths, with_masses
 from seerob.human.skeleton import SIDES
 from seerob.human.tables import table
 from seerob.snapshot import Finding
@@ -92,6 +94,8 @@ class Body:
     share: dict[str, float]
     """Bone → share of the body mass; they sum to 1."""
     findings: tuple[Finding, ...]
+    by_hand: bool = False
+    """Whether lengths or masses were given beside the tables."""
 
     def bone_mass(self, bone: str) -> float:
         """Mass of a bone with its flesh [kg]."""
@@ -99,9 +103,20 @@ class Body:
 
 
 def body(
-    *, name: str, stature: float, mass: float, sex: str, lengths: str = "drillis", masses: str = "deleva"
+    *,
+    name: str,
+    stature: float,
+    mass: float,
+    sex: str,
+    lengths: str = "drillis",
+    masses: str = "deleva",
+    own_lengths: Mapping[str, float] | None = None,
+    own_masses: Mapping[str, float] | None = None,
 ) -> Body:
     """The body of a person of that stature [m], body mass [kg] and sex.
+
+    ``own_lengths`` [m] (`seerob.human.by_hand.LENGTHS`) and ``own_masses`` [kg], by bone, replace the
+    tables'; the other lengths and masses make up for it, so that stature and body mass stay.
 
     Raises:
         InputError: A value is not a plausible adult's, or not one of the choices; all are named.
@@ -109,16 +124,38 @@ def body(
     _check(name, stature, mass, {"sex": sex, "lengths": lengths, "masses": masses})
     chosen, kind, by = Sex(sex), Lengths(lengths), Masses(masses)
     length, findings = _lengths(name, stature, chosen, kind)
+    if own_lengths:
+        length = with_lengths(length, own_lengths, stature=stature, name=name)
+        shown = ", ".join(f"{key} {value * 1e3:.0f} mm" for key, value in own_lengths.items())
+        text = f"given by hand: {shown}; the other lengths up to the vertex make up for it"
+        findings.append(Finding(level="note", subject=name, text=text))
     index = mass / stature**2
     low, high = BODY_MASS_INDEX_RANGE
     if not low <= index <= high:
         text = f"body mass index {index:.1f} kg/m² is outside {low:g}…{high:g}: the tables fit badly"
         findings.append(Finding(level="warning", subject=name, text=text))
     share = _shares(chosen, by, mass, stature)
+    if own_masses:
+        share = with_masses(share, own_masses, mass=mass, name=name)
+        shown = ", ".join(f"{key} {value:g} kg" for key, value in own_masses.items())
+        text = f"given by hand: {shown}; the other bones make up for it"
+        findings.append(Finding(level="note", subject=name, text=text))
     if min(share.values()) <= 0:
         raise unfit(name, mass, stature)
     offset = _offsets(length)
-    return Body(name, stature, mass, chosen, kind, by, length, offset, share, tuple(findings))
+    return Body(
+        name,
+        stature,
+        mass,
+        chosen,
+        kind,
+        by,
+        length,
+        offset,
+        share,
+        tuple(findings),
+        bool(own_lengths or own_masses),
+    )
 
 
 def unfit(name: str, mass: float, stature: float) -> InputError:

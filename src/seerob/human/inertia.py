@@ -11,6 +11,7 @@ masses and moments, the centres stay de Leva's.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,6 +29,9 @@ SOURCES = {
 }
 SPLIT = "; split (share and shape are a choice): uniform body of the bone's length"
 REMAINDER = "; less what was split off"
+MENDED = "; largest moment lowered to that of a possible body"
+ALMOST = 0.98
+"""Of the sum of the two smaller moments, which the largest of a body cannot exceed."""
 SEGMENTS = {"pelvis": "lower_trunk", "lumbar": "middle_trunk", "thorax": "upper_trunk"}
 """Bone → the tables' name where it is another."""
 CLAVICLE_RADIUS = 0.2
@@ -63,6 +67,8 @@ def inertials(body: Body) -> dict[str, Inertial]:
             shift = -body.offset["head"] if piece == "neck" else body.offset[piece]
             taken.append((result[piece].mass, result[piece].com + shift, result[piece].inertia))
         result[bone] = remainder(result[bone], taken)
+    if body.by_hand:
+        result = {bone: each if _possible(each) else _mended(each) for bone, each in result.items()}
     if not all(map(_possible, result.values())):
         raise unfit(body.name, body.mass, body.stature)
     return result
@@ -72,6 +78,13 @@ def _possible(inertial: Inertial) -> bool:
     """Whether any distribution of mass has these moments."""
     smallest, middle, largest = np.linalg.eigvalsh(inertial.inertia)
     return bool(inertial.mass > 0 and smallest > 0 and smallest + middle > largest)
+
+
+def _mended(inertial: Inertial) -> Inertial:
+    """With the largest moment as small as the others allow: proportions by hand are not the tables'."""
+    values, axes = np.linalg.eigh(inertial.inertia)
+    values[2] = min(values[2], ALMOST * (values[0] + values[1]))
+    return replace(inertial, inertia=axes @ np.diag(values) @ axes.T, source=inertial.source + MENDED)
 
 
 _PIECES = ("neck", "clavicle", "toes")

@@ -8,12 +8,13 @@ frames, axes and signs, `seerob.human.posture` named postures.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from seerob.errors import InputError
 from seerob.human.anthropometry import Body, Masses, Sex, body
-from seerob.human.inertia import inertials
+from seerob.human.inertia import MENDED, inertials
 from seerob.human.skeleton import AXES, BONES, PARENTS, ROOT, ROOT_FROM_ISB, SIDES, Axis
 from seerob.human.skin import skin
 from seerob.human.tables import table
@@ -21,6 +22,22 @@ from seerob.model_io.description import Description, Joint, JointKind, Link, Qua
 from seerob.snapshot import Finding, Origin
 from seerob.transforms import transform
 
+DAMPING = {
+    "lumbar": 2.0,
+    "thorax": 2.0,
+    "neck": 0.5,
+    "head": 0.3,
+    "clavicle": 1.0,
+    "shoulder": 1.0,
+    "elbow": 0.5,
+    "wrist": 0.1,
+    "hip": 2.0,
+    "knee": 1.0,
+    "ankle": 0.5,
+    "toes": 0.05,
+}
+"""Passive damping of the joints [N·m·s/rad]: a choice, of the order of what flesh has. It keeps a limb whose
+torque limit is reached from spinning, and the controllers make up for it in what is heard."""
 GRAVITY = 9.81
 """As in Anderson et al. 2007 [m/s²]."""
 
@@ -34,6 +51,8 @@ def build(
     lengths: str = "drillis",
     masses: str = "deleva",
     hand: str = "right",
+    own_lengths: Mapping[str, float] | None = None,
+    own_masses: Mapping[str, float] | None = None,
 ) -> Description:
     """A standing person: 21 bones, 47 joint axes and six of the waist.
 
@@ -44,6 +63,8 @@ def build(
         sex: ``male`` or ``female``: which published table of segments.
         lengths: ``drillis`` (fractions of the stature) or ``deleva`` (distances of joint centres).
         masses: ``deleva`` or, for men, ``zatsiorsky``: segments' masses and moments of inertia.
+        own_lengths: Lengths by hand [m], names of `seerob.human.by_hand.LENGTHS`.
+        own_masses: Masses by hand [kg], by bone, or without side for both.
         hand: Dominant side, ``right`` or ``left``; its hand is the description's tip.
 
     Returns:
@@ -55,7 +76,16 @@ def build(
     """
     if hand not in SIDES:
         raise InputError.at(name, "hand", f"{hand!r} is not a side", "give right or left")
-    person = body(name=name, stature=stature, mass=mass, sex=sex, lengths=lengths, masses=masses)
+    person = body(
+        name=name,
+        stature=stature,
+        mass=mass,
+        sex=sex,
+        lengths=lengths,
+        masses=masses,
+        own_lengths=own_lengths,
+        own_masses=own_masses,
+    )
     solids = skin(person)
     mass_properties = inertials(person)
     links = [Link(ROOT, None, np.eye(4))]
@@ -73,17 +103,28 @@ def build(
                 solids=solids[bone],
             )
         )
+    mended = [bone for bone, each in mass_properties.items() if each.source.endswith(MENDED)]
+    findings = _findings(name, person)
+    if mended:
+        text = f"moments of inertia of {', '.join(mended)} were lowered to those of a possible body"
+        findings = (*findings, Finding(level="assumed", subject=name, text=text))
     source = (
         f"digital human: {sex}, {stature:g} m, {mass:g} kg, {hand}-handed; "
         f"lengths {person.lengths}, masses {person.masses}"
     )
-    return Description(name, tuple(links), f"{hand}_hand", source, findings=_findings(name, person))
+    return Description(name, tuple(links), f"{hand}_hand", source, findings=findings)
 
 
 def _joint(axis: Axis, person: Body) -> Joint:
     lower, upper = _range(axis)
     return Joint(
-        axis.name, axis.kind, np.array(axis.axis), lower=lower, upper=upper, effort=_effort(axis, person)
+        axis.name,
+        axis.kind,
+        np.array(axis.axis),
+        lower=lower,
+        upper=upper,
+        effort=_effort(axis, person),
+        damping=0.0 if axis.group == "pelvis" else DAMPING[axis.group],
     )
 
 

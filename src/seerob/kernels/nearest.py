@@ -10,8 +10,9 @@ Pairs are skipped by lower bounds: of the previous tick's bound less the largest
 either solid since (a displacement is a convex function of the point, so the corners of a box bound
 all it contains, and :math:`\varphi` of closed cores is 1-Lipschitz), of bounding spheres, of root boxes.
 The inside test is never skipped except where a positive bound of closed cores proves the answer.
-Bounds carry a margin of `MARGIN`, and ties go to the lower pair: the answer is a function of the
-poses alone, bit for bit, whatever was asked before.
+Bounds carry a margin of `MARGIN`, and ties go to the earlier pair of a group: the answer is a function of
+the poses alone, bit for bit, whatever was asked before or is asked beside it. What one group has found
+of a pair holds for every group that it is in.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ Indices = NDArray[np.int64]
 
 MARGIN = 1e-9
 """What bounds give away against rounding [m]."""
-EXACT, DEPTH_AT_LEAST, BEYOND_CAP = 0, 1, 2
+EXACT, DEPTH_AT_LEAST, BEYOND_CAP, WITHIN_CAP = 0, 1, 2, 3
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -50,9 +51,11 @@ def nearest(
     pair: Indices,
     start: Indices,
     members: Indices,
-    cap: float,
+    cap: Array,
+    whether: NDArray[np.bool_],
     at: Array,
     low: Array,
+    high: Array,
     first: Indices,
     last: Indices,
     distance: Array,
@@ -75,17 +78,19 @@ def nearest(
         T: Likewise.
         probes: A vertex of each connected piece of each core, shape (np, 3).
         used: Solids in any pair.
-        pair: Solids of each pair, meshes first, and 1 where the first belongs to the second set: (m, 3).
+        pair: Solids of each pair, meshes first, shape (m, 2).
         start: Where the pairs of each group begin in ``members``, shape (g + 1,).
-        members: Pairs by group, ascending in each.
-        cap: Distance above which the answer does not matter [m].
+        members: By group, a pair, and 1 where its first solid belongs to the second set, shape (k, 2).
+        cap: Distance above which the answer does not matter, of each group [m], shape (g,).
+        whether: Of which groups only that is asked: whether anything is nearer than the cap, shape (g,).
         at: State: world corners at the last call, infinity before the first, shape (ns, 8, 3).
         low: State: lower bound of each pair's distance then, -infinity before the first.
+        high: State: upper bound of each pair's distance then, infinity before the first.
         first: State: triangles that were nearest, -1 before the first, shape (m, 2).
-        last: State: pair that won each group, -1 before the first.
+        last: State: member that won each group, -1 before the first.
         distance: Result [m], shape (N, g).
         points: Result: points on the solids of the first and second set, shape (N, g, 6).
-        winner: Result: pair, or -1 beyond ``cap``, shape (N, g).
+        winner: Result: member, or -1 beyond ``cap``, shape (N, g).
         status: Result, shape (N, g).
 
     Returns:
@@ -96,7 +101,8 @@ def nearest(
     world = np.zeros((ns, 12))
     centre = np.zeros((ns, 3))
     moved = np.zeros(ns)
-    state = np.zeros(m, np.int8)  # 0 ball bound, 1 root box bound, 2 settled
+    state = np.zeros(m, np.int8)  # 0 ball bound, 1 root box bound, 2 value known
+    beyond = np.full(m, -1, np.int64)  # the last group whose best it was found to be farther than
     within = np.zeros(m, np.bool_)
     value = np.empty(m)
     found = np.empty((m, 6))
@@ -121,7 +127,10 @@ def nearest(
             )
             gap -= ball[i, 3] + ball[j, 3] + MARGIN
             bound = low[p] - moved[i] - moved[j]
+            # The distance of two surfaces changes no faster than they move, whatever is inside of what.
+            high[p] += moved[i] + moved[j]
             state[p] = 0
+            beyond[p] = -1
             within[p] = False
             if gap <= 0.0 and (which[i, VOLUME] or which[j, VOLUME]):
                 proven = which[i, CLOSED] and which[j, CLOSED] and bound + r > MARGIN
@@ -131,24 +140,32 @@ def nearest(
                     ) or (which[j, VOLUME] and inside(i, j, which, nodes, links, T, probes, world))
             low[p] = -np.inf if within[p] else max(bound, max(gap, 0.0) - r)
         for g in range(len(start) - 1):
-            best = cap
-            best_pair = -1
-            guess = last[g]
-            while True:
-                p = -1
-                if guess >= 0:
-                    p = guess
-                    guess = -1
-                    state[p] = 1
+            best = cap[g]
+            winning = -1
+            for e in range(start[g], start[g + 1]):
+                q = members[e, 0]
+                if state[q] == 2 and value[q] < best:
+                    best = value[q]
+                    winning = e
+                elif whether[g] and high[q] < best - MARGIN:
+                    winning = e
+            guess = -1 if whether[g] else last[g]
+            while not (whether[g] and winning >= 0):
+                chosen = -1
+                if guess >= 0 and state[members[guess, 0]] < 2:
+                    chosen = guess
+                    state[members[chosen, 0]] = 1
                 else:
                     least = best + MARGIN
                     for e in range(start[g], start[g + 1]):
-                        q = members[e]
-                        if state[q] < 2 and low[q] <= least:
+                        q = members[e, 0]
+                        if state[q] < 2 and low[q] <= least and beyond[q] != g:
                             least = low[q]
-                            p = q
-                    if p < 0:
+                            chosen = e
+                    if chosen < 0:
                         break
+                guess = -1
+                p = members[chosen, 0]
                 i = pair[p, 0]
                 j = pair[p, 1]
                 r = radius[i] + radius[j]
@@ -156,18 +173,20 @@ def nearest(
                     state[p] = 1
                     low[p] = max(low[p], root_bound(i, j, which, nodes, world, at, R, t) - r)
                     continue
-                state[p] = 2
                 reach = np.inf if within[p] else max(best + r + MARGIN, 0.0)
                 d2 = core_distance(
                     i, j, reach * reach, which, nodes, links, T, world, at, first[p], stack, bounds, R, t, W
                 )
                 if not d2 < np.inf:
                     low[p] = max(low[p], best)
+                    beyond[p] = g
                     continue
+                state[p] = 2
                 d = math.sqrt(d2)
                 value[p] = (-d if within[p] else d) - r
                 deep[p] = within[p] or d2 == 0.0
                 low[p] = value[p]
+                high[p] = d - r
                 # Points move from the cores to the surfaces, apart when a core is inside.
                 for c in range(3):
                     u = (W[3 + c] - W[c]) / d if d > 0.0 else 0.0
@@ -175,17 +194,25 @@ def nearest(
                         u = -u
                     found[p, c] = W[c] + radius[i] * u
                     found[p, 3 + c] = W[3 + c] - radius[j] * u
-                if value[p] < best or (value[p] == best and p < best_pair):
+                if value[p] < best or (value[p] == best and chosen < winning):
                     best = value[p]
-                    best_pair = p
+                    winning = chosen
             distance[n, g] = best
-            winner[n, g] = best_pair
+            winner[n, g] = winning
             status[n, g] = BEYOND_CAP
-            last[g] = best_pair
-            if best_pair >= 0:
-                status[n, g] = DEPTH_AT_LEAST if deep[best_pair] else EXACT
+            last[g] = winning
+            points[n, g] = np.nan
+            if whether[g]:
+                distance[n, g] = cap[g]
+                if winning >= 0:
+                    # By which pair depends on what was asked before.
+                    winner[n, g] = -1
+                    status[n, g] = WITHIN_CAP
+            elif winning >= 0:
+                p = members[winning, 0]
+                status[n, g] = DEPTH_AT_LEAST if deep[p] else EXACT
+                swap = 3 * members[winning, 1]
                 for c in range(3):
-                    swap = 3 * pair[best_pair, 2]
-                    points[n, g, c] = found[best_pair, c + swap]
-                    points[n, g, 3 + c] = found[best_pair, 3 + c - swap]
+                    points[n, g, c] = found[p, c + swap]
+                    points[n, g, 3 + c] = found[p, 3 + c - swap]
     return -1, -1

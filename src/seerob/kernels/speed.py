@@ -1,4 +1,4 @@
-"""Fastest point of every body at once.
+"""Where every body is and how it moves, and its fastest point, for all of them at once.
 
 The speed of a rigid body is a convex function of the point, so over a convex hull it is largest at
 a corner; what lies up to r outside the corners' hull adds at most ``|ω| r``.
@@ -18,6 +18,69 @@ Indices = NDArray[np.int64]
 
 
 _ROWS = "f8[:,::1]"
+
+
+@njit(f"void({_ROWS}, {_ROWS}, {_ROWS}, i8[::1], f8[:,:,::1], {_ROWS}, {_ROWS})", cache=True, nogil=True)
+def placed(
+    xmat: Array,
+    xpos: Array,
+    xquat: Array,
+    ids: Indices,
+    rotations: Array,
+    positions: Array,
+    quaternions: Array,
+) -> None:
+    """Poses of some of MuJoCo's bodies; writes into the last three arguments.
+
+    Args:
+        xmat: World from body, row by row, shape (m, 9).
+        xpos: [m], shape (m, 3).
+        xquat: Shape (m, 4).
+        ids: Which, shape (n,).
+        rotations: Shape (n, 3, 3).
+        positions: [m], shape (n, 3).
+        quaternions: Shape (n, 4).
+    """
+    for i in range(len(ids)):
+        for c in range(9):
+            rotations[i, c // 3, c % 3] = xmat[ids[i], c]
+        for c in range(3):
+            positions[i, c] = xpos[ids[i], c]
+        for c in range(4):
+            quaternions[i, c] = xquat[ids[i], c]
+
+
+@njit(f"void({_ROWS}, {_ROWS}, {_ROWS}, i8[::1], i8[::1], {_ROWS}, {_ROWS})", cache=True, nogil=True)
+def velocities(
+    cvel: Array,
+    subtree_com: Array,
+    positions: Array,
+    ids: Indices,
+    roots: Indices,
+    linear: Array,
+    angular: Array,
+) -> None:
+    """Velocities of bodies at their origins; writes into the last two arguments.
+
+    Args:
+        cvel: MuJoCo's twists: rotation first, at the centre of mass of the whole tree, shape (m, 6).
+        subtree_com: Centre of mass of the tree below each of MuJoCo's bodies [m], shape (m, 3).
+        positions: World positions of the bodies' origins [m], shape (n, 3).
+        ids: MuJoCo's body of each, shape (n,).
+        roots: The first body of its tree, shape (n,).
+        linear: World axes [m/s], shape (n, 3).
+        angular: World axes [rad/s], shape (n, 3).
+    """
+    for i in range(len(ids)):
+        k, root = ids[i], roots[i]
+        wx, wy, wz = cvel[k, 0], cvel[k, 1], cvel[k, 2]
+        ax = positions[i, 0] - subtree_com[root, 0]
+        ay = positions[i, 1] - subtree_com[root, 1]
+        az = positions[i, 2] - subtree_com[root, 2]
+        angular[i, 0], angular[i, 1], angular[i, 2] = wx, wy, wz
+        linear[i, 0] = cvel[k, 3] + (wy * az - wz * ay)
+        linear[i, 1] = cvel[k, 4] + (wz * ax - wx * az)
+        linear[i, 2] = cvel[k, 5] + (wx * ay - wy * ax)
 
 
 @njit(

@@ -2,6 +2,7 @@ r"""Effective mass of a point of a robot, [Weistroffer2022]_ Eqs. 7 and 8, [Khat
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -10,11 +11,12 @@ from msgspec import Meta
 from seerob import provenance
 from seerob.criterion import Criterion, Evaluate, judge
 from seerob.impact_mass import simplified_mass
+from seerob.kernels.axes import mobility, principal_axes
 from seerob.model import Model
+from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Ellipsoid, Result, Verdict
 from seerob.state import State
 from seerob.transforms import Array, wxyz_from_rotation
-from seerob.workstation import Metres3
 
 DRAWN = 0.02
 """Half axis, or arrow, drawn for 1 kg [m]."""
@@ -33,7 +35,14 @@ def inverse_effective_mass(J_v: Array, M: Array) -> Array:
     Returns:
         Symmetric matrix, shape (..., 3, 3) [1/kg]; singular where the point cannot be pushed.
     """
-    return J_v @ np.linalg.solve(M, np.swapaxes(J_v, -1, -2))
+    J_v, M = np.asarray(J_v, float), np.asarray(M, float)
+    batch, (rows, n) = np.broadcast_shapes(J_v.shape[:-2], M.shape[:-2]), J_v.shape[-2:]
+    points = np.array(np.broadcast_to(J_v, (*batch, rows, n))).reshape(-1, rows, n)
+    masses = np.array(np.broadcast_to(M, (*batch, n, n))).reshape(-1, n, n)
+    found = np.empty((len(points), rows, rows))
+    if not mobility(points, masses, found):
+        raise np.linalg.LinAlgError("a mass matrix is not positive definite")
+    return found.reshape(*batch, rows, rows)
 
 
 def projected_mass(inverse: Array, u: Array) -> Array:
@@ -46,16 +55,22 @@ def projected_mass(inverse: Array, u: Array) -> Array:
     Returns:
         Mass [kg], shape (...); inf where the point cannot be pushed that way.
     """
-    mobility = np.einsum("...i,...ij,...j->...", u, inverse, u)
-    with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / np.maximum(mobility, 0.0))
+    along = (u[..., None, :] @ inverse @ u[..., :, None])[..., 0, 0]
+    return np.asarray(np.divide(1.0, along, out=np.full(np.shape(along), np.inf), where=~(along <= 0)))
 
 
 def principal_masses(inverse: Array) -> tuple[Array, Array]:
-    """Effective masses along the principal axes, smallest first [kg], and the axes as columns."""
-    mobility, axes = np.linalg.eigh(inverse)
-    with np.errstate(divide="ignore"):
-        return 1.0 / np.maximum(mobility, 0.0)[..., ::-1], axes[..., ::-1]
+    """Effective masses along the principal axes, smallest first [kg], and the axes as columns.
+
+    The columns are a right-handed frame.
+    """
+    batch = inverse.shape[:-2]
+    used_up = inverse.reshape(-1, 3, 3).copy()
+    values, axes = np.empty((len(used_up), 3)), np.empty_like(used_up)
+    # Of a symmetric matrix without negative eigenvalues they are its singular values.
+    principal_axes(used_up, values, axes)
+    masses = np.divide(1.0, values, out=np.full_like(values, np.inf), where=~(values <= 0))
+    return masses.reshape(*batch, 3), axes.reshape(*batch, 3, 3)
 
 
 class EffectiveMass(Criterion, frozen=True, kw_only=True):
@@ -90,14 +105,14 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
             if gap is not None:
                 closest = state.closest(gap)
                 line = closest.point_b - closest.point_a
-                length = float(np.linalg.norm(line))
+                length = math.sqrt(float(line @ line))
                 if length < 1e-9:
                     return None, "touching: the line to the person has no direction"
                 return line / length, ""
             if self.along == "worst":
                 return axes[:, -1], ""
             v = J_v @ state.qd(robot)
-            speed = float(np.linalg.norm(v))
+            speed = math.sqrt(float(v @ v))
             return (v / speed, "") if speed > STANDSTILL else (None, "stands still: no direction of motion")
 
         def evaluate(state: State) -> Result:
@@ -112,10 +127,9 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                 verdict = Verdict.UNDECIDED
             rotation, position = state.pose(frame)
             center = position + rotation @ offset
-            turn = axes * np.array([1, 1, np.sign(np.linalg.det(axes))])
             ellipsoid = Ellipsoid(
                 center=tuple(center.tolist()),
-                wxyz=tuple(wxyz_from_rotation(turn).tolist()),
+                wxyz=tuple(wxyz_from_rotation(axes).tolist()),
                 radii=tuple(np.minimum(DRAWN * masses, LARGEST_DRAWN).tolist()),
                 verdict=verdict,
             )

@@ -15,10 +15,10 @@ from seerob.criterion import Criterion, Evaluate, judge
 from seerob.errors import InputError, Undecided
 from seerob.model import Mechanism, Model
 from seerob.polytope import Polytope, free_moment, torque_box, zero_moment
+from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Hull, Input, Marker, Origin, Result, Sphere, Verdict
 from seerob.state import State
 from seerob.transforms import Array
-from seerob.workstation import Metres3
 
 DRAWN = 0.001
 """Length drawn for 1 N [m]."""

@@ -28,7 +28,7 @@ def kinetic_energy(M: Array, qd: Array) -> Array:
     Returns:
         Energy [J], shape (...).
     """
-    return np.asarray(0.5 * np.einsum("...i,...ij,...j->...", qd, M, qd))
+    return np.asarray(0.5 * (qd[..., None, :] @ M @ qd[..., :, None])[..., 0, 0])
 
 
 class KineticEnergy(Criterion, frozen=True, kw_only=True):

@@ -2,6 +2,7 @@ r"""Manipulability of a point of a robot, [Weistroffer2022]_ section 2.2.2.2."""
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -9,11 +10,12 @@ from msgspec import Meta
 
 from seerob import provenance
 from seerob.criterion import Criterion, Evaluate, judge
+from seerob.kernels.axes import principal_axes
 from seerob.model import Model
+from seerob.quantities import Metres3
 from seerob.snapshot import Basis, Ellipsoid, Result
 from seerob.state import State
 from seerob.transforms import Array, wxyz_from_rotation
-from seerob.workstation import Metres3
 
 DRAWN = 0.3
 """Half axis drawn for a singular value of 1 m/rad [m]."""
@@ -29,14 +31,15 @@ def singular_values(J_v: Array) -> tuple[Array, Array]:
         J_v: Linear Jacobian, shape (..., 3, n) [m/rad for revolute joints].
 
     Returns:
-        Singular values, largest first, shape (..., 3) [m/rad], and the directions as columns in the
-        same order, shape (..., 3, 3).
+        Singular values, largest first, shape (..., 3) [m/rad], and the directions as columns of a
+        right-handed frame in the same order, shape (..., 3, 3).
     """
-    directions, values, _ = np.linalg.svd(J_v, full_matrices=True)
-    missing = 3 - values.shape[-1]
-    if missing > 0:
-        values = np.concatenate([values, np.zeros((*values.shape[:-1], missing))], axis=-1)
-    return values[..., :3], directions
+    J_v = np.asarray(J_v, float)
+    batch = J_v.shape[:-2]
+    rows = J_v.reshape(-1, *J_v.shape[-2:]).copy()
+    values, directions = np.empty((len(rows), 3)), np.empty((len(rows), 3, 3))
+    principal_axes(rows, values, directions)
+    return values.reshape(*batch, 3), directions.reshape(*batch, 3, 3)
 
 
 class Manipulability(Criterion, frozen=True, kw_only=True):
@@ -69,10 +72,9 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
             smallest = float(sigma[2])
             verdict = judge(smallest, self.limit, at_most=False)
             rotation, position = state.pose(frame)
-            turn = axes * np.array([1, 1, np.sign(np.linalg.det(axes))])
             ellipsoid = Ellipsoid(
                 center=tuple((position + rotation @ offset).tolist()),
-                wxyz=tuple(wxyz_from_rotation(turn).tolist()),
+                wxyz=tuple(wxyz_from_rotation(axes).tolist()),
                 radii=tuple((DRAWN * sigma).tolist()),
                 label=f"σ₃ {smallest:.3f}",
                 verdict=verdict,
@@ -80,7 +82,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
             parts = (
                 Result(name="σ₁", value=float(sigma[0]), unit="m/rad"),
                 Result(name="σ₂", value=float(sigma[1]), unit="m/rad"),
-                Result(name="√det J_v J_vᵀ", value=float(np.prod(sigma)), unit="m³/rad³"),
+                Result(name="√det J_v J_vᵀ", value=math.prod(sigma.tolist()), unit="m³/rad³"),
             )
             return Result(
                 name=self.name,

@@ -3,7 +3,6 @@ r"""Power and force limiting: permissible speed of contact, ISO/TS 15066:2016 5.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -13,7 +12,9 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from seerob import clamping, collision, contact_limits, contact_shape, figures, provenance
+from seerob.contact_limits import Judged
 from seerob.contact_regions import REGIONS, Person, without_limit
+from seerob.contact_rows import ContactRows
 from seerob.criterion import Criterion, Evaluate, worst
 from seerob.errors import Undecided, UnknownName
 from seerob.impact_mass import masses_along_motion, moving_masses, simplified_mass
@@ -76,7 +77,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
 
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
-        return _Bound(self, model).evaluate
+        return Contacts(self, model).evaluate
 
     def table(self, model: Model) -> body_limits.BodyLimits:
         """The limits that apply."""
@@ -203,7 +204,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         )
 
 
-class _Bound:
+class Contacts:
     """What is resolved once, and the judgement of a state."""
 
     def __init__(self, spec: PowerAndForce, model: Model) -> None:
@@ -244,15 +245,20 @@ class _Bound:
             if spec.human is None or not self.moving
             else Person(model, self.robot, spec.human, horizon=spec.horizon)
         )
+        hand = {human.name: human.hand for human in model.workstation.humans}.get(spec.human or "")
+        self.rows = ContactRows(self, hand=hand)
 
-    def evaluate(self, state: State) -> Result:
-        """The result at a state."""
+    def judge(self, state: State) -> Judged:
+        """Every part of the robot against every body region.
+
+        Raises:
+            Undecided: Not heard, or a mass that nobody gave.
+        """
         spec, robot = self.spec, self.robot
         if not self.moving:
             raise Undecided(f"{robot.name} has no moving part with a shape")
         projected = masses_along_motion(state, robot, self.frames, self.moving, standstill=STANDSTILL)
-        fastest = [state.fastest_point(i) for i in self.moving]
-        v_r = np.array([f[0] for f in fastest])
+        v_r = state.fastest_points(self.moving)[0]
         masses = np.full(len(v_r), self.simplified)
         if spec.mass != "simplified":
             # A part that stands still has no direction of motion, and hits nobody.
@@ -260,15 +266,19 @@ class _Bound:
             masses = either(masses, projected)
         clamped = self._clamped(state)
         speeds = self.arrays.speeds(masses, self.least, clamped)
-        moves = v_r > STANDSTILL
         if self.people is None:
             near: Flags = np.ones((len(v_r), len(REGIONS)), bool)
             v_h = np.full(len(REGIONS), spec.person_speed or 0.0)
         else:
             near, v_h = self.people.near(state, spec.person_speed)
-        near &= moves[:, None]
+        near &= (v_r > STANDSTILL)[:, None]
         v = v_r[:, None] + v_h
-        judged = _Judged(v, speeds, clamped, *self._governing(v, near, speeds))
+        return Judged(v_r, v_h, near, projected, speeds, clamped, *self._governing(v, near, speeds))
+
+    def evaluate(self, state: State) -> Result:
+        """The result at a state."""
+        spec, judged = self.spec, self.judge(state)
+        near, projected = judged.near, judged.projected
         found = [self._region(int(k), judged) for k in np.flatnonzero(near.any(axis=0))]
         known = projected[np.isfinite(projected)]
         heaviest = float(known.max()) if len(known) else None
@@ -278,13 +288,13 @@ class _Bound:
         )
         if not found:
             nobody = f"nobody within {spec.horizon:g} m of a moving part"
-            reason = nobody if moves.any() else "no part moves"
+            reason = nobody if (judged.v_r > STANDSTILL).any() else "no part moves"
             return Result(name=spec.name, unit="m/s", reason=reason, parts=mass_parts)
         verdict = worst([part.verdict for part, _ in found])
         chosen = [entry for entry in found if entry[0].verdict is verdict]
         part, row = min(chosen, key=_margin)
         body = self.model.bodies[self.moving[row]]
-        _, point, velocity = fastest[row]
+        _, point, velocity = state.fastest_point(self.moving[row])
         shown = figures.against(part.value, part.limit, spec.unit, at_most=spec.at_most)
         label = f"{part.name}: {shown.value} m/s" + ("" if part.limit is None else f" of {shown.limit}")
         arrow = Arrow(
@@ -302,12 +312,13 @@ class _Bound:
             reason=f"{part.name}: {part.reason}",
             parts=(*(part for part, _ in found), *mass_parts),
             markers=(arrow, Highlight(body=body.name, verdict=verdict)),
+            rows=self.rows.of(found, judged, (lambda _: ()) if self.people is None else self.people.hit),
         )
 
     def _clamped(self, state: State) -> Flags:
         """Which moving body clamps which region, shape (b, r)."""
         state.require(*self.robots)
-        gaps, _ = self.pinch.gaps(state.rotations, state.positions)
+        gaps, _ = self.pinch.asked(state.distances)
         return self.pinch.per_body(self.memory.step(state.t, gaps, self.thickness, self.pinch.opened))
 
     def _governing(self, v: Array, near: Flags, speeds: contact_limits.Speeds) -> tuple[Array, Array]:
@@ -323,7 +334,7 @@ class _Bound:
         worst_rows = badness.argmax(axis=0)
         return worst_rows, rank[worst_rows, np.arange(len(worst_rows))]
 
-    def _region(self, k: int, judged: _Judged) -> tuple[Result, int]:
+    def _region(self, k: int, judged: Judged) -> tuple[Result, int]:
         """The result of one of `REGIONS`, and the row of the moving body that governs it."""
         name, row = REGIONS[k], int(judged.rows[k])
         value = float(judged.v[row, k])
@@ -360,7 +371,7 @@ class _Bound:
             parts=self._area_results(row, column, value, judged),
         ), row
 
-    def _area_results(self, row: int, column: int, v: float, judged: _Judged) -> tuple[Result, ...]:
+    def _area_results(self, row: int, column: int, v: float, judged: Judged) -> tuple[Result, ...]:
         """The same for each specific area: force belongs to the region, pressure to the area."""
         speeds = judged.speeds
         others = min(float(speeds.force[row, column]), float(speeds.energy[row, column]))
@@ -377,19 +388,6 @@ class _Bound:
                 Result(name=area.name, value=v, unit="m/s", limit=limit, verdict=verdict, reason=reason)
             )
         return tuple(found)
-
-
-@dataclass(frozen=True, eq=False)
-class _Judged:
-    """What the results of the regions are made from."""
-
-    v: Array
-    """Bounds on the relative speed [m/s], shape (b, len(REGIONS))."""
-    speeds: contact_limits.Speeds
-    clamped: Flags
-    """Shape (b, r)."""
-    rows: Array
-    ranks: Array
 
 
 def _margin(entry: tuple[Result, int]) -> float:

@@ -1,83 +1,172 @@
-"""Intrusion into a safety area, [Weistroffer2022]_ section 2.2.2.7."""
+"""Intrusion into safety areas, [Weistroffer2022]_ section 2.2.2.7."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
+from msgspec import Meta
 
 from seerob import provenance
 from seerob.criterion import Criterion, Evaluate
-from seerob.errors import UnknownName
-from seerob.model import Model
-from seerob.snapshot import Basis, Highlight, Result, Verdict
+from seerob.depth import Depth, depth
+from seerob.errors import InputError, UnknownName
+from seerob.model import Gap, Model
+from seerob.snapshot import Basis, Highlight, Marker, Result, Segment, Verdict
 from seerob.state import State
+
+CELLS, FEWEST = 400, 20
+"""Of the search for depths at one tick, shared by all that is inside; the interval says what it left open."""
 
 
 class SafetyArea(Criterion, frozen=True, kw_only=True):
-    """Whether anything of a set is inside a safety area, which bodies, and how deep at least."""
+    """Whether anything of a set is inside a safety area, which bodies, and how deep."""
 
     unit: ClassVar[str] = "m"
     at_most: ClassVar[bool] = False
 
-    area: str
-    """An entry of ``[[areas]]``."""
-    of: str
-    """What must stay outside: a robot, a human, a tool or a part."""
+    area: str | tuple[str, ...]
+    """An entry of ``[[areas]]`` or the field of a sensor, or a list of them."""
+    of: str | tuple[str, ...]
+    """What must stay outside: a robot, a human, a tool or a part, or a list of them."""
+    tolerance: Annotated[float, Meta(ge=1e-4, le=0.1, extra={"unit": "m"})] = 0.005
+    """Width of the interval of a depth that is enough [m]; a finer one takes longer."""
+
+    def __post_init__(self) -> None:
+        for key in ("area", "of"):
+            if not getattr(self, key):
+                raise ValueError(f"{key} is empty: name at least one")
 
     def subjects(self) -> tuple[str, ...]:
-        """The area and what must stay outside."""
-        return self.area, self.of
+        """The areas and what must stay outside."""
+        return *_names(self.area), *_names(self.of)
 
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
-        areas = {body.owner for body in model.bodies if body.role == "area"}
-        if self.area not in areas:
-            raise UnknownName("area", self.area, areas)
-        gap = model.gap(model.select(self.area), model.select(self.of))
+        watched = self._watched(model)
+        several = len(_names(self.area)) > 1
 
         def evaluate(state: State) -> Result:
-            found = state.closest_per_body(gap)
-            nearest = int(found.distance.argmin())
-            inside = np.flatnonzero(found.distance <= 0)
-            # The real surface may stick out of the shape: nearly inside is not outside.
-            close = found.distance[nearest] - gap.deviation <= 0
-            verdict = Verdict.EXCEEDED if len(inside) else Verdict.UNDECIDED if close else Verdict.WITHIN
-            names = [model.bodies[gap.b[i]].name for i in inside]
-            parts = tuple(
-                Result(
-                    name=name,
-                    value=float(found.distance[i]),
-                    unit="m",
-                    limit=0.0,
-                    at_most=False,
-                    verdict=Verdict.EXCEEDED,
-                )
-                for i, name in zip(inside, names, strict=True)
-            )
-            reason = ", ".join(names) if names else model.bodies[gap.b[nearest]].name
-            if verdict is Verdict.UNDECIDED:
-                reason += f" is within {gap.deviation * 1e3:.1f} mm, what its shape may be off by"
-            return Result(
-                name=self.name,
-                value=float(found.distance[nearest]),
-                unit=self.unit,
-                limit=0.0,
-                at_most=False,
-                verdict=verdict,
-                reason=reason,
-                parts=parts,
-                markers=tuple(Highlight(body=name, verdict=verdict) for name in (self.area, *names)),
-            )
+            outside = (np.inf, "", 0.0)
+            parts: list[Result] = []
+            lit: list[Marker] = []
+            asked = [state.closest_per_body(each.gap) for each in watched]
+            cells = max(CELLS // max(sum(int((a.distance <= 0).sum()) for a in asked), 1), FEWEST)
+            for each, found in zip(watched, asked, strict=True):
+                nearest = int(found.distance.argmin())
+                room = float(found.distance[nearest])
+                if room < outside[0]:
+                    outside = room, _where(model, each, nearest, several), each.gap.deviation
+                for i in np.flatnonzero(found.distance <= 0):
+                    body = model.bodies[each.gap.b[i]]
+                    area = int(found.body_a[i])
+                    deep = depth(
+                        model.shapes, state.rotations, state.positions, area, body.index,
+                        tolerance=self.tolerance, cells=cells,
+                    )  # fmt: skip
+                    least = max(deep.at_least, -float(found.distance[i]))
+                    parts.append(
+                        Result(
+                            name=_where(model, each, int(i), several),
+                            value=-least,
+                            unit="m",
+                            limit=0.0,
+                            at_most=False,
+                            verdict=Verdict.EXCEEDED,
+                            interval=(-max(deep.at_most, least), -least),
+                        )
+                    )
+                    lit += [
+                        Highlight(body=body.name, verdict=Verdict.EXCEEDED),
+                        *_line(deep, found.point_a[i]),
+                    ]
+            return self._result(outside, parts, lit)
 
         return evaluate
 
+    def _result(self, outside: tuple[float, str, float], parts: list[Result], lit: list[Marker]) -> Result:
+        room, who, deviation = outside
+        if parts:
+            deepest = min(parts, key=lambda part: part.value or 0.0)
+            verdict, reason, room = (
+                Verdict.EXCEEDED,
+                ", ".join(part.name for part in parts),
+                deepest.value or 0.0,
+            )
+            interval = deepest.interval
+        else:
+            # The real surface may stick out of the shape: nearly inside is not outside.
+            close = room - deviation <= 0
+            verdict = Verdict.UNDECIDED if close else Verdict.WITHIN
+            reason = (
+                f"{who} is within {deviation * 1e3:.1f} mm, what its shape may be off by" if close else who
+            )
+            interval = None
+        areas = [Highlight(body=name, verdict=verdict) for name in _names(self.area)]
+        return Result(
+            name=self.name,
+            value=room,
+            unit=self.unit,
+            limit=0.0,
+            at_most=False,
+            verdict=verdict,
+            reason=reason,
+            interval=interval,
+            parts=tuple(parts),
+            markers=(*areas, *dict.fromkeys(lit)),
+        )
+
+    def _watched(self, model: Model) -> tuple[_Watched, ...]:
+        known = {body.owner: body for body in model.bodies if body.role == "area"}
+        known |= {body.name: body for body in model.bodies if body.role == "area"}
+        inside = tuple(dict.fromkeys(i for name in _names(self.of) for i in model.select(name)))
+        watched = []
+        for name in _names(self.area):
+            if name not in known:
+                raise UnknownName("area", name, known)
+            bodies = model.select(name)
+            if set(bodies) & set(inside):
+                raise InputError.at(
+                    self.name, "of", f"{name!r} cannot be inside itself", "name what enters it"
+                )
+            watched.append(_Watched(name, model.gap(bodies, inside)))
+        return tuple(watched)
+
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
-        gap = model.gap(model.select(self.area), model.select(self.of))
+        gaps = [each.gap for each in self._watched(model)]
+        carriers = dict.fromkeys(name for gap in gaps for name in gap.carriers)
         return Basis(
-            formula="least distance of each body to the area; 0 or less is inside, at least that deep",
+            formula="least distance of each body to the area; 0 or less is inside, then as deep as its "
+            "point farthest from the area's surface",
             source="Weistroffer et al. 2022, section 2.2.2.7",
-            inputs=provenance.motion(model, *gap.carriers) + provenance.shapes(gap),
+            inputs=provenance.motion(model, *carriers)
+            + tuple(dict.fromkeys(given for gap in gaps for given in provenance.shapes(gap))),
             not_modelled=("the sensor that would watch the area: its resolution and response time",),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _Watched:
+    area: str
+    gap: Gap
+
+
+def _names(given: str | tuple[str, ...]) -> tuple[str, ...]:
+    return (given,) if isinstance(given, str) else given
+
+
+def _where(model: Model, watched: _Watched, i: int, several: bool) -> str:
+    body = model.bodies[watched.gap.b[i]].name
+    return f"{body} in {watched.area}" if several else body
+
+
+def _line(deep: Depth, border: Iterable[float]) -> tuple[Segment, ...]:
+    """From the border to the deepest point."""
+    if not np.isfinite(deep.point).all():
+        return ()
+    start = tuple(float(x) for x in border)
+    end = tuple(deep.point.tolist())
+    return (Segment(start=start, end=end, label=f"{deep.at_least:.3f} m deep", verdict=Verdict.EXCEEDED),)  # type: ignore[arg-type]

@@ -151,6 +151,15 @@ class Separation(Criterion, frozen=True, kw_only=True):
             missing.append("robot_uncertainty (Z_r)")
         return (C or 0.0, self.human_uncertainty or 0.0, self.robot_uncertainty or 0.0), missing
 
+    def unknown(self, model: Model) -> str:
+        """Why S_p may be larger than what is computed; empty when it is not."""
+        return self._unknown(self._terms()[1], self._stop(model))
+
+    @staticmethod
+    def _unknown(missing: list[str], stop: StopModel) -> str:
+        reasons = [f"not given: {', '.join(missing)}"] if missing else []
+        return "; ".join([*reasons, *stop.doubts])
+
     def _distance(self, course: Course, K: float) -> Array:
         """S_p of each part [m]."""
         if self.human_speed is not None:
@@ -162,8 +171,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         gap, stop = self._gap(model), self._stop(model)
         (C, Z_d, Z_r), missing = self._terms()
         K = C + Z_d + Z_r + gap.deviation
-        reasons = [f"not given: {', '.join(missing)}"] if missing else []
-        unknown = "; ".join([*reasons, *stop.doubts])
+        unknown = self._unknown(missing, stop)
         unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
         largest = _Largest()
 

@@ -16,10 +16,10 @@ from seerob import joint_torques, provenance
 from seerob.criterion import Criterion, Evaluate, judge, judge_interval
 from seerob.errors import InputError, Undecided
 from seerob.model import Mechanism, Model
+from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Input, Marker, Origin, Result, Sphere, Verdict
 from seerob.state import State
 from seerob.transforms import Array
-from seerob.workstation import Metres3
 
 DRAWN = 0.002
 """Arrow drawn for 1 N [m]."""

@@ -2,6 +2,7 @@ r"""Speed of a point, or of the fastest point of a set of bodies, [Weistroffer20
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -11,10 +12,10 @@ from seerob import provenance
 from seerob.criterion import Criterion, Evaluate, judge
 from seerob.errors import InputError
 from seerob.model import Model
+from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Input, Result
 from seerob.state import State
 from seerob.transforms import Array
-from seerob.workstation import Metres3
 
 DRAWN = 0.5
 """Length of the arrow of a speed of 1 m/s [m]."""
@@ -30,7 +31,7 @@ def point_velocity(J: Array, qd: Array) -> Array:
     Returns:
         Twist (v, ω) at the point [m/s, rad/s], world axes, shape (..., 6).
     """
-    return np.asarray(np.einsum("...ij,...j->...i", J, qd))
+    return np.asarray((J @ qd[..., None])[..., 0])
 
 
 class Velocity(Criterion, frozen=True, kw_only=True):
@@ -67,19 +68,19 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         def evaluate(state: State) -> Result:
             v = point_velocity(state.jacobian(frame, mechanism, offset), state.qd(mechanism))[:3]
             rotation, position = state.pose(frame)
-            return self._result(float(np.linalg.norm(v)), position + rotation @ offset, v)
+            return self._result(math.sqrt(float(v @ v)), position + rotation @ offset, v)
 
         return evaluate
 
     def _bind_set(self, model: Model) -> Evaluate:
-        bodies = [i for i in model.select(self.of or "") if model.bodies[i].carrier]
+        bodies = tuple(i for i in model.select(self.of or "") if model.bodies[i].carrier)
         if not bodies:
             raise InputError.at(self.name, "of", f"nothing of {self.of!r} moves", "name a robot or human")
 
         def evaluate(state: State) -> Result:
-            found = [(*state.fastest_point(i), i) for i in bodies]
-            speed, point, v, body = max(found, key=lambda entry: entry[0])
-            return self._result(speed, point, v, model.bodies[body].name)
+            speeds, points, velocities = state.fastest_points(bodies)
+            k = int(speeds.argmax())
+            return self._result(float(speeds[k]), points[k], velocities[k], model.bodies[bodies[k]].name)
 
         return evaluate
 

@@ -10,33 +10,15 @@ import numpy as np
 from seerob.criterion import judge, judge_interval
 from seerob.human.angles import SIDED, Angles
 from seerob.human.skeleton import SIDES
+from seerob.scoring.bands import Edges
 from seerob.scoring.published import Ints
+from seerob.scoring.score_rows import ANGLES_OF, BONES_OF, component_rows, total_row
 from seerob.scoring.spans import Span
-from seerob.snapshot import Highlight, Result, Verdict
+from seerob.scoring.thresholds import Thresholds
+from seerob.snapshot import Highlight, Level, Result, Row, Verdict
 
 Grand = Callable[[Mapping[str, Ints]], Ints]
 """Score of component scores; central components have a last axis of 1, sided ones of 2."""
-
-BONES_OF: dict[str, tuple[str, ...]] = {
-    "upper arm": ("{side}_upper_arm",),
-    "lower arm": ("{side}_forearm",),
-    "wrist": ("{side}_hand",),
-    "wrist twist": ("{side}_hand", "{side}_forearm"),
-    "neck": ("neck", "head"),
-    "trunk": ("lumbar", "thorax"),
-    "legs": ("right_thigh", "right_shank", "left_thigh", "left_shank"),
-}
-"""Component → bones that are coloured."""
-ANGLES_OF: dict[str, tuple[str, ...]] = {
-    "upper arm": ("shoulder_flexion", "shoulder_abduction", "clavicle_elevation"),
-    "lower arm": ("elbow_flexion", "forearm_out", "wrist_across"),
-    "wrist": ("wrist_flexion", "wrist_deviation"),
-    "wrist twist": ("forearm_rotation",),
-    "neck": ("neck_flexion", "neck_side_bend", "neck_twist"),
-    "trunk": ("trunk_flexion", "trunk_side_bend", "trunk_twist"),
-    "legs": ("knee_flexion", "foot_rise"),
-}
-"""Component → angles that it is made of, for whoever reads the result."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,11 +28,27 @@ class Method:
     grand: Grand
     least: Mapping[str, int]
     """Components and their least score."""
+    most: Mapping[str, int]
+    """Components and their greatest score."""
+    edges: Callable[[Thresholds], Edges]
+    """Bands of the angles."""
     levels: Sequence[int]
     """Highest score of each action level."""
     actions: Sequence[str]
     first_level: int
     """Number of the first action level."""
+
+    @property
+    def scale(self) -> tuple[int, int]:
+        """Best and worst score."""
+        return 1, self.levels[-1]
+
+    @property
+    def classes(self) -> tuple[Level, ...]:
+        """The action levels, the lowest first."""
+        return tuple(
+            Level(up_to=top, name=f"action level {self.first_level + k}") for k, top in enumerate(self.levels)
+        )
 
     def level(self, score: float) -> str:
         """``action level 3: investigation …`` of a score."""
@@ -67,6 +65,7 @@ def judged(
     angles: Angles,
     components: Mapping[str, Span],
     spread: Mapping[str, Span] | None,
+    thresholds: Thresholds,
 ) -> Result:
     """The result of a rule at one instant.
 
@@ -78,6 +77,7 @@ def judged(
         angles: Of the posture, to be shown.
         components: Score of each component as it was measured.
         spread: The same when each angle may be off by its accuracy; None when that is not known.
+        thresholds: For the bands that are shown.
 
     Returns:
         The worse side gives the value. Undecided when a component is not assessed, unless even the
@@ -122,7 +122,44 @@ def judged(
             *_parts(components, spread, angles),
         ),
         markers=tuple(Highlight(body=f"{human}/{bone}", verdict=verdict) for bone in dict.fromkeys(bones)),
+        rows=(
+            *_totals(method, measured, None if spread is None else reach, limit, (*verdicts, verdict)),
+            *component_rows(
+                components,
+                spread,
+                angles,
+                human=human,
+                least=method.least,
+                most=method.most,
+                edges=method.edges(thresholds),
+            ),
+        ),
     )
+
+
+def _totals(
+    method: Method,
+    measured: Span,
+    reach: Span | None,
+    limit: int | None,
+    verdicts: Sequence[Verdict | None],
+) -> list[Row]:
+    def ends(span: Span, side: int) -> tuple[int, int]:
+        if side == len(SIDES):
+            return int(span.low.max()), int(span.high.max())
+        return int(span.low[side]), int(span.high[side])
+
+    return [
+        total_row(
+            name,
+            ends(measured, i),
+            None if reach is None else ends(reach, i),
+            method.scale,
+            limit,
+            verdicts[i],
+        )
+        for i, name in enumerate((*SIDES, ""))
+    ]
 
 
 def _both(span: Span) -> Span:

@@ -14,8 +14,9 @@ from msgspec import Struct
 from numpy.typing import ArrayLike, NDArray
 
 from seerob.human.angles import Angles
+from seerob.scoring.measured import Accuracy, Measured
 from seerob.scoring.published import Ints, cells
-from seerob.scoring.spans import Span, beyond, either
+from seerob.scoring.spans import Span, either
 from seerob.scoring.thresholds import Angle
 
 CODES = {"back": 4, "arms": 3, "legs": 7, "load": 3}
@@ -99,30 +100,30 @@ def load_codes(kg: float | None) -> Possible:
     return np.ones(3, bool) if kg is None else only(1 + (kg >= 10) + (kg > 20), 3)
 
 
-def back_codes(angles: Angles, thresholds: OwasThresholds, accuracy: float = 0.0) -> Possible:
+def back_codes(angles: Angles, thresholds: OwasThresholds, accuracy: Accuracy = 0.0) -> Possible:
     """1 straight, 2 bent, 3 twisted or bent sideways, 4 both."""
-    bent = beyond(angles.trunk_flexion, thresholds.bent, accuracy=accuracy)
+    m = Measured(angles, accuracy)
+    bent = m.beyond("trunk_flexion", thresholds.bent)
     turned = either(
-        beyond(angles.trunk_twist, thresholds.twisted, accuracy=accuracy),
-        beyond(angles.trunk_side_bend, thresholds.side_bent, accuracy=accuracy),
+        m.beyond("trunk_twist", thresholds.twisted), m.beyond("trunk_side_bend", thresholds.side_bent)
     )
     pairs = [_may(bent, b) & _may(turned, t) for t in (False, True) for b in (False, True)]
     return np.stack(pairs, axis=-1)
 
 
-def arm_codes(angles: Angles, accuracy: float = 0.0) -> Possible:
+def arm_codes(angles: Angles, accuracy: Accuracy = 0.0) -> Possible:
     """1 both below shoulder level, 2 one at or above it, 3 both; elbow or wrist, whichever is higher."""
-    up = beyond(angles.arm_rise, -1e-9, accuracy=accuracy, signed=True)
+    up = Measured(angles, accuracy).beyond("arm_rise", -1e-9, signed=True)
     low, high = up.low.sum(axis=-1), up.high.sum(axis=-1)
     return np.stack([(low <= n) & (n <= high) for n in range(3)], axis=-1)
 
 
-def leg_codes(angles: Angles, thresholds: OwasThresholds, accuracy: float = 0.0) -> Possible:
+def leg_codes(angles: Angles, thresholds: OwasThresholds, accuracy: Accuracy = 0.0) -> Possible:
     """Codes 2 to 6 of somebody who stands or kneels; sitting and walking cannot be seen from one posture."""
-    t, a = thresholds, accuracy
-    high = beyond(angles.foot_rise, t.foot_rise, accuracy=a, signed=True)
-    bent = beyond(angles.knee_flexion, t.knee_bent, accuracy=a)
-    flat = beyond(angles.shank_tilt, t.kneeling, accuracy=a, signed=True)
+    t, m = thresholds, Measured(angles, accuracy)
+    high = m.beyond("foot_rise", t.foot_rise, signed=True)
+    bent = m.beyond("knee_flexion", t.knee_bent)
+    flat = m.beyond("shank_tilt", t.kneeling, signed=True)
     found = np.zeros((*angles.trunk_flexion.shape, 7), bool)
     for raised, folded, lying in itertools.product(itertools.product((False, True), repeat=2), repeat=3):
         possible = np.ones(angles.trunk_flexion.shape, bool)

@@ -1,48 +1,72 @@
-"""What no posture shows, given for each phase of the task: load, grip, support, repetition."""
+"""From the phases that every rule shares to those of one rule, and what they say of both sides."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
-from typing import Annotated, Literal, TypeVar
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
-from msgspec import Meta, Struct
 
+from seerob.errors import InputError
+from seerob.model import Model
 from seerob.scoring.spans import Span, between, exactly
+from seerob.task_phase import (
+    Kilograms,
+    Period,
+    Phase,
+    Seconds,
+    Sides,
+    Stance,
+    TaskPhase,
+    check_order,
+    phase_at,
+)
 
-Kilograms = Annotated[float, Meta(ge=0, extra={"unit": "kg"}, extra_json_schema={"x-unit": "kg"})]
-Seconds = Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})]
-Sides = Literal["none", "left", "right", "both"]
-
-
-class Phase(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Base of the phases of a rule; what a phase leaves out is not assessed."""
-
-    start: Seconds = 0.0
-    """When the phase begins [s]; it lasts until the next one."""
-
+__all__ = [
+    "Kilograms",
+    "Period",
+    "Phase",
+    "Seconds",
+    "Sides",
+    "Stance",
+    "TaskPhase",
+    "check_order",
+    "on_sides",
+    "phase_at",
+    "shared_phases",
+]
 
 P = TypeVar("P", bound=Phase)
 
 
-def check_order(phases: Sequence[Phase]) -> None:
-    """Refuse phases that do not follow each other.
+def shared_phases(
+    model: Model, human: str, own: Sequence[P], read: Callable[[TaskPhase], P]
+) -> tuple[P, ...]:
+    """Phases of a rule: its own, or else those of ``[[phases]]`` that are of this person.
+
+    Args:
+        model: The compiled workstation.
+        human: Who is judged.
+        own: Phases in the rule's table; when there are any, the shared ones are not read.
+        read: What the rule takes from a shared phase.
 
     Raises:
-        ValueError: A phase does not begin after the one before.
+        UnknownName: A shared phase is of somebody who does not exist.
+        InputError: The shared phases of the person do not follow each other.
     """
-    for before, after in pairwise(phases):
-        if after.start <= before.start:
-            raise ValueError(
-                f"phases: one that starts at {after.start:g} s follows one at {before.start:g} s; "
-                "let each start after the one before"
-            )
-
-
-def phase_at(phases: Sequence[P], t: float, unknown: P) -> P:
-    """The phase of an instant [s]; ``unknown`` before the first."""
-    return next((phase for phase in reversed(phases) if phase.start <= t + 1e-9), unknown)
+    if own:
+        return tuple(own)
+    shared = model.workstation.phases
+    for phase in shared:
+        if phase.human:
+            model.human(phase.human)
+    mine = [phase for phase in shared if phase.human in ("", human)]
+    try:
+        check_order(mine)
+    except ValueError as error:
+        file = next(iter(model.workstation.files), "workstation")
+        raise InputError.at(file, "phases", f"of {human}: {error}") from error
+    return tuple(map(read, mine))
 
 
 def on_sides(sides: Sides | None) -> Span:

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seerob.human.angles import Angles
+from seerob.scoring.measured import Accuracy, Measured
 from seerob.scoring.published import Ints, cells
 from seerob.scoring.shoulder import ArmPolicy, arm_score
-from seerob.scoring.spans import Span, between, beyond, either, exactly, graded
+from seerob.scoring.spans import Span, between, either, exactly, graded
 from seerob.scoring.thresholds import Thresholds
 from seerob.transforms import Array
 
@@ -34,6 +35,18 @@ LEAST = {
     "activity": 0,
 }
 """Components in the order of `reba`, and their least score."""
+MOST = {
+    "neck": 3,
+    "trunk": 5,
+    "legs": 4,
+    "upper arm": 6,
+    "lower arm": 2,
+    "wrist": 3,
+    "load": 3,
+    "coupling": 3,
+    "activity": 3,
+}
+"""Their greatest score."""
 
 
 class Coupling(StrEnum):
@@ -159,7 +172,7 @@ def posture_components(
     supported: Span,
     legs: Span,
     sitting: bool | None,
-    accuracy: float = 0.0,
+    accuracy: Accuracy = 0.0,
     policy: ArmPolicy = ArmPolicy.PROJECTION,
 ) -> dict[str, Span]:
     """Scores of the six parts of the body.
@@ -176,33 +189,30 @@ def posture_components(
     Returns:
         Span by component: arms with shape (..., 2), right and left; neck, trunk and legs with shape (...).
     """
-    t, a = thresholds, accuracy
-    outward = beyond(angles.shoulder_abduction, t.arm_abducted, accuracy=a, signed=True)
-    rotated = beyond(angles.shoulder_rotation, t.arm_rotated, accuracy=a)
-    raised = beyond(angles.clavicle_elevation, t.shoulder_raised, accuracy=a, signed=True)
+    t, m = thresholds, Measured(angles, accuracy)
     relief = Span(-supported.high, -supported.low)
-    bent = graded(angles.knee_flexion.max(axis=-1), knees, within=(0, 2), accuracy=a)
+    bent = graded(angles.knee_flexion.max(axis=-1), knees, within=(0, 2), accuracy=m.error("knee_flexion"))
     if sitting is not False:
         bent = Span(np.zeros_like(bent.low), np.zeros_like(bent.high) if sitting else bent.high)
     return {
-        "neck": graded(angles.neck_flexion, lambda x: neck(x, t.neck_extension), within=(1, 2), accuracy=a)
-        + either(
-            beyond(angles.neck_twist, t.neck_twist, accuracy=a),
-            beyond(angles.neck_side_bend, t.neck_side_bend, accuracy=a),
-        ),
-        "trunk": graded(angles.trunk_flexion, lambda x: trunk(x, t.trunk_upright), within=(1, 4), accuracy=a)
-        + either(
-            beyond(angles.trunk_twist, t.trunk_twist, accuracy=a),
-            beyond(angles.trunk_side_bend, t.trunk_side_bend, accuracy=a),
-        ),
+        "neck": m.graded("neck_flexion", lambda x: neck(x, t.neck_extension), within=(1, 2))
+        + either(m.beyond("neck_twist", t.neck_twist), m.beyond("neck_side_bend", t.neck_side_bend)),
+        "trunk": m.graded("trunk_flexion", lambda x: trunk(x, t.trunk_upright), within=(1, 4))
+        + either(m.beyond("trunk_twist", t.trunk_twist), m.beyond("trunk_side_bend", t.trunk_side_bend)),
         "legs": legs + bent,
         "upper arm": (
-            arm_score(angles, upper_arm, policy, accuracy) + either(outward, rotated) + raised + relief
+            arm_score(m, upper_arm, policy)
+            + either(
+                m.beyond("shoulder_abduction", t.arm_abducted, signed=True),
+                m.beyond("shoulder_rotation", t.arm_rotated),
+            )
+            + m.beyond("clavicle_elevation", t.shoulder_raised, signed=True)
+            + relief
         ).at_least(1),
-        "lower arm": graded(angles.elbow_flexion, lower_arm, within=(1, 2), accuracy=a, neutral=80 * _RAD),
-        "wrist": graded(angles.wrist_flexion, wrist, within=(1, 2), accuracy=a)
+        "lower arm": m.graded("elbow_flexion", lower_arm, within=(1, 2), neutral=80 * _RAD),
+        "wrist": m.graded("wrist_flexion", wrist, within=(1, 2))
         + either(
-            beyond(angles.wrist_deviation, t.wrist_deviation, accuracy=a),
-            beyond(angles.forearm_rotation, t.forearm_rotation, accuracy=a),
+            m.beyond("wrist_deviation", t.wrist_deviation),
+            m.beyond("forearm_rotation", t.forearm_rotation),
         ),
     }

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seerob.human.angles import Angles
+from seerob.scoring.measured import Accuracy, Measured
 from seerob.scoring.published import Ints, cells
 from seerob.scoring.shoulder import ArmPolicy, arm_score
-from seerob.scoring.spans import Span, between, beyond, either, exactly, graded
+from seerob.scoring.spans import Span, between, beyond, either, exactly
 from seerob.scoring.thresholds import Thresholds
 from seerob.transforms import Array
 
@@ -37,6 +38,20 @@ LEAST = {
     "force of the body": 0,
 }
 """Components in the order of `rula`, and their least score."""
+MOST = {
+    "upper arm": 6,
+    "lower arm": 3,
+    "wrist": 4,
+    "wrist twist": 2,
+    "neck": 6,
+    "trunk": 6,
+    "legs": 2,
+    "muscle use of the arms": 1,
+    "force of the arms": 3,
+    "muscle use of the body": 1,
+    "force of the body": 3,
+}
+"""Their greatest score."""
 
 
 class Profile(StrEnum):
@@ -180,7 +195,7 @@ def posture_components(
     supported: Span,
     back_supported: bool | None,
     legs: Span | None,
-    accuracy: float = 0.0,
+    accuracy: Accuracy = 0.0,
     policy: ArmPolicy = ArmPolicy.PROJECTION,
 ) -> dict[str, Span]:
     """Scores of the seven parts of the body.
@@ -197,51 +212,52 @@ def posture_components(
     Returns:
         Span by component: arms with shape (..., 2), right and left; neck, trunk and legs with shape (...).
     """
-    t, a = thresholds, accuracy
-    lifted = beyond(angles.shoulder_abduction, t.arm_abducted, accuracy=a, signed=True)
-    raised = beyond(angles.clavicle_elevation, t.shoulder_raised, accuracy=a, signed=True)
-    base = arm_score(angles, upper_arm, policy, accuracy)
+    t, m = thresholds, Measured(angles, accuracy)
     relief = Span(-supported.high, -supported.low)
     aside = either(
-        beyond(angles.wrist_across, t.wrist_across, accuracy=a, signed=True),
-        beyond(angles.forearm_out, t.forearm_out, accuracy=a, signed=True),
+        m.beyond("wrist_across", t.wrist_across, signed=True),
+        m.beyond("forearm_out", t.forearm_out, signed=True),
     )
-    middle = 80 * _RAD
-    back = graded(angles.trunk_flexion, lambda x: trunk(x, t.trunk_upright), within=(1, 4), accuracy=a)
+    back = m.graded("trunk_flexion", lambda x: trunk(x, t.trunk_upright), within=(1, 4))
     if back_supported is not False:
-        leaning = graded(
-            angles.trunk_flexion,
-            lambda x: trunk(np.maximum(x, 0.0), t.trunk_upright),
-            within=(1, 4),
-            accuracy=a,
+        leaning = m.graded(
+            "trunk_flexion", lambda x: trunk(np.maximum(x, 0.0), t.trunk_upright), within=(1, 4)
         )
         back = Span(leaning.low, leaning.high if back_supported else back.high)
     return {
-        "upper arm": (base + lifted + raised + relief).at_least(1),
-        "lower arm": graded(angles.elbow_flexion, lower_arm, within=(1, 2), accuracy=a, neutral=middle)
-        + aside,
-        "wrist": graded(angles.wrist_flexion, lambda x: wrist(x, t.wrist_neutral), within=(1, 3), accuracy=a)
-        + beyond(angles.wrist_deviation, t.wrist_deviation, accuracy=a),
-        "wrist twist": exactly(1) + beyond(angles.forearm_rotation, t.forearm_rotation, accuracy=a),
-        "neck": graded(angles.neck_flexion, lambda x: neck(x, t.neck_extension), within=(1, 4), accuracy=a)
-        + beyond(angles.neck_twist, t.neck_twist, accuracy=a)
-        + beyond(angles.neck_side_bend, t.neck_side_bend, accuracy=a),
+        "upper arm": (
+            arm_score(m, upper_arm, policy)
+            + m.beyond("shoulder_abduction", t.arm_abducted, signed=True)
+            + m.beyond("clavicle_elevation", t.shoulder_raised, signed=True)
+            + relief
+        ).at_least(1),
+        "lower arm": m.graded("elbow_flexion", lower_arm, within=(1, 2), neutral=80 * _RAD) + aside,
+        "wrist": m.graded("wrist_flexion", lambda x: wrist(x, t.wrist_neutral), within=(1, 3))
+        + m.beyond("wrist_deviation", t.wrist_deviation),
+        "wrist twist": exactly(1) + m.beyond("forearm_rotation", t.forearm_rotation),
+        "neck": m.graded("neck_flexion", lambda x: neck(x, t.neck_extension), within=(1, 4))
+        + m.beyond("neck_twist", t.neck_twist)
+        + m.beyond("neck_side_bend", t.neck_side_bend),
         "trunk": back
-        + beyond(angles.trunk_twist, t.trunk_twist, accuracy=a)
-        + beyond(angles.trunk_side_bend, t.trunk_side_bend, accuracy=a),
-        "legs": exactly(1) + uneven(angles, t, a) if legs is None else legs,
+        + m.beyond("trunk_twist", t.trunk_twist)
+        + m.beyond("trunk_side_bend", t.trunk_side_bend),
+        "legs": exactly(1) + uneven(m, t) if legs is None else legs,
     }
 
 
-def uneven(angles: Angles, thresholds: Thresholds, accuracy: float = 0.0) -> Span:
+def uneven(measured: Measured, thresholds: Thresholds) -> Span:
     """1 where one foot is raised or the knees differ: an estimate of weight that is not evenly spread."""
-    right, left = angles.knee_flexion[..., 0], angles.knee_flexion[..., 1]
-    apart = beyond(right - left, thresholds.knee_difference, accuracy=2 * accuracy)
-    return either(apart, one_foot_up(angles, thresholds, accuracy))
+    knees = measured.angles.knee_flexion
+    apart = beyond(
+        knees[..., 0] - knees[..., 1],
+        thresholds.knee_difference,
+        accuracy=2 * measured.error("knee_flexion"),
+    )
+    return either(apart, one_foot_up(measured, thresholds))
 
 
-def one_foot_up(angles: Angles, thresholds: Thresholds, accuracy: float = 0.0) -> Span:
+def one_foot_up(measured: Measured, thresholds: Thresholds) -> Span:
     """1 where one foot is raised: an estimate of standing on one leg."""
     # Not fmax: what is not assessed on one side is not known of both.
-    higher = angles.foot_rise.max(axis=-1)
-    return beyond(higher, thresholds.foot_rise, accuracy=accuracy, signed=True)
+    higher = measured.angles.foot_rise.max(axis=-1)
+    return beyond(higher, thresholds.foot_rise, accuracy=measured.error("foot_rise"), signed=True)

@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from seerob.human.angles import Angles
+from seerob.scoring.measured import Measured
 from seerob.scoring.published import Ints
 from seerob.scoring.spans import Span, graded
 from seerob.transforms import Array
@@ -29,9 +29,7 @@ BASE = (1, 4)
 """Least and greatest score of an upper arm without modifiers."""
 
 
-def arm_score(
-    angles: Angles, score: Callable[[Array], Ints], policy: ArmPolicy, accuracy: float = 0.0
-) -> Span:
+def arm_score(measured: Measured, score: Callable[[Array], Ints], policy: ArmPolicy) -> Span:
     """Score of the upper arm without modifiers, shape (..., 2).
 
     Seen from the side, an arm that points sideways has no direction: with its angle λ out of the
@@ -39,11 +37,12 @@ def arm_score(
     direction in which an arm points, with its elevation θ, by ``arcsin(sin δ / sin θ)``.
 
     Args:
-        angles: Of the postures.
+        measured: Angles of the postures; the accuracy of the flexion is that of the arm's direction.
         score: 1 to 4 of a flexion [rad], least at 0.
         policy: Which angle it is asked for.
-        accuracy: Of the direction of the arm [rad].
     """
+    angles = measured.angles
+    accuracy = measured.error("shoulder_flexion", "shoulder_elevation")
     flexion, side = angles.shoulder_flexion, angles.shoulder_abduction
     spread = _turned(accuracy, np.cos(side))
     if policy is ArmPolicy.PROJECTION:

@@ -30,6 +30,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from seerob.errors import InputError
 from seerob.recording_format import nanoseconds
 from seerob.sinks._glb_reader import read_glb
+from seerob.sinks._marker_shapes import prism
 from seerob.snapshot import (
     Arrow,
     Box,
@@ -38,6 +39,9 @@ from seerob.snapshot import (
     Hull,
     Label,
     Marker,
+    Polyline,
+    Prism,
+    Rays,
     Scene,
     Segment,
     Snapshot,
@@ -161,16 +165,27 @@ def _draw(entity: SceneEntity, marker: Marker) -> None:
             entity.cubes.append(CubePrimitive(pose=_pose(center, wxyz), size=size, color=fill))
             _text(entity, marker, center)
         case Hull(vertices=vertices, faces=faces):
-            entity.triangles.append(
-                TriangleListPrimitive(
-                    pose=_pose((0.0, 0.0, 0.0)),
-                    points=[_point(v) for v in vertices],
-                    indices=[i for face in faces for i in face],
-                    color=fill,
-                )
-            )
+            entity.triangles.append(_triangles(vertices, [i for face in faces for i in face], fill))
             if vertices:
                 _text(entity, marker, vertices[0])
+        case Polyline(points=points):
+            entity.lines.append(_lines([p for leg in marker.legs() for p in leg], line))
+            if points:
+                _text(entity, marker, points[0])
+        case Prism():
+            placed, prism_faces, edges = prism(marker)
+            corners = [(float(x), float(y), float(z)) for x, y, z in placed]
+            entity.triangles.append(_triangles(corners, [int(i) for i in prism_faces.ravel()], fill))
+            entity.lines.append(_lines([corners[i] for edge in edges for i in edge], line))
+            if corners:
+                _text(entity, marker, corners[-1])
+        case Rays(starts=starts):
+            beams = list(enumerate(marker.beams()))
+            for hit, color in ((True, line), (False, fill)):
+                ends = [p for k, beam in beams if (k in marker.hits) is hit for p in beam]
+                entity.lines.append(_lines(ends, color))
+            if starts:
+                _text(entity, marker, starts[0])
         case Label(position=position, text=text):
             _text(entity, marker, position, text)
         case Highlight():
@@ -201,6 +216,12 @@ def _lines(points: list[Vec3], color: Color) -> LinePrimitive:
         scale_invariant=True,
         points=[_point(p) for p in points],
         color=color,
+    )
+
+
+def _triangles(points: Iterable[Vec3], indices: list[int], color: Color) -> TriangleListPrimitive:
+    return TriangleListPrimitive(
+        pose=_pose((0.0, 0.0, 0.0)), points=[_point(v) for v in points], indices=indices, color=color
     )
 
 

@@ -5,9 +5,24 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.ear_cutting import cut_ears
 from seerob.sinks._canvas import Canvas
 from seerob.sinks._palette import DARK, FILL, MARK
-from seerob.snapshot import Arrow, Box, Ellipsoid, Highlight, Hull, Label, Marker, Segment, Sphere, Vec3
+from seerob.snapshot import (
+    Arrow,
+    Box,
+    Ellipsoid,
+    Highlight,
+    Hull,
+    Label,
+    Marker,
+    Polyline,
+    Prism,
+    Rays,
+    Segment,
+    Sphere,
+    Vec3,
+)
 from seerob.transforms import Array, rotation_from_wxyz
 
 _VEIL = 0.38
@@ -48,6 +63,25 @@ def draw_marker(canvas: Canvas, marker: Marker) -> None:
             inside = [f for f in hull_faces if all(0 <= i < len(points) for i in f)]
             if inside:
                 canvas.veil(np.array(points, float), np.array(inside, np.int32), fill, _VEIL)
+        case Polyline():
+            for start, end in marker.legs():
+                canvas.line(np.array(start), np.array(end), dark, width=2.4, hidden=0.5)
+        case Prism():
+            points, prism_faces, prism_edges = prism(marker)
+            if len(prism_faces):
+                canvas.veil(points, prism_faces, fill, _VEIL)
+            for a, b in prism_edges:
+                canvas.line(points[a], points[b], dark, width=1.6, hidden=0.35)
+        case Rays():
+            for k, (start, end) in enumerate(marker.beams()):
+                solid = k in marker.hits
+                canvas.line(
+                    np.array(start),
+                    np.array(end),
+                    dark,
+                    width=1.6 if solid else 0.8,
+                    alpha=1.0 if solid else 0.3,
+                )
         case Label() | Highlight():
             pass
 
@@ -65,6 +99,12 @@ def points_of(marker: Marker) -> list[Vec3]:
             return [(float(x), float(y), float(z)) for x, y, z in corners(marker)]
         case Hull(vertices=vertices):
             return list(vertices)
+        case Polyline(points=points):
+            return list(points)
+        case Prism():
+            return [(float(x), float(y), float(z)) for x, y, z in prism(marker)[0]]
+        case Rays(starts=starts, ends=ends):
+            return [*starts, *ends]
         case Label(position=position):
             return [position]
         case Highlight():
@@ -78,7 +118,9 @@ def label_of(marker: Marker) -> tuple[str, Vec3]:
     if not text or not points:
         return "", (0.0, 0.0, 0.0)
     mark = "" if marker.verdict is None else MARK[marker.verdict] + " "
-    middle = np.mean(points if isinstance(marker, Segment | Box | Hull) else points[:1], axis=0)
+    middle = np.mean(
+        points if isinstance(marker, Segment | Box | Hull | Polyline | Prism) else points[:1], axis=0
+    )
     return mark + text, (float(middle[0]), float(middle[1]), float(middle[2]))
 
 
@@ -86,6 +128,23 @@ def corners(box: Box) -> Array:
     """Corners of a box marker in the world [m], shape (8, 3)."""
     signs = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     return np.asarray(signs * box.size @ rotation_from_wxyz(box.wxyz).T + box.center)
+
+
+def prism(marker: Prism) -> tuple[Array, NDArray[np.int32], list[tuple[int, int]]]:
+    """Vertices in the world [m], shape (2 n, 3), the lower ones first; faces, shape (m, 3); edges.
+
+    The faces are none when the outline encloses nothing.
+    """
+    n = len(marker.outline)
+    outline = np.array(marker.outline, float).reshape(-1, 2)
+    points = np.array([[x, y, z] for z in (marker.lower, marker.upper) for x, y in outline])
+    placed = points.reshape(-1, 3) @ rotation_from_wxyz(marker.wxyz).T + marker.position
+    ring = [(i, (i + 1) % n) for i in range(n)]
+    sides = [face for a, b in ring for face in ((a, b, b + n), (a, b + n, a + n))]
+    caps = cut_ears(outline)
+    faces = [*((c, b, a) for a, b, c in caps), *((a + n, b + n, c + n) for a, b, c in caps), *sides]
+    edges = [*ring, *((a + n, b + n) for a, b in ring), *((i, i + n) for i in range(n))]
+    return np.asarray(placed), np.array(faces if caps else [], np.int32).reshape(-1, 3), edges
 
 
 def ball(rings: int = 16) -> tuple[Array, NDArray[np.int32]]:

@@ -6,11 +6,13 @@ from base64 import b64encode
 
 from seerob.series import Series
 from seerob.sinks import _plots
+from seerob.sinks._added import added
 from seerob.sinks._evidence import assumed, evaluated, not_covered
 from seerob.sinks._html import Html, joined, table, tag
 from seerob.sinks._page_style import STYLE
 from seerob.sinks._report import Report, badge, input_row
 from seerob.sinks._sentences import about, bound, extremum, percent, reached, summary
+from seerob.sinks._time_shares import spread_over_time
 from seerob.snapshot import Basis, CriterionInfo, Verdict
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
@@ -36,6 +38,7 @@ def page(report: Report) -> str:
         _opening(report),
         _verdicts(report),
         _criteria(report),
+        added(report.sections),
         assumed(report),
         not_covered(report),
         evaluated(report),
@@ -135,6 +138,7 @@ def _criteria(report: Report) -> Html:
                 [tag("p", sentence) for sentence in about(series)],
                 _picture(report, series),
                 tag("figure", _plots.curve(series, salt=_anchor(report, series))) if series.known else None,
+                spread_over_time(infos.get(series.name), series),
                 _parts(series),
                 _basis(report.bases.get(series.name)),
                 id=_anchor(report, series),

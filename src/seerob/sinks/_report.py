@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from seerob.report_section import ReportSection
 from seerob.results import ResultLog
 from seerob.sinks._html import Html, tag
 from seerob.sinks._palette import MARK, WORD
@@ -44,6 +45,8 @@ class Report:
     """Engine and sources."""
     command: str
     """What wrote the report."""
+    sections: tuple[ReportSection, ...] = ()
+    """Added by a command."""
 
 
 def badge(verdict: Verdict | None) -> Html:

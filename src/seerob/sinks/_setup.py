@@ -79,6 +79,7 @@ def _engine(table: Any) -> tuple[tuple[str, str], ...]:
             f"{number(e.human_bandwidth, 'Hz')} for people",
         ),
         ("largest tracking error that is still judged", f"{number(e.tracking_limit)} rad or m"),
+        ("the same of people", f"{number(e.human_tracking_limit)} rad or m"),
         ("gravity", ", ".join(number(x) for x in e.gravity) + " m/s²"),
     )
 

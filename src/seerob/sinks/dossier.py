@@ -13,6 +13,7 @@ from typing import Annotated, Self
 from msgspec import Meta
 
 from seerob.errors import InputError
+from seerob.report_section import ReportSection
 from seerob.results import ResultLog, result_named
 from seerob.samples import Sample
 from seerob.sink import Sink
@@ -61,6 +62,8 @@ class DossierWriter:
         """Called while `close` works; every picture is a step, and so is the page."""
         self.findings: list[Finding] = list(scene.findings)
         """What the report lists as found; the run may add to it."""
+        self.sections: list[ReportSection] = []
+        """What a command adds to the report, after the criteria."""
         self._scene, self._meshes, self._files, self._pictures = scene, meshes, files, pictures
         self.log = ResultLog(scene.criteria)
         self._worst: dict[str, Snapshot] = {}
@@ -93,6 +96,7 @@ class DossierWriter:
             findings=tuple(self.findings),
             setup=setup(self._files),
             command=command(),
+            sections=tuple(self.sections),
         )
         write_whole(self.path, page(report).encode())
         self._tell(len(pictures) + 1, len(pictures) + 1)

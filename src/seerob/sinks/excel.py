@@ -19,6 +19,7 @@ from seerob.samples import Sample
 from seerob.series import CODES, Series
 from seerob.sink import Sink
 from seerob.sinks._sheets import Cell, Sheets
+from seerob.sinks._time_shares import HEAD, time_rows
 from seerob.snapshot import Basis, Scene, Snapshot
 
 _VERDICT_OF = {code: verdict for verdict, code in CODES.items()}
@@ -121,6 +122,9 @@ class ExcelWriter:
             for k, (name, columns) in enumerate(self._joints.items()):
                 sheets.add(f"joints {name}", self._joint_head(name, len(columns)), self._joint_rows(name))
                 self._tell(len(self.log) + k + 1, steps)
+            infos = {info.name: info for info in self._scene.criteria}
+            if any(info.group == "ergonomics" for info in infos.values()):
+                sheets.add("Time shares", HEAD, time_rows(self.log, infos))
             sheets.add("Inputs", _INPUTS, list(self._inputs()), fit=True)
             found = [[f.level, f.subject, f.text] for f in self._scene.findings]
             sheets.add("Findings", ["level", "about", "text"], found, fit=True)

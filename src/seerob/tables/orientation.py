@@ -63,22 +63,23 @@ def wxyz_from(convention: str, values: Array) -> Array:
         q = np.column_stack([np.cos(angle / 2), values * (np.sinc(angle / (2 * np.pi)) / 2)[:, None]])
     else:
         axes = "xyz" if convention == "rpy" else convention
-        turns = [_about(axis, values[:, i]) for i, axis in enumerate(axes.lower())]
+        turns = [about(axis, values[:, i]) for i, axis in enumerate(axes.lower())]
         if axes.islower():
             turns = turns[::-1]
-        q = _product(_product(turns[0], turns[1]), turns[2])
+        q = product(product(turns[0], turns[1]), turns[2])
     return np.where(q[:, :1] < 0, -q, q)
 
 
-def _about(axis: str, angle: Array) -> Array:
+def about(axis: str, angle: Array) -> Array:
+    """Quaternions (n, 4) of turns (n,) [rad] about ``x``, ``y`` or ``z``."""
     q = np.zeros((len(angle), 4))
     q[:, 0] = np.cos(angle / 2)
     q[:, 1 + "xyz".index(axis)] = np.sin(angle / 2)
     return q
 
 
-def _product(p: Array, q: Array) -> Array:
-    """Hamilton product, row by row."""
+def product(p: Array, q: Array) -> Array:
+    """Hamilton product of quaternions (n, 4), row by row."""
     pw, pv, qw, qv = p[:, :1], p[:, 1:], q[:, :1], q[:, 1:]
     w = pw * qw - np.sum(pv * qv, axis=1, keepdims=True)
     return np.hstack([w, pw * qv + qw * pv + np.cross(pv, qv)])

@@ -8,6 +8,9 @@ import { EllipsoidDrawn } from "./ellipsoid";
 import { HighlightDrawn } from "./highlight";
 import { HullDrawn } from "./hull";
 import { LabelDrawn } from "./label";
+import { PolylineDrawn } from "./polyline";
+import { PrismDrawn } from "./prism";
+import { RaysDrawn } from "./rays";
 import { SegmentDrawn } from "./segment";
 import { SphereDrawn } from "./sphere";
 
@@ -20,6 +23,9 @@ const MAKERS: Makers = {
   ellipsoid: () => new EllipsoidDrawn(),
   box: () => new BoxDrawn(),
   hull: () => new HullDrawn(),
+  polyline: () => new PolylineDrawn(),
+  prism: () => new PrismDrawn(),
+  rays: () => new RaysDrawn(),
   label: () => new LabelDrawn(),
   highlight: () => new HighlightDrawn(),
 };

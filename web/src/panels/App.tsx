@@ -3,10 +3,10 @@
 import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { scene } from "../page_state";
-import { CriteriaTable } from "./CriteriaTable";
-import { allFindings, Findings } from "./Findings";
+import { VisitedInstant } from "./ElsewhereNote";
 import { Plots } from "./Plots";
 import { Properties } from "./Properties";
+import { RightSide } from "./RightSide";
 import { SceneTree } from "./SceneTree";
 import { Timeline } from "./Timeline";
 import { TopBar } from "./TopBar";
@@ -35,6 +35,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
       <main class="centre">
         <div class="room" ref={place} />
         <ViewTools />
+        <VisitedInstant />
       </main>
       <RightSide />
       <footer class="bottom">
@@ -43,43 +44,6 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
         <Timeline />
       </footer>
     </div>
-  );
-}
-
-function RightSide() {
-  const tab = useSignal<"criteria" | "findings">("criteria");
-  const findings = allFindings();
-  const warnings = findings.filter((finding) => finding.level !== "note").length;
-  return (
-    <aside class="right" aria-label="Results">
-      <div class="tabs" role="tablist">
-        <button
-          type="button"
-          role="tab"
-          aria-selected={tab.value === "criteria"}
-          onClick={() => {
-            tab.value = "criteria";
-          }}
-        >
-          Criteria
-        </button>
-        <button
-          type="button"
-          role="tab"
-          aria-selected={tab.value === "findings"}
-          onClick={() => {
-            tab.value = "findings";
-          }}
-        >
-          Findings{" "}
-          <span class={warnings > 0 ? "count count-warn" : "count"}>
-            {warnings > 0 ? `! ${findings.length}` : findings.length}
-          </span>
-        </button>
-      </div>
-      {tab.value === "criteria" ? <CriteriaTable /> : <Findings />}
-      <p class="disclaimer">Evaluation of a model, to be confirmed by measurement.</p>
-    </aside>
   );
 }
 

@@ -1,10 +1,10 @@
 // What is shown, from where, and the worst that is said about it.
 
-import type { Elsewhere } from "../elsewhere";
 import { formatQuantity } from "../format";
 import { elsewhere, frame, hello, isLive, link, lookingAt, overall, rows, scene, stale } from "../page_state";
 import { orderedRows } from "../row_order";
-import { STATE_ICONS, STATE_WORDS, type State } from "../verdicts";
+import { STATE_ICONS, type State } from "../verdicts";
+import { ElsewhereNote } from "./ElsewhereNote";
 
 export function TopBar() {
   const run = scene.value;
@@ -54,7 +54,7 @@ const HEADLINES: Record<State, string> = {
 
 /**
  * The worst verdict, and the criterion that gives it. Grey as soon as it may be out of date; it speaks of
- * the instant on screen, and says so where a recording is worse at another.
+ * the instant on screen, and says so where a recording is, or a live run was, worse at another.
  */
 function StatusPill() {
   const state = overall.value;
@@ -78,32 +78,23 @@ function StatusPill() {
       <span class="badge-icon" aria-hidden="true">
         {STATE_ICONS[state]}
       </span>
-      <strong>{HEADLINES[state]}</strong>
+      <strong>
+        {HEADLINES[state]}
+        {other && isLive.value && lookingAt.value === null && " NOW"}
+      </strong>
       {detail && <span class="pill-detail">{detail}</span>}
       {worst?.result && detail && worst.result.value !== null && (
         <span class="pill-value" aria-hidden="true">
           {formatQuantity(worst.result.value, worst.result.unit, worst.result.limit)}
         </span>
       )}
-      {other && <ElsewhereNote {...other} />}
+      {other && <ElsewhereNote other={other} />}
       {!detail && !other && state !== "none" && (
         <span class="pill-more">all {judgedCount()} with a limit</span>
       )}
       {detail && others > 0 && <span class="pill-more">+{others}</span>}
       {lookingAt.value !== null && <span class="pill-more">looking back</span>}
     </output>
-  );
-}
-
-function ElsewhereNote({ verdict, criteria }: Elsewhere) {
-  const more = criteria.length > 1 ? ` +${criteria.length - 1}` : "";
-  return (
-    <span class={`pill-elsewhere elsewhere-${verdict}`} title={criteria.join(", ")}>
-      <span class="pill-instant">at this instant; </span>
-      <span aria-hidden="true">{STATE_ICONS[verdict]} </span>
-      {STATE_WORDS[verdict]} elsewhere: {criteria[0]}
-      {more}
-    </span>
   );
 }
 

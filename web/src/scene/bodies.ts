@@ -15,7 +15,7 @@ import {
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { FLOATS_PER_NODE } from "../poses";
 import type { Node, Scene, Verdict } from "../wire";
-import { bodyMaterial, lineMaterial, markerMaterial } from "./materials";
+import { bodyMaterial, lineMaterial, markerMaterial, scoreMaterial } from "./materials";
 
 /** Role of what is only room: a safety area. */
 const AREA = "area";
@@ -32,6 +32,8 @@ export class Body {
   private dressed: { mesh: Mesh; own: Material | Material[] }[] = [];
   private enclosed: { fill: Mesh; edges: LineSegments }[] = [];
   private painted: Verdict | null | undefined = undefined;
+  /** Colour of a score; undefined while it has its own or a verdict's. */
+  tint: number | undefined = undefined;
   private lit = false;
 
   constructor(readonly node: Node) {
@@ -80,6 +82,13 @@ export class Body {
     this.repaint();
   }
 
+  /** Show it in the colour of a score, sRGB; goes before a verdict's; `undefined` for none. */
+  color(tint: number | undefined): void {
+    if (tint === this.tint) return;
+    this.tint = tint;
+    this.repaint();
+  }
+
   /** Make it stand out as selected. */
   light(on: boolean): void {
     if (on === this.lit) return;
@@ -93,7 +102,8 @@ export class Body {
       edges.material = lineMaterial(this.painted ?? null);
     }
     for (const { mesh, own } of this.dressed) {
-      mesh.material = this.painted === undefined ? own : bodyMaterial(this.painted);
+      if (this.tint !== undefined) mesh.material = scoreMaterial(this.tint);
+      else mesh.material = this.painted === undefined ? own : bodyMaterial(this.painted);
       for (const material of [own].flat()) {
         if (material instanceof MeshStandardMaterial) material.emissive.setHex(this.lit ? SELECTED_GLOW : 0);
       }
@@ -164,6 +174,11 @@ export class Bodies {
   /** Make these stand out as selected, and only these. */
   light(names: ReadonlySet<string>): void {
     for (const body of this.list) body.light(names.has(body.node.name));
+  }
+
+  /** Colour bodies by scores, and only those. */
+  color(tints: ReadonlyMap<string, number>): void {
+    for (const body of this.list) body.color(tints.get(body.node.name));
   }
 
   /** Colour the bodies that verdicts are about, and only those. */

@@ -7,6 +7,7 @@ import {
   type Material,
   MeshBasicMaterial,
   MeshStandardMaterial,
+  PointsMaterial,
 } from "three";
 import { NEUTRAL_COLOR, VERDICT_COLORS } from "../verdicts";
 import type { Verdict } from "../wire";
@@ -67,14 +68,26 @@ export function markerMaterial(kind: Kind, verdict: Verdict | null): Material {
 
 /** The shared material of thin lines: edges of translucent things. */
 export function lineMaterial(verdict: Verdict | null): Material {
+  return thin(verdict, 0.85);
+}
+
+/** The shared material of lines that are many and mean little one by one: beams that hit nothing. */
+export function faintMaterial(verdict: Verdict | null): Material {
+  return thin(verdict, 0.22);
+}
+
+function thin(verdict: Verdict | null, opacity: number): Material {
   const tone: Tone = verdict ?? "none";
-  return once(`thin ${tone}`, () => {
-    return new LineBasicMaterial({
-      color: colorOf(tone),
-      toneMapped: false,
-      transparent: true,
-      opacity: 0.85,
-    });
+  return once(`thin ${opacity} ${tone}`, () => {
+    return new LineBasicMaterial({ color: colorOf(tone), toneMapped: false, transparent: true, opacity });
+  });
+}
+
+/** The shared material of dots with a size in pixels. */
+export function dotMaterial(verdict: Verdict | null): Material {
+  const tone: Tone = verdict ?? "none";
+  return once(`dot ${tone}`, () => {
+    return new PointsMaterial({ color: colorOf(tone), toneMapped: false, size: 5, sizeAttenuation: false });
   });
 }
 
@@ -95,5 +108,26 @@ export function bodyMaterial(verdict: Verdict | null): Material {
     });
     if (tone === "undecided") hatch(material);
     return material;
+  });
+}
+
+/** Score colours in use; scales have few steps. */
+const MOST_SCORES = 256;
+
+/** The shared material of a body in the colour of a score, sRGB. */
+export function scoreMaterial(color: number): Material {
+  if (made.size > MOST_SCORES) {
+    for (const key of made.keys()) if (key.startsWith("score ")) made.delete(key);
+  }
+  return once(`score ${color}`, () => {
+    return new MeshStandardMaterial({
+      color,
+      emissive: color,
+      emissiveIntensity: 0.3,
+      roughness: 0.65,
+      metalness: 0,
+      side: DoubleSide,
+      toneMapped: false,
+    });
   });
 }

@@ -3,10 +3,12 @@
 import { effect, signal } from "@preact/signals";
 import { Quaternion, Vector3 } from "three";
 import type { PoseFeed } from "../connection";
+import { Glide } from "../glide";
 import type { View } from "../markers/drawn";
 import { MarkerLayer } from "../markers/layer";
 import type { Frame } from "../messages";
 import { hidden, mutedCriteria, select, selectedNodes, selection, stale } from "../page_state";
+import { manikinTints } from "../posture/coloring";
 import type { Scene } from "../wire";
 import { Bodies } from "./bodies";
 import { Outline } from "./outline";
@@ -26,8 +28,12 @@ export class Viewer {
   readonly viewpoint: Viewpoint;
   private readonly outline = new Outline(this.bodies);
   private readonly view: View;
+  private readonly glide = new Glide();
   private feed: PoseFeed | null = null;
   private frame: Frame | null = null;
+  /** Heard, and shown as soon as the bodies are where it speaks of. */
+  private coming: Frame | null = null;
+  private tickedAt = Number.NEGATIVE_INFINITY;
   private posed = false;
   private framed = false;
   private dressed = false;
@@ -46,29 +52,38 @@ export class Viewer {
   async begin(scene: Scene, feed: PoseFeed): Promise<void> {
     this.feed = feed;
     this.frame = null;
+    this.coming = null;
+    this.glide.clear();
     this.dressed = false;
     this.markers.update([], new Set(), null, false);
     unseen.value = await this.bodies.load(scene);
     if (feed !== this.feed) return;
     this.bodies.hide(hidden.peek());
+    this.bodies.color(manikinTints.peek());
     this.emphasize();
     this.dressed = true;
     this.stage.moved();
   }
 
   show(frame: Frame): void {
-    this.frame = frame;
-    this.draw();
+    if (this.coming) this.arrive();
+    this.coming = frame;
   }
 
   /** Once per display frame, before drawing. */
-  tick(): void {
+  tick(time: number): void {
     const block = this.feed?.read();
-    if (block) {
-      this.bodies.pose(block);
-      this.posed = true;
-      this.stage.moved();
+    if (block) this.glide.take(block, this.feed!.t, time, time - this.tickedAt);
+    this.tickedAt = time;
+    if (block || this.glide.moving) {
+      const shown = this.glide.at(time);
+      if (shown) {
+        this.bodies.pose(shown);
+        this.posed = true;
+        this.stage.moved();
+      }
     }
+    if (this.coming && !this.glide.moving) this.arrive();
     if (!this.framed && this.posed && this.dressed) {
       this.framed = true;
       this.viewpoint.go("corner");
@@ -95,6 +110,12 @@ export class Viewer {
     const at = world.localToWorld(new Vector3(...point)).project(camera);
     const box = element.getBoundingClientRect();
     return [box.left + ((at.x + 1) / 2) * box.width, box.top + ((1 - at.y) / 2) * box.height];
+  }
+
+  private arrive(): void {
+    this.frame = this.coming;
+    this.coming = null;
+    this.draw();
   }
 
   private draw(): void {
@@ -135,6 +156,10 @@ export class Viewer {
       // Read to be told of changes.
       void [mutedCriteria.value, selection.value, showCaptions.value];
       this.draw();
+    });
+    effect(() => {
+      this.bodies.color(manikinTints.value);
+      this.stage.invalidate();
     });
     effect(() => {
       this.markers.root.visible = !stale.value;

@@ -1,0 +1,342 @@
+"""What the twin of a person is pulled toward, from what any number of devices see of it.
+
+Every device's samples wait here until the engine needs them. At each instant somebody speaks of, all
+devices are brought to it (between two samples interpolated, after the newest held), each bone is taken
+from the device that counts most for it, and the posture that agrees best with all that is the joint
+reference of that instant. The engine's controllers pull the body there; contacts decide the rest.
+
+Nothing here believes a jump: a point that nobody could have moved so far since it was last believed is
+left out until it is near enough in time and place, joints move no faster than a person can, and whoever
+appears elsewhere is put there, not dragged. Whatever is left out or held says why, for the verdicts.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from seerob.human.fitting import Fitter, Pulls, pulls
+from seerob.human.skeleton import AXES, BONES
+from seerob.model_io.description import Description, JointKind
+from seerob.samples import BodyPoint, BodySample, Quality, Vec3, Vec4
+from seerob.transforms import Array, inverse
+
+POINT_SPEED = 10.0
+"""No point of a person at work is faster [m/s]."""
+POINT_SLACK = 0.1
+"""What a position may jump by itself, as noise [m]."""
+SPEED = {"rad": 10.0, "m": 5.0}
+"""No joint of a person at work is faster; the waist's translation [rad/s, m/s]."""
+FAR = 0.25
+"""A bone that is farther from where it is seen [m] is not followed."""
+TURNED = np.radians(45.0)
+"""The same for how it is turned [rad]."""
+MOST_KEPT = 4096
+"""Samples per device at most; many times what lies between two ticks."""
+MOST_DEVICES = 32
+LARGEST = 1e6
+"""No number of a point is larger, in SI."""
+SLACK = 1e-9
+"""Instants that differ by less are the same [s]."""
+MANY = 0.3
+"""Share of a device's points that jump at once, beyond which none of them is believed."""
+ELSEWHERE = 0.1
+"""Whoever was not seen for a while and is farther from before [rad or m] is put there, not pulled."""
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """The posture at one instant."""
+
+    t: float
+    """[s]"""
+    q: Array
+    """Joint reference [rad or m], shape (53,)."""
+    reason: str
+    """Why it may not be relied on; empty when it may."""
+    anew: bool
+    """Nobody knows how the person came here: it is to be put there."""
+    seen: Pulls
+    """What it was made of, in the root's frame."""
+
+
+@dataclass
+class _Device:
+    """What one source said."""
+
+    times: list[float] = field(default_factory=list)
+    samples: list[BodySample] = field(default_factory=list)
+    believed: dict[str, tuple[float, Vec3]] = field(default_factory=dict)
+    """Point → when and where it was last believed."""
+    seen: dict[str, float] = field(default_factory=dict)
+    """Bone → when it was last seen."""
+
+    def forget(self, t: float) -> None:
+        """Drop what is older than the last sample at or before ``t``."""
+        k = max(bisect_right(self.times, t) - 1, len(self.times) - MOST_KEPT)
+        if k > 0:
+            del self.times[:k], self.samples[:k]
+
+
+class Following:
+    """One person and all devices that see it."""
+
+    def __init__(self, description: Description, world_from_root: Array) -> None:
+        """Know the person.
+
+        Args:
+            description: Of `seerob.human.manikin.build`.
+            world_from_root: Where its root stands, (4, 4).
+        """
+        self._fitter = Fitter(description)
+        self._root_from_world = inverse(world_from_root)
+        self._speed = np.array([SPEED["m" if a.kind is JointKind.PRISMATIC else "rad"] for a in AXES])
+        self._devices: dict[str, _Device] = {}
+        self._instants: list[float] = []
+        self._last: Followed | None = None
+        self._history: list[Followed] = []
+        self._waits = False
+        """Nothing was believed of late: where the person is now is not known."""
+
+    def hear(self, sample: BodySample) -> bool:
+        """Take a sample; False for one that is not newer than the last of its device, which is dropped."""
+        if sample.source not in self._devices and len(self._devices) >= MOST_DEVICES:
+            return False
+        device = self._devices.setdefault(sample.source, _Device())
+        if not np.isfinite(sample.t) or (device.times and sample.t <= device.times[-1]):
+            return False
+        device.times.append(sample.t)
+        device.samples.append(sample)
+        k = bisect_right(self._instants, sample.t)
+        if k == 0 or self._instants[k - 1] < sample.t:
+            self._instants.insert(k, sample.t)
+        return True
+
+    def until(self, t: float) -> Iterator[Followed]:
+        """Postures at the instants that were heard of, up to the first one after ``t`` [s], each once."""
+        while self._instants and (self._last is None or self._last.t < t):
+            instant = self._instants.pop(0)
+            if self._last is not None and instant <= self._last.t:
+                continue
+            found = self._at(instant)
+            if found is None:
+                continue
+            self._last = found
+            self._history.append(found)
+            yield found
+        for device in self._devices.values():
+            device.forget(min(t, np.inf if self._last is None else self._last.t))
+
+    def _at(self, t: float) -> Followed | None:
+        points, reasons, jumped = [], [], False
+        for name, device in self._devices.items():
+            seen, reason, leapt = self._device_at(device, name, t)
+            points.append(seen)
+            jumped |= leapt
+            if reason:
+                reasons.append(reason)
+        chosen, last = _best(points), self._last
+        if not chosen:
+            if last is None or not jumped:
+                return None
+            self._waits = True
+            return Followed(t, last.q, "; ".join(reasons[:4]), False, pulls((), self._root_from_world))
+        reasons += self._lost(t)
+        found = pulls(chosen, self._root_from_world)
+        # After a silence, or where nothing was believed, a person may be anywhere, in any posture.
+        hold = max(device.samples[-1].hold for device in self._devices.values() if device.samples)
+        lost = last is not None and (self._waits or t - last.t > hold)
+        reach = np.inf if last is None or lost else self._speed * (t - last.t)
+        before, since = (None, np.inf) if last is None or lost else (last.q, t - last.t)
+        q, error = self._fitter.fit(found, before, reach=reach, since=since)
+        moved = np.zeros(len(q)) if last is None else np.abs(q - last.q)
+        anew = lost and bool(moved.max() > ELSEWHERE)
+        self._waits = False
+        if (moved >= 0.999 * reach).any():
+            joint = AXES[int((moved / reach).argmax())].name
+            reasons.append(f"{joint} would move faster than a person can")
+        reasons += _residual(found, error)
+        if anew:
+            reasons.append("appeared elsewhere")
+        return Followed(t, q, "; ".join(reasons[:4]), anew, found)
+
+    def _device_at(self, device: _Device, name: str, t: float) -> tuple[list[BodyPoint], str, bool]:
+        """What a device sees at ``t``: between two samples, or the newest while it counts.
+
+        Returns:
+            Points, why they may not be relied on, and whether some were left out that jumped.
+        """
+        k = bisect_right(device.times, t) - 1
+        if k < 0:
+            return [], "", False
+        sample = device.samples[k]
+        age = t - device.times[k]
+        if age > sample.hold:
+            return [], f"{name} was not heard for {age:.2f} s", False
+        points: Sequence[BodyPoint] = sample.points
+        instant = device.times[k]
+        if age > 0 and k + 1 < len(device.times) and device.times[k + 1] - device.times[k] <= sample.hold:
+            share = age / (device.times[k + 1] - device.times[k])
+            instant = t
+            points = _between(points, device.samples[k + 1].points, share)
+        reason = "" if sample.quality is Quality.GOOD else f"{name} says {sample.quality.value}"
+        if sample.quality is Quality.INVALID:
+            return [], reason, False
+        return self._believed(device, points, instant, reason)
+
+    def _believed(
+        self, device: _Device, points: Sequence[BodyPoint], t: float, reason: str
+    ) -> tuple[list[BodyPoint], str, bool]:
+        """Without what cannot have moved so far; what is believed is remembered."""
+        out: list[BodyPoint] = []
+        jumped: list[str] = []
+        for point in points:
+            device.seen.setdefault(point.bone, t)
+            if not _finite(point):
+                continue
+            if point.position is not None:
+                before = device.believed.get(point.name)
+                if before is not None:
+                    away = float(np.linalg.norm(np.subtract(point.position, before[1])))
+                    if away > POINT_SLACK + POINT_SPEED * (t - before[0]):
+                        jumped.append(point.name)
+                        continue
+                device.believed[point.name] = t, point.position
+            if point.position is not None or point.wxyz is not None:
+                device.seen[point.bone] = t
+                out.append(point)
+        if len(jumped) > MANY * max(1, len(points)):
+            # What a device loses so much of, it has lost altogether.
+            out = []
+        if jumped:
+            shown = ", ".join(jumped[:4]) + (" …" if len(jumped) > 4 else "")
+            reason = "; ".join(filter(None, (reason, f"{shown} jumped")))
+        return out, reason, bool(jumped)
+
+    def _lost(self, t: float) -> list[str]:
+        """Bones that a device has and that nobody has seen for too long."""
+        newest: dict[str, tuple[float, float]] = {}
+        for device in self._devices.values():
+            if not device.samples:
+                continue
+            hold = device.samples[-1].hold
+            for bone, seen in device.seen.items():
+                before = newest.get(bone, (-np.inf, hold))
+                newest[bone] = max(seen, before[0]), max(hold, before[1])
+        lost = [bone for bone, (seen, hold) in newest.items() if t - seen > hold]
+        return [f"not seen any more: {', '.join(sorted(lost, key=BONES.index)[:6])}"] if lost else []
+
+    def errors(self, t: float, q: Array) -> dict[str, tuple[float | None, float | None]]:
+        """How far the twin is from what devices saw at ``t``: bone → position [m] and angle [rad].
+
+        Args:
+            t: [s]
+            q: Joint values of the twin [rad or m], shape (53,).
+
+        Returns:
+            The largest of each bone that was seen; None where no position or no orientation was.
+        """
+        k = sum(f.t <= t + SLACK for f in self._history) - 1
+        self._history = self._history[max(0, k) :]
+        if k < 0:
+            return {}
+        here = self._history[0]
+        after = self._history[1] if len(self._history) > 1 else None
+        if after is not None and after.anew and t > here.t + SLACK:
+            return {}
+        if after is None or t <= here.t:
+            return self._fitter.errors(here.seen, q)
+        share = (t - here.t) / (after.t - here.t)
+        if here.seen.same(after.seen):
+            return self._fitter.errors(here.seen.toward(after.seen, share), q)
+        return self._fitter.errors(here.seen if share < 0.5 else after.seen, q)
+
+
+def _best(devices: Sequence[Sequence[BodyPoint]]) -> list[BodyPoint]:
+    """Per bone the positions, and the orientations, of the device that counts most for it."""
+    if len(devices) == 1:
+        return list(devices[0])
+    best: dict[tuple[str, bool], tuple[float, int]] = {}
+    for k, points in enumerate(devices):
+        for p in points:
+            for turned, value, weight in (
+                (False, p.position, p.position_weight),
+                (True, p.wxyz, p.orientation_weight),
+            ):
+                if value is not None and weight > best.get((p.bone, turned), (0.0, 0))[0]:
+                    best[p.bone, turned] = weight, k
+    out = []
+    for k, points in enumerate(devices):
+        for p in points:
+            here = best.get((p.bone, False), (0.0, -1))[1] == k
+            turned = best.get((p.bone, True), (0.0, -1))[1] == k
+            if (here and p.position is not None) or (turned and p.wxyz is not None):
+                out.append(_point(p, p.position if here else None, p.wxyz if turned else None))
+    return out
+
+
+def _between(before: Sequence[BodyPoint], after: Sequence[BodyPoint], share: float) -> list[BodyPoint]:
+    """Points that both samples have, a share of the way from one to the other."""
+    later = {p.name: p for p in after}
+    out = []
+    for p in before:
+        other = later.get(p.name)
+        position: Vec3 | None = None
+        wxyz: Vec4 | None = None
+        if other is not None and p.position is not None and other.position is not None:
+            x, y, z = ((1 - share) * a + share * b for a, b in zip(p.position, other.position, strict=True))
+            position = x, y, z
+        if other is not None and p.wxyz is not None and other.wxyz is not None:
+            wxyz = _nlerp(p.wxyz, other.wxyz, share)
+        out.append(_point(p, position, wxyz))
+    return out
+
+
+def _nlerp(a: Vec4, b: Vec4, share: float) -> Vec4:
+    sign = 1.0 if sum(x * y for x, y in zip(a, b, strict=True)) >= 0 else -1.0
+    mixed = [(1 - share) * x + share * sign * y for x, y in zip(a, b, strict=True)]
+    norm = float(np.linalg.norm(mixed)) or 1.0
+    w, x, y, z = (value / norm for value in mixed)
+    return w, x, y, z
+
+
+def _point(p: BodyPoint, position: Vec3 | None, wxyz: Vec4 | None) -> BodyPoint:
+    return BodyPoint(
+        name=p.name,
+        bone=p.bone,
+        at=p.at,
+        position=position,
+        wxyz=wxyz,
+        position_weight=p.position_weight,
+        orientation_weight=p.orientation_weight,
+        confidence=p.confidence,
+    )
+
+
+def _finite(point: BodyPoint) -> bool:
+    values = [*point.at, *(point.position or ()), *(point.wxyz or ())]
+    values += [point.position_weight, point.orientation_weight]
+    return (
+        all(abs(value) < LARGEST for value in values)  # false for NaN
+        and point.bone in BONES
+        and min(point.position_weight, point.orientation_weight) >= 0
+        and (point.wxyz is None or sum(x * x for x in point.wxyz) > 0.5)
+    )
+
+
+def _residual(seen: Pulls, error: Array) -> list[str]:
+    """Bones that the posture cannot bring to where they are seen."""
+    far = np.where(seen.wp > 0, np.linalg.norm(error[:, :3], axis=1), 0.0)
+    turned = np.where(seen.wo > 0, np.linalg.norm(error[:, 3:], axis=1), 0.0)
+    out = []
+    k = int(far.argmax())
+    if far[k] > FAR:
+        out.append(f"{BONES[seen.bone[k]]} cannot be where {seen.names[k]} is seen ({far[k]:.2f} m off)")
+    k = int(turned.argmax())
+    if turned[k] > TURNED:
+        degrees = np.degrees(turned[k])
+        out.append(f"{BONES[seen.bone[k]]} cannot be turned as {seen.names[k]} is seen ({degrees:.0f}° off)")
+    return out

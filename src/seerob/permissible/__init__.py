@@ -1,0 +1,1 @@
+"""How fast a robot may go along its path, a motion that keeps to it, and what it costs."""

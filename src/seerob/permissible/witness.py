@@ -1,0 +1,93 @@
+"""Where everybody else is while the robot moves: the twin of a run, kept tick by tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from seerob.model import Mechanism, Model
+from seerob.snapshot import Result
+from seerob.state import Hearing, State
+from seerob.transforms import Array
+
+
+class Witness:
+    """Stands beside the judge of a run and keeps where the twin is and what may be doubted.
+
+    Attributes:
+        t: Instants of the ticks [s].
+    """
+
+    def __init__(self, judge: Callable[[State], tuple[Result, ...]]) -> None:
+        self._judge = judge
+        self.t: list[float] = []
+        self._qpos: list[Array] = []
+        self._qvel: list[Array] = []
+        self._doubts: list[dict[str, str]] = []
+
+    def __call__(self, state: State) -> tuple[Result, ...]:
+        """Take one tick; what the judge says goes on."""
+        self.t.append(state.t)
+        self._qpos.append(np.array(state.data.qpos))
+        self._qvel.append(np.array(state.data.qvel))
+        self._doubts.append({name: state.doubt(name) for name in state.hearings})
+        return self._judge(state)
+
+    def _tick(self, t: float) -> int:
+        """The tick that is nearest to an instant [s]."""
+        k = int(np.clip(np.searchsorted(self.t, t), 1, max(len(self.t) - 1, 1)))
+        if k >= len(self.t):
+            return len(self.t) - 1
+        return k if self.t[k] - t < t - self.t[k - 1] else k - 1
+
+    def others(self, t: float) -> tuple[Array, Array, dict[str, str]]:
+        """Positions, velocities and doubts of the whole twin at the tick that is nearest to ``t`` [s]."""
+        k = self._tick(t)
+        return self._qpos[k], self._qvel[k], self._doubts[k]
+
+    def moves(self, mechanism: Mechanism) -> bool:
+        """Whether somebody ever moved."""
+        q = np.array(self._qpos)[:, mechanism.q_address]
+        return bool((np.ptp(q, axis=0) > 1e-3).any()) if len(q) else False
+
+
+class Posed(State):
+    """A state that is put together: the robot where the path has it, all others as they were seen."""
+
+    def __init__(self, model: Model, robot: Mechanism, witness: Witness) -> None:
+        """At home until `place` is called."""
+        data: Any = mujoco.MjData(model.mj)
+        hearings = {name: Hearing(given=True, driven=False) for name in model.mechanisms}
+        super().__init__(model, data, hearings)
+        self._robot, self._witness = robot, witness
+        self._doubts: dict[str, str] = {}
+
+    def place(self, t: float, others_at: float, q: Array, qd: Array, own_doubt: str = "") -> None:
+        """Put everybody where they are.
+
+        Args:
+            t: Instant that criteria with a memory are told [s].
+            others_at: When the others were seen [s].
+            q: Of the robot [rad or m], shape (n,).
+            qd: Likewise [rad/s or m/s].
+            own_doubt: Why the robot's position may not be relied on.
+        """
+        qpos, qvel, doubts = self._witness.others(others_at)
+        self.data.qpos[:], self.data.qvel[:] = qpos, qvel
+        robot = self._robot
+        self.data.qpos[robot.q_address] = robot.coupling @ q + robot.offset
+        self.data.qvel[robot.v_address] = robot.coupling @ qd
+        self._doubts = {**doubts, robot.name: own_doubt}
+        self.asked.clear()
+        self.refresh(t)
+
+    def doubt(self, name: str) -> str:
+        """See `State.doubt`; of the others what the run knew of them then."""
+        return self._doubts[name]
+
+
+Clock = Callable[[float], float]
+"""When the others are to be seen, for when the given motion was there [s]."""

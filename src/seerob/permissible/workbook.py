@@ -1,0 +1,122 @@
+"""The map, the rescaled motion and what they rest on as an Excel workbook."""
+
+from __future__ import annotations
+
+import io
+
+from seerob.permissible.evaluation import PermissibleSpeed
+from seerob.permissible.tables import (
+    COST_HEAD,
+    MAP_HEAD,
+    REGION_HEAD,
+    Cell,
+    cost_rows,
+    map_rows,
+    region_rows,
+    trajectory_head,
+    trajectory_rows,
+)
+from seerob.sinks._sheets import Sheets
+from seerob.snapshot import Scene
+
+INPUT_HEAD: list[Cell] = ["of", "input", "value", "unit", "origin", "source"]
+PROOF_HEAD: list[Cell] = [
+    "criterion",
+    "before",
+    "after",
+    "worst value",
+    "unit",
+    "limit",
+    "at [s]",
+    "what governs",
+]
+
+
+def workbook(found: PermissibleSpeed, scene: Scene, *, period: float) -> bytes:
+    """The workbook.
+
+    Args:
+        found: What was found.
+        scene: Of the workstation, for hashes and where inputs are from.
+        period: Of the rescaled motion's rows [s].
+    """
+    from openpyxl import Workbook
+
+    book = Workbook(write_only=True)
+    sheets = Sheets(book)
+    try:
+        sheets.add("Summary", ["what", "value"], _summary(found, scene), fit=True)
+        sheets.add("Map", list(MAP_HEAD), map_rows(found.map))
+        sheets.add("Map by region", list(REGION_HEAD), region_rows(found.map))
+        if found.rescaled is not None:
+            trajectory = found.rescaled.trajectory(period)
+            head = trajectory_head(trajectory, found.map.limits.units)
+            sheets.add("Rescaled", list(head), trajectory_rows(trajectory))
+            sheets.add("Where the time goes", list(COST_HEAD), list(cost_rows(found)), fit=True)
+            sheets.add("Evaluated again", PROOF_HEAD, proof_rows(found), fit=True)
+        sheets.add("Inputs", INPUT_HEAD, _inputs(found, scene), fit=True)
+        about: list[list[Cell]] = [[f.level, f.subject, f.text] for f in (*scene.findings, *found.findings)]
+        sheets.add("Findings", ["level", "about", "text"], about, fit=True)
+    finally:
+        sheets.close()
+    out = io.BytesIO()
+    book.save(out)
+    return out.getvalue()
+
+
+def proof_rows(found: PermissibleSpeed) -> list[list[Cell]]:
+    """Every criterion of the given motion and of the rescaled one."""
+    if found.after is None:
+        return []
+    rows: list[list[Cell]] = []
+    for name, series in found.after.results.items():
+        before = found.before.get(name)
+        words = [
+            "no limit" if one is None or one.verdict is None else one.verdict.value
+            for one in (before, series)
+        ]
+        worst = series.worst() if series.known else None
+        rows.append(
+            [name, *words, "never gave a result"]
+            if worst is None
+            else [name, *words, worst.value, series.unit, worst.limit, worst.t, worst.reason]
+        )
+    return rows
+
+
+def _summary(found: PermissibleSpeed, scene: Scene) -> list[list[Cell]]:
+    rows: list[list[Cell]] = [
+        ["workstation", scene.title],
+        ["inputs, SHA-256", scene.workstation_hash],
+        ["seerob", scene.version],
+        ["edition", scene.edition],
+        ["robot", found.map.robot],
+        ["criteria asked", ", ".join(found.map.asked)],
+        ["cycle time before [s]", found.motion.duration],
+    ]
+    if found.rescaled is None or found.check is None:
+        return [*rows, ["rescaled motion", f"none: {found.refused}"]]
+    used = found.check
+    return [
+        *rows,
+        ["cycle time after [s]", found.rescaled.duration],
+        ["margin to the map", found.rescaled.margin],
+        ["largest deviation of the path [rad or m]", float(found.path.deviation.max())],
+        ["largest use of the map", used.map],
+        ["largest use of a joint's speed", used.velocity],
+        ["largest use of a joint's acceleration", used.acceleration],
+        ["largest use of a joint's jerk", used.jerk],
+    ]
+
+
+def _inputs(found: PermissibleSpeed, scene: Scene) -> list[list[Cell]]:
+    rows: list[list[Cell]] = [
+        ["joint limits", i.name, i.value, i.unit, i.origin.value, i.source] for i in found.map.limits.inputs
+    ]
+    for info in scene.criteria:
+        if info.basis is not None and info.name in found.map.asked:
+            rows.append([info.name, "formula", info.basis.formula, "", "", info.basis.source])
+            rows += [
+                [info.name, i.name, i.value, i.unit, i.origin.value, i.source] for i in info.basis.inputs
+            ]
+    return rows

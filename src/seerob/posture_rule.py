@@ -1,0 +1,130 @@
+"""What every rule about a posture shares: whose, how accurately it is known, what is entered for it."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from msgspec import Meta
+
+from seerob.criterion import Criterion, Evaluate
+from seerob.ergonomic_posture import bind_posture
+from seerob.errors import InputError
+from seerob.human.angles import Angles
+from seerob.model import Model
+from seerob.scoring.held_work import Watch, WorkDetection
+from seerob.scoring.judgement import Method, judged
+from seerob.scoring.measured import Accuracy, JointAccuracy, accuracy_of
+from seerob.scoring.phases import Phase, check_order, phase_at, shared_phases
+from seerob.scoring.repetition import GAP
+from seerob.scoring.shoulder import ArmPolicy
+from seerob.scoring.spans import Span
+from seerob.scoring.thresholds import Thresholds
+from seerob.snapshot import Level, Result
+from seerob.state import State
+
+
+class PostureRule(Criterion, frozen=True, kw_only=True):
+    """Base of the rules about a person's posture."""
+
+    human: str
+    """Who is judged."""
+    accuracy: Annotated[float, Meta(ge=0, lt=np.pi / 2, extra={"unit": "rad"})] | None = None
+    """How far each angle of the posture may be off [rad]; the verdict then is of the whole interval."""
+    joint_accuracy: JointAccuracy | None = None
+    """The same for single joints, where it differs."""
+    unmeasured: tuple[str, ...] = ()
+    """Bones that the source does not measure, such as ``"right_hand"``: what needs them is not assessed."""
+
+    def __post_init__(self) -> None:
+        check_order(getattr(self, "phases", ()))
+        self.error()
+
+    def subjects(self) -> tuple[str, ...]:
+        """The person."""
+        return (self.human,)
+
+    def error(self) -> Accuracy | None:
+        """Accuracy of each angle [rad]; None when nobody gave one."""
+        return accuracy_of(self.accuracy, self.joint_accuracy)
+
+
+class ScoredPosture(PostureRule, frozen=True, kw_only=True):
+    """Base of the rules that score the parts of the body and look the total up in tables: RULA, REBA."""
+
+    METHOD: ClassVar[Method]
+    PHASE: ClassVar[type[Phase]]
+
+    thresholds: Thresholds = Thresholds()
+    """Where a posture counts as twisted, raised, upright and so on."""
+    arm: ArmPolicy = ArmPolicy.PROJECTION
+    """Which angle stands for the flexion of an upper arm."""
+    detect: WorkDetection | None = None
+    """Find static and repeated work in the movement, where no phase enters it."""
+
+    @property
+    def limit(self) -> int | None:
+        """Greatest admissible score."""
+        level = getattr(self, "action_level", None)
+        return None if level is None else self.METHOD.levels[level - self.METHOD.first_level]
+
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """Action levels, the lowest first."""
+        return self.METHOD.classes
+
+    def watch(self) -> Watch | None:
+        """What finds static and repeated work; None when it is entered."""
+        raise NotImplementedError
+
+    def components(
+        self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: Watch | None = None
+    ) -> dict[str, Span]:
+        """Component scores of postures in a phase, in the order of the method.
+
+        Args:
+            angles: Of the postures.
+            phase: What was entered.
+            accuracy: Of each angle [rad].
+            watch: What was found of static and repeated work so far.
+
+        Returns:
+            Shapes (..., 2) of sided components and (...) of central ones.
+        """
+        raise NotImplementedError
+
+    def entered(self, model: Model) -> tuple[Phase, ...]:
+        """Phases of the rule, or else those that every rule shares."""
+        own: tuple[Phase, ...] = getattr(self, "phases", ())
+        return shared_phases(model, self.human, own, self.PHASE.from_task)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        read = bind_posture(model, self.human, self.unmeasured)
+        phases, unknown, error = self.entered(model), self.PHASE(), self.error()
+        watch = None if self.detect is None else self.watch()
+        if watch is not None and self.every is not None and self.every > GAP:
+            raise InputError.at(
+                self.name,
+                "every",
+                f"{self.every:g} s is too seldom to see static and repeated work",
+                f"at most {GAP:g} s, or none",
+            )
+
+        def evaluate(state: State) -> Result:
+            angles = read(state)
+            if watch is not None:
+                watch.add(state.t, angles)
+            phase = phase_at(phases, state.t, unknown)
+            return judged(
+                self.METHOD,
+                name=self.name,
+                human=self.human,
+                limit=self.limit,
+                angles=angles,
+                components=self.components(angles, phase, watch=watch),
+                spread=None if error is None else self.components(angles, phase, error, watch),
+                thresholds=self.thresholds,
+            )
+
+        return evaluate

@@ -1,0 +1,62 @@
+"""Kinds of values in a workstation file: quantities with their units, names, poses."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from msgspec import Meta, Struct
+
+
+def unit(symbol: str, **limits: Any) -> Any:
+    """Metadata of a quantity, for keys with a suffix, messages, documentation and the schema."""
+    return Meta(extra={"unit": symbol}, extra_json_schema={"x-unit": symbol}, **limits)
+
+
+Metre = Annotated[float, unit("m")]
+Length = Annotated[float, unit("m", gt=0, le=1000)]
+Mass = Annotated[float, unit("kg", gt=0, le=1e6)]
+Density = Annotated[float, unit("kg/m³", gt=0, le=1e5)]
+Inertia = Annotated[float, unit("kg·m²")]
+Seconds = Annotated[float, unit("s", gt=0)]
+Radian = Annotated[float, unit("rad")]
+Hertz = Annotated[float, unit("Hz", gt=0)]
+Coordinate = Annotated[float, Meta(ge=-1000, le=1000)]
+Metres3 = Annotated[tuple[Coordinate, Coordinate, Coordinate], unit("m")]
+Radians3 = Annotated[tuple[float, float, float], unit("rad")]
+Radians = Annotated[tuple[float, ...], unit("rad")]
+Corner = Annotated[tuple[Coordinate, Coordinate], unit("m")]
+Corners = Annotated[tuple[Corner, ...], unit("m", min_length=3, max_length=200)]
+"""Corners (x, y) of a polygon [m]."""
+Share = Annotated[float, Meta(ge=0, le=1)]
+Name = Annotated[
+    str,
+    Meta(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=80, description="letters, digits, '_', '.' and '-' only"),
+]
+PathName = Annotated[
+    str,
+    Meta(
+        pattern=r"^[A-Za-z0-9_.\-]+(/[A-Za-z0-9_.\-]+)*$",
+        max_length=200,
+        description="letters, digits, '_', '.', '-', and '/' between them only",
+    ),
+]
+
+
+class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of every table."""
+
+
+class Pose(Table, frozen=True, kw_only=True):
+    """Where something is: a position and one way of giving an orientation."""
+
+    position: Metres3 = (0.0, 0.0, 0.0)
+    rpy: Radians3 | None = None
+    """Roll, pitch, yaw about the fixed x, y, z axes [rad]; write ``rpy_deg`` for degrees."""
+    wxyz: tuple[float, float, float, float] | None = None
+    """Unit quaternion, w first."""
+
+    def __post_init__(self) -> None:
+        if self.rpy is not None and self.wxyz is not None:
+            raise ValueError("rpy and wxyz are both given: keep one")
+        if self.wxyz is not None and abs(sum(x * x for x in self.wxyz) - 1.0) > 1e-3:
+            raise ValueError(f"wxyz = {list(self.wxyz)} is not a unit quaternion")

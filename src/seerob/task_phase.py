@@ -1,0 +1,125 @@
+"""What no posture shows, given for each phase of the task: load, grip, support, repetition.
+
+A rule has phases of its own, or reads those of ``[[phases]]``, which every rule about the person shares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Literal, Self, TypeVar
+
+from msgspec import Meta, Struct
+
+Kilograms = Annotated[float, Meta(ge=0, extra={"unit": "kg"}, extra_json_schema={"x-unit": "kg"})]
+Seconds = Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})]
+Period = Annotated[float, Meta(gt=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})]
+Sides = Literal["none", "left", "right", "both"]
+Stance = Literal[
+    "sitting",
+    "standing",
+    "one_leg",
+    "both_knees_bent",
+    "one_knee_bent",
+    "kneeling",
+    "walking",
+    "lying",
+    "climbing",
+    "posture",
+]
+_ROUNDING = 1e-9
+
+
+class Phase(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of the phases of a rule; what a phase leaves out is not assessed."""
+
+    title: str = ""
+    """What the phase is called in reports."""
+    start: Seconds = 0.0
+    """When the phase begins [s], in run time, or in the time of the cycle."""
+    end: Seconds | None = None
+    """When it ends [s]; with the next phase when not given. Between phases nothing is entered."""
+    cycle: Period | None = None
+    """Length of a cycle that repeats from the begin of the run on [s]; the same for all phases."""
+
+    @classmethod
+    def from_task(cls, task: TaskPhase) -> Self:
+        """What a rule takes from a phase that all rules share: every field that has the same name."""
+        return cls(**{name: getattr(task, name) for name in cls.__struct_fields__ if hasattr(task, name)})
+
+
+class TaskPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is handled and how, in one phase of the work; every rule about the person reads what it needs."""
+
+    human: str = ""
+    """Whose work it is; everybody's when not given."""
+    load: Kilograms | None = None
+    """Handled mass, or a force divided by 9.81 m/s² [kg]; 0 for none."""
+    load_use: Literal["intermittent", "static", "repeated", "shock"] | None = None
+    """How the load acts; not needed for a load of 0."""
+    hand: Literal["left", "right", "both"] = "both"
+    """Which arm carries the load."""
+    coupling: Literal["good", "fair", "poor", "unacceptable"] | None = None
+    """How well the load can be held."""
+    supported_arms: Sides | None = None
+    """Arms whose weight is supported, or on which the person leans."""
+    back_supported: bool | None = None
+    """The trunk is well supported."""
+    legs: Stance | None = None
+    """How the legs are used; ``posture`` estimates it for somebody who stands or kneels."""
+    balanced: bool | None = None
+    """Legs and feet are well supported and evenly loaded, for RULA."""
+    muscle_arms: bool | None = None
+    """Posture of the arms mainly static, or repeated 4 times per minute or more."""
+    muscle_body: bool | None = None
+    """The same of neck, trunk and legs."""
+    static: bool | None = None
+    """One or more parts of the body held longer than 1 min."""
+    repeated: bool | None = None
+    """Small movements repeated more than 4 times per minute."""
+    rapid: bool | None = None
+    """Rapid large changes of posture, or an unstable base."""
+
+
+P = TypeVar("P", bound=Phase)
+
+
+def check_order(phases: Sequence[Phase]) -> None:
+    """Refuse phases that do not follow each other.
+
+    Raises:
+        ValueError: A phase does not begin after the one before, overlaps the next one, ends before it
+            begins, or lies outside its cycle.
+    """
+    for before, after in pairwise(phases):
+        if after.start <= before.start:
+            raise ValueError(
+                f"phases: one that starts at {after.start:g} s follows one at {before.start:g} s; "
+                "let each start after the one before"
+            )
+        if before.end is not None and before.end > after.start + _ROUNDING:
+            raise ValueError(
+                f"phases: one that ends at {before.end:g} s overlaps the next, from {after.start:g} s on; "
+                "let it end before"
+            )
+    if len({phase.cycle for phase in phases}) > 1:
+        raise ValueError("phases: they have different cycles; give all of them the same, or none")
+    for phase in phases:
+        if phase.end is not None and phase.end <= phase.start:
+            raise ValueError(
+                f"phases: one ends at {phase.end:g} s, not after its start at {phase.start:g} s; "
+                "let it end later"
+            )
+        last = phase.start if phase.end is None else phase.end
+        if phase.cycle is not None and (last > phase.cycle + _ROUNDING or phase.start >= phase.cycle):
+            raise ValueError(f"phases: one reaches to {last:g} s, beyond its cycle of {phase.cycle:g} s")
+
+
+def phase_at(phases: Sequence[P], t: float, unknown: P) -> P:
+    """The phase of an instant of the run [s]; ``unknown`` where nothing is entered."""
+    if not phases:
+        return unknown
+    cycle = phases[0].cycle
+    at = t + _ROUNDING if cycle is None else (t + _ROUNDING) % cycle
+    found = next((phase for phase in reversed(phases) if phase.start <= at), unknown)
+    return unknown if found.end is not None and at >= found.end else found

@@ -1,0 +1,218 @@
+"""The EAWS-style screening: lines, points over time, asymmetry, and no rating without sections 2 to 4."""
+
+import re
+
+import numpy as np
+import pytest
+from made_postures import PERSON, made_angles
+
+from made_cell import judged, made, state_at
+from seerob.human.posture import posture
+from seerob.human.skeleton import JOINTS
+from seerob.scoring.eaws_posture import (
+    EawsThresholds,
+    Interpolation,
+    asymmetry_points,
+    line_points,
+    lines,
+    possible_lines,
+)
+from seerob.scoring.posture_time import PostureTime
+from seerob.scoring.published import published
+from seerob.snapshot import Verdict
+
+USUAL = EawsThresholds()
+STILL = np.zeros(len(JOINTS))
+
+
+def line(legs="standing", supported=False, accuracy=0.0, **angles):
+    return possible_lines(
+        made_angles(**angles),
+        legs=legs,
+        supported=supported,
+        thresholds=USUAL,
+        accuracy=np.radians(accuracy),
+    )
+
+
+@pytest.mark.parametrize(
+    ("expected", "given"),
+    [
+        ("1", {"supported": True}),
+        ("1", {"legs": "walking"}),
+        ("2", {}),
+        ("2", {"trunk_flexion": 19.9}),
+        ("3a", {"trunk_flexion": 20}),
+        ("3a", {"trunk_flexion": 60}),
+        ("3b", {"trunk_flexion": 40, "supported": True}),
+        ("4a", {"trunk_flexion": 61}),
+        ("4b", {"trunk_flexion": 61, "supported": True}),
+        ("5", {"arm_rise": [0, -80]}),
+        ("6", {"arm_rise": [-80, 60]}),
+        ("6", {"arm_rise": 60, "trunk_flexion": 70}),
+        ("7", {"legs": "sitting", "supported": True}),
+        ("8", {"legs": "sitting"}),
+        ("9", {"legs": "sitting", "trunk_flexion": 30, "supported": True}),
+        ("10", {"legs": "sitting", "arm_rise": 10}),
+        ("11", {"legs": "sitting", "arm_rise": 50}),
+        ("12", {"legs": "kneeling"}),
+        ("13", {"legs": "kneeling", "trunk_flexion": 30}),
+        ("14", {"legs": "kneeling", "arm_rise": 10}),
+        ("15", {"legs": "lying"}),
+        ("16", {"legs": "climbing"}),
+        ("12", {"legs": "posture", "knee_flexion": 90}),
+        ("12", {"legs": "posture", "shank_tilt": [90, 0]}),
+        ("2", {"legs": "posture", "knee_flexion": [90, 0]}),
+    ],
+)
+def test_each_line_has_its_posture(expected, given):
+    assert line(**given) == (expected,)
+
+
+def test_what_is_not_known_may_be_several_lines_the_lightest_first():
+    assert line(supported=None) == ("1", "2")
+    assert set(line(legs=None)) == {"2", "8", "1", "12", "15", "16"}
+    assert line(trunk_flexion=np.nan) == ("2", "3a", "4a")
+    assert line(trunk_flexion=18, accuracy=5) == ("2", "3a")
+    assert line(trunk_flexion=18, accuracy=1) == ("2",)
+
+
+@pytest.mark.parametrize("name", list(lines()))
+def test_points_grow_with_the_share_and_hit_the_columns(name):
+    shares = published("eaws_posture")["shares"]
+    points = lines()[name].points
+    assert len(points) == (6 if name == "16" else 10)
+    for share, expected in zip(shares, points, strict=False):
+        for interpolation in Interpolation:
+            assert line_points(name, share, interpolation) == pytest.approx(expected)
+    grid = np.linspace(0, 1, 400)
+    for interpolation in Interpolation:
+        assert (np.diff([line_points(name, x, interpolation) for x in grid]) >= -1e-9).all()
+    assert line_points(name, 0.025) == pytest.approx(points[0] / 2)
+    assert line_points(name, 0.025, Interpolation.STEP) == 0
+    assert line_points(name, 1.0) == points[-1]
+
+
+def test_raised_arms_cost_more_than_bending_more_than_upright():
+    for low, high in (
+        ("12", "13"),
+        ("13", "14"),
+        ("2", "3a"),
+        ("3a", "4a"),
+        ("5", "6"),
+        ("8", "9"),
+        ("10", "11"),
+    ):
+        for share in published("eaws_posture")["shares"][:6]:
+            assert line_points(low, share) <= line_points(high, share)
+
+
+@pytest.mark.parametrize(
+    ("shares", "expected"),
+    [
+        ((0, 0, 0), 0),
+        ((0.05, 0.05, 0.05), 0),
+        ((0.06, 0, 0), 1.5),
+        ((0.15, 0, 0), 2.5),
+        ((0.5, 0.2, 0.06), 9),
+        ((1, 1, 1), 15),
+    ],
+)
+def test_asymmetry_reaches_every_factor(shares, expected):
+    assert asymmetry_points(shares) == expected
+
+
+def test_a_posture_counts_from_its_begin_once_it_is_held():
+    times = PostureTime(4.0)
+    for k in range(201):
+        t = k / 10
+        times.add(t, "a" if t < 5 else "b" if t < 8 else "a")
+    assert times.heard == pytest.approx(20)
+    assert times.seconds == {"a": pytest.approx(5 + 12)}
+    times.add(30.0, "a")
+    assert (times.silent, times.heard) == (pytest.approx(10), pytest.approx(20))
+
+
+def station(folder, more="", cycle=20):
+    phases = 'phases = [{ legs = "posture", back_supported = false }]\n'
+    return made(
+        folder,
+        '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
+        f'[[ergonomics]]\nkind = "eaws_posture"\nname = "s"\nhuman = "op"\ncycle = {cycle}\n'
+        f"{more if 'phases' in more else phases + more}\n",
+    )
+
+
+ENTERED = (
+    "entered = { moving_objects = 0, accessibility = 0, impulses = 0, joint_position = 0, special = 0, "
+    "far_reach = 0, forces = 10, loads = 5, upper_limbs = 30 }\n"
+)
+
+
+def run(stage, poses, duration, rate=5):
+    """The result after every instant."""
+    state = state_at(stage)
+    angles = {}
+    for k in range(round(duration * rate) + 1):
+        t = k / rate
+        name = poses(t)
+        if name not in angles:
+            q = posture(PERSON, {} if name == "up" else {"pelvis_tilt_forward": np.radians(45)})
+            angles[name] = state_at(stage, op=(q, STILL))
+        state = angles[name]
+        state.t = t
+        yield judged(stage.bound, state)[0]
+
+
+def test_a_cycle_half_bent_has_the_points_of_both_halves(tmp_path):
+    stage = station(tmp_path, ENTERED)
+    *_, last = run(stage, lambda t: "bent" if t < 10 else "up", 20)
+    by_line = {p.name: p.value for p in last.parts}
+    assert by_line["line 3a"] == pytest.approx(line_points("3a", 0.5), rel=0.05)
+    assert by_line["line 2"] == pytest.approx(line_points("2", 0.5), rel=0.05)
+    assert last.value == pytest.approx(by_line["line 3a"] + by_line["line 2"] + 15)
+    assert "points: above 25, up to 50" in last.reason
+
+
+def test_there_is_no_rating_without_sections_2_to_4(tmp_path):
+    """Whatever the points, the limit and the cycle: undecided, and no band in any text."""
+    band = re.compile(r"0 to 25|above 25|above 50|green|yellow|\bred\b", re.IGNORECASE)
+    for limit in (1, 25, 1000):
+        *_, last = run(station(tmp_path, f"limit = {limit}\n"), lambda _: "bent", 20)
+        assert last.verdict is Verdict.UNDECIDED
+        assert last.value > 30
+        assert last.reason.startswith("EAWS-style posture screening (sections 0-1 only), no rating")
+        assert "not entered: moving objects" in last.reason
+        assert not band.search(last.reason)
+        assert last.rows[0].verdict is Verdict.UNDECIDED
+    partly = ENTERED.replace(", upper_limbs = 30", "")
+    *_, last = run(station(tmp_path, partly + "limit = 50\n"), lambda _: "up", 20)
+    assert last.verdict is Verdict.UNDECIDED
+    assert not band.search(last.reason)
+
+
+def test_with_everything_entered_the_limit_is_judged_once_a_cycle_is_whole(tmp_path):
+    found = list(run(station(tmp_path, ENTERED + "limit = 25\n"), lambda _: "bent", 20))
+    assert {r.verdict for r in found[:-1]} <= {None, Verdict.EXCEEDED}
+    assert found[10].reason.count("counting: 2.0 of 20 s")
+    assert found[-1].verdict is Verdict.EXCEEDED
+    values = [r.value for r in found]
+    assert values == sorted(values)
+    assert values[0] == 30  # the upper limbs, until the whole body has more
+    assert values[-1] == pytest.approx(40 + 15)
+
+
+def test_what_is_unknown_makes_an_interval(tmp_path):
+    *_, last = run(station(tmp_path, ENTERED + 'phases = [{ legs = "posture" }]\n'), lambda _: "bent", 20)
+    assert last.value is None
+    assert last.interval == (pytest.approx(25 + 15), pytest.approx(40 + 15))
+
+
+def test_what_is_printed_says_where_the_figures_are_from(tmp_path):
+    stage = station(tmp_path)
+    basis = stage.bound[0].basis
+    named = {i.name: i for i in basis.inputs}
+    assert "conflict" in named["line 14"].source
+    assert "1 + M" in basis.source
+    assert any("sections 2 to 4" in text for text in basis.not_modelled)
+    assert "EAWS" not in stage.scene().criteria[0].title.replace("EAWS-style", "").replace("not the EAWS", "")

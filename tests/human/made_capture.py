@@ -1,0 +1,65 @@
+"""A person who walks, as a device would see it, and workstations around it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from msgspec.structs import replace
+
+from seerob.human import keyframes, manikin, motion
+from seerob.human.captured import Captured, CaptureFrame, Layout, Seen
+from seerob.human.skeleton import BONES, bone_poses
+from seerob.reading import convert_workstation
+from seerob.sources._capture_file import CaptureFile
+from seerob.transforms import wxyz_from_rotation
+from seerob.workstation import Workstation
+
+PERSON = manikin.build(name="operator", stature=1.75, mass=75, sex="male")
+TABLE = {"name": "operator", "stature": 1.75, "mass": 75.0, "sex": "male"}
+RATE = 60.0
+
+
+@cache
+def walking(seconds: float = 1.5) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] (n,) and joint values (n, 53) of a walk."""
+    played = keyframes.read("library:walk", PERSON, folder=Path())
+    sampled = motion.sample(played, PERSON, RATE)
+    n = round(seconds * RATE)
+    return sampled.t[:n], sampled.q[:n]
+
+
+def frames_of(t: np.ndarray, q: np.ndarray, *, turned: bool = True) -> list[CaptureFrame]:
+    """What a device that sees every bone would say; its clock began long ago."""
+    R, p = bone_poses(PERSON, q)
+    wxyz = [np.array([wxyz_from_rotation(r) for r in each]) for each in R] if turned else [None] * len(t)
+    return [CaptureFrame(t=s + 7.0, positions=p[i].copy(), orientations=wxyz[i]) for i, s in enumerate(t)]
+
+
+def captured(frames: list[CaptureFrame], **more: object) -> Captured:
+    """A recording of all bones in our own names and frames."""
+    layout = Layout(Seen.SEGMENTS, BONES, "seerob")
+    return Captured(layout, frames, RATE, len(frames), **more)  # type: ignore[arg-type]
+
+
+class Made(CaptureFile, frozen=True, kw_only=True):
+    """A source that reads nothing: ``made`` is what its file holds."""
+
+    made: Callable[[], Captured]
+
+    def read(self, path: Path) -> Captured:
+        return self.made()
+
+
+def source(recording: Captured, **options: object) -> Made:
+    given = {"human": "operator", "file": "made", "name": "device", **options}
+    return Made(made=lambda: recording, **given)  # type: ignore[arg-type]
+
+
+def workstation(*sources: CaptureFile, **tables: object) -> Workstation:
+    """One person, and what ``tables`` add."""
+    made, problems = convert_workstation({"humans": [TABLE], **tables}, "made.toml")
+    assert made is not None, problems
+    return replace(made, sources=sources, folder=".")

@@ -1,0 +1,251 @@
+"""Captured motion becomes a person in physics; what cannot be is flagged and never followed."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from made_capture import PERSON, captured, frames_of, source, walking, workstation
+
+from seerob import run as road
+from seerob.engine import Engine
+from seerob.human.following import POINT_SPEED, Following
+from seerob.human.skeleton import BONES, JOINTS, bone_poses
+from seerob.quantities import Pose
+from seerob.samples import BodyPoint, BodySample, Quality
+from seerob.station import Station
+from seerob.transforms import rotation_from_axis_angle, rotation_from_wxyz, wxyz_from_rotation
+
+HAND = BONES.index("right_hand")
+
+
+def play(*sources, **tables):
+    """Tick by tick: time, doubt, errors per bone, positions of the joints."""
+    station = Station(workstation(*sources, **tables))
+    engine = Engine(station.model, driven={"operator": 0.2})
+    mechanism = station.model.mechanisms["operator"]
+    told = []
+    for seq, samples in enumerate(road.pump(station.sources, 0.01)):
+        engine.take(samples)
+        state = engine.tick() if seq else engine.start()
+        hearing = state.hearings["operator"]
+        speed = float(np.abs(state.data.qvel[mechanism.v_address]).max())
+        q = state.joint_positions(mechanism).copy()
+        told.append((state.t, state.doubt("operator"), dict(hearing.bones), speed, q))
+    return told
+
+
+def test_a_walk_is_followed_by_every_bone():
+    told = play(source(captured(frames_of(*walking()))))
+    assert {doubt for _, doubt, *_ in told} == {""}
+    away = [e[0] for _, _, bones, *_ in told for e in bones.values()]
+    turned = [e[1] for _, _, bones, *_ in told for e in bones.values()]
+    assert set(told[-1][2]) == set(BONES)
+    assert np.median(away) < 1e-3
+    assert max(away) < 0.01
+    assert np.median(turned) < 5e-3
+
+
+def test_it_is_where_it_was_captured_and_the_capture_may_stand_elsewhere():
+    t, q = walking(0.5)
+    there = play(source(captured(frames_of(t, q)), at=turned_and_moved()))
+    x, y = there[-1][4][:2]
+    # Turned by a quarter and moved by (1, 2): forward in the capture is left in the cell.
+    assert (x, y) == pytest.approx((1 - q[-1, 1], 2 + q[-1, 0]), abs=5e-3)
+
+
+def turned_and_moved():
+    return Pose(position=(1.0, 2.0, 0.0), rpy=(0.0, 0.0, np.pi / 2))
+
+
+@pytest.mark.parametrize("leap", [4.0, 40.0])
+def test_a_jump_of_a_whole_person_is_never_a_motion(leap):
+    frames = frames_of(*walking())
+    for frame in frames[40:50]:
+        frame.positions[:] += leap
+    told = play(source(captured(frames)))
+    during = [doubt for t, doubt, *_ in told if 0.66 < t < 0.84]
+    assert all("jumped" in doubt or "elsewhere" in doubt for doubt in during)
+    assert max(speed for *_, speed, _ in told) < 15.0
+    assert max(abs(q[:3]).max() for *_, q in told) < 3.0
+    assert told[-1][1] == ""
+
+
+def test_who_stays_elsewhere_is_believed_after_as_long_as_the_way_takes_and_put_there():
+    frames = frames_of(*walking(2.0))
+    for frame in frames[30:]:
+        frame.positions[:, 1] += 4.0
+    told = play(source(captured(frames)))
+    assert all(doubt for t, doubt, *_ in told if 0.52 < t < 0.5 + 4.0 / POINT_SPEED)
+    assert told[-1][1] == ""
+    assert told[-1][4][1] == pytest.approx(4.0, abs=0.1)
+    assert max(speed for *_, speed, _ in told) < 15.0
+
+
+def test_a_hand_that_jumps_is_left_out_and_named():
+    frames = frames_of(*walking(), turned=False)
+    for frame in frames[40:43]:
+        frame.positions[HAND] += 2.0
+    told = play(source(captured(frames)))
+    doubts = {doubt for _, doubt, *_ in told if doubt}
+    assert doubts == {"operator: right_hand jumped"}
+    assert max(e[0] for _, _, bones, *_ in told for e in bones.values() if e[0] is not None) < 0.1
+
+
+def test_a_bone_that_is_lost_counts_for_the_hold_time_and_not_longer():
+    frames = frames_of(*walking(), turned=False)
+    for frame in frames[30:75]:
+        frame.positions[HAND] = np.nan
+    told = play(source(captured(frames), hold=0.4))
+    lost = [t for t, doubt, *_ in told if "not seen any more: right_hand" in doubt]
+    assert min(lost) == pytest.approx(29 / 60 + 0.4, abs=0.03)
+    assert max(lost) == pytest.approx(75 / 60, abs=0.03)
+    assert "right_hand" not in told[60][2]
+
+
+def test_a_person_that_is_lost_is_undecided_and_found_again():
+    frames = frames_of(*walking())
+    for frame in frames[20:60]:
+        frame.positions[:] = np.nan
+        frame.orientations[:] = np.nan
+    told = play(source(captured(frames)))
+    assert all(doubt for t, doubt, *_ in told if 19 / 60 + 0.21 < t < 0.98)
+    assert told[-1][1] == ""
+    assert max(speed for *_, speed, _ in told) < 15.0
+
+
+def test_a_sensor_that_is_mounted_a_quarter_turn_off_is_never_silently_followed():
+    frames = frames_of(*walking(0.5))
+    wrong = rotation_from_axis_angle([1, 0, 0], np.pi / 2)
+    for frame in frames:
+        row = frame.orientations[BONES.index("right_shank")]
+        row[:] = wxyz_from_rotation(rotation_from_wxyz(row) @ wrong)
+    told = play(source(captured(frames)))
+    assert all("right_shank" in doubt for _, doubt, *_ in told)
+
+
+def test_dropped_and_reordered_frames_change_little():
+    t, q = walking()
+    frames = frames_of(t, q)
+    random = np.random.default_rng(1)
+    mixed = [frame for frame in frames if random.random() > 0.2 or frame is frames[0]]
+    mixed[20], mixed[21] = mixed[21], mixed[20]
+    told = play(source(captured(mixed)))
+    assert {doubt for _, doubt, *_ in told} == {""}
+    assert told[60][4] == pytest.approx(play(source(captured(frames)))[60][4], abs=0.05)
+
+
+def test_a_table_stops_the_hand_and_the_person_does_not_explode():
+    """The capture reaches through a table: the twin stays outside, and says that it does not follow."""
+    t = np.arange(90) / 60.0
+    q = np.tile(walking(0.1)[1][0], (len(t), 1))
+    q[:, JOINTS.index("right_elbow_flexion")] = 1.5
+    q[:, JOINTS.index("right_shoulder_flexion")] = np.interp(t, [0.3, 1.0], [0.6, 0.0])
+    tables = {
+        "parts": [
+            {"name": "desk", "at": {"position": [0.45, -0.2, 0.575]}, "shape": {"box": [0.5, 0.8, 1.15]}}
+        ],
+        "contacts": [
+            {"between": ["operator/right_forearm", "desk"]},
+            {"between": ["operator/right_hand", "desk"]},
+        ],
+    }
+    free = play(source(captured(frames_of(t, q))))
+    told = play(source(captured(frames_of(t, q))), **tables)
+    assert free[-1][1] == ""
+    assert "the twin is off" in told[-1][1]
+    assert max(speed for *_, speed, _ in told) < 20.0
+    away = told[-1][2]["right_hand"][0]
+    assert away > 0.02 > free[-1][2]["right_hand"][0]
+
+
+def points(names, q, weight=1.0, shift=0.0):
+    _, p = bone_poses(PERSON, q)
+    return tuple(
+        BodyPoint(
+            name=name,
+            bone=name,
+            position=tuple((p[BONES.index(name)] + shift).tolist()),
+            position_weight=weight,
+        )
+        for name in names
+    )
+
+
+def test_devices_complement_one_another_and_the_best_one_counts():
+    _, q = walking()
+    body = [b for b in BONES if b != "right_hand"]
+    following = Following(PERSON, np.eye(4))
+    for seq, t in enumerate((0.0, 0.1)):
+        camera = points(BONES, q[0], weight=0.5, shift=0.03)
+        tracker = points(["right_hand"], q[0], weight=4.0)
+        for name, what in (("camera", camera), ("tracker", tracker)):
+            following.hear(BodySample(source=name, target="operator", seq=seq, t=t, points=what))
+    found = list(following.until(0.1))[-1]
+    assert found.reason == ""
+    names = [BONES[b] for b in found.seen.bone]
+    assert sorted(names) == sorted([*body, "right_hand"])
+    _, exact = bone_poses(PERSON, q[0])
+    assert found.seen.position[names.index("right_hand")] == pytest.approx(exact[HAND])
+    assert found.seen.position[names.index("head")] == pytest.approx(exact[BONES.index("head")] + 0.03)
+
+
+def test_a_device_that_falls_silent_leaves_its_bones_to_the_others_or_in_doubt():
+    _, q = walking()
+    following = Following(PERSON, np.eye(4))
+    for seq in range(20):
+        t = 0.05 * seq
+        body = points([b for b in BONES if b != "right_hand"], q[0])
+        following.hear(BodySample(source="camera", target="operator", seq=seq, t=t, points=body, hold=0.3))
+        if seq < 8:
+            hand = points(["right_hand"], q[0])
+            following.hear(BodySample(source="glove", target="operator", seq=seq, t=t, points=hand, hold=0.3))
+    told = {found.t: found.reason for found in following.until(0.9)}
+    assert all(reason == "" for t, reason in told.items() if t < 0.6)
+    assert all("right_hand" in reason and "glove" in reason for t, reason in told.items() if t > 0.7)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -1e300])
+def test_what_is_not_finite_is_left_out(bad):
+    _, q = walking()
+    following = Following(PERSON, np.eye(4))
+    good = points(BONES, q[0])
+    poor = (
+        *points([b for b in BONES if b != "head"], q[0]),
+        BodyPoint(name="head", bone="head", position=(bad, 0, 0)),
+    )
+    for seq, what in enumerate((good, poor, poor)):
+        following.hear(BodySample(source="d", target="operator", seq=seq, t=0.02 * seq, points=what))
+    assert (
+        not following.hear(BodySample(source="d", target="operator", seq=9, t=bad, points=good))
+        or bad == -1e300
+    )
+    for found in following.until(0.04):
+        assert np.isfinite(found.q).all()
+        assert np.abs(found.q - q[0]).max() < 1.0
+
+
+def test_what_a_device_calls_invalid_is_not_followed():
+    _, q = walking()
+    following = Following(PERSON, np.eye(4))
+    for seq, quality in enumerate((Quality.GOOD, Quality.INVALID, Quality.DEGRADED)):
+        what = points(BONES, q[0], shift=0.0 if seq != 1 else 0.05)
+        following.hear(
+            BodySample(source="d", target="operator", seq=seq, t=0.02 * seq, points=what, quality=quality)
+        )
+    found = list(following.until(0.04))
+    assert [f.t for f in found] == [0.0, 0.04]
+    assert found[-1].reason == "d says degraded"
+
+
+def test_mujoco_agrees_where_the_bones_are():
+    """The posture that is fitted and the body that is simulated are the same person."""
+    station = Station(workstation())
+    model, mechanism = station.model, station.model.mechanisms["operator"]
+    data = mujoco.MjData(model.mj)
+    q = walking()[1][10]
+    data.qpos[mechanism.q_address] = q
+    mujoco.mj_kinematics(model.mj, data)
+    _, p = Following(PERSON, np.eye(4))._fitter.bones(q)
+    for i, bone in enumerate(BONES):
+        assert data.xpos[model.frames[f"operator/{bone}"].mj] == pytest.approx(p[i], abs=1e-12)

@@ -1,0 +1,108 @@
+"""Tables of captured motion: headers say what is what, everything else is asked."""
+
+import numpy as np
+import pytest
+
+from seerob.errors import InputError
+from seerob.human.captured import Seen
+from seerob.motion_io import body_csv
+from seerob.motion_io.body_columns import Column, column
+from seerob.motion_io.markers import MarkerReading
+
+NAMES = ("Head", "Left Foot", "pelvis")
+READING = MarkerReading(file="r.csv")
+
+
+@pytest.mark.parametrize(
+    ("header", "wanted"),
+    [
+        ("PELVIS_X [mm]", Column("PELVIS", "position", 0, "mm")),
+        ("LeftHand position y (m)", Column("LeftHand", "position", 1, "m")),
+        ("LeftHandZ", Column("LeftHand", "position", 2)),
+        ("head.qw", Column("head", "orientation", 0)),
+        ("Left Hand rotation Z", Column("Left Hand", "orientation", 3)),
+        ("wrist confidence", Column("wrist", "confidence")),
+        ("timestamp_usec", Column("", "time", unit="us")),
+        ("Time (ms)", Column("", "time", unit="ms")),
+        ("body_id", Column("", "person")),
+        ("joint", Column("", "point")),
+        ("qx", Column("", "orientation", 1)),
+        ("y [cm]", Column("", "position", 1, "cm")),
+        ("frame", None),
+        ("INDEX", None),
+    ],
+)
+def test_headers(header, wanted):
+    assert column(header) == wanted
+
+
+def values():
+    rng = np.random.default_rng(2)
+    return rng.normal(0, 0.02, (12, 3, 3)) + np.array([1.7, 0.05, 0.95])[:, None] * [0.0, 0.0, 1.0]
+
+
+def text(delimiter=",", *, time="time [s]", unit=" [m]", person=None):
+    head = [time, *([] if person is None else ["person"])]
+    head += [f"{name} {axis}{unit}" for name in NAMES for axis in "xyz"]
+    rows = [delimiter.join(head)]
+    for k, row in enumerate(values().reshape(12, -1)):
+        rows += [
+            delimiter.join([str(k / 10), *([] if person is None else [p]), *(f"{x:.6f}" for x in row)])
+            for p in person or ("",)
+        ]
+    return "\n".join(rows)
+
+
+def read(tmp_path, content, reading=READING, **more):
+    path = tmp_path / "r.csv"
+    path.write_text(content)
+    return body_csv.read(path, reading, seen=Seen.JOINTS, **more)
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", "|"])
+def test_points_are_where_the_table_says(tmp_path, delimiter):
+    captured = read(tmp_path, text(delimiter))
+    found = np.stack([frame.positions for frame in captured.frames])
+    np.testing.assert_allclose(found, values(), atol=1e-6)
+    assert captured.layout.names == NAMES
+    assert captured.rate == pytest.approx(10.0)
+
+
+def test_what_is_open_is_asked(tmp_path):
+    with pytest.raises(InputError, match='give unit = "m"'):
+        read(tmp_path, text(unit=""))
+    with pytest.raises(InputError, match="no unit in the header of the time"):
+        read(tmp_path, text(time="time"))
+    assert read(tmp_path, text(time="time"), time_unit="ms").rate == pytest.approx(10_000.0)
+    with pytest.raises(InputError, match="several persons"):
+        read(tmp_path, text(person=("a", "b")))
+    chosen = MarkerReading(file="r.csv", subject="b")
+    assert read(tmp_path, text(person=("a", "b")), chosen).count == 12
+
+
+def test_empty_cells_were_not_seen_and_words_are_refused(tmp_path):
+    lines = text().splitlines()
+    lines[3] = ",".join([*lines[3].split(",")[:-3], "", "NaN", ""])
+    captured = read(tmp_path, "\n".join(lines))
+    assert np.isnan(list(captured.frames)[2].positions).sum() == 3
+    lines[4] = lines[4].replace(",", ",lost", 1)
+    with pytest.raises(InputError, match="row 5: 'lost"):
+        read(tmp_path, "\n".join(lines))
+
+
+def test_a_table_with_a_row_per_point_is_the_same(tmp_path):
+    rows = ["t [s];marker;x [mm];y [mm];z [mm];qw;qx;qy;qz"]
+    for k, row in enumerate(values() * 1000):
+        rows += [
+            ";".join([str(k / 10), name, *(f"{x:.4f}" for x in point), "1", "0", "0", "0"])
+            for name, point in zip(NAMES, row, strict=True)
+        ]
+    captured = read(tmp_path, "\n".join(rows))
+    frames = list(captured.frames)
+    np.testing.assert_allclose([f.positions for f in frames], values(), atol=1e-6)
+    np.testing.assert_allclose([f.orientations for f in frames], np.tile([1.0, 0, 0, 0], (12, 3, 1)))
+
+
+def test_incomplete_coordinates_are_named(tmp_path):
+    with pytest.raises(InputError, match="2 columns for the position of pelvis"):
+        read(tmp_path, text().replace("pelvis z [m]", "pelvis"))

@@ -1,0 +1,155 @@
+"""Bounds between samples against a thousand looks in each gap: never violated, and near what is met."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, two_r
+from seerob import cli
+from seerob.errors import InputError, Undecided, UnknownName
+from seerob.permissible.between_samples import BetweenSamples
+from seerob.permissible.given_motion import GivenMotion
+from seerob.permissible.moving_joints import MovingJoints, chains_of
+
+POST = '[[parts]]\nname = "post"\nshape = {{ box = [0.2, 0.3, 0.2] }}\nat = {{ position = [{x}, 0.4, 0] }}\n'
+SLIDING = (
+    '<robot name="slider"><link name="base"/><link name="rail"><collision><geometry><box size="0.3 0.2 0.2"/>'
+    '</geometry></collision></link><link name="arm"><collision><origin xyz="0.4 0 0"/><geometry>'
+    '<box size="0.8 0.1 0.1"/></geometry></collision></link><link name="rod"><collision><geometry>'
+    '<box size="0.6 0.05 0.05"/></geometry></collision></link>'
+    '<joint name="j1" type="prismatic"><parent link="base"/><child link="rail"/><axis xyz="1 0 0"/>'
+    '<limit lower="-9" upper="9" effort="1" velocity="9"/></joint>'
+    '<joint name="j2" type="continuous"><parent link="rail"/><child link="arm"/><axis xyz="0 0 1"/>'
+    '<limit effort="1" velocity="9"/></joint>'
+    '<joint name="j3" type="prismatic"><parent link="arm"/><child link="rod"/><origin xyz="0.8 0 0"/>'
+    '<axis xyz="1 0 0"/><limit lower="-9" upper="9" effort="1" velocity="9"/></joint></robot>'
+)
+
+
+def wild(seed, n=5, joints=2, step=0.1, size=0.4):
+    """Positions and velocities that do not even belong together."""
+    rng = np.random.default_rng(seed)
+    q = np.cumsum(rng.normal(size=(n, joints)) * size / 2, axis=0)
+    qd = rng.normal(size=(n, joints)) * size * 4
+    t = np.cumsum(rng.uniform(0.5, 1.5, n)) * step
+    return GivenMotion("arm", t, q, qd, np.ones(n, bool))
+
+
+@pytest.fixture(scope="module", params=["turning", "sliding"])
+def model(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp(request.param)
+    urdf = two_r() if request.param == "turning" else SLIDING
+    text = FLOATING + TWO_R + POST.format(x=5.5)
+    return made(folder, text, {"arm.urdf": urdf}).model
+
+
+def looks(model, motion, between, count):
+    """Distances and speeds of the sets at many instants."""
+    gap = model.gap(model.select("post"), model.select("arm"))
+    distances, speeds = [], []
+    # At the samples the acceleration jumps: a peak may stand there alone.
+    for t in np.union1d(np.linspace(motion.t[0], motion.t[-1], count), motion.t):
+        state = between._at(float(t))
+        distances.append(gap.query.minimum(state.rotations, state.positions).distance)
+        speeds.append(max(state.fastest_point(i)[0] for i in gap.b))
+    return np.array(distances), np.array(speeds)
+
+
+@pytest.mark.parametrize("seed", range(1, 3))
+def test_bounds_hold_at_every_instant_and_are_tight(model, seed):
+    n = len(model.robot("arm").joints)
+    motion = wild(seed, joints=n)
+    between = BetweenSamples(model, {"arm": motion})
+    distance, speed = between.distance("post", "arm", tolerance=2e-3), between.speed("arm", tolerance=5e-3)
+    distances, speeds = looks(model, motion, between, 1000 * (len(motion.t) - 1) + 1)
+    assert distances.min() > 0
+    assert distances.min() >= distance.value
+    assert speeds.max() <= speed.value
+    assert distances.min() - distance.value <= 2e-3 + 2e-6
+    assert speed.value - speeds.max() <= 5e-3 + 2e-6
+    # What was met lies between truth and bound.
+    assert distance.value <= distance.found
+    assert speed.found <= speed.value
+
+
+def test_the_samples_alone_would_have_missed_it(model):
+    """Fast in the middle, at rest at the samples: the bound sees what no sample shows."""
+    n = len(model.robot("arm").joints)
+    q = np.zeros((2, n))
+    q[1, 1] = 1.0
+    motion = GivenMotion("arm", np.array([0.0, 0.5]), q, np.zeros((2, n)), np.ones(2, bool))
+    bound = BetweenSamples(model, {"arm": motion}).speed("arm/" + ("l2" if n == 2 else "arm"))
+    # The middle of the cubic is 1.5 times the mean; the joint's own body reaches a metre, or 0.8 m.
+    lever = np.hypot(1.0, 0.05) if n == 2 else np.hypot(0.8, 0.05)
+    assert bound.value == pytest.approx(1.5 * 1.0 / 0.5 * lever, abs=2e-3)
+
+
+def test_no_point_is_faster_or_quicker_than_its_chain_allows(model):
+    """Finite differences of the corners of every body against w and A."""
+    n = len(model.robot("arm").joints)
+    motion = wild(11, joints=n)
+    joints = MovingJoints(model, {"arm": motion})
+    between = BetweenSamples(model, {"arm": motion})
+    bodies = model.robot("arm").moving
+    chains = chains_of(model, bodies, joints.slid())
+    for t in np.random.default_rng(2).uniform(motion.t[0] + 0.01, motion.t[-1] - 0.01, 60):
+        h = 1e-4
+        if np.abs(motion.t - t).min() < 2 * h:
+            continue
+        places = []
+        for at in (t - h, t, t + h):
+            state = between._at(float(at))
+            places.append(
+                [model.bodies[i].corners @ state.rotations[i].T + state.positions[i] for i in bodies]
+            )
+        qd, qdd = joints.largest(np.array([t - h]), np.array([t + h]))
+        for k, chain in enumerate(chains):
+            a, b, c = (place[k] for place in places)
+            acceleration = np.linalg.norm((a - 2 * b + c) / h**2, axis=1).max()
+            speed = np.linalg.norm((c - a) / (2 * h), axis=1).max()
+            assert acceleration <= chain.agility(qd, qdd)[0] * (1 + 1e-6) + 1e-4
+            assert speed <= (qd[0, chain.dofs] * chain.weight).sum() * (1 + 1e-6)
+
+
+def test_shapes_that_touch_have_no_bound(tmp_path):
+    text = FLOATING + TWO_R + POST.format(x=1.0)
+    model = made(tmp_path, text, {"arm.urdf": two_r()}).model
+    sweep = GivenMotion(
+        "arm", np.array([0.0, 1.0]), np.array([[0.0, 0], [1, 0]]), np.ones((2, 2)), np.ones(2, bool)
+    )
+    bound = BetweenSamples(model, {"arm": sweep}).distance("post", "arm")
+    assert bound.value == -np.inf
+    assert "no bound, they touch or overlap" in bound.sentence()
+    json.dumps(bound.figures(), allow_nan=False)
+
+
+def test_what_cannot_be_bounded_is_said(model, tmp_path):
+    n = len(model.robot("arm").joints)
+    motion = wild(0, joints=n)
+    with pytest.raises(InputError, match="nobody moves"):
+        BetweenSamples(model, {})
+    between = BetweenSamples(model, {"arm": motion})
+    with pytest.raises(InputError, match="tolerance"):
+        between.speed("arm", tolerance=0.0)
+    with pytest.raises(UnknownName):
+        between.speed("nobody")
+    with pytest.raises(Undecided, match="no source drives it"):
+        BetweenSamples(
+            made(tmp_path, FLOATING + TWO_R + TWO_R.replace('"arm"', '"two"'), {"arm.urdf": two_r()}).model,
+            {"two": wild(0)},
+        ).distance("arm", "two")
+
+
+def test_assess_prints_and_reports_them(tmp_path, capsys):
+    distance = '[[safety]]\nkind = "minimum_distance"\nbetween = ["post", "arm"]\n'
+    source = '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "m.csv"\n'
+    rows = "".join(f"{t:.2f},{np.sin(t):.9f},{t:.9f}\n" for t in np.arange(0, 0.5, 0.05))
+    text = FLOATING + TWO_R + POST.format(x=5.0) + source + distance
+    made(tmp_path / "cell", text, {"arm.urdf": two_r(), "m.csv": "t [s],J1 [rad],J2 [rad]\n" + rows})
+    words = ["assess", str(tmp_path / "cell"), "--between-samples", "-o", str(tmp_path / "out")]
+    cli.main(words)
+    assert "at every instant from 0.000 s to 0.450 s" in capsys.readouterr().out
+    assert "Between the samples" in (tmp_path / "out/report.html").read_text(encoding="utf-8")

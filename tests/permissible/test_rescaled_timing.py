@@ -1,0 +1,165 @@
+"""Timing of a path: closed forms on a line, limits kept everywhere, the path that of the given motion."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from seerob.errors import InputError
+from seerob.permissible.given_motion import GivenMotion, largest_hermite, largest_on
+from seerob.permissible.joint_limits import JointLimits
+from seerob.permissible.path import path_of
+from seerob.permissible.profile import Parabolas, Profile
+from seerob.permissible.timing import timed
+
+
+def motion(t, q, qd):
+    q, qd = (np.asarray(x, float).reshape(len(t), -1) for x in (q, qd))
+    return GivenMotion("arm", np.asarray(t, float), q, qd, np.ones(len(t), bool))
+
+
+def line(length=1.0):
+    t = np.linspace(0, 1, 51)
+    return motion(t, length * t, np.full(51, length))
+
+
+def wave(rate=100):
+    t = np.arange(0, 1.5 + 1e-9, 1 / rate)
+    q = np.stack([np.sin(2 * t), 0.5 * np.cos(3 * t), -0.6 * np.sin(2 * t)], 1)
+    qd = np.stack([2 * np.cos(2 * t), -1.5 * np.sin(3 * t), -1.2 * np.cos(2 * t)], 1)
+    return motion(t, q, qd)
+
+
+def limits(v, a, j, n=1):
+    return JointLimits(("j",) * n, ("rad",) * n, np.full(n, v), np.full(n, a), np.full(n, j), ())
+
+
+def free(s):
+    return np.full(len(s), 1e9)
+
+
+@pytest.mark.parametrize(
+    ("v", "a", "j", "duration"),
+    [
+        (0.5, 2.0, 1e6, 1 / 0.5 + 0.5 / 2.0),  # trapezoid: way / v + v / a
+        (10.0, 2.0, 1e6, 2 * np.sqrt(1 / 2.0)),  # bang-bang: 2 sqrt(way / a)
+        (0.5, 2.0, 20.0, 1 / 0.5 + 0.5 / 2.0 + 2.0 / 20.0),  # seven segments: … + a / j
+    ],
+)
+def test_a_straight_line_takes_as_long_as_by_hand(v, a, j, duration):
+    piece = path_of(line(), tolerance=1e-3).pieces[0]
+    assert timed(piece, free, limits(v, a, j)).duration == pytest.approx(duration, rel=2e-4)
+
+
+def test_a_ceiling_on_a_line_is_a_smaller_speed():
+    piece = path_of(line(), tolerance=1e-3).pieces[0]
+    by_map = timed(piece, lambda s: np.full(len(s), 0.4), limits(2.0, 2.0, 20.0)).duration
+    assert by_map == pytest.approx(timed(piece, free, limits(0.4, 2.0, 20.0)).duration, rel=1e-3)
+
+
+def test_no_limit_is_exceeded_at_any_millisecond():
+    """By differences of positions, which know nothing of how the timing was made."""
+    piece = path_of(wave(), tolerance=5e-4).pieces[0]
+    top = limits(2.0, 8.0, 80.0, 3)
+
+    def ceiling(s):
+        return np.where(s < piece.length / 2, 1.5, 0.5)
+
+    found = timed(piece, ceiling, top)
+    t = np.arange(0, found.duration, 1e-3)
+    q = found.at(t)[0]
+    # A mean over a step is never above the largest in it; the jerk is a difference of third order.
+    assert np.abs(np.diff(q, axis=0) / 1e-3).max() <= 2.0
+    assert np.abs(np.diff(q, 2, axis=0) / 1e-6).max() <= 8.0 + 1e-6
+    assert np.abs(np.diff(q, 3, axis=0) / 1e-9).max() <= 80.0 + 1e-3
+    s = found.profile.at(t).s
+    assert (np.diff(s) >= 0).all()
+    inside = (s < piece.length / 2 - 0.01) | (s > piece.length / 2 + 0.01)
+    assert (np.diff(s)[inside[1:]] / 1e-3 <= ceiling(s[1:][inside[1:]]) + 1e-9).all()
+    use = found.use(t, ceiling, top)
+    assert max(x.max() for x in (use.map, use.velocity, use.acceleration, use.jerk)) <= 1.0
+
+
+@cache
+def wave_in_time():
+    return timed(path_of(wave(), tolerance=5e-4).pieces[0], free, limits(2.0, 8.0, 80.0, 3))
+
+
+def test_derivatives_are_those_of_the_positions():
+    found = wave_in_time()
+    t, h = np.linspace(0.1, found.duration - 0.1, 37), 1e-5
+    for order in range(3):
+        numeric = (found.at(t + h)[order] - found.at(t - h)[order]) / (2 * h)
+        np.testing.assert_allclose(found.at(t)[order + 1], numeric, atol=2e-3 * 10**order)
+
+
+def test_it_starts_and_ends_at_rest_where_the_given_motion_does():
+    found = wave_in_time()
+    q, qd, qdd, _ = found.at(np.array([0.0, found.duration]))
+    np.testing.assert_allclose(q, wave().q[[0, -1]], atol=1e-12)
+    np.testing.assert_allclose([qd, qdd], 0, atol=1e-9)
+
+
+def test_no_speed_anywhere_is_said():
+    piece = path_of(line(), tolerance=1e-3).pieces[0]
+    with pytest.raises(InputError, match="no speed is known"):
+        timed(piece, lambda s: np.where(s > 0.5, 0.0, 1.0), limits(1.0, 1.0, 1.0))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+def test_the_path_is_nowhere_farther_than_it_says(noise):
+    given = wave()
+    rough = given.q + noise * np.random.default_rng(0).normal(size=given.q.shape)
+    given = motion(given.t, rough, given.qd)
+    path = path_of(given, tolerance=5e-4)
+    (piece,) = path.pieces
+    assert path.deviation.max() <= 5e-4
+    dense = piece.at(np.linspace(0, piece.length, 20_001))[0]
+    for t in np.linspace(0, 1.5, 151):
+        q, _ = given.at(np.array([t]))
+        assert np.abs(dense - q).max(axis=1).min() <= path.deviation.max() + 2e-4
+
+
+def test_stands_and_turns_cut_the_path_and_stands_are_kept():
+    x = np.linspace(0, 1, 51)
+    way, speed = 10 * x**3 - 15 * x**4 + 6 * x**5, 30 * x**2 - 60 * x**3 + 30 * x**4
+    t = np.concatenate([x, 1.5 + x, 2.5 + x[1:]])
+    q, qd = np.concatenate([way, 1 + way, 2 - way[1:]]), np.concatenate([speed, speed, -speed[1:]])
+    path = path_of(motion(t, q, qd), tolerance=1e-3)
+    assert len(path.pieces) == 3  # on, on again after a stand, and back
+    # Slower than the tolerance shows is a stand too.
+    np.testing.assert_allclose(path.stands, [0, 0.5, 0, 0], atol=0.2)
+    assert path.stands.sum() + sum(p.t[-1] - p.t[0] for p in path.pieces) == pytest.approx(3.5)
+
+
+def test_what_never_moves_is_refused():
+    with pytest.raises(InputError, match="never moves"):
+        path_of(motion([0, 1, 2], [0, 0, 0], [0, 0, 0]), tolerance=1e-3)
+
+
+def test_largest_values_of_polynomials():
+    rng = np.random.default_rng(1)
+    x = np.linspace(0, 1, 4001)
+    for _ in range(50):
+        d0, d1, e0, e1 = rng.normal(size=4)
+        c2, c3 = 3 * (d1 - d0) - 2 * e0 - e1, e0 + e1 - 2 * (d1 - d0)
+        dense = np.abs(d0 + x * (e0 + x * (c2 + x * c3))).max()
+        found = float(largest_hermite(*(np.array(v) for v in (d0, d1, e0, e1))))
+        assert dense <= found + 1e-12
+        assert found == pytest.approx(dense, rel=1e-5)
+        dense = np.abs(d0 + x * (e0 + x * c2)).max()
+        found = float(largest_on(*(np.array(v) for v in (d0, e0, c2)), 0.0, 1.0))
+        assert dense <= found + 1e-12
+        assert found == pytest.approx(dense, rel=1e-5)
+
+
+def test_an_averaged_profile_has_the_same_way_and_its_own_derivatives():
+    profile = Profile(Parabolas.of(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0, 0.0])), 0.3, 1.2)
+    t = np.linspace(-0.1, profile.duration + 0.1, 4001)
+    now = profile.at(t)
+    assert (now.s[0], now.s[-1]) == pytest.approx((0.0, 2.0))
+    np.testing.assert_allclose(np.gradient(now.s, t), now.speed, atol=2e-3)
+    np.testing.assert_allclose(np.gradient(now.speed, t)[5:-5], now.acceleration[5:-5], atol=2e-2)
+    assert np.abs(np.diff(now.acceleration)).max() < 0.05  # no jump

@@ -1,0 +1,104 @@
+"""A hundred thousand broken datagrams, and files, of motion capture: an error or a flagged frame, no more."""
+
+from __future__ import annotations
+
+import random
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "sources"))
+
+from made_mvnx import Q, made  # tests/sources
+
+from seerob.emulators.mvn_datagrams import datagrams
+from seerob.emulators.mvn_person import Pose, segments
+from seerob.errors import InputError
+from seerob.protocols import ProtocolError
+from seerob.protocols.mvn import Kind, Splitter
+from seerob.sources import bvh, mvnx
+from seerob.sources._mvn_frames import Frames
+
+COUNT = 100_000
+pytestmark = pytest.mark.soak
+
+
+def broken(rng, data):
+    """Some bytes changed, cut off or put in."""
+    bad = bytearray(data)
+    for _ in range(rng.randint(0, 8)):
+        bad[rng.randrange(len(bad))] = rng.randrange(256)
+    if rng.random() < 0.3:
+        at = rng.randrange(len(bad))
+        bad[at : at + rng.randint(0, 40)] = rng.randbytes(rng.randint(0, 40))
+    return bytes(bad[: rng.randint(0, len(bad))] if rng.random() < 0.3 else bad)
+
+
+def good():
+    positions, _ = segments(mvnx_person(), Q[:5])
+    pose = Pose(positions[0], np.tile([1.0, 0, 0, 0], (23, 1)))
+    kinds = [k for k in Kind if k not in {Kind.POINTS, Kind.TRACKERS}]
+    return [d for kind in kinds for n in (0, 9) for d in datagrams(kind, pose, sample=3, t=1.0, items_each=n)]
+
+
+def mvnx_person():
+    from made_mvnx import PERSON
+
+    return PERSON
+
+
+def flagged(frame):
+    seen = frame.positions[np.isfinite(frame.positions).all(axis=1)]
+    turns = frame.orientations[np.isfinite(frame.orientations).all(axis=1)]
+    assert not np.isinf(frame.positions).any()
+    assert (np.abs(seen) <= 1e6).all()
+    np.testing.assert_allclose(np.linalg.norm(turns, axis=1), 1.0, atol=1e-6)
+
+
+def test_datagrams():
+    rng, frames, samples = random.Random(1), Frames(), good()
+    heard = 0
+    for k in range(COUNT):
+        if k % 1000 == 0:
+            frames = Frames()
+        item = frames.feed(broken(rng, rng.choice(samples)), k / 100)
+        if item is not None:
+            heard += 1
+            flagged(item[1])
+    assert 0 < heard < COUNT
+
+
+def test_streams():
+    rng, samples, refused = random.Random(2), good(), 0
+    for _ in range(COUNT // 10):
+        splitter = Splitter()
+        try:
+            for _ in range(10):
+                splitter.feed(broken(rng, rng.choice(samples)))
+        except ProtocolError:
+            refused += 1
+    assert refused > COUNT // 20
+
+
+@pytest.mark.parametrize("kind", ["mvnx", "bvh"])
+def test_files(tmp_path, kind):
+    if kind == "mvnx":
+        data = made(tmp_path / "good.mvnx", Q[:1]).read_bytes()
+        read = mvnx.read
+    else:
+        from test_bvh import made as made_bvh
+
+        data = made_bvh(tmp_path / "good.bvh").read_bytes()[:4000]
+        read = bvh.read
+    rng, path, refused = random.Random(3), tmp_path / f"bad.{kind}", 0
+    count = COUNT // 20  # a file takes a hundred times as long as a datagram
+    for _ in range(count):
+        path.write_bytes(broken(rng, data))
+        try:
+            for frame in read(path).frames:
+                flagged(frame)
+        except InputError:
+            refused += 1
+    assert 0 < refused < count

@@ -1,0 +1,80 @@
+"""Markers that are made of many pieces."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from seerob.ear_cutting import cut_ears
+from seerob.snapshot import Polyline, Prism, Rays
+from seerob.transforms import Array
+
+
+def test_an_open_line_has_a_leg_less_than_points_and_a_closed_one_as_many() -> None:
+    points = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0))
+    legs = Polyline(points=points).legs()
+    assert legs == list(pairwise(points))
+    assert Polyline(points=points, closed=True).legs() == [*legs, (points[2], points[0])]
+    assert Polyline(points=()).legs() == Polyline(points=(), closed=True).legs() == []
+
+
+def test_beams_start_together_or_each_where_it_says() -> None:
+    ends = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    starts = ((0.0, 0.0, 1.0), (0.0, 0.0, 2.0))
+    assert Rays(starts=starts[:1], ends=ends).beams() == [(starts[0], ends[0]), (starts[0], ends[1])]
+    assert Rays(starts=starts, ends=ends).beams() == list(zip(starts, ends, strict=True))
+
+
+def star(rng: np.random.Generator, n: int) -> Array:
+    """A star-shaped, so simple, polygon around the origin, shape (n, 2)."""
+    angles = np.sort(rng.uniform(0, 2 * np.pi, n) + 1e-3 * np.arange(n))
+    return np.stack([np.cos(angles), np.sin(angles)], 1) * rng.uniform(0.3, 1.0, n)[:, None]
+
+
+def area(corners: Array) -> float:
+    x, y = corners.T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_triangles_cover_a_concave_polygon_exactly_whichever_way_round(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    corners = (
+        np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [2.0, 1.0], [0.0, 3.0]])
+        if seed == 0
+        else star(rng, 4 + seed)
+    )
+    for outline in (corners, corners[::-1]):
+        triangles = cut_ears(outline)
+        assert len(triangles) == len(outline) - 2
+        pieces = [area(outline[list(t)]) for t in triangles]
+        assert min(pieces) > 0
+        assert sum(pieces) == pytest.approx(abs(area(corners)), rel=1e-12)
+
+
+def test_what_encloses_nothing_has_no_triangles() -> None:
+    assert cut_ears(np.zeros((0, 2))) == cut_ears(np.zeros((2, 2))) == cut_ears(np.zeros((5, 2))) == []
+
+
+def test_a_prism_is_a_closed_solid_of_its_volume_where_its_frame_is() -> None:
+    from seerob.sinks._marker_shapes import prism
+
+    outline = ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (2.0, 1.0), (0.0, 3.0))
+    marker = Prism(
+        outline=outline,
+        lower=-1.0,
+        upper=2.0,
+        position=(1.0, 2.0, 3.0),
+        wxyz=(np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0),
+    )
+    vertices, faces, edges = prism(marker)
+    volume = np.linalg.det(vertices[faces] - vertices[0]).sum() / 6
+    assert volume == pytest.approx(abs(area(np.array(outline))) * 3.0, rel=1e-12)
+    directed = {(int(f[i]), int(f[i - 2])) for f in faces for i in range(3)}
+    assert all((b, a) in directed for a, b in directed)
+    assert len(edges) == 15
+    # Turned by 90° about x: its z points to −y of the world.
+    assert vertices[:, 1].min() == pytest.approx(0.0)
+    assert vertices[:, 1].max() == pytest.approx(3.0)

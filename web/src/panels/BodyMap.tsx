@@ -1,0 +1,171 @@
+// Power and force limiting on a body: each of the 29 areas by how near a contact now would be to its limit.
+
+import { signal } from "@preact/signals";
+import {
+  type Aspect,
+  contactRows,
+  dominantHand,
+  LOOK_WORDS,
+  type Look,
+  lookOf,
+  shareOf,
+  type Told,
+  toldOf,
+  toldOfRegion,
+  worst,
+} from "../body_map/exposure";
+import { type Spot, spots } from "../body_map/figure";
+import { formatPercent } from "../format";
+import { frame, scene, stale } from "../page_state";
+import { BodyFigure, type DrawnSpot } from "./BodyFigure";
+import { ContactDetails, ContactHead } from "./ContactCard";
+
+const ASPECTS: readonly [Aspect, string][] = [
+  ["worst", "Worst"],
+  ["force", "Force"],
+  ["pressure", "Pressure"],
+  ["energy", "Energy"],
+];
+const LEGEND: readonly Look[] = [
+  "clear",
+  "low",
+  "middle",
+  "high",
+  "exceeded",
+  "forbidden",
+  "undecided",
+  "none",
+];
+
+const aspect = signal<Aspect>("worst");
+const only = signal<string | null>(null);
+const pointed = signal<string | null>(null);
+const pinned = signal<string | null>(null);
+
+export function BodyMap() {
+  const run = scene.value;
+  const results = frame.value?.results ?? [];
+  const sources = results.filter((result) => contactRows([result], null).length > 0).map((r) => r.name);
+  const possible = run?.criteria.filter((c) => c.kind === "power_and_force").map((c) => c.name) ?? [];
+  if (!run || (possible.length === 0 && sources.length === 0)) {
+    return (
+      <section class="body-map scroll" aria-label="Body map">
+        <p class="empty">
+          No criterion of this run judges contacts with the body. Add one of kind <code>power_and_force</code>{" "}
+          to the workstation file.
+        </p>
+      </section>
+    );
+  }
+  const from = only.value !== null && sources.includes(only.value) ? only.value : null;
+  const all = contactRows(results, from);
+  const drawn = spots(dominantHand(all)).map((spot) => drawnSpot(spot, all));
+  const governing = worst(all, aspect.value);
+  const keyOf = (told: Told | undefined): string | null =>
+    drawn.find((spot) => told && toldOf(spot, all, aspect.value) === told)?.key ?? null;
+  const shownKey = pointed.value ?? pinned.value ?? keyOf(governing);
+  const shown = drawn.find((spot) => spot.key === shownKey);
+  const told = shown ? toldOf(shown, all, aspect.value) : governing;
+  return (
+    <section class={`body-map scroll ${stale.value ? "stale" : ""}`} aria-label="Body map">
+      <div class="panel-tools">
+        <fieldset class="choice">
+          <legend class="visually-hidden">Limit</legend>
+          {ASPECTS.map(([key, title]) => (
+            <button
+              key={key}
+              type="button"
+              aria-pressed={aspect.value === key}
+              onClick={() => {
+                aspect.value = key;
+              }}
+            >
+              {title}
+            </button>
+          ))}
+        </fieldset>
+        {sources.length > 1 && (
+          <select
+            aria-label="Criterion"
+            value={from ?? ""}
+            onChange={(event) => {
+              only.value = event.currentTarget.value || null;
+            }}
+          >
+            <option value="">worst of all</option>
+            {sources.map((name) => (
+              <option key={name} value={name}>
+                {name}
+              </option>
+            ))}
+          </select>
+        )}
+      </div>
+      <ContactHead spot={shown} told={told} aspect={aspect.value} />
+      <fieldset class="figures" aria-label="Body areas" onKeyDown={(event) => move(event, drawn)}>
+        {(["front", "back"] as const).map((view) => (
+          <BodyFigure
+            key={view}
+            view={view}
+            spots={drawn.filter((spot) => spot.view === view)}
+            regionLook={({ region, side }) =>
+              lookOf(toldOfRegion(region, side, all, aspect.value)?.row, aspect.value)
+            }
+            chosen={pinned.value}
+            reachable={shownKey ?? drawn[0]?.key ?? null}
+            onPoint={(key) => {
+              pointed.value = key;
+            }}
+            onChoose={(key) => {
+              pinned.value = pinned.value === key ? null : key;
+            }}
+          />
+        ))}
+      </fieldset>
+      <ul class="look-legend" aria-label="Colours: present speed as a share of the permissible one">
+        {LEGEND.map((look) => (
+          <li key={look}>
+            <i class={`swatch look-${look}`} aria-hidden="true" />
+            {LOOK_WORDS[look]}
+          </li>
+        ))}
+      </ul>
+      {told && <ContactDetails run={run} told={told} />}
+    </section>
+  );
+}
+
+function drawnSpot(spot: Spot, all: readonly Told[]): DrawnSpot {
+  const told = toldOf(spot, all, aspect.value);
+  const look = lookOf(told?.row, aspect.value);
+  const share = told ? shareOf(told.row, aspect.value) : null;
+  const name = told ? told.row.name : `area ${spot.area}`;
+  const side = spot.side === "" ? "" : `${spot.side} `;
+  const amount = share === null ? "" : `, ${formatPercent(share)} of the permissible speed`;
+  return {
+    ...spot,
+    key: `${spot.area} ${spot.side}`,
+    look,
+    title: `${side}${name}: ${LOOK_WORDS[look]}${amount}`,
+  };
+}
+
+const ARROWS: Record<string, 1 | -1> = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 };
+
+// Arrows go from spot to spot, worst places and all; time has them everywhere else on the page.
+function move(event: KeyboardEvent, drawn: readonly DrawnSpot[]): void {
+  const target = event.target as Element;
+  const at = drawn.findIndex((spot) => spot.key === target.getAttribute("data-spot"));
+  if (at < 0) return;
+  if (event.key === "Enter" || event.key === " ") {
+    pinned.value = pinned.value === drawn[at]!.key ? null : drawn[at]!.key;
+  } else {
+    const step = ARROWS[event.key];
+    if (step === undefined) return;
+    const next = drawn[(at + step + drawn.length) % drawn.length]!;
+    const figures = event.currentTarget as HTMLElement;
+    figures.querySelector<SVGGElement>(`[data-spot="${next.key}"]`)?.focus();
+  }
+  event.preventDefault();
+  event.stopPropagation();
+}

@@ -1,0 +1,105 @@
+// What is said of one area of the body: the verdict first, then what each limit allows and where it is from.
+
+import { type Aspect, inputsOf, LOOK_WORDS, lookOf, shareOf, type Told } from "../body_map/exposure";
+import type { Spot } from "../body_map/figure";
+import { formatNumber, formatPercent, formatQuantity } from "../format";
+import type { Input, Scene } from "../wire";
+import { StateBadge } from "./StateBadge";
+
+/** Of constant height, so that the figures stay where they are while one points from area to area. */
+export function ContactHead(props: { spot: Spot | undefined; told: Told | undefined; aspect: Aspect }) {
+  const { spot, told, aspect } = props;
+  if (!told) {
+    return (
+      <div class="contact-head">
+        <h3>{spot ? `Area ${spot.area}` : "Whole body"}</h3>
+        <p class="reason">Nothing that moves is within reach.</p>
+      </div>
+    );
+  }
+  const { row } = told;
+  const look = lookOf(row, aspect);
+  const side = row.side || (spot?.side ?? "");
+  const share = shareOf(row, aspect);
+  return (
+    <div class={`contact-head card-${look}`}>
+      <h3>
+        {side !== "" && `${side} `}
+        {row.name}
+        <span class="unit">
+          {row.areas?.length ? ` area ${row.areas.join(", ")}` : ""}
+          {row.group && row.group !== row.name ? ` · ${row.group}` : ""}
+        </span>
+      </h3>
+      <p class="contact-speed">
+        {row.verdict && row.state !== "forbidden" ? <StateBadge state={row.verdict} /> : LOOK_WORDS[look]}
+        {row.limit != null && (
+          <span>
+            {formatNumber(row.value ?? null, row.limit)} of {formatQuantity(row.limit, row.unit ?? "")}
+          </span>
+        )}
+        {share !== null && <span>{formatPercent(share)}</span>}
+      </p>
+      <p class="reason">{row.reason}</p>
+    </div>
+  );
+}
+
+export function ContactDetails({ run, told }: { run: Scene; told: Told }) {
+  const { row, criterion } = told;
+  const inputs = inputsOf(told, run);
+  return (
+    <div class="contact-details">
+      <dl>
+        <dt>Speed now</dt>
+        <dd>{quantity(row.value, row.unit)}</dd>
+        <dt>Permissible speed</dt>
+        <dd>{row.limit == null ? LOOK_WORDS[lookOf(row, "worst")] : quantity(row.limit, row.unit)}</dd>
+        {(row.aspects ?? []).map((one) => (
+          <AspectRow key={one.name} name={one.name} text={one.band || quantity(one.value, one.unit)} />
+        ))}
+        <dt>Criterion</dt>
+        <dd>{criterion}</dd>
+      </dl>
+      {inputs.length > 0 && (
+        <table class="inputs">
+          <caption>Limits, where from and how sure</caption>
+          <tbody>
+            {inputs.map((input) => (
+              <LimitRow key={input.name} input={input} group={row.group ?? ""} />
+            ))}
+          </tbody>
+        </table>
+      )}
+    </div>
+  );
+}
+
+function AspectRow({ name, text }: { name: string; text: string }) {
+  return (
+    <>
+      <dt>{name}</dt>
+      <dd>{text}</dd>
+    </>
+  );
+}
+
+function LimitRow({ input, group }: { input: Input; group: string }) {
+  const value = typeof input.value === "number" ? formatNumber(input.value) : (input.value ?? "–");
+  return (
+    <tr>
+      <th scope="row">{input.name.replace(`${group}: `, "")}</th>
+      <td class="number">
+        {value} <span class="unit">{input.unit}</span>
+      </td>
+      <td>
+        <span class={`origin origin-${input.origin}`}>{input.origin}</span>
+        <span class="reason">{input.source}</span>
+      </td>
+    </tr>
+  );
+}
+
+function quantity(value: number | null | undefined, unit: string | undefined): string {
+  return value == null ? "not known" : formatQuantity(value, unit ?? "");
+}

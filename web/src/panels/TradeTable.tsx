@@ -1,0 +1,70 @@
+// Posture against separation: the worst instants of either, and what the other says at the same time.
+
+import { formatNumber, formatTime } from "../format";
+import { tradeColumns, tradeRows } from "../posture/instants";
+import { STATE_ICONS } from "../verdicts";
+import type { CriterionInfo, Verdict } from "../wire";
+import type { Instant } from "../worst_instant";
+import { useActions } from "./app_context";
+
+/** A number without decimals: scores are whole. */
+const WHOLE = 100;
+const CODES: readonly Verdict[] = ["within", "exceeded", "undecided"];
+
+export function TradeTable() {
+  const { time } = useActions();
+  const columns = tradeColumns.value;
+  const rows = tradeRows.value;
+  if (rows.length === 0 || !columns.some((c) => c.group !== "ergonomics")) return null;
+  return (
+    <div class="trade">
+      <h3>Posture against separation</h3>
+      <div class="trade-scroll">
+        <table>
+          <thead>
+            <tr>
+              <th scope="col">At</th>
+              {columns.map(({ name, unit }) => (
+                <th scope="col" key={name} class="number" title={name}>
+                  {name}
+                  {unit !== "" && <span class="unit"> {unit}</span>}
+                </th>
+              ))}
+            </tr>
+          </thead>
+          <tbody>
+            {rows.map((row) => (
+              <tr key={row.t}>
+                <th scope="row">
+                  <button
+                    type="button"
+                    class="link"
+                    title={`Worst of ${row.of}`}
+                    onClick={() => time.visit(row.t)}
+                  >
+                    {formatTime(row.t)}
+                  </button>
+                </th>
+                {row.cells.map((cell, i) => (
+                  <TradeCell key={columns[i]!.name} cell={cell} info={columns[i]!} of={row.of} />
+                ))}
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </div>
+    </div>
+  );
+}
+
+function TradeCell({ cell, info, of }: { cell: Instant | null; info: CriterionInfo; of: string }) {
+  const verdict = cell ? CODES[cell.verdict] : undefined;
+  const value = cell && !Number.isNaN(cell.value) ? cell.value : null;
+  return (
+    <td class={`number ${verdict ? `state-${verdict}` : ""} ${info.name === of ? "own" : ""}`}>
+      {verdict && <span aria-hidden="true">{STATE_ICONS[verdict]} </span>}
+      {verdict && <span class="visually-hidden">{verdict} </span>}
+      {formatNumber(value, info.unit === "" ? WHOLE : null)}
+    </td>
+  );
+}

@@ -1,0 +1,229 @@
+// The body map and the posture panel in a real browser: they say what the shown snapshot says, and lead on.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { openBrowser } from "./browser.mjs";
+import { settled, show } from "./expect.mjs";
+import { serve } from "./served.mjs";
+
+let served;
+let browser;
+let page;
+
+before(async () => {
+  served = await serve("--mode", "replay", "--seconds", "12");
+  browser = await openBrowser({ width: 1280, height: 900 });
+  page = browser.page;
+  await show(page, served.url);
+});
+
+after(async () => {
+  await browser?.close();
+  await served?.close();
+});
+
+async function seek(t) {
+  const box = await page.locator(".strip").boundingBox();
+  await page.mouse.click(box.x + (box.width * t) / 12, box.y + box.height / 2);
+  await page.waitForFunction((to) => Math.abs(window.seerob.t - to) < 0.06, t);
+  return settled(page);
+}
+
+const spot = (key) => page.locator(`[data-spot="${key}"]`);
+const look = async (key) => (await spot(key).getAttribute("class")).match(/look-(\w+)/)[1];
+const tab = (name) => page.getByRole("tab", { name, exact: true }).click();
+
+/** The row of an area in the snapshot of a run time. */
+async function rowOf(t, area) {
+  const { results } = await served.tell(`snapshot ${t}`);
+  return results.find((r) => r.name === "contacts").rows.find((row) => row.areas?.includes(area));
+}
+
+test("every one of the 29 areas is on the body, on both sides where there are two", async () => {
+  await tab("Body");
+  const keys = await page.locator("[data-spot]").evaluateAll((all) => all.map((g) => g.dataset.spot));
+  assert.deepEqual(
+    [...new Set(keys.map((key) => Number(key.split(" ")[0])))].sort((a, b) => a - b),
+    Array.from({ length: 29 }, (_, i) => i + 1),
+  );
+  assert.equal(new Set(keys).size, keys.length);
+  for (const [dominant, other] of [
+    [17, 18],
+    [24, 25],
+  ]) {
+    assert.ok(keys.includes(`${dominant} right`) && keys.includes(`${other} left`));
+  }
+});
+
+for (const t of [0.3, 1, 5.5, 8]) {
+  test(`at ${t} s each area has the colour of its share`, async () => {
+    const at = await seek(t);
+    const expected = async (area) => {
+      const row = await rowOf(at, area);
+      if (!row) return "clear";
+      const share = row.value / row.limit;
+      if (share > 1) return "exceeded";
+      if (row.verdict === "undecided") return "undecided";
+      return share < 0.5 ? "low" : share < 0.8 ? "middle" : "high";
+    };
+    for (const [area, key] of [
+      [8, "8 "],
+      [9, "9 left"],
+      [9, "9 right"],
+      [14, "14 right"],
+      [24, "24 right"],
+    ]) {
+      const wanted = await expected(area);
+      await page.waitForFunction(
+        ([k, l]) => document.querySelector(`[data-spot="${k}"]`).classList.contains(`look-${l}`),
+        [key, wanted],
+      );
+    }
+    // What one side can be hit at says nothing of the other.
+    assert.equal(await look("14 left"), "clear");
+    assert.equal(await look("25 left"), "clear");
+  });
+}
+
+test("contact that is not permitted is hatched, feet without a limit are grey, neither has a number", async () => {
+  await seek(0.3);
+  assert.equal(await look("1 "), "forbidden");
+  const fill = await spot("1 ")
+    .locator("circle:not(.target)")
+    .evaluate((circle) => getComputedStyle(circle).fill);
+  assert.match(fill, /url\(.*#forbidden-front/);
+  const feet = page.locator('[data-region="Feet"]').first();
+  assert.match(await feet.getAttribute("class"), /look-none/);
+  assert.match(await spot("1 ").getAttribute("aria-label"), /contact not permitted$/);
+});
+
+test("a tap says speed, limit, what governs, what each limit allows, where from and how sure", async () => {
+  const at = await seek(0.3);
+  await spot("24 right").click();
+  const row = await rowOf(at, 24);
+  const text = await page.locator(".body-map").innerText();
+  for (const said of [
+    "Back of the hand (dominant)",
+    "area 24",
+    `${row.value.toFixed(3)} of ${row.limit.toFixed(3)}`,
+    "force, free, ur10/wrist_3_link",
+    "allowed by pressure",
+    "1.00 m/s",
+    "Table A.2 (2S)",
+    "stated",
+  ]) {
+    assert.ok(
+      text.replaceAll("\u00a0", " ").toLowerCase().includes(said.toLowerCase()),
+      `${said} is not in ${text}`,
+    );
+  }
+  await spot("24 right").click();
+});
+
+test("keys go from area to area without moving time", async () => {
+  const t = await settled(page);
+  await page.locator('[data-spot][tabindex="0"]').first().focus();
+  const key = () => page.evaluate(() => document.activeElement.dataset.spot);
+  const first = await key();
+  await page.keyboard.press("ArrowRight");
+  const second = await key();
+  assert.notEqual(second, first);
+  await page.keyboard.press("Enter");
+  assert.equal(await spot(second).getAttribute("aria-pressed"), "true");
+  await page.keyboard.press("Enter");
+  await page.keyboard.press("ArrowLeft");
+  assert.equal(await key(), first);
+  assert.equal(await settled(page), t);
+});
+
+test("one limit can be looked at by itself; what it does not know is undecided", async () => {
+  await seek(1);
+  await page.getByRole("button", { name: "Pressure" }).click();
+  assert.equal(await look("14 right"), "undecided");
+  await page.getByRole("button", { name: "Force" }).click();
+  assert.notEqual(await look("14 right"), "undecided");
+  await page.getByRole("button", { name: "Worst" }).click();
+});
+
+test("the posture has both sides, angles, and says what was not assessed", async () => {
+  await tab("Posture");
+  await seek(5.5);
+  await page.waitForFunction(() => document.querySelector(".score-value").textContent === "7");
+  const rows = await page.locator(".scores tbody tr").allInnerTexts();
+  const flat = rows.map((text) => text.replace(/\s+/g, " "));
+  assert.match(flat[0], /score 3\/7 7\/7/i);
+  assert.match(
+    flat[1],
+    /upper arm 1\/6 shoulder flexion 6° −20° to 20° 5\/6 shoulder flexion 100° 20° to 45°/i,
+  );
+  assert.match(flat[3], /wrist – \? not assessed wrist flexion not measured/i);
+});
+
+test("the manikin has the colours of the parts, or of the whole, or its own", async () => {
+  const color = (name) => page.evaluate((n) => window.seerob.tint(n), name);
+  const [right, left] = ["operator/right upper arm", "operator/left upper arm"];
+  await page.waitForFunction((n) => window.seerob.tint(n) !== null, right);
+  const red = (hex) => (hex >> 16) - ((hex >> 8) & 255);
+  assert.ok(red(await color(right)) > 60, "5 of 6 is warm");
+  assert.ok(red(await color(left)) < -60, "1 of 6 is green");
+  assert.equal(await color("operator/right hand"), null, "not assessed has no colour");
+  await page.getByRole("button", { name: "Overall" }).click();
+  await page.waitForFunction(([a, b]) => window.seerob.tint(a) === window.seerob.tint(b), [right, left]);
+  await page.getByRole("button", { name: "Verdicts" }).click();
+  await page.waitForFunction((n) => window.seerob.tint(n) === null, right);
+  await page.getByRole("button", { name: "Body parts" }).click();
+  await page.waitForFunction((n) => window.seerob.tint(n) !== null, right);
+  await tab("Criteria");
+  await page.waitForFunction((n) => window.seerob.tint(n) === null, right);
+  await tab("Posture");
+});
+
+test("the worst instants lead to where the score is highest", async () => {
+  await seek(9);
+  await page.locator('[data-worst="posture score"]').click();
+  await page.waitForFunction(() => window.seerob.t >= 4.99 && window.seerob.t < 6);
+  await page.waitForFunction(() => document.querySelector(".score-value").textContent === "7");
+});
+
+test("posture and separation of the same instant stand in one row", async () => {
+  const told = await page
+    .locator(".trade tbody tr")
+    .evaluateAll((all) => all.map((row) => [...row.children].map((cell) => cell.textContent.trim())));
+  assert.ok(told.length >= 3);
+  for (const [time, score, separation] of told) {
+    const [minutes, seconds] = time.split(":").map(Number);
+    const { results } = await served.tell(`snapshot ${60 * minutes + seconds}`);
+    const value = (name) => results.find((r) => r.name === name).value;
+    assert.equal(Number(score.match(/[\d.]+$/)[0]), value("posture score"));
+    assert.ok(Math.abs(Number(separation.match(/[\d.]+$/)[0]) - value("separation")) < 6e-3);
+  }
+});
+
+test("the pill leads to the worst instant of what it names, and its figures stay", async () => {
+  await seek(10);
+  await page.waitForSelector(".pill.state-undecided .elsewhere-exceeded");
+  await page.locator(".pill-elsewhere").click();
+  await page.waitForSelector(".pill.state-exceeded");
+  const seen = await page.locator(".visited").innerText();
+  const at = await settled(page);
+  const here = (await served.tell(`snapshot ${at}`)).results.find((r) => r.name === "separation");
+  assert.ok(seen.includes(here.value.toFixed(3)), seen);
+  let least = Number.POSITIVE_INFINITY;
+  for (let k = 0; k <= 1200; k += 10) {
+    const { results } = await served.tell(`snapshot ${k / 100}`);
+    const one = results.find((r) => r.name === "separation");
+    least = Math.min(least, one.value - one.limit);
+  }
+  assert.ok(here.value - here.limit <= least + 1e-6);
+});
+
+test("a phone held upright loses nothing to the right", async () => {
+  await page.setViewportSize({ width: 390, height: 844 });
+  for (const name of ["Criteria", "Body", "Posture"]) {
+    await tab(name);
+    const over = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    assert.ok(over <= 0, `${name} is ${over} px too wide`);
+  }
+});
+
+test("nothing complained", () => assert.deepEqual(browser.complaints, []));

@@ -61,16 +61,14 @@ class Story:
         there = [motion(s.t - offset)[0] for s in self.snapshots]
         return np.abs(np.subtract(there, joints)).max(axis=1)
 
-    def follows(self, motion):
+    def check_that_it_follows(self, motion):
         """What lies between samples is where the device was, and what is decided is never far from it."""
-        errors, decided = self.errors(motion), np.array([v == "within" for v in self.verdicts()])
-        return (
-            self.ahead().sum() > 10
-            and decided.sum() > 10
-            and np.median(errors[self.ahead()]) < 1e-4
-            # At 0.5 rad/s that is the time-out of 0.2 s: later is undecided.
-            and errors[decided].max() < 0.1
-        )
+        errors, decided, ahead = self.errors(motion), np.array(self.verdicts()) == "within", self.ahead()
+        assert ahead.sum() > 10
+        assert decided.sum() > 10
+        assert np.median(errors[ahead]) < 1e-3
+        # At 0.5 rad/s it is the time-out of 0.2 s: what is later is undecided.
+        assert errors[decided].max() < 0.1
 
     def fastest(self, first=0):
         """Largest speed that was claimed [m/s]."""

@@ -67,7 +67,7 @@ def test_a_module_that_is_not_one_rule_says_why(module, name, text, words):
     "kind", ["", ".", ".velocity", "velocity.", "a..b", "_hidden", "__init__", "a b", "a-b", "a/b"]
 )
 def test_a_kind_that_is_no_name_of_a_module_imports_nothing(kind):
-    with pytest.raises(UnknownName, match="velocity"):
+    with pytest.raises(UnknownName, match=min(plugin.kinds("safety"))):
         plugin.load("safety", kind, Criterion)
 
 

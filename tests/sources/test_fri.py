@@ -49,7 +49,7 @@ def test_the_twin_follows_the_robot_and_commands_nothing(tmp_path, port, edition
         assert server.answers > 10
         assert server.wrong == []
         assert server.moved_by_answer < 1e-12
-    assert story.follows(motion)
+    story.check_that_it_follows(motion)
     speeds = [np.abs(np.subtract(motion(s.t_device)[1], s.qd)).max() for s in story.joints() if s.qd]
     assert len(speeds) > 10
     assert np.median(speeds) < 1e-3

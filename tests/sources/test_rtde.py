@@ -46,7 +46,7 @@ def cell(folder, server, *, frequency=125.0, timeout=0.2, more=""):
 def test_the_twin_follows_the_robot(tmp_path, frequency):
     with RtdeServer(motion) as server:
         story = lived(cell(tmp_path, server, frequency=frequency), Story(150))
-    assert story.follows(motion)
+    story.check_that_it_follows(motion)
     assert story.fastest() < FASTEST
 
 

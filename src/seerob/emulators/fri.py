@@ -62,7 +62,7 @@ class FriServer:
         self.moved_by_answer = 0.0
         """Largest difference between joints of an answer and the controller's own [rad]."""
         self._sequence = self._row = self._missing = 0
-        self._sent: dict[int, tuple[float, ...]] = {}
+        self._sent: dict[int, Monitoring] = {}
         self._made = time.monotonic()
         self._thread: Thread | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -147,7 +147,7 @@ class FriServer:
         try:
             while not self._over.is_set():
                 message = self.message(begun - self._made + k * self.period)
-                self._sent[self._sequence] = message.q
+                self._sent[self._sequence] = message
                 self._sent.pop(self._sequence - REMEMBERED, None)
                 transport.sendto(fri.encode_monitoring(message), self.to)
                 self._sequence = (self._sequence + 1) & 0xFFFF_FFFF
@@ -170,13 +170,17 @@ class FriServer:
         except ProtocolError as error:
             self.wrong.append(str(error))
             return
-        if (self.edition is Edition.V1 or self.overlay) and not answer.q:
+        asked = self._sent.get(answer.reflected)
+        if asked is None:
+            self.wrong.append(f"an answer to {answer.reflected}, which was not sent of late")
+            return
+        wants_joints = self.edition is Edition.V1 or asked.session == SessionState.COMMANDING_ACTIVE
+        if wants_joints and not answer.q:
             self.wrong.append("an answer without joints")
             return
-        if answer.q and (there := self._sent.get(answer.reflected)) is not None:
-            self.moved_by_answer = max(
-                self.moved_by_answer, *(abs(a - b) for a, b in zip(answer.q, there, strict=True))
-            )
+        if answer.q:
+            apart = (abs(a - b) for a, b in zip(answer.q, asked.q, strict=True))
+            self.moved_by_answer = max(self.moved_by_answer, *apart)
         self.answers += 1
         self._row, self._missing = self._row + 1, 0
         if self._row >= READY:

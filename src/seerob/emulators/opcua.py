@@ -1,0 +1,320 @@
+"""An OPC UA server that plays a cell: variables of a PLC, and robots as OPC 40010 has them; real sockets.
+
+The address space is built by hand: the companion specification's own node set is not needed for a client
+that goes by types and names.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import math
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from threading import Event, Thread
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+from seerob.emulators.motions import Motion
+from seerob.protocols.opcua_client import SILENT, content
+from seerob.protocols.opcua_robotics import AXIS, DEVICE, DEVICES, ROBOTICS, SAFETY, SYSTEM
+from seerob.protocols.opcua_units import CODES, NAMESPACE, number
+
+if TYPE_CHECKING:
+    from asyncua.common.node import Node
+
+URI = "urn:seerob:emulator"
+
+
+class Emulated(NamedTuple):
+    """A variable of the PLC."""
+
+    value: Callable[[float], Any]
+    """At a time since the start [s]."""
+    unit: str = ""
+    """That the server states; nothing for none."""
+
+
+class OpcuaServer:
+    """A server in a thread of its own.
+
+    Args:
+        variables: Of the PLC, by path: ``Belt/speed``.
+        robots: Motions of robots, by name; their axes turn, in degrees.
+        host: Address to listen on.
+        port: 0 is any free one.
+        period: Between updates [s].
+        axis_unit: Unit of the axes that is stated; nothing is, where it is empty.
+        certificate: Own certificate and key; then only protected sessions are taken.
+        trusted: Certificates of clients that may come in; all may when empty.
+    """
+
+    def __init__(
+        self,
+        variables: Mapping[str, Emulated] | None = None,
+        robots: Mapping[str, Motion] | None = None,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        period: float = 0.02,
+        axis_unit: str = "deg",
+        certificate: tuple[Path, Path] | None = None,
+        trusted: tuple[Path, ...] = (),
+    ) -> None:
+        self.host, self.port, self.period, self.axis_unit = host, port, period, axis_unit
+        self._variables, self._robots = dict(variables or {}), dict(robots or {})
+        self._certificate, self._trusted = certificate, trusted
+        self.safety = {"EmergencyStop": False, "ProtectiveStop": False, "OperationalMode": 3}
+        """May be changed while it runs."""
+        self.bad: set[str] = set()
+        """Paths of variables that are called bad; may be changed while it runs."""
+        self._made = time.monotonic()
+        self._thread: Thread | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._over: asyncio.Event | None = None
+        self._ready = Event()
+        self._failure: BaseException | None = None
+
+    @property
+    def url(self) -> str:
+        """Where it is."""
+        return f"opc.tcp://{self.host}:{self.port}"
+
+    def start(self) -> Self:
+        """Listen; returns when clients can connect.
+
+        Raises:
+            OSError: The port cannot be listened on.
+            ValueError: The certificate or its key cannot be read.
+        """
+        if self._thread is not None:
+            raise RuntimeError("is already started")
+        if self.port == 0:
+            self.port = _free(self.host)
+        self._ready, self._failure = Event(), None
+        self._thread = Thread(target=self._run, name="seerob-emulator-opcua", daemon=True)
+        self._thread.start()
+        self._ready.wait()
+        if self._failure is not None:
+            self._thread.join()
+            self._thread = None
+            raise self._failure
+        return self
+
+    def stop(self) -> None:
+        """Switch it off; it may be started again on the same port."""
+        if self._loop is not None and self._over is not None and self._thread is not None:
+            with contextlib.suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._over.set)
+            self._thread.join()
+            self._loop = self._over = self._thread = None
+
+    def __enter__(self) -> Self:
+        return self.start()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def now(self) -> float:
+        """Time since it was made [s]."""
+        return time.monotonic() - self._made
+
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._serve())
+        except Exception as error:
+            self._failure = error
+        finally:
+            self._ready.set()
+
+    async def _serve(self) -> None:
+        from asyncua.server.server import Server
+
+        for name in (*SILENT, "asyncua.server"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        self._loop, self._over = asyncio.get_running_loop(), asyncio.Event()
+        server = Server()
+        await server.init()
+        server.set_endpoint(self.url)
+        await self._protect(server)
+        cell = _Cell(server, self)
+        await cell.build()
+        async with server:
+            self._ready.set()
+            while not self._over.is_set():
+                await cell.update(self.now())
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(self._over.wait(), self.period)
+
+    async def _protect(self, server: Any) -> None:
+        from asyncua import ua
+
+        if self._certificate is None:
+            server.set_security_policy([ua.SecurityPolicyType.NoSecurity])
+            return
+        certificate, key = (content(path) for path in self._certificate)
+        await server.load_certificate(certificate.path_or_content, certificate.extension)
+        await server.load_private_key(key.path_or_content, format=key.extension)
+        policy = [
+            ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,
+            ua.SecurityPolicyType.Basic256Sha256_Sign,
+        ]
+        if self._trusted:
+            from asyncua.crypto.validator import CertificateValidator, CertificateValidatorOptions
+
+            known = [path.read_bytes() for path in self._trusted]
+            server.set_certificate_validator(
+                _Known(known, CertificateValidator, CertificateValidatorOptions.BASIC_VALIDATION)
+            )
+        server.set_security_policy(policy)
+
+    def motion(self, name: str) -> Motion:
+        """Of a robot."""
+        return self._robots[name]
+
+    @property
+    def paths(self) -> dict[str, Emulated]:
+        """The PLC's variables."""
+        return self._variables
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """Names of the robots."""
+        return tuple(self._robots)
+
+
+class _Known:
+    """Lets in whoever shows one of the certificates that were given."""
+
+    def __init__(self, known: list[bytes], *_: Any) -> None:
+        from cryptography import x509
+        from cryptography.hazmat.primitives.serialization import Encoding
+
+        self._known = {x509.load_pem_x509_certificate(k).public_bytes(Encoding.DER) for k in known}
+
+    async def __call__(self, certificate: Any, _: Any) -> None:
+        from asyncua.ua.uaerrors import BadCertificateUntrusted
+        from cryptography.hazmat.primitives.serialization import Encoding
+
+        if certificate.public_bytes(Encoding.DER) not in self._known:
+            raise BadCertificateUntrusted
+
+
+class _Cell:
+    def __init__(self, server: Any, emulator: OpcuaServer) -> None:
+        self._server, self._emulator = server, emulator
+        self._variables: dict[str, Node] = {}
+        self._axes: dict[str, list[tuple[Node, Node]]] = {}
+        self._safety: dict[str, Node] = {}
+
+    async def build(self) -> None:
+        """Make the address space."""
+        own = await self._server.register_namespace(URI)
+        for path, variable in self._emulator.paths.items():
+            *folders, name = path.split("/")
+            node = self._server.nodes.objects
+            for folder in folders:
+                node = await self._below(node, own, folder)
+            value = variable.value(0.0)
+            made = await node.add_variable(f"ns={own};s={path}", f"{own}:{name}", value)
+            await self._state_unit(made, variable.unit)
+            self._variables[path] = made
+        if self._emulator.robots:
+            await self._build_robots(own)
+
+    async def _below(self, node: Node, own: int, name: str) -> Node:
+        from asyncua.ua.uaerrors import UaError
+
+        try:
+            return await node.get_child(f"{own}:{name}")
+        except UaError:
+            return await node.add_object(own, name)
+
+    async def _build_robots(self, own: int) -> None:
+        from asyncua import ua
+
+        robotics = await self._server.register_namespace(ROBOTICS)
+        di = await self._server.register_namespace(DEVICES)
+
+        async def typed(number: int, name: str) -> ua.NodeId:
+            kind = ua.NodeId(ua.Int32(number), robotics)
+            await self._server.nodes.base_object_type.add_object_type(kind, ua.QualifiedName(name, robotics))
+            return kind
+
+        system_type = await typed(SYSTEM, "MotionDeviceSystemType")
+        device_type = await typed(DEVICE, "MotionDeviceType")
+        axis_type = await typed(AXIS, "AxisType")
+        safety_type = await typed(SAFETY, "SafetyStateType")
+        device_set = await self._server.nodes.objects.add_object(di, "DeviceSet")
+        system = await device_set.add_object(own, "Cell", objecttype=system_type)
+        devices = await system.add_object(robotics, "MotionDevices")
+        for name in self._emulator.robots:
+            device = await devices.add_object(own, name, objecttype=device_type)
+            await device.add_property(di, "Manufacturer", ua.LocalizedText("seerob"))
+            await device.add_property(di, "Model", ua.LocalizedText("emulated"))
+            axes = await device.add_object(robotics, "Axes")
+            q, _ = self._emulator.motion(name)(0.0)
+            made = []
+            for k in range(len(q)):
+                axis = await axes.add_object(own, f"Axis_{k + 1}", objecttype=axis_type)
+                parameters = await axis.add_object(di, "ParameterSet")
+                position = await parameters.add_variable(robotics, "ActualPosition", 0.0)
+                speed = await parameters.add_variable(robotics, "ActualSpeed", 0.0)
+                if self._emulator.axis_unit:
+                    await self._state_unit(position, self._emulator.axis_unit)
+                    await self._state_unit(speed, f"{self._emulator.axis_unit}/s")
+                made.append((position, speed))
+            self._axes[name] = made
+        states = await system.add_object(robotics, "SafetyStates")
+        state = await states.add_object(own, "SafetyState", objecttype=safety_type)
+        parameters = await state.add_object(di, "ParameterSet")
+        for key, value in self._emulator.safety.items():
+            self._safety[key] = await parameters.add_variable(robotics, key, value)
+
+    async def _state_unit(self, node: Node, unit: str) -> None:
+        from asyncua import ua
+
+        if not unit:
+            return
+        code = next(code for code, spelling in CODES.items() if spelling == unit)
+        stated = ua.EUInformation(NAMESPACE, number(code), ua.LocalizedText(unit), ua.LocalizedText(unit))
+        await node.add_property(0, "EngineeringUnits", stated)
+
+    async def update(self, t: float) -> None:
+        """What everything is at a time since the start [s]."""
+        from asyncua import ua
+        from asyncua.ua.status_codes import StatusCodes
+
+        for path, node in self._variables.items():
+            value = ua.DataValue(ua.Variant(self._emulator.paths[path].value(t)))
+            if path in self._emulator.bad:
+                value = ua.DataValue(value.Value, ua.StatusCode(ua.UInt32(StatusCodes.BadSensorFailure)))
+            await self._server.write_attribute_value(node.nodeid, value)
+        degrees = 180 / math.pi if self._emulator.axis_unit in ("deg", "") else 1.0
+        for name, nodes in self._axes.items():
+            for (position, speed), q, qd in zip(nodes, *self._emulator.motion(name)(t), strict=True):
+                await self._write(position, degrees * q)
+                await self._write(speed, degrees * qd)
+        for key, node in self._safety.items():
+            await self._write(node, self._emulator.safety[key])
+
+    async def _write(self, node: Node, value: Any) -> None:
+        from datetime import UTC, datetime
+
+        from asyncua import ua
+
+        now: Any = datetime.now(UTC).replace(tzinfo=None)
+        stamped = ua.DataValue(ua.Variant(value), SourceTimestamp=now)
+        await self._server.write_attribute_value(node.nodeid, stamped)
+
+
+def _free(host: str) -> int:
+    import socket
+
+    with socket.socket() as probe:
+        probe.bind((host, 0))
+        return int(probe.getsockname()[1])

@@ -1,0 +1,305 @@
+"""An OPC UA client that only reads: sessions, nodes by names that last, and changes, the newest of each.
+
+Namespaces are meant by their URI and resolved at every connection: their numbers may change when a
+server restarts.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import time
+from collections.abc import AsyncGenerator, Mapping
+from contextlib import asynccontextmanager, suppress
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import msgspec
+from msgspec import Meta
+
+from seerob.errors import InputError
+from seerob.protocols import ProtocolError
+from seerob.protocols.opcua_units import unit
+
+if TYPE_CHECKING:
+    from asyncua.client.client import Client
+    from asyncua.common.node import Node
+
+PATIENCE = 2.0
+"""With each answer [s]."""
+SESSION = 60_000
+"""Time-out of a session [ms]: some servers lose shorter ones in storms."""
+BEAT = 0.5
+"""The connection is looked at so often [s]."""
+SILENT = ("asyncua", "asyncua.client.ua_client", "asyncua.common.subscription")
+
+
+class Security(StrEnum):
+    """How a session is protected."""
+
+    NONE = "none"
+    SIGN = "sign"
+    ENCRYPT = "encrypt"
+    """Basic256Sha256, signed and encrypted."""
+
+
+class Way(msgspec.Struct, frozen=True, kw_only=True):
+    """How to get to a server."""
+
+    url: Annotated[str, Meta(pattern=r"^opc\.tcp://[^\s/]+")]
+    security: Security = Security.NONE
+    certificate: str | None = None
+    """Own certificate (PEM or DER), which the server must trust."""
+    key: str | None = None
+    """Its private key (PEM)."""
+    server_certificate: str | None = None
+    """The server's own; what another shows is refused."""
+    user: str | None = None
+    password_env: str | None = None
+    """Environment variable that holds the password."""
+
+
+class Said(NamedTuple):
+    """What a server says of one node."""
+
+    value: Any
+    doubt: str
+    """Its status, when that is not good."""
+    age: float
+    """By its own stamps [s]."""
+    stamp: float | None
+    """Source's time [s since 1970]."""
+
+
+class Address(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A path of browse names from the server's Objects folder."""
+
+    browse: Annotated[tuple[str, ...], Meta(min_length=1, max_length=50)]
+    """Each ``namespace-uri|name``, or ``name`` for the standard's own."""
+
+
+def address(raw: object) -> str | Address:
+    """Where a variable is: ``nsu=uri;s=DB.speed``, ``ns=2;i=7``, or ``{ browse = [...] }``.
+
+    Raises:
+        ValueError: It cannot be understood.
+    """
+    if isinstance(raw, str):
+        parts = raw.split(";")
+        if not any(p[:2] in ("s=", "i=", "g=", "b=") for p in parts):
+            raise ValueError('write "nsu=urn:…;s=name", "ns=2;i=7" or { browse = ["urn:…|Folder", …] }')
+        return raw
+    if isinstance(raw, dict):
+        return msgspec.convert(raw, Address)
+    raise ValueError(f"{raw!r} is neither a node id nor a path of browse names")
+
+
+def needed() -> None:
+    """Check that asyncua is installed.
+
+    Raises:
+        InputError: It is not.
+    """
+    try:
+        import asyncua  # noqa: F401
+    except ModuleNotFoundError as error:
+        remedy = "pip install seerob[opcua]"
+        raise InputError.at("sources", "kind", "OPC UA needs the package asyncua", remedy) from error
+
+
+@asynccontextmanager
+async def connect(way: Way, folder: Path) -> AsyncGenerator[Client, None]:
+    """A session, until the block ends.
+
+    Args:
+        way: How to get there.
+        folder: Where relative paths of certificates start.
+
+    Raises:
+        OSError: There is no connection.
+        ProtocolError: The server refuses.
+        InputError: asyncua is not installed.
+    """
+    needed()
+    from asyncua.client.client import Client
+    from asyncua.ua.uaerrors import UaError
+
+    for name in SILENT:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    client = Client(way.url, timeout=PATIENCE)
+    client.session_timeout = SESSION
+    client.name = client.description = "seerob"
+    if way.user is not None:
+        client.set_user(way.user)
+        client.set_password(os.environ.get(way.password_env or "", ""))
+    try:
+        if way.security is not Security.NONE:
+            await _protect(client, way, folder)
+        async with asyncio.timeout(3 * PATIENCE):
+            await client.connect()
+    except TimeoutError as error:
+        raise TimeoutError("no answer in time") from error
+    except UaError as error:
+        raise ProtocolError(f"the server refuses: {_text(error)}") from error
+    except ValueError as error:
+        raise ProtocolError(str(error)) from error
+    try:
+        yield client
+    except UaError as error:
+        raise ProtocolError(f"the server says: {_text(error)}") from error
+    finally:
+        # Whatever is left to be said, a stop does not wait long for it.
+        with suppress(Exception):
+            async with asyncio.timeout(PATIENCE / 2):
+                await client.disconnect()
+
+
+async def _protect(client: Client, way: Way, folder: Path) -> None:
+    from asyncua import ua
+    from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
+
+    encrypt = ua.MessageSecurityMode.SignAndEncrypt
+    mode = encrypt if way.security is Security.ENCRYPT else ua.MessageSecurityMode.Sign
+    if way.certificate is None or way.key is None:
+        raise ProtocolError("a protected session needs certificate and key")
+    server = None if way.server_certificate is None else content(folder / way.server_certificate)
+    await client.set_security(
+        SecurityPolicyBasic256Sha256,
+        certificate=content(folder / way.certificate),
+        private_key=content(folder / way.key),
+        server_certificate=server,
+        mode=mode,
+    )
+
+
+def content(path: Path) -> Any:
+    """A certificate or key, PEM or DER by what is in it: asyncua goes by the end of the name."""
+    from asyncua.crypto.uacrypto import CertProperties
+
+    data = path.read_bytes()
+    return CertProperties(path_or_content=data, extension="pem" if data.startswith(b"-----") else "der")
+
+
+async def find(client: Client, where: str | Address) -> Node:
+    """The node of an address.
+
+    Raises:
+        ProtocolError: The server has no such namespace or node.
+    """
+    from asyncua.ua.uaerrors import UaError
+
+    try:
+        if isinstance(where, str):
+            return client.get_node(await _node_id(client, where))
+        names = [await _browse_name(client, name) for name in where.browse]
+        return await client.nodes.objects.get_child(names)
+    except (UaError, ValueError) as error:
+        raise ProtocolError(
+            f"no node {where if isinstance(where, str) else '/'.join(where.browse)}: {_text(error)}"
+        ) from error
+
+
+async def _node_id(client: Client, text: str) -> str:
+    first, _, rest = text.partition(";")
+    if not first.startswith("nsu="):
+        return text
+    return f"ns={await _namespace(client, first.removeprefix('nsu='))};{rest}"
+
+
+async def _browse_name(client: Client, text: str) -> str:
+    uri, bar, name = text.rpartition("|")
+    return f"{await _namespace(client, uri) if bar else 0}:{name}"
+
+
+async def _namespace(client: Client, uri: str) -> int:
+    try:
+        return int(await client.get_namespace_index(uri))
+    except ValueError:
+        raise ProtocolError(f"the server has no namespace {uri!r}") from None
+
+
+async def stated_unit(node: Node) -> str:
+    """Unit that the server states for a variable, as the dictionary spells it; empty when it does not."""
+    from asyncua.ua.uaerrors import UaError
+
+    try:
+        found = await (await node.get_child("0:EngineeringUnits")).read_value()
+    except (UaError, ValueError):
+        return ""
+    return unit(getattr(found, "UnitId", 0) or 0)
+
+
+class Changes:
+    """Changes of nodes as they come: of each node only the newest waits."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[str, Said] = {}
+        self._names: dict[Any, str] = {}
+        self._arrived = asyncio.Event()
+        self.revised: float | None = None
+        """Publishing interval that the server grants [s]."""
+
+    async def watch(self, client: Client, nodes: Mapping[str, Node], interval: float) -> dict[str, str]:
+        """Subscribe to nodes by name; returns why some cannot be watched.
+
+        Raises:
+            OSError: The connection is gone.
+        """
+        from asyncua.ua.uaerrors import UaError
+
+        self._names = {node.nodeid: name for name, node in nodes.items()}
+        subscription = await client.create_subscription(1e3 * interval, self)
+        self.revised = 1e-3 * float(subscription.parameters.RequestedPublishingInterval)
+        refused = {}
+        sampling: Any = 1e3 * interval
+        for name, node in nodes.items():
+            try:
+                await subscription.subscribe_data_change(node, queuesize=1, sampling_interval=sampling)
+            except UaError as error:
+                refused[name] = _text(error)
+        return refused
+
+    def datachange_notification(self, node: Node, value: Any, data: Any) -> None:
+        """Called by asyncua, in the loop."""
+        name = self._names.get(node.nodeid)
+        if name is not None:
+            self._waiting[name] = said(data.monitored_item.Value)
+            self._arrived.set()
+
+    async def heard(self, client: Client) -> AsyncGenerator[dict[str, Said], None]:
+        """What has changed, as long as there is a connection; nothing, now and then, while nothing does.
+
+        Raises:
+            OSError: The connection is gone.
+        """
+        while True:
+            changed, self._waiting = self._waiting, {}
+            self._arrived.clear()
+            yield changed
+            try:
+                async with asyncio.timeout(BEAT):
+                    await self._arrived.wait()
+            except TimeoutError:
+                await client.check_connection()
+
+
+def said(value: Any) -> Said:
+    """What a data value says."""
+    status = value.StatusCode
+    doubt = "" if status is None or status.is_good() else f"the server says {status.name}"
+    stamp = _seconds(value.SourceTimestamp)
+    # Of two clocks that differ nothing is known; what lies ahead is as new as can be.
+    return Said(value.Value.Value, doubt, 0.0 if stamp is None else max(0.0, time.time() - stamp), stamp)
+
+
+def _seconds(stamp: datetime | None) -> float | None:
+    if stamp is None or stamp.year < 1990:
+        return None
+    return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
+
+
+def _text(error: BaseException) -> str:
+    return str(error).split("(", 1)[0].strip()[:200] or type(error).__name__

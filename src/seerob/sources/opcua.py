@@ -1,0 +1,159 @@
+"""Variables of PLCs and machines through OPC UA: subscribed, so that a value stands until it changes."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncGenerator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import msgspec
+from msgspec import Meta
+
+from seerob.dictionary import Kind, Variable
+from seerob.errors import InputError, Problem
+from seerob.protocols import ProtocolError
+from seerob.protocols.opcua_client import (
+    Changes,
+    Security,
+    Way,
+    address,
+    connect,
+    find,
+    needed,
+    stated_unit,
+)
+from seerob.quantities import Seconds
+from seerob.snapshot import Finding
+from seerob.source import Opened, Target
+from seerob.sources._opcua_files import at_home, missing
+from seerob.sources._variables import Change, Node, VariablesSource
+
+if TYPE_CHECKING:
+    from asyncua.client.client import Client
+    from asyncua.common.node import Node as Found
+
+MOST_BROWSED = 5000
+DEEPEST = 12
+
+
+class Opcua(VariablesSource, frozen=True, kw_only=True):
+    """Variables of a PLC or machine through OPC UA."""
+
+    by_exception: ClassVar[bool] = True
+
+    url: Annotated[str, Meta(pattern=r"^opc\.tcp://[^\s/]+")]
+    """``opc.tcp://192.168.0.1:4840``"""
+    interval: Seconds = 0.02
+    """Publishing interval that is asked for [s]; a server may grant a longer one, and says so."""
+    security: Security = Security.NONE
+    certificate: str | None = None
+    """Own certificate beside the workstation, which the server must trust; for ``sign`` and ``encrypt``."""
+    key: str | None = None
+    """Its private key."""
+    server_certificate: str | None = None
+    """The server's certificate; another one is refused."""
+    user: str | None = None
+    password_env: str | None = None
+    """Environment variable that holds the password: a workstation file is no place for one."""
+
+    def way(self) -> Way:
+        """How to get there."""
+        return msgspec.convert(self, Way, from_attributes=True)
+
+    def open(self, folder: Path, target: Target | None) -> Opened:
+        """Understand every address, and ask the server for each of them, if it can be reached.
+
+        Raises:
+            InputError: With every address that cannot be understood, certificate that is missing, and unit
+                that the server states otherwise.
+        """
+        needed()
+        where = f"opcua {self.url}"
+        problems = missing(where, self, folder)
+        for variable in () if target is None else target.variables:
+            try:
+                address(variable.address)
+            except (ValueError, msgspec.ValidationError) as error:
+                problems.append(Problem(where, f"{variable.name}.address", str(error)))
+        if problems:
+            raise InputError(problems)
+        return VariablesSource.open(at_home(self, folder), folder, target)
+
+    async def ask(self) -> tuple[Finding, ...]:
+        """Connect once."""
+        async with connect(self.way(), Path()) as client:
+            changes = Changes()
+            await changes.watch(client, {}, self.interval)
+            text = f"variables subscribed at {self.url}, every {1e3 * (changes.revised or 0):.0f} ms at most"
+            return (Finding(level="note", subject=self.name or "opcua", text=text),)
+
+    async def changes(
+        self, variables: tuple[Variable, ...], folder: Path
+    ) -> AsyncGenerator[tuple[Change, ...], None]:
+        """What the server says, as it changes; first why some cannot be had."""
+        async with connect(self.way(), folder) as client:
+            nodes: dict[str, Found] = {}
+            lost: dict[str, str] = {}
+            for variable in variables:
+                try:
+                    node = await find(client, address(variable.address))
+                    if wrong := await _disagreement(variable, node):
+                        lost[variable.name] = wrong
+                    else:
+                        nodes[variable.name] = node
+                except ProtocolError as error:
+                    lost[variable.name] = str(error)
+            changes = Changes()
+            lost |= await changes.watch(client, nodes, self.interval)
+            yield tuple(Change(name, None, doubt=why) for name, why in lost.items())
+            async for changed in changes.heard(client):
+                yield tuple(
+                    # A value that stands is as new as the connection, however long ago it changed.
+                    Change(name, found.value, doubt=found.doubt)
+                    for name, found in changed.items()
+                )
+
+    async def browse(self) -> AsyncGenerator[Node, None]:
+        """The variables below Objects, without the server's own, by addresses that last."""
+        from asyncua import ua
+
+        async with connect(self.way(), Path()) as client:
+            uris = await client.get_namespace_array()
+            waiting = [(client.nodes.objects, 0)]
+            seen: set[Any] = set()
+            while waiting and len(seen) < MOST_BROWSED:
+                node, depth = waiting.pop()
+                for child in await node.get_children():
+                    if child.nodeid in seen or child.nodeid == client.nodes.server.nodeid:
+                        continue
+                    seen.add(child.nodeid)
+                    if depth < DEEPEST:
+                        waiting.append((child, depth + 1))
+                    own = child.nodeid.NamespaceIndex == 0
+                    if not own and await child.read_node_class() == ua.NodeClass.Variable:
+                        yield await _described(client, child, uris)
+
+
+async def _disagreement(variable: Variable, node: Found) -> str:
+    """Why a variable is not what the dictionary says; empty when nothing speaks against it."""
+    if variable.type is not Kind.NUMBER:
+        return ""
+    stated = await stated_unit(node)
+    if stated and variable.scale == 1 and stated != variable.unit:
+        return f"the server states the unit {stated}, the dictionary {variable.unit}"
+    return ""
+
+
+async def _described(client: Client, node: Found, uris: list[str]) -> Node:
+    from asyncua.ua.uaerrors import UaError
+
+    number = node.nodeid.NamespaceIndex
+    text = node.nodeid.to_string().rpartition(";")[2]
+    place = f"nsu={uris[number]};{text}" if number else text
+    kind, value = "", ""
+    try:
+        kind = (await node.read_data_type_as_variant_type()).name
+        value = str(await node.read_value())[:40]
+    except UaError:
+        pass  # not readable for us: it is named all the same
+    return Node(place, kind, await stated_unit(node), value)

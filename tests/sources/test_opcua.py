@@ -1,0 +1,262 @@
+"""PLCs and robots through OPC UA, over real sockets: values, units, doubts, certificates, restarts."""
+
+from __future__ import annotations
+
+import asyncio
+import datetime
+import math
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+pytest.importorskip("asyncua")
+
+from live_story import Story, lived, wait_for
+from made_cell import made
+from seerob.dictionary import Kind, Variable
+from seerob.emulators.opcua import URI, Emulated, OpcuaServer
+from seerob.errors import InputError
+from seerob.live import Listener
+from seerob.protocols.opcua_client import Address, Security, address
+from seerob.protocols.opcua_robotics import natural
+from seerob.protocols.opcua_units import number, unit
+from seerob.samples import JointSample, SignalSample
+from seerob.source import Target
+from seerob.sources.opcua import Opcua
+from seerob.sources.opcua_robot import OpcuaRobot
+from seerob.variable_units import UNITS
+
+HOME, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([0.5, 0.3, -0.3, 0.4, -0.4, 0.5])
+
+
+def motion(t):
+    return tuple((HOME + AMPLITUDE * np.sin(t)).tolist()), tuple((AMPLITUDE * np.cos(t)).tolist())
+
+
+PLC = {"Belt/speed": Emulated(lambda t: 250.0, "mm/s"), "Belt/running": Emulated(lambda t: True)}
+SPEED = Variable(
+    name="belt/speed", source="plc", unit="mm/s", address={"browse": [f"{URI}|Belt", f"{URI}|speed"]}
+)
+RUNS = Variable(name="belt/runs", source="plc", type=Kind.BOOL, address=f"nsu={URI};s=Belt/running")
+GONE = Variable(name="gone", source="plc", unit="1", address=f"nsu={URI};s=Gone")
+OTHER = Variable(name="other", source="plc", unit="m/s", address=f"nsu={URI};s=Belt/speed")
+
+
+def target(*variables, folder=""):
+    return Target(
+        name="", joints=(), units=(), lower=(), upper=(), velocity=(), variables=variables, folder=str(folder)
+    )
+
+
+@pytest.fixture(scope="module")
+def server():
+    """A PLC with a robot: starting one takes seconds."""
+    with OpcuaServer(PLC, {"R1": motion, "R2": motion}) as found:
+        yield found
+
+
+@contextmanager
+def listening(source, aim):
+    heard = []
+    listener = Listener(source, aim, heard.append)
+    listener.start()
+    try:
+        yield heard
+    finally:
+        listener.ask_to_stop()
+        assert listener.join(10)
+
+
+def good(heard, name="belt/speed"):
+    return bool(heard) and name in heard[-1].values and name not in heard[-1].doubts
+
+
+def test_variables_are_subscribed_and_stand_until_they_change(server):
+    with listening(Opcua(name="plc", url=server.url), target(SPEED, RUNS, GONE, OTHER)) as heard:
+        wait_for(lambda: good(heard) and good(heard, "belt/runs"), 30)
+        assert heard[-1].values == {"belt/speed": 0.25, "belt/runs": True}
+        assert "does not exist" in heard[-1].doubts["gone"]
+        assert "states the unit mm/s, the dictionary m/s" in heard[-1].doubts["other"]
+        # Nothing changes, and yet it stands.
+        count = len(heard)
+        wait_for(lambda: len(heard) > count + 15, 30)
+        assert good(heard)
+        server.bad.add("Belt/speed")
+        wait_for(lambda: "BadSensorFailure" in heard[-1].doubts.get("belt/speed", ""), 30)
+        server.bad.clear()
+        wait_for(lambda: good(heard), 30)
+
+
+def test_a_server_that_is_killed_is_found_again(monkeypatch):
+    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.05)
+    monkeypatch.setattr("seerob.live.LONGEST_PAUSE", 0.2)
+    server = OpcuaServer({"Belt/speed": PLC["Belt/speed"]}).start()
+    try:
+        with listening(Opcua(name="plc", url=server.url), target(SPEED)) as heard:
+            wait_for(lambda: good(heard), 30)
+            server.stop()
+            heard.clear()
+            server.start()
+            wait_for(lambda: good(heard), 60)
+    finally:
+        server.stop()
+
+
+def test_browsing_names_what_can_be_written_into_a_dictionary(server):
+    async def found():
+        return [node async for node in Opcua(name="plc", url=server.url).browse()]
+
+    nodes = {n.address: n for n in asyncio.run(found())}
+    assert nodes[f"nsu={URI};s=Belt/speed"].unit == "mm/s"
+    assert nodes[f"nsu={URI};s=Belt/running"].type == "Boolean"
+    # What was found is an address.
+    with listening(Opcua(name="plc", url=server.url), target(RUNS)) as heard:
+        wait_for(lambda: good(heard, "belt/runs"), 30)
+
+
+def cell(folder, server, more=""):
+    return made(
+        folder,
+        '[[robots]]\nname = "arm"\nmodel = "library:ur10"\n'
+        f'[[sources]]\nkind = "opcua_robot"\nname = "controller"\nrobot = "arm"\nurl = "{server.url}"\n{more}'
+        '[[safety]]\nkind = "velocity"\nname = "speed"\nat = "arm"\nlimit = 1.5\n',
+    )
+
+
+def test_a_robot_is_bound_without_a_dictionary(tmp_path, server):
+    station = cell(tmp_path, server, 'device = "R1"\n')
+    said = " ".join(f.text for f in station.scene().findings)
+    assert "R1, seerob, emulated; axes Axis_1" in said
+    story = lived(station, Story(150))
+    joints = [s for s in story.joints() if s.qd is not None]
+    assert len(joints) > 10
+    # The server stamps what it writes a little later than the motion that it plays.
+    t = np.array([s.t_device for s in joints])
+    q, qd = np.array([s.q for s in joints]), np.array([s.qd for s in joints])
+    assert np.abs(q - HOME).max() < 0.51
+    assert np.abs((q[:, 0] / 0.5) ** 2 + (qd[:, 0] / 0.5) ** 2 - 1).max() < 0.02
+    assert (np.diff(t) > 0).mean() > 0.9
+    signals = [s for samples in story.heard for s in samples if isinstance(s, SignalSample)]
+    assert {"emergency_stop": False, "operational_mode": "AUTOMATIC"}.items() <= signals[-1].values.items()
+
+
+def test_units_are_required_and_never_guessed(tmp_path):
+    with OpcuaServer(robots={"R1": motion}, axis_unit="") as silent:
+        with pytest.raises(InputError, match="Axis_1 states no unit"):
+            _ = cell(tmp_path / "a", silent).sources
+        source = OpcuaRobot(robot="arm", url=silent.url, position_unit="deg")
+        heard = []
+        listener = Listener(source, None, heard.append)
+        listener.start()
+        wait_for(lambda: any(isinstance(s, JointSample) for s in heard), 30)
+        listener.ask_to_stop()
+        assert listener.join(10)
+        sample = next(s for s in heard if isinstance(s, JointSample))
+        assert np.abs(np.array(sample.q) - HOME).max() < 0.51
+        assert sample.qd is None
+
+
+def test_which_robot_and_which_axes_must_be_clear(tmp_path, server):
+    with pytest.raises(InputError, match="several robots; the server has: Cell/R1, Cell/R2"):
+        _ = cell(tmp_path / "a", server).sources
+    names = ", ".join(f'"J{k}"' for k in range(1, 7))
+    with pytest.raises(InputError, match="no axis J1"):
+        _ = cell(tmp_path / "b", server, f'device = "R2"\naxes = [{names}]\n').sources
+    _ = cell(tmp_path / "c", server, 'device = "R2"\n').sources
+
+
+# -- protection ---------------------------------------------------------------------------------
+
+
+def certificate(folder, name, uri):
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes, serialization
+    from cryptography.hazmat.primitives.asymmetric import rsa
+
+    key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
+    who = x509.Name([x509.NameAttribute(x509.oid.NameOID.COMMON_NAME, name)])
+    now = datetime.datetime.now(datetime.UTC)
+    made_of = (
+        x509.CertificateBuilder()
+        .subject_name(who)
+        .issuer_name(who)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - datetime.timedelta(days=1))
+        .not_valid_after(now + datetime.timedelta(days=1))
+        .add_extension(
+            x509.SubjectAlternativeName([x509.UniformResourceIdentifier(uri), x509.DNSName("localhost")]),
+            critical=False,
+        )
+        .sign(key, hashes.SHA256())
+    )
+    (folder / f"{name}.pem").write_bytes(made_of.public_bytes(serialization.Encoding.PEM))
+    (folder / f"{name}.key").write_bytes(
+        key.private_bytes(
+            serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+        )
+    )
+    return folder / f"{name}.pem", folder / f"{name}.key"
+
+
+def test_only_who_is_known_comes_in(tmp_path):
+    server_files = certificate(tmp_path, "server", URI)
+    own, _ = certificate(tmp_path, "twin", "urn:freeopcua:client")
+    certificate(tmp_path, "stranger", "urn:freeopcua:client")
+    with OpcuaServer(PLC, certificate=server_files, trusted=(own,)) as server:
+
+        def source(who, **more):
+            options = {"security": Security.ENCRYPT, "certificate": f"{who}.pem", "key": f"{who}.key"}
+            return Opcua(name="plc", url=server.url, server_certificate="server.pem", **(options | more))
+
+        with listening(source("twin"), target(SPEED, folder=tmp_path)) as heard:
+            wait_for(lambda: good(heard), 30)
+        said = " ".join(f.text for f in source("stranger").open(tmp_path, target()).findings)
+        assert "not reached at start" in said
+        said = " ".join(f.text for f in Opcua(name="plc", url=server.url).open(tmp_path, target()).findings)
+        assert "not reached at start" in said
+
+
+def test_what_is_missing_is_named_before_the_start(tmp_path, monkeypatch):
+    monkeypatch.delenv("SEEROB_NONE", raising=False)
+    bad = Variable(name="bad", source="plc", unit="1", address=5)
+    source = Opcua(
+        name="plc",
+        url="opc.tcp://127.0.0.1:1",
+        security=Security.ENCRYPT,
+        key="gone.key",
+        password_env="SEEROB_NONE",
+    )
+    with pytest.raises(InputError) as caught:
+        source.open(tmp_path, target(bad))
+    for part in ("certificate", "gone.key", "SEEROB_NONE", "bad.address"):
+        assert part in str(caught.value)
+
+
+# -- names and units ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("code", "of_the_standard", "spelling"),
+    [("DD", 17476, "deg"), ("C81", 4405297, "rad"), ("MMT", 5066068, "mm"), ("MTS", 5067859, "m/s")],
+)
+def test_unit_ids_are_the_published_numbers(code, of_the_standard, spelling):
+    assert number(code) == of_the_standard
+    assert unit(of_the_standard) == spelling
+    assert spelling in UNITS
+    assert unit(4711) == ""
+
+
+def test_addresses():
+    assert address("ns=2;i=5") == "ns=2;i=5"
+    assert address({"browse": ["a|b", "c"]}) == Address(("a|b", "c"))
+    for wrong in ("Speed", 5, {"path": []}, {"browse": []}, {"browse": [1]}):
+        with pytest.raises((ValueError, TypeError)):
+            address(wrong)
+
+
+def test_axes_in_natural_order():
+    names = [f"Axis_{k}" for k in (10, 2, 1, 9)]
+    assert sorted(names, key=natural) == ["Axis_1", "Axis_2", "Axis_9", "Axis_10"]
+    assert math.isclose(UNITS["deg"].factor * 180, math.pi)

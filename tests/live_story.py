@@ -14,9 +14,9 @@ from seerob.samples import JointSample
 class Story:
     """Keeps what goes out, and does things to the server at given ticks."""
 
-    def __init__(self, ticks, **deeds):
+    def __init__(self, ticks, enough=lambda story: True, **deeds):
         self.ticks, self.deeds = ticks, {int(k.removeprefix("at_")): deed for k, deed in deeds.items()}
-        self.snapshots, self.heard = [], []
+        self.snapshots, self.heard, self.enough = [], [], enough
 
     def write(self, snapshot, samples):
         self.snapshots.append(snapshot)
@@ -24,7 +24,8 @@ class Story:
         self.deeds.get(len(self.snapshots), lambda: None)()
 
     def stop(self):
-        return len(self.snapshots) >= self.ticks
+        ticks = len(self.snapshots)
+        return ticks >= self.ticks and (self.enough(self) or ticks >= 30 * self.ticks)
 
     def close(self):
         pass
@@ -53,22 +54,30 @@ class Story:
             found.append(newest >= snapshot.t)
         return np.array(found)
 
+    def between(self):
+        """Per tick, whether it lies between samples and the device's clock is known well by then."""
+        # The first samples may have waited for a busy machine.
+        offset = np.median([s.t - s.t_device for s in self.joints()])
+        settled = next(s.t for s in self.joints() if s.t - s.t_device < offset + 0.002)
+        return self.ahead() & np.array([s.t > settled for s in self.snapshots]), offset
+
+    def seen_enough(self):
+        """Whether many ticks lie between samples: on a busy machine that takes longer."""
+        return bool(self.joints()) and self.between()[0].sum() > 20
+
     def check_that_it_follows(self, motion):
         """What lies between samples is where the device was, and what is decided is never far from it."""
-        # Where the device's clock is on the run's; the first samples may have waited for a busy machine.
-        offsets = np.array([s.t - s.t_device for s in self.joints()])
-        offset = np.median(offsets)
-        settled = next(s.t for s in self.joints() if s.t - s.t_device < offset + 0.002)
+        between, offset = self.between()
         joints = np.array([s.joints["arm"] for s in self.snapshots])
         there = np.array([motion(s.t - offset)[0] for s in self.snapshots])
         errors = np.abs(there - joints).max(axis=1)
-        known = np.array([s.t > settled for s in self.snapshots])
-        decided, ahead = known & (np.array(self.verdicts()) == "within"), known & self.ahead()
-        assert ahead.sum() > 10
-        assert decided.sum() > 10
-        assert np.median(errors[ahead]) < 1e-3
+        first = int(np.argmax(between))
+        decided = np.array(self.verdicts()[first:]) == "within"
+        assert between.sum() > 20
+        assert decided.any()
+        assert np.median(errors[between]) < 1e-3
         # At 0.5 rad/s it is the time-out of 0.2 s: what is later is undecided.
-        assert errors[decided].max() < 0.11
+        assert errors[first:][decided].max() < 0.11
 
     def fastest(self, first=0):
         """Largest speed that was claimed [m/s]."""

@@ -45,7 +45,7 @@ def cell(folder, port, *, robot="iiwa14", more=""):
 @pytest.mark.parametrize("edition", Edition)
 def test_the_twin_follows_the_robot_and_commands_nothing(tmp_path, port, edition):
     with FriServer(motion, to=("127.0.0.1", port), edition=edition) as server:
-        story = lived(cell(tmp_path, port), Story(120))
+        story = lived(cell(tmp_path, port), Story(120, Story.seen_enough))
         assert server.answers > 10
         assert server.wrong == []
         assert server.moved_by_answer < 1e-12

@@ -45,7 +45,7 @@ def cell(folder, server, *, frequency=125.0, timeout=0.2, more=""):
 @pytest.mark.parametrize("frequency", [125.0, 500.0])
 def test_the_twin_follows_the_robot(tmp_path, frequency):
     with RtdeServer(motion) as server:
-        story = lived(cell(tmp_path, server, frequency=frequency), Story(150))
+        story = lived(cell(tmp_path, server, frequency=frequency), Story(150, Story.seen_enough))
     story.check_that_it_follows(motion)
     assert story.fastest() < FASTEST
 

@@ -10,10 +10,9 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Callable
-from threading import Event, Thread
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from seerob.emulators.background import LoopEmulator
 from seerob.emulators.motions import Motion
 from seerob.protocols import ProtocolError, fri
 from seerob.protocols.fri import Edition, Monitoring, Quality, SessionState
@@ -26,7 +25,7 @@ READY = 20
 """Answers in a row after which it is good."""
 
 
-class FriServer:
+class FriServer(LoopEmulator):
     """A controller's FRI session, in a thread of its own.
 
     Args:
@@ -50,6 +49,7 @@ class FriServer:
         torques: Callable[[float], tuple[float, ...]] | None = None,
         stamped: bool = True,
     ) -> None:
+        super().__init__()
         self.to, self.host, self.edition, self.period, self.stamped = to, host, edition, period, stamped
         self.motion, self.torques = motion, torques
         self.session, self.quality = SessionState.MONITORING_WAIT, Quality.POOR
@@ -64,45 +64,6 @@ class FriServer:
         self._sequence = self._row = self._missing = 0
         self._sent: dict[int, Monitoring] = {}
         self._made = time.monotonic()
-        self._thread: Thread | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._over: asyncio.Event | None = None
-        self._ready = Event()
-        self._failure: OSError | None = None
-
-    def start(self) -> Self:
-        """Begin to send.
-
-        Raises:
-            OSError: The address is not of this machine.
-        """
-        if self._thread is not None:
-            raise RuntimeError("is already started")
-        self._ready, self._failure = Event(), None
-        self._thread = Thread(target=self._run, name="seerob-emulator-fri", daemon=True)
-        self._thread.start()
-        self._ready.wait()
-        if self._failure is not None:
-            self._thread.join()
-            self._thread = None
-            raise self._failure
-        return self
-
-    def stop(self) -> None:
-        """Fall silent; it may be started again."""
-        if self._loop is not None and self._over is not None and self._thread is not None:
-            with contextlib.suppress(RuntimeError):  # ended by itself
-                self._loop.call_soon_threadsafe(self._over.set)
-            self._thread.join()
-            self._loop = self._over = self._thread = None
-
-    def __enter__(self) -> Self:
-        return self.start()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.stop()
 
     def message(self, t: float) -> Monitoring:
         """What it sends at a time since it was made [s]."""
@@ -129,23 +90,16 @@ class FriServer:
             time=round(t, 9) if self.stamped else None,
         )
 
-    def _run(self) -> None:
-        try:
-            asyncio.run(self._serve())
-        except OSError as error:
-            self._failure = error
-            self._ready.set()
-
-    async def _serve(self) -> None:
-        self._loop, self._over = asyncio.get_running_loop(), asyncio.Event()
-        transport, _ = await self._loop.create_datagram_endpoint(
+    async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
+        """Send at a steady rate, and hear the answers."""
+        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
             lambda: _Answers(self), local_addr=(self.host, 0)
         )
-        self._ready.set()
+        ready()
         begun = time.monotonic()
         k = 0
         try:
-            while not self._over.is_set():
+            while not over.is_set():
                 message = self.message(begun - self._made + k * self.period)
                 self._sent[self._sequence] = message
                 self._sent.pop(self._sequence - REMEMBERED, None)
@@ -159,7 +113,7 @@ class FriServer:
                 if wait < -1.0:  # this machine slept: what was not sent is not made up for
                     k = int((time.monotonic() - begun) / self.period)
                 with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(self._over.wait(), max(wait, 0.0))
+                    await asyncio.wait_for(over.wait(), max(wait, 0.0))
         finally:
             transport.abort()
 

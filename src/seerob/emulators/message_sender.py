@@ -5,9 +5,9 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable, Sequence
-from threading import Event, Thread
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
+
+from seerob.emulators.background import Emulator
 
 if TYPE_CHECKING:
     from websockets.sync.server import Server, ServerConnection
@@ -19,7 +19,7 @@ Way = Callable[[bytes], Sequence[bytes]]
 """What a network does to a message: loses, doubles, damages it."""
 
 
-class MessageSender:
+class MessageSender(Emulator):
     """The sender, in threads of its own.
 
     Args:
@@ -39,56 +39,33 @@ class MessageSender:
         rate: float,
         way: Way | None = None,
     ) -> None:
+        super().__init__()
         self.to, self.host, self.port, self.rate, self.way = to, host, port, rate, way
         self.sent = 0
         """Messages so far."""
-        self._over = Event()
-        self._thread: Thread | None = None
         self._server: Server | None = None
 
-    def start(self) -> Self:
-        """Begin to send, or to listen for whoever wants to hear.
+    def begin(self) -> Callable[[], object]:
+        """Listen for whoever wants to hear, or connect.
 
         Raises:
             OSError: The address cannot be listened on, or is none.
         """
-        if self._thread is not None:
-            raise RuntimeError("is already started")
-        self._over.clear()
-        if self.to is None:
-            from websockets.sync.server import serve
-
-            self._server = serve(self._speak, self.host, self.port, compression=None)
-            self.port = self._server.socket.getsockname()[1]
-            self._thread = Thread(
-                target=self._server.serve_forever, name=f"seerob-emulator-{type(self).__name__}", daemon=True
-            )
-        else:
+        if self.to is not None:
             link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             link.connect(self.to)
-            self._thread = Thread(
-                target=self._send, args=(link,), name=f"seerob-emulator-{type(self).__name__}", daemon=True
-            )
-        self._thread.start()
-        return self
+            return lambda: self._send(link)
+        from websockets.sync.server import serve
 
-    def stop(self) -> None:
-        """Fall silent; it may be started again."""
-        if self._thread is None:
-            return
-        self._over.set()
+        server = self._server = serve(self._speak, self.host, self.port, compression=None)
+        self.port = server.socket.getsockname()[1]
+        return server.serve_forever
+
+    def stopping(self) -> None:
+        """Close the connections."""
         if self._server is not None:
             self._server.shutdown()
-        self._thread.join()
-        self._thread = self._server = None
-
-    def __enter__(self) -> Self:
-        return self.start()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.stop()
+            self._server = None
 
     def message(self, k: int) -> bytes:
         """The message number ``k``."""

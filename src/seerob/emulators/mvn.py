@@ -5,10 +5,8 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable, Sequence
-from threading import Event, Thread
-from types import TracebackType
-from typing import Self
 
+from seerob.emulators.background import Emulator
 from seerob.emulators.mvn_datagrams import datagrams
 from seerob.emulators.mvn_person import Person
 from seerob.protocols import mvn
@@ -26,7 +24,7 @@ Way = Callable[[list[bytes]], Sequence[bytes]]
 """What a network does to the datagrams of an instant: loses, swaps, doubles some."""
 
 
-class MvnSender:
+class MvnSender(Emulator):
     """The streamer, in a thread of its own.
 
     Args:
@@ -54,46 +52,25 @@ class MvnSender:
         old: bool = False,
         way: Way | None = None,
     ) -> None:
+        super().__init__()
         self.people, self.to, self.rate, self.kinds = dict(people), to, rate, tuple(kinds)
         self.units, self.tcp, self.items_each, self.old, self.way = units, tcp, items_each, old, way
         self.sent = 0
         """Instants so far."""
-        self._over = Event()
-        self._thread: Thread | None = None
 
-    def start(self) -> Self:
-        """Begin to send.
+    def begin(self) -> Callable[[], object]:
+        """Connect.
 
         Raises:
             OSError: With TCP, nobody listens there.
         """
-        if self._thread is not None:
-            raise RuntimeError("is already started")
         if self.tcp:
             link = socket.create_connection(self.to, PATIENCE)
             link.settimeout(PATIENCE)
         else:
             link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             link.connect(self.to)
-        self._over.clear()
-        self._thread = Thread(target=self._send, args=(link,), name="seerob-emulator-mvn", daemon=True)
-        self._thread.start()
-        return self
-
-    def stop(self) -> None:
-        """Fall silent; it may be started again."""
-        if self._thread is not None:
-            self._over.set()
-            self._thread.join()
-            self._thread = None
-
-    def __enter__(self) -> Self:
-        return self.start()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.stop()
+        return lambda: self._send(link)
 
     def instant(self, k: int) -> list[bytes]:
         """All datagrams of an instant, as they are sent."""

@@ -13,10 +13,9 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from threading import Event, Thread
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from seerob.emulators.background import LoopEmulator
 from seerob.emulators.motions import Motion
 from seerob.protocols.opcua_client import SILENT, content
 from seerob.protocols.opcua_robotics import AXIS, DEVICE, DEVICES, ROBOTICS, SAFETY, SYSTEM
@@ -37,7 +36,7 @@ class Emulated(NamedTuple):
     """That the server states; nothing for none."""
 
 
-class OpcuaServer:
+class OpcuaServer(LoopEmulator):
     """A server in a thread of its own.
 
     Args:
@@ -63,6 +62,7 @@ class OpcuaServer:
         certificate: tuple[Path, Path] | None = None,
         trusted: tuple[Path, ...] = (),
     ) -> None:
+        super().__init__()
         self.host, self.port, self.period, self.axis_unit = host, port, period, axis_unit
         self._variables, self._robots = dict(variables or {}), dict(robots or {})
         self._certificate, self._trusted = certificate, trusted
@@ -71,72 +71,28 @@ class OpcuaServer:
         self.bad: set[str] = set()
         """Paths of variables that are called bad; may be changed while it runs."""
         self._made = time.monotonic()
-        self._thread: Thread | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._over: asyncio.Event | None = None
-        self._ready = Event()
-        self._failure: BaseException | None = None
 
     @property
     def url(self) -> str:
         """Where it is."""
         return f"opc.tcp://{self.host}:{self.port}"
 
-    def start(self) -> Self:
-        """Listen; returns when clients can connect.
-
-        Raises:
-            OSError: The port cannot be listened on.
-            ValueError: The certificate or its key cannot be read.
-        """
-        if self._thread is not None:
-            raise RuntimeError("is already started")
+    def begin(self) -> Callable[[], object]:
+        """The loop, at a port that is free."""
         if self.port == 0:
             self.port = _free(self.host)
-        self._ready, self._failure = Event(), None
-        self._thread = Thread(target=self._run, name="seerob-emulator-opcua", daemon=True)
-        self._thread.start()
-        self._ready.wait()
-        if self._failure is not None:
-            self._thread.join()
-            self._thread = None
-            raise self._failure
-        return self
-
-    def stop(self) -> None:
-        """Switch it off; it may be started again on the same port."""
-        if self._loop is not None and self._over is not None and self._thread is not None:
-            with contextlib.suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(self._over.set)
-            self._thread.join()
-            self._loop = self._over = self._thread = None
-
-    def __enter__(self) -> Self:
-        return self.start()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.stop()
+        return super().begin()
 
     def now(self) -> float:
         """Time since it was made [s]."""
         return time.monotonic() - self._made
 
-    def _run(self) -> None:
-        try:
-            asyncio.run(self._serve())
-        except Exception as error:
-            self._failure = error
-        finally:
-            self._ready.set()
-
-    async def _serve(self) -> None:
+    async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
+        """Listen, and play."""
         from asyncua.server.server import Server
 
         for name in (*SILENT, "asyncua.server"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        self._loop, self._over = asyncio.get_running_loop(), asyncio.Event()
         server = Server()
         await server.init()
         server.set_endpoint(self.url)
@@ -144,11 +100,11 @@ class OpcuaServer:
         cell = _Cell(server, self)
         await cell.build()
         async with server:
-            self._ready.set()
-            while not self._over.is_set():
+            ready()
+            while not over.is_set():
                 await cell.update(self.now())
                 with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(self._over.wait(), self.period)
+                    await asyncio.wait_for(over.wait(), self.period)
 
     async def _protect(self, server: Any) -> None:
         from asyncua import ua

@@ -8,15 +8,12 @@ takes no inputs.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import math
 import time
-from collections.abc import Mapping
-from threading import Event, Thread
-from types import TracebackType
-from typing import Self
+from collections.abc import Callable, Mapping
 
+from seerob.emulators.background import LoopEmulator
 from seerob.emulators.motions import Motion
 from seerob.protocols import ProtocolError
 from seerob.protocols.rtde import (
@@ -74,7 +71,7 @@ LATE = 0.5
 """Time that is not made up for when this machine was too slow [s]."""
 
 
-class RtdeServer:
+class RtdeServer(LoopEmulator):
     """A controller's RTDE port, in a thread of its own.
 
     Args:
@@ -100,6 +97,7 @@ class RtdeServer:
         values: Mapping[str, Value] | None = None,
         messages: tuple[str, ...] = (),
     ) -> None:
+        super().__init__()
         self.host, self.port = host, port
         self.motion, self.controller, self.version, self.messages = motion, controller, version, messages
         self.types = {name: kind for name, kind in TYPES.items() if name not in without}
@@ -110,45 +108,6 @@ class RtdeServer:
         self.connections = 0
         """Clients at present."""
         self._begun = 0.0
-        self._thread: Thread | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._over: asyncio.Event | None = None
-        self._ready = Event()
-        self._failure: OSError | None = None
-
-    def start(self) -> Self:
-        """Listen; returns when clients can connect.
-
-        Raises:
-            OSError: The port cannot be listened on.
-        """
-        if self._thread is not None:
-            raise RuntimeError("is already started")
-        self._ready, self._failure = Event(), None
-        self._thread = Thread(target=self._run, name="seerob-emulator-rtde", daemon=True)
-        self._thread.start()
-        self._ready.wait()
-        if self._failure is not None:
-            self._thread.join()
-            self._thread = None
-            raise self._failure
-        return self
-
-    def stop(self) -> None:
-        """Cut every connection, as a controller does that is switched off; it may be started again."""
-        if self._loop is not None and self._over is not None and self._thread is not None:
-            with contextlib.suppress(RuntimeError):  # ended by itself
-                self._loop.call_soon_threadsafe(self._over.set)
-            self._thread.join()
-            self._loop = self._over = self._thread = None
-
-    def __enter__(self) -> Self:
-        return self.start()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.stop()
 
     def at(self, t: float) -> dict[str, Value]:
         """Every field at a time since the start [s]."""
@@ -176,20 +135,13 @@ class RtdeServer:
         """Time since the start [s]."""
         return time.monotonic() - self._begun
 
-    def _run(self) -> None:
-        try:
-            asyncio.run(self._serve())
-        except OSError as error:
-            self._failure = error
-            self._ready.set()
-
-    async def _serve(self) -> None:
-        self._loop, self._over = asyncio.get_running_loop(), asyncio.Event()
+    async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
+        """Listen, and serve whoever connects."""
         server = await asyncio.start_server(self._welcome, self.host, self.port)
         self.port = server.sockets[0].getsockname()[1]
         self._begun = time.monotonic()
-        self._ready.set()
-        await self._over.wait()
+        ready()
+        await over.wait()
         server.close()
         # What is left, the clients' tasks, asyncio.run cancels.
 

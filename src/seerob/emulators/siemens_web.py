@@ -7,10 +7,9 @@ import socket
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from threading import Thread
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from seerob.emulators.background import Emulator
 from seerob.protocols import s7_web
 
 MOST_SESSIONS = 4
@@ -18,7 +17,7 @@ Program = Mapping[str, Callable[[float], Any]]
 """Variable → its value at a time since the start [s]."""
 
 
-class SiemensWebServer:
+class SiemensWebServer(Emulator):
     """A PLC with a web server, in a thread of its own.
 
     Args:
@@ -28,6 +27,7 @@ class SiemensWebServer:
         host: Address to listen on.
         port: 0 is any free one.
         certificate: Certificate and key files (PEM); unencrypted without.
+        outputs: Bools that may be written; `written` keeps what was.
     """
 
     def __init__(
@@ -39,20 +39,22 @@ class SiemensWebServer:
         host: str = "127.0.0.1",
         port: int = 0,
         certificate: tuple[Path, Path] | None = None,
+        outputs: tuple[str, ...] = (),
     ) -> None:
+        super().__init__()
         self.program, self.host, self.port = program, host, port
         self.sessions: set[str] = set()
+        self.written: dict[str, list[bool]] = {name: [] for name in outputs}
         self._who, self._certificate = (user, password), certificate
         self._begun = 0.0
         self._server: Any = None
-        self._thread: Thread | None = None
 
     @property
     def url(self) -> str:
         """Where it is."""
         return f"http{'s' if self._certificate else ''}://{self.host}:{self.port}"
 
-    def start(self) -> Self:
+    def begin(self) -> Callable[[], object]:
         """Listen.
 
         Raises:
@@ -72,27 +74,17 @@ class SiemensWebServer:
         self._server = uvicorn.Server(config)
         self._begun = time.monotonic()
         run = self._server.run
-        self._thread = Thread(target=lambda: run([listening]), name="seerob-emulator-s7", daemon=True)
-        self._thread.start()
-        while not self._server.started and self._thread.is_alive():
+        return lambda: run([listening])
+
+    def started(self) -> None:
+        """Wait until clients can connect."""
+        while not self._server.started and self._thread is not None and self._thread.is_alive():
             time.sleep(0.005)
-        return self
 
-    def stop(self) -> None:
-        """Switch the PLC off; its sessions are gone."""
-        if self._thread is not None:
-            self._server.should_exit = self._server.force_exit = True
-            self._thread.join()
-            self._thread = None
-            self.sessions.clear()
-
-    def __enter__(self) -> Self:
-        return self.start()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.stop()
+    def stopping(self) -> None:
+        """Its sessions are gone, too."""
+        self._server.should_exit = self._server.force_exit = True
+        self.sessions.clear()
 
     async def _answer(self, request: Any) -> Any:
         from starlette.responses import JSONResponse
@@ -127,6 +119,11 @@ class SiemensWebServer:
             if value is None:
                 return _error(200, "Address does not exist")
             return {"result": value(time.monotonic() - self._begun)}
+        if method == "PlcProgram.Write":
+            if params["var"] not in self.written:
+                return _error(200, "Address does not exist")
+            self.written[params["var"]].append(bool(params["value"]))
+            return {"result": True}
         if method == "PlcProgram.Browse":
             return {"result": self._below(params.get("var", ""))}
         return _error(-32601, "Method not found")

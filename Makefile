@@ -1,4 +1,5 @@
 # make demo   set everything up and run the UR10 assembly workstation live
+# make demo-plc   a cell with a robot controller and a PLC, both emulated; the PLC dies and comes back
 # make test   set everything up and run every check
 #
 # Everything is installed into .venv and web/node_modules, with versions locked in requirements/ and
@@ -18,16 +19,19 @@ NODE := $(VENV)/.node
 PAGE := src/seerob/server/page/index.html
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test setup check format lint types imports unit web-test package bench soak wire web build docs lock clean
+.PHONY: help demo demo-plc test setup check format lint types imports unit web-test package bench soak mutate wire web build docs lock clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
-	@echo "also: check format unit web-test package bench soak wire web build docs lock clean"
+	@echo "also: check format unit web-test package bench soak mutate wire web build docs lock clean"
 
 # -- the two commands ---------------------------------------------------------------------------
 
 demo: $(RUN) $(PAGE)
 	$(BIN)/seerob run workstations/ur10_assembly || [ $$? -le 2 ]  # 1 and 2 are verdicts, not failures
+
+demo-plc: $(DEV) $(PAGE)
+	scripts/demo-plc $(BIN) || [ $$? -le 2 ]
 
 test: setup check unit web-test package
 
@@ -104,6 +108,10 @@ web: $(PAGE)
 build: $(DEV) $(PAGE)
 	rm -rf dist
 	$(BIN)/python -m build --no-isolation --wheel --sdist
+
+# Each limit, sign, unit and comparison of the verdicts changed in turn: minutes.
+mutate: $(DEV)
+	$(BIN)/python scripts/mutate
 
 docs: $(DEV)
 	$(BIN)/python scripts/write-docs

@@ -4,9 +4,10 @@
     python benchmarks/criteria.py --smoke    # seconds of motion, correctness only
 
 In a tick, whoever asks first pays for what others share (Jacobians, masses, distances). A recording is
-judged without physics (``engine.physics = false``) by two processes, half of it each; its peer is the
-same with physics, in the same run. All times are those of the processor, so that what else the machine
-does is not in them: two processes take as long on two free cores.
+judged by ``Station.batch`` with two threads, and by the road without physics, instant by instant. The peer
+is Pinocchio with numpy in a loop, as one would write it, for the four criteria that this makes short.
+All times are those of the processor, so that what else the machine does is not in them: what two threads
+spend counts by half, as two free cores would take, and what only one can do counts in full.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ import argparse
 import os
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 # One core per process: the figures must not borrow another one from a library's threads.
@@ -23,12 +23,15 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "
     os.environ.setdefault(variable, "1")
 
 import numpy as np
+import pinocchio as pin
 from msgspec.structs import replace
 
+from seerob import batch
 from seerob import run as road
 from seerob.commands import cache_folder
 from seerob.criterion import Criterion
 from seerob.engine import Engine
+from seerob.model_io import library
 from seerob.reading import read
 from seerob.safety.effective_mass import EffectiveMass
 from seerob.safety.force_polytope import ForcePolytope
@@ -40,6 +43,9 @@ from seerob.safety.safety_area import SafetyArea
 from seerob.safety.separation import Separation, Stop
 from seerob.safety.velocity import Velocity
 from seerob.station import Station
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from oracles.pinocchio_oracle import pinocchio_model
 
 FOLDER = Path(__file__).parents[1] / "workstations" / "ur10_assembly"
 ROBOT, PERSON = "ur10", "operator"
@@ -64,6 +70,10 @@ APART: tuple[Criterion, ...] = (
         robot_uncertainty=0.005,
     ),
 )
+SHORT = (ALONE[0], *ALONE[2:5])
+"""Velocity, energy, manipulability, effective mass: what a loop over Pinocchio makes short."""
+FAR = (*ALONE, APART[0], APART[2])
+"""With the distances of all parts of the person and the robot, and S_p of each."""
 CONTACT: tuple[Criterion, ...] = (PowerAndForce(name="power and force", robot=ROBOT, human=PERSON),)
 
 
@@ -101,32 +111,62 @@ def per_tick(ticks: int) -> tuple[dict[str, float], float, float]:
     return median, float(np.median(whole)), float(np.percentile(whole, 99))
 
 
-def recorded(ticks: int, *, distances: bool, physics: bool) -> float:
-    """Time to judge one half of a recording, without reading and compiling [s]."""
-    station = made((*ALONE, *(APART if distances else ())), physics=physics)
+def batched(samples: int, criteria: tuple[Criterion, ...]) -> tuple[float, float, float]:
+    """Processor time per sample: to follow a recording, to judge it with two threads, and on the road [s]."""
+    station = made(criteria, physics=False)
+    feed = [one for _, one in zip(range(samples), pump(station), strict=False)]
+    # What is compiled is loaded, and threads are there, before time is taken.
+    batch.judged(station.model, station.bound, batch.recorded(station.model, iter(feed[:600])), threads=2)
+    begin = time.process_time()
+    motion = batch.recorded(station.model, iter(feed))
+    followed = time.process_time()
+    batch.judged(station.model, station.bound, motion, threads=2)
+    judged = time.process_time()
+    few = feed[: max(samples // 10, 20)]
     engine, judge = engine_of(station), road.Judge(station.bound)
-    model = station.model
-    parts = model.gap(model.robot(ROBOT).moving, model.human(PERSON).bodies)
-    feed = list(zip(range(ticks), road.pump(station.sources, 0.01, endless=True), strict=False))
-    begin = 0.0
     with road.settled():
-        for seq, samples in feed:
-            if seq == 1:
-                begin = time.thread_time()  # the first tick loads what is compiled
-            engine.take(samples)
-            state = engine.tick() if seq else engine.start()
-            road.snapshot(state, seq, judge(state))
-            if distances:
-                state.closest_per_body(parts)
-    return time.thread_time() - begin
+        start = time.process_time()
+        for seq, heard in enumerate(few):
+            engine.take(heard)
+            judge(engine.tick() if seq else engine.start())
+        walked = time.process_time() - start
+    return (followed - begin) / samples, (judged - followed) / samples, walked / len(few)
 
 
-def halves(ticks: int, *, distances: bool, physics: bool) -> float:
-    """How many times faster than real time two processes are, half of the recording each."""
-    with ProcessPoolExecutor(2) as pool:
-        jobs = [pool.submit(recorded, ticks // 2, distances=distances, physics=physics) for _ in range(2)]
-        longest = max(job.result() for job in jobs)
-    return ticks * 0.01 / longest
+def pump(station: Station) -> road.Feed:
+    """Its sources, over and over."""
+    return road.pump(station.sources, station.workstation.engine.tick, endless=True)
+
+
+def beside(samples: int) -> tuple[float, float]:
+    """Processor time per sample of four criteria: here on one core, and Pinocchio with numpy [s]."""
+    station = made(SHORT, physics=False)
+    motion = batch.recorded(
+        station.model, (one for _, one in zip(range(samples), pump(station), strict=False))
+    )
+    robot = station.model.robot(ROBOT)
+    batch.judged(station.model, station.bound, motion.part(0, 300), threads=1)
+    begin = time.process_time()
+    found = batch.judged(station.model, station.bound, motion, threads=1)
+    own = time.process_time() - begin
+    model = pinocchio_model(library.load("ur10"))
+    data, tool = model.createData(), model.getFrameId("tool0")
+    q, qd = motion.q[:, robot.q_address], motion.v[:, robot.v_address]
+    begin = time.process_time()
+    for k in range(samples):
+        J = pin.computeFrameJacobian(model, data, q[k], tool, pin.LOCAL_WORLD_ALIGNED)[:3]
+        M = pin.crba(model, data, q[k])
+        M = np.triu(M) + np.triu(M, 1).T
+        v = J @ qd[k]
+        speed, energy, sigma = np.linalg.norm(v), qd[k] @ M @ qd[k] / 2, np.linalg.svd(J, compute_uv=False)
+        inverse = J @ np.linalg.solve(M, J.T)
+        mass = speed**2 / (v @ inverse @ v) if speed > 0 else np.inf
+        assert np.isfinite([speed, energy, sigma[2]]).all()
+        assert mass > 0
+    other = time.process_time() - begin
+    # Another point of the robot, without its tool: of the same size, not the same figures.
+    assert np.isfinite(found["kinetic energy"].value).all()
+    return own / samples, other / samples
 
 
 def main() -> int:
@@ -139,13 +179,19 @@ def main() -> int:
     for name, spent in each.items():
         print(f"  {name:20s} {spent:7.1f} µs")
     print(f"all criteria: median {median:.2f} ms, p99 {p99:.2f} ms per tick   (goal: <= 1 ms)")
-    for distances, goal in ((False, 100), (True, 15)):
-        placed = halves(samples, distances=distances, physics=False)
-        pulled = halves(min(samples, 3000), distances=distances, physics=True)
-        kind = "with the distances of every body part" if distances else "without distances"
+    own, other = beside(samples // 4)
+    print(
+        f"four of them over a recording, one core: {1e6 * own:.1f} µs per sample, "
+        f"Pinocchio with numpy {1e6 * other:.1f} µs, ratio {other / own:.1f}"
+    )
+    period = 0.01
+    for kind, criteria, goal in (("without distances", ALONE, 100), ("with 25-part distances", FAR, 15)):
+        followed, judged, walked = batched(samples, criteria)
         print(
-            f"recording of {samples} samples {kind}, two processes: {placed:.0f} x real time "
-            f"(goal: >= {goal}), {placed / pulled:.1f} x as fast as with physics"
+            f"recording of {samples} samples at {1 / period:.0f} Hz {kind}, two cores: "
+            f"{period / (followed + judged / 2):.0f} x real time (goal: >= {goal}), "
+            f"{period / (judged / 2):.0f} x from arrays; {(followed + judged) * 1e6:.0f} µs per sample, "
+            f"{walked / (followed + judged):.1f} x less than on the road"
         )
     return 0 if np.isfinite(median) else 1
 

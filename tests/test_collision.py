@@ -124,6 +124,11 @@ def test_least_speed_governs_and_an_equal_energy_is_called_force() -> None:
     assert which.tolist() == [0, 1, 2, 0, 2]
 
 
+def test_an_energy_that_is_the_forces_own_is_called_force_within_rounding() -> None:
+    assert c.permissible_speed(1.0, 2.0, 1.0 - 1e-14)[1] == c.Governing.FORCE
+    assert c.permissible_speed(1.0, 2.0, 1.0 - 1e-9)[1] == c.Governing.ENERGY
+
+
 def test_heavier_robots_and_stiffer_bodies_are_never_permitted_more() -> None:
     mu = c.reduced_mass(0.6, np.linspace(0.1, 100, 500))
     assert (np.diff(c.speed_at_force(280, mu, 75e3)) < 0).all()

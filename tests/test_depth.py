@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from concave import bumpy_ball
-from seerob.depth import depth
+from seerob.depth import Depths
 from seerob.distance import Shapes
 from seerob.floor_polygon import prism_mesh
 from seerob.geometry import Solid, capsule
@@ -23,7 +23,8 @@ SMALL = Solid(mesh=box_mesh([-0.15] * 3, [0.15] * 3))
 def found(outer, inner, at, tolerance=1e-3, cells=20_000):
     shapes = Shapes.build([("outer", (outer,)), ("inner", (inner,))])
     x = np.array([[0.0, 0, 0], at])
-    return depth(shapes, np.repeat(np.eye(3)[None], 2, axis=0), x, 0, 1, tolerance=tolerance, cells=cells)
+    asked = Depths(shapes, tolerance=tolerance, cells=cells)
+    return asked.ask(np.repeat(np.eye(3)[None], 2, axis=0), x, [(0, 1)])[0]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import pytest
 from seerob.floor_polygon import (
     check_polygon,
     contains,
-    distance_between,
     distance_to_edge,
     prism_mesh,
     signed_area,
@@ -78,13 +77,3 @@ def test_inside_and_distance_agree_with_sampling():
     turn = rng.uniform(0, 2 * np.pi, len(points))
     moved = points + 0.999 * room[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
     np.testing.assert_array_equal(contains(L, moved), inside)
-
-
-def test_distance_of_a_ring_to_edges():
-    ring = np.array([[0.2, 0.2], [0.5, 0.2], [0.5, 0.6], [0.2, 0.6]])
-    border = np.array(L)
-    found = [distance_between(ring, border, np.array([k]))[0] for k in range(6)]
-    reflex = np.hypot(0.5, 0.4)
-    np.testing.assert_allclose(found, [0.2, 2.5, reflex, reflex, 2.4, 0.2], atol=1e-12)
-    assert distance_between(ring + np.array([0.8, 0.0]), border, np.arange(6))[0] == pytest.approx(0.2)
-    assert distance_between(ring + np.array([0.8, 0.5]), border, np.arange(6))[0] == 0.0

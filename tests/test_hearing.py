@@ -9,7 +9,7 @@ from made_cell import FLOATING, TWO_R, heard, made, recorded, two_r
 from seerob.engine import Engine
 from seerob.errors import InputError, UnknownName
 from seerob.run import Judge, bind, pump, ticks
-from seerob.samples import Quality, SignalSample
+from seerob.samples import Quality
 from seerob.source import Opened, Source
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
@@ -159,12 +159,6 @@ def test_old_samples_do_not_turn_back_time(arm):
         state = engine.tick()
     assert not state.doubt("arm")
     np.testing.assert_allclose(state.joint_positions(arm.model.robot("arm")), [0.1, 0.2], atol=1e-6)
-
-
-def test_signals_are_kept_by_source(arm):
-    engine = Engine(arm.model)
-    engine.take([SignalSample(source="plc", seq=0, t=0.0, values={"lamp": True})])
-    assert engine.signals == {"plc": {"lamp": True}}
 
 
 @pytest.mark.parametrize("size", [(4.0, 3.0), (0.05, 0.29), (0.03, 0.15), (100.0, 100.0)])

@@ -111,6 +111,13 @@ def test_largest_factor_is_the_last_that_holds(c, b, a):
         assert worst(s * (1 + 1e-6) + 1e-9) >= -1e-9
 
 
+def test_no_factor_helps_a_part_that_is_too_near_at_rest():
+    """Also where nothing grows with the speeds."""
+    assert largest_factor(np.array([0.5]), np.zeros(1), np.zeros(1)) == 0.0
+    assert largest_factor(np.array([-0.5]), np.zeros(1), np.zeros(1)) == np.inf
+    assert largest_factor(np.array([-0.5]), np.zeros(1), np.full(1, 2.0)) == pytest.approx(0.5)
+
+
 def test_search_ends_where_it_holds():
     assert largest_scale(lambda s: s <= 0.7, 2.0, 40) == pytest.approx(0.7)
     assert largest_scale(lambda s: s <= 0.7, 2.0, 3) <= 0.7

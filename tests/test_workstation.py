@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 import seerob as sr
 from seerob.workstation import PLUGINS, TABLES, Engine, Pose, Shape, Workstation, content_hash, locate
 
-LIVE = {"ur10_rtde"}
-"""Run in real time only; see test_live_workstation.py."""
+LIVE = {"ur10_rtde", "plc_cell"}
+"""Run in real time only; see test_live_workstation.py and test_plc_cell.py."""
 EVERY = sorted(
     path.parent for path in (Path(__file__).parents[1] / "workstations").glob("*/workstation.toml")
 )
@@ -72,6 +72,8 @@ def test_the_type_of_the_file_names_every_table_once():
         "title",
         "edition",
         "description",
+        "variables",
+        "allow_writing",
         "engine",
         "folder",
         "files",

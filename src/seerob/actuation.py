@@ -16,6 +16,10 @@ from seerob.workstation import Engine as Options
 Indices = NDArray[np.int64]
 
 POSES_FOR_GAINS = 16
+REGULAR = 0.05
+"""Share of its own inertia that a person's joint gets on top. Where two of the shoulder's three axes fall
+together the mass matrix is singular, and a torque at its limit turns both against each other as fast as
+nothing hinders it. The feed-forward contains the share, so that free motion does not know it."""
 
 
 def set_gains(
@@ -49,6 +53,8 @@ def set_gains(
     for m in mechanisms:
         if m.role == "human":
             omega[m.v_address] = 2 * np.pi * options.human_bandwidth
+            turning = m.v_address[[unit == "rad" for unit in m.units]]
+            mj.dof_armature[turning] += (REGULAR if controllers else 0.0) * largest[turning]
     kp, kd = omega**2 * largest, 2 * omega * largest
     if controllers:
         mj.actuator_gainprm[:, 0] = kp[dof]

@@ -26,7 +26,9 @@ COMMANDS = (
     "schema",
     "emulate",
     "probe",
+    "variables",
     "measure",
+    "capture",
     "import_aml",
 )
 """One module each in `seerob.commands`, with ``HELP``, ``EXAMPLE``, ``add`` and ``run``."""

@@ -22,6 +22,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seerob.kernels.axes import mobility
 from seerob.transforms import Array
 
 
@@ -65,10 +66,16 @@ def mass_along(J_v: Array, M: Array, u: Array) -> Array:
     Returns:
         Shape (b,); inf where a point cannot be pushed that way.
     """
-    w = np.einsum("bij,bi->bj", J_v, u)
-    mobility = np.einsum("bj,bj->b", w, np.linalg.solve(M, w.T).T)
+    return mass_of_rows(np.einsum("bij,bi->bj", J_v, u), M)
+
+
+def mass_of_rows(w: Array, M: Array) -> Array:
+    r"""The same of rows :math:`w = u^T J_v`, shape (b, n): :math:`1/m_u = w M^{-1} w^T` [kg], shape (b,)."""
+    found = np.empty((1, len(w), len(w)))
+    if not mobility(np.ascontiguousarray(w)[None], np.ascontiguousarray(M)[None], found):
+        raise np.linalg.LinAlgError("a mass matrix is not positive definite")
     with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / np.maximum(mobility, 0.0))
+        return np.asarray(1.0 / np.maximum(found[0].diagonal(), 0.0))
 
 
 def impact_energy(mu: ArrayLike, v: ArrayLike) -> Array:

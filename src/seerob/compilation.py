@@ -12,6 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from seerob import machine_mounting
 from seerob.area_mounting import mount_sensor, mount_swept
 from seerob.body_list import listed
 from seerob.by_hand import by_hand, home
@@ -20,17 +21,18 @@ from seerob.contacts import add_contacts
 from seerob.distance import Shapes
 from seerob.errors import InputError, Problem, UnknownName
 from seerob.filing import filed
-from seerob.human import manikin, posture
+from seerob.human import posture
 from seerob.model import Body, Frame, Mechanism, Model
 from seerob.model_io.description import Description, Link, Quantity
 from seerob.model_io.loader import load_robot
 from seerob.mounting import Mounting
 from seerob.mounting import pose_matrix as pose_matrix  # noqa: PLC0414
+from seerob.people import describe
 from seerob.snapshot import Finding
 from seerob.things import AREA_COLOR, PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, MadeArea, load_thing
 from seerob.transforms import Array
 from seerob.variable_binding import Bound, bound
-from seerob.workstation import Area, Human, Mounted, Robot, Tool, Workstation
+from seerob.workstation import Area, Human, Machine, Mounted, Robot, Tool, Workstation
 
 Progress = Callable[[str], None]
 
@@ -91,6 +93,8 @@ class _Compiler:
             self._try(f"humans[{i}]", self._human, human)
         for i, part in enumerate(self.station.parts):
             self._try(f"parts[{i}]", self._part, part)
+        for i, machine in enumerate(self.station.machines):
+            self._try(f"machines[{i}]", self._machine, machine)
         if not self.problems:
             self._mount_all()
         if not self.problems:
@@ -166,17 +170,8 @@ class _Compiler:
 
     def _human(self, human: Human) -> None:
         self.progress(f"making {human.name}")
-        description = manikin.build(
-            name=human.name,
-            stature=human.stature,
-            mass=human.mass,
-            sex=human.sex,
-            lengths=human.lengths if isinstance(human.lengths, str) else "drillis",
-            masses=human.masses if isinstance(human.masses, str) else "deleva",
-            own_lengths=None if isinstance(human.lengths, str) else human.lengths,
-            own_masses=None if isinstance(human.masses, str) else human.masses,
-            hand=human.hand,
-        )
+        description, said = describe(human, touches=bool(self.station.contacts))
+        self.mounting.findings += said
         q = posture.posture(description, human.posture, joints=human.joints, file=f"{human.name}.joints")
         self._chain(human.name, description, "human", pose_matrix(human.at), q, True)
 
@@ -213,6 +208,14 @@ class _Compiler:
 
     def _part(self, part: Any) -> None:
         self._thing(part, "part", None, pose_matrix(part.at), PART_COLOR)
+
+    def _machine(self, machine: Machine) -> None:
+        description, thing = machine_mounting.loaded(machine, self.folder, file=self.file)
+        start = machine_mounting.home(machine.motion)
+        self._chain(machine.name, description, "machine", pose_matrix(machine.at), start, True)
+        self.mounting.files |= filed(
+            machine.name, thing.files, folder=self.folder, references=(machine.mesh,)
+        )
 
     def _area(self, area: Area) -> None:
         if area.on is not None and not self.mounting.has(area.on):

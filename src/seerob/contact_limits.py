@@ -21,6 +21,7 @@ from seerob import collision
 from seerob.contact_shape import ContactShape, force_at_pressure
 from seerob.norms.body_limits import BodyLimits, BodyRegion
 from seerob.snapshot import Input, Origin
+from seerob.tolerances import Spread
 from seerob.transforms import Array
 
 
@@ -152,6 +153,13 @@ class Judged:
     """Surface that governs, shape (k,)."""
     ranks: Array
     """2 exceeded, 1 open, 0 within, shape (k,)."""
+    ends: Spread | None = None
+    """Of the permissible speeds, shape (b, r), where something that they are made from may be off."""
+
+    @property
+    def least(self) -> Array:
+        """Permissible speeds that hold whatever is off [m/s], shape (b, r)."""
+        return self.speeds.permissible if self.ends is None else self.ends.low
 
     @property
     def v(self) -> Array:

@@ -96,10 +96,8 @@ class Person:
         found = state.distances(self._query, Per.WHETHER)
         close: NDArray[np.bool_] = np.asarray(found.reach == Reach.WITHIN_CAP).reshape(self._shape)
         self._close = np.asarray(close.any(axis=0))
-        near: NDArray[np.bool_] = np.any(close[:, :, None] & self._member[None], axis=1)
+        near: NDArray[np.bool_] = close @ self._member
         if speed is not None:
             return near, np.full(len(REGIONS), speed)
-        reached = np.flatnonzero(close.any(axis=0))
-        v = np.zeros(len(self.bodies))
-        v[reached] = state.fastest_points(self.bodies)[0][reached]
+        v = np.where(self._close, state.fastest_points(self.bodies)[0], 0.0)
         return near, np.asarray(np.max(v[:, None] * self._member, axis=0))

@@ -15,6 +15,7 @@ import numpy as np
 from seerob.collision import speed_at_force
 from seerob.contact_limits import Judged, RegionArrays
 from seerob.contact_regions import FORBIDDEN, REGIONS
+from seerob.contact_tolerances import area_verdict
 from seerob.human.skeleton import SIDES
 from seerob.model import Frame
 from seerob.norms.body_limits import BodyArea, BodyLimits, BodyRegion
@@ -117,7 +118,10 @@ class ContactRows:
             open_ = math.isnan(v_P)
             limit = others if open_ else min(others, v_P)
             verdict = Verdict.EXCEEDED if value > limit else Verdict.UNDECIDED if open_ else Verdict.WITHIN
-            if verdict is Verdict.UNDECIDED:
+            verdict = area_verdict(verdict, part.verdict, judged.ends)
+            if verdict is Verdict.UNDECIDED and not open_:
+                reason = part.reason
+            elif verdict is Verdict.UNDECIDED:
                 reason = f"contact pressure of {self._bodies[row]} ({how}): {self._unknown[row]}"
             else:
                 reason = f"pressure, {how}, {self._bodies[row]}" if limit == v_P else by_others

@@ -11,11 +11,15 @@ from msgspec import Meta, Struct
 from seerob.snapshot import Basis, Result, Verdict
 
 if TYPE_CHECKING:
+    from seerob.answers import Answers
     from seerob.model import Model
     from seerob.state import State
+    from seerob.states import States
 
 Evaluate = Callable[["State"], Result]
 """Called at each tick (or each ``every``); may raise `Undecided`."""
+EvaluateMany = Callable[["States"], "Answers"]
+"""The same of many instants; may raise `Undecided`, of all of them."""
 
 
 _seconds = Meta(gt=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})
@@ -37,6 +41,9 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What results are called; made from the kind and the subject when not given."""
     every: Annotated[float, _seconds] | None = None
     """Period [s]; each tick when not given."""
+    active: str | None = None
+    """Variable of the dictionary, a bool: while it is false, it is not asked (muted, another mode of
+    operation); while nobody knows, it is undecided."""
 
     def bind(self, model: Model) -> Evaluate:
         """Resolve every name once and return the function that judges a state.
@@ -47,9 +54,20 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """
         raise NotImplementedError
 
+    def batch(self, model: Model) -> EvaluateMany | None:
+        """The function that judges many states at once, where there is one.
+
+        It depends on no instant but the one it speaks of, and says of it what that of `bind` says.
+        """
+        return None
+
     def basis(self, model: Model) -> Basis:
         """Formula, source and inputs of what `bind` computes."""
         raise NotImplementedError
+
+    def variables(self) -> dict[str, str]:
+        """Variables of the dictionary that it asks, and the SI unit that each must have, or ``bool``."""
+        return {} if self.active is None else {self.active: "bool"}
 
     def subjects(self) -> tuple[str, ...]:
         """Names from the workstation file that this criterion speaks of."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from seerob.kernels.depth import deepest
-from seerob.kernels.pairs import CORNERS
 from seerob.kernels.shapes import Shapes
 from seerob.transforms import Array
 
@@ -22,70 +22,69 @@ class Depth:
     """How deep one body reaches into another."""
 
     at_least: float
-    """[m]; 0 when they have nothing in common but their surfaces."""
+    """[m]; 0 when no point of both was found inside."""
     at_most: float
     """[m]"""
     point: Array
     """The deepest point found, in the world [m], shape (3,); NaN when there is none."""
 
 
-def depth(
-    shapes: Shapes,
-    rotations: Array,
-    positions: Array,
-    outer: int,
-    inner: int,
-    *,
-    tolerance: float = TOLERANCE,
-    cells: int = CELLS,
-) -> Depth:
-    """The largest distance to the surface of ``outer`` of any point of ``inner`` that is inside it.
+NONE = Depth(0.0, 0.0, np.full(3, np.nan))
+"""Of bodies that have nothing in common."""
 
-    Exact on concave shapes. Of a body of several solids, the depth in one of them.
 
-    Args:
-        shapes: Of the model.
-        rotations: world_from_body of every body, shape (n, 3, 3).
-        positions: Likewise [m], shape (n, 3).
-        outer: Index of the body that is entered.
-        inner: Index of the body that enters.
-        tolerance: Width of the interval that is enough [m].
-        cells: Largest number of cells of the search per pair of solids: what bounds its time.
+class Depths:
+    """How deep bodies reach into others; bound once, asked at every tick in one compiled call.
+
+    The answers are functions of the poses alone: nothing is remembered.
     """
-    world = np.zeros((len(shapes.which), 12))
-    box = {
-        s: _placed(shapes, rotations, positions, b, s, world)
-        for b in (outer, inner)
-        for s in shapes.solids[b]
-    }
-    low, high, point = 0.0, 0.0, np.full(3, np.nan)
-    for i in shapes.solids[outer]:
-        for j in shapes.solids[inner]:
-            least, most = np.maximum(box[i][0], box[j][0]), np.minimum(box[i][1], box[j][1])
-            if (least > most).any():
-                continue
-            at = np.full(3, np.nan)
-            found = deepest(
-                i, j, shapes.which, shapes.corners, shapes.radius, shapes.nodes, shapes.links,
-                shapes.triangles, world, least, most, tolerance, cells, at,
-            )  # fmt: skip
-            if found[0] > low:
-                low, point = found[0], at
-            high = max(high, found[1])
-    return Depth(low, max(high, low) if low > 0 else 0.0, point)
 
+    def __init__(
+        self, shapes: Shapes, *, tolerance: float = TOLERANCE, cells: int = CELLS, fewest: int | None = None
+    ) -> None:
+        """Bind.
 
-def place_solid(shapes: Shapes, rotations: Array, positions: Array, body: int, s: int, world: Array) -> None:
-    """Write world_from_solid of a solid of a body to row ``s`` of ``world``, shape (ns, 12)."""
-    world[s, :9] = (rotations[body] @ shapes.local[s, :9].reshape(3, 3)).ravel()
-    world[s, 9:] = rotations[body] @ shapes.local[s, 9:] + positions[body]
+        Args:
+            shapes: Of the model.
+            tolerance: Width of the interval that is enough [m].
+            cells: Largest number of cells of the search in all pairs of solids: what bounds its time.
+            fewest: Cells that each pair has all the same; ``cells`` for each when not given.
+        """
+        self.shapes, self.tolerance, self.cells, self.fewest = shapes, tolerance, cells, fewest
 
+    def ask(self, rotations: Array, positions: Array, entered: Sequence[tuple[int, int]]) -> list[Depth]:
+        """The largest distance to the surface of an outer body of any point of an inner one inside it.
 
-def _placed(
-    shapes: Shapes, rotations: Array, positions: Array, body: int, s: int, world: Array
-) -> tuple[Array, Array]:
-    """Place a solid; the upright box around it in the world [m], (3,) each."""
-    place_solid(shapes, rotations, positions, body, s, world)
-    corners = shapes.corners[s, : shapes.which[s, CORNERS]] @ world[s, :9].reshape(3, 3).T + world[s, 9:]
-    beyond = shapes.radius[s] + 1e-12
-    return corners.min(axis=0) - beyond, corners.max(axis=0) + beyond
+        Exact on concave shapes. Of a body of several solids, the depth in one of them.
+
+        Args:
+            rotations: world_from_body of every body, shape (n, 3, 3).
+            positions: Likewise [m], shape (n, 3).
+            entered: Indices of the body that is entered and of the one that enters.
+        """
+        s = self.shapes
+        rows = [
+            (k, i, j)
+            for k, (outer, inner) in enumerate(entered)
+            for i in s.solids[outer]
+            for j in s.solids[inner]
+        ]
+        if not rows:
+            return [NONE] * len(entered)
+        table = np.array(rows, np.int64)
+        n = len(rows)
+        share = self.cells if self.fewest is None else max(self.cells // n, self.fewest)
+        at, least, most = np.empty((n, 3)), np.empty(n), np.empty(n)
+        deepest(
+            np.ascontiguousarray(table[:, 1:]), np.ascontiguousarray(rotations, float),
+            np.ascontiguousarray(positions, float), s.which, s.local, s.corners, s.radius, s.nodes, s.links,
+            s.triangles, self.tolerance, share, at, least, most,
+        )  # fmt: skip
+        found = [NONE] * len(entered)
+        for (k, _, _), low, high, point in zip(rows, least.tolist(), most.tolist(), at, strict=True):
+            known = found[k]
+            if low > known.at_least:
+                found[k] = Depth(low, max(high, known.at_most), point)
+            elif high > known.at_most:
+                found[k] = Depth(known.at_least, high, known.point)
+        return found

@@ -86,7 +86,7 @@ class Closests:
     reach: NDArray[np.int8]
     """Values of `Reach`."""
 
-    def of(self, *index: int | slice) -> Closests:
+    def of(self, *index: int | slice | Indices) -> Closests:
         """Some of them."""
         return Closests(
             self.distance[index],
@@ -246,6 +246,7 @@ class Survey:
         ends = np.cumsum([0, *sizes]).tolist()
         columns = {k: slice(ends[i], ends[i + 1]) for i, k in enumerate(order)}
         self._columns = [columns[k] for k in range(len(order))]
+        self._in_turn = np.concatenate([np.arange(len(self._caps))[part] for part in self._columns])
         self._used = np.unique(self._pair)
         self._memory = self._forget()
 
@@ -253,6 +254,19 @@ class Survey:
         """Answers for one set of poses, in the order of the questions; see `Query.minimum`."""
         found = self._run(np.asarray(rotations)[None], np.asarray(positions)[None], self._memory)
         return [found.of(0, columns) for columns in self._columns]
+
+    def within(self, rotations: ArrayLike, positions: ArrayLike, caps: Array) -> Closests:
+        """Answers for one set of poses up to other caps, one after the other in the order of the questions.
+
+        Args:
+            rotations: As of `Query.minimum`.
+            positions: Likewise.
+            caps: Of every answer [m]; -infinity where none is asked for.
+        """
+        own = np.empty_like(self._caps)
+        own[self._in_turn] = caps
+        R, x = np.asarray(rotations)[None], np.asarray(positions)[None]
+        return self._run(R, x, self._memory, own).of(0, self._in_turn)
 
     def batch(self, rotations: ArrayLike, positions: ArrayLike) -> list[Closests]:
         """Answers for many samples, in the order of the questions; see `Query.batch`."""
@@ -269,7 +283,9 @@ class Survey:
             np.full(len(self._caps), -1, np.int64),
         )
 
-    def _run(self, rotations: ArrayLike, positions: ArrayLike, memory: Memory) -> Closests:
+    def _run(
+        self, rotations: ArrayLike, positions: ArrayLike, memory: Memory, caps: Array | None = None
+    ) -> Closests:
         s = self.shapes
         R = np.ascontiguousarray(rotations, float)
         x = np.ascontiguousarray(positions, float)
@@ -281,7 +297,7 @@ class Survey:
         winner, reach = np.empty(shape, np.int64), np.empty(shape, np.int8)
         bad, body = kernel.nearest(
             R, x, s.which, s.local, s.ball, s.corners, s.radius, s.nodes, s.links, s.triangles, s.probes,
-            self._used, self._pair, self._start, self._members, self._caps,
+            self._used, self._pair, self._start, self._members, self._caps if caps is None else caps,
             self._whether, *memory, distance, points, winner, reach,
         )  # fmt: skip
         if bad >= 0:

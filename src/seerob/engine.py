@@ -26,16 +26,18 @@ from seerob.errors import InputError, SimulationDiverged
 from seerob.human.following import Following
 from seerob.inverse_kinematics import solve_pose
 from seerob.kernels import pull as kernel
+from seerob.machines import Machines, Moved
 from seerob.model import Mechanism, Model
 from seerob.reference import Reference
+from seerob.sample_values import is_finite, largest_speed, torques_of
 from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
+from seerob.signals import Signals
 from seerob.state import Hearing, State
+from seerob.task_space import TaskPull
 from seerob.transforms import Array, rotation_from_wxyz
 
 DEFAULT_TIMEOUT = 0.2
 """Of what is heard without a source that states one [s]."""
-LARGEST_SPEED = {"rad": 30.0, "m": 10.0}
-"""Above it two samples are a jump [rad/s or m/s]: no arm and no person at work moves like that."""
 WILD = 300.0
 """Above it the physics has lost a joint [rad/s or m/s]."""
 POSE_TOLERANCE = 1e-4
@@ -57,7 +59,7 @@ class Engine:
 
     Attributes:
         state: The twin at the last tick; the same object throughout.
-        signals: Newest values of machines by source.
+        signals: What machines say, by variable.
     """
 
     def __init__(
@@ -66,6 +68,7 @@ class Engine:
         *,
         driven: dict[str, float] | None = None,
         live: Collection[str] = (),
+        signals: dict[str, float] | None = None,
         controllers: bool = True,
         contacts: bool = True,
     ) -> None:
@@ -75,6 +78,7 @@ class Engine:
             model: The compiled workstation.
             driven: Time-out [s] of the source of each robot and human that a source drives.
             live: Those of them whose source is live; when a sample is late they coast, until the time-out.
+            signals: Time-out [s] of each source of variables.
             controllers: Whether the twin is pulled at all; off, it moves freely from where the first
                 samples put it, and nothing that is heard later is compared with it.
             contacts: Whether the contacts that the file asks for act.
@@ -106,7 +110,7 @@ class Engine:
             if m.offset.any() or not np.array_equal(m.coupling, np.eye(len(m.v_address)))
         }
         self._references = {
-            m.name: Reference(m.home, _largest_speed(m), coast=driven[m.name] if m.name in live else 0.0)
+            m.name: Reference(m.home, largest_speed(m), coast=driven[m.name] if m.name in live else 0.0)
             for m in self._mechanisms
         }
         self._hearings = {
@@ -124,6 +128,11 @@ class Engine:
             self._mj, self._wanted, self._mechanisms, engine, self._dof, controllers=controllers
         )
         self._limits = set_torque_limits(self._mj, self._mechanisms, self._dof)
+        self._task_pulls = [
+            TaskPull(self._mj, model.mechanisms[human.name], engine.human_bandwidth)
+            for human in model.workstation.humans
+            if human.follow == "task" and controllers
+        ]
         self._feedforward = np.zeros(self._mj.nv)
         self._before = np.zeros(self._mj.nv)
         self._courses: dict[str, tuple[Array, Array, Array]] = {}
@@ -135,8 +144,9 @@ class Engine:
         self._almost = 0.999 * self._limits
         self._followings: dict[str, Following] = {}
         """By person that devices see."""
-        self.signals: dict[str, dict[str, float | bool | str]] = {}
-        self.state = State(model, self._shown, self._hearings)
+        self.signals = Signals(model.dictionary, signals or {})
+        self._machines = Machines(model.workstation.machines, self.signals)
+        self.state = State(model, self._shown, self._hearings, self.signals)
         self._tick = 0
         self._place(0.0)
 
@@ -146,7 +156,9 @@ class Engine:
         """Hear samples: what they say is where the twin is pulled from now on."""
         for sample in samples:
             if isinstance(sample, SignalSample):
-                self.signals[sample.source] = sample.values
+                self.signals.take(sample)
+                for moved in self._machines.hear(sample):
+                    self._move(moved)
                 continue
             if isinstance(sample, BodySample):
                 self._following(sample.target).hear(sample)
@@ -154,26 +166,18 @@ class Engine:
             mechanism = self._target(sample)
             reason = "" if sample.quality is Quality.GOOD else f"its source says {sample.quality.value}"
             reference = self._references[mechanism.name]
-            if not _finite(sample):
+            if not is_finite(sample):
                 # Nothing to be pulled to; not knowing where it is must show all the same.
                 taken, reason = bool(np.isfinite(sample.t)), "its source sends values that are not finite"
             elif isinstance(sample, JointSample):
                 qd = None if sample.qd is None else np.array(sample.qd)
-                # Only of a live source the newest sample is ever this old: nobody knows what came next.
-                silent = self._tick * self._period - reference.until > self._hearings[mechanism.name].timeout
-                anew = self._tick > 0 and silent
-                taken = reference.take(sample.t, np.array(sample.q), qd, anew=anew)
+                taken = reference.take(sample.t, np.array(sample.q), qd, anew=self._silent(mechanism.name))
             else:
                 taken, reached = self._take_pose(mechanism, sample)
                 reason = reason or (
                     "" if reached else f"{sample.target} cannot reach the pose that was heard"
                 )
-            hearing = self._hearings[mechanism.name]
-            hearing.driven = self.controllers
-            if taken and (not hearing.heard or sample.t > hearing.heard[-1][0]):
-                jump = f"its samples jump at {sample.t:.3f} s" if reference.jumped else ""
-                hearing.heard.append((sample.t, reason or jump))
-                hearing.torques.append(_torques(sample))
+            self._note(mechanism.name, sample.t, reason, torques_of(sample), taken=taken)
 
         for name, following in self._followings.items():
             hearing = self._hearings[name]
@@ -181,7 +185,29 @@ class Engine:
             for found in following.until((self._tick + 1) * self._period):
                 self._references[name].take(found.t, found.q, None, anew=found.anew and self._tick > 0)
                 hearing.heard.append((found.t, found.reason))
+                hearing.parts.append((found.t, found.parts))
                 hearing.torques.append(None)
+
+    def _silent(self, name: str) -> bool:
+        """Whether what drives it was silent: of a live source only the newest sample is ever this old."""
+        age = self._tick * self._period - self._references[name].until
+        return self._tick > 0 and age > self._hearings[name].timeout
+
+    def _move(self, moved: Moved) -> None:
+        """A machine follows what its variables say."""
+        anew = self._tick > 0 and moved.anew
+        reference = self._references[moved.machine]
+        taken = reference.take(moved.t, moved.q, moved.qd, anew=anew or self._silent(moved.machine))
+        self._note(moved.machine, moved.t, moved.doubt, None, taken=taken)
+
+    def _note(self, name: str, t: float, reason: str, torques: Array | None, *, taken: bool) -> None:
+        """Note that a robot, a person or a machine was heard, and why that may not be relied on."""
+        hearing = self._hearings[name]
+        hearing.driven = self.controllers
+        if taken and (not hearing.heard or t > hearing.heard[-1][0]):
+            jump = f"its samples jump at {t:.3f} s" if self._references[name].jumped else ""
+            hearing.heard.append((t, reason or jump))
+            hearing.torques.append(torques)
 
     def _following(self, name: str) -> Following:
         """What captured motion of a person goes through.
@@ -247,6 +273,7 @@ class Engine:
             reference.forget(start)
         for hearing in self._hearings.values():
             hearing.forget(start)
+        self.signals.forget(start)
         self._aim(start)
         qvel = self._data.qvel
         for step in range(self._steps if self.physics else 0):
@@ -308,6 +335,8 @@ class Engine:
             q, v, a, self._feedforward, wanted.qfrc_passive, mj.dof_armature, mj.dof_damping,
             self._kp, self._kd, self._dt, self._dof, self._data.ctrl,
         )  # fmt: skip
+        for pull in self._task_pulls:
+            pull.command(mj, self._data, wanted, self._kp)
 
     def _place(self, t: float) -> None:
         for mechanism in self._mechanisms:
@@ -365,19 +394,3 @@ class Engine:
                     "lower engine.bandwidth or check masses and samples"
                 )
         raise SimulationDiverged(f"a velocity is not finite after {self._tick * self._period:.3f} s")
-
-
-def _largest_speed(mechanism: Mechanism) -> Array:
-    return np.array([LARGEST_SPEED[unit] for unit in mechanism.units])
-
-
-def _torques(sample: JointSample | PoseSample) -> Array | None:
-    if isinstance(sample, PoseSample) or sample.tau is None or not np.isfinite(sample.tau).all():
-        return None
-    return np.array(sample.tau)
-
-
-def _finite(sample: JointSample | PoseSample) -> bool:
-    if isinstance(sample, JointSample):
-        return bool(np.isfinite([sample.t, *sample.q, *(sample.qd or ())]).all())
-    return bool(np.isfinite([sample.t, *sample.position, *sample.wxyz]).all())

@@ -8,6 +8,7 @@ import numpy as np
 
 from seerob.errors import UnknownName
 from seerob.human.angles import Angles, angles
+from seerob.human.estimated import estimated
 from seerob.human.skeleton import BONES
 from seerob.model import Mechanism, Model
 from seerob.state import State
@@ -48,8 +49,11 @@ def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> C
     rows = np.array(bone_rows(model, human))
 
     def read(state: State) -> Angles:
-        state.require(human.name)
+        doubted = state.bones_in_doubt(human.name)
         found = angles(state.rotations[rows], state.positions[rows])
-        return found.without(unmeasured) if unmeasured else found
+        # What devices see changes with time: of a leg that nobody sees no score is made.
+        guessed = (*estimated(state.hearings[human.name].bones), *doubted)
+        lost = (*unmeasured, *guessed) if guessed else unmeasured
+        return found.without(lost) if lost else found
 
     return read

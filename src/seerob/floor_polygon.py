@@ -153,34 +153,3 @@ def prism_mesh(
         i, j = j, i
     sides = np.vstack([np.column_stack([i, j, j + n]), np.column_stack([i, j + n, i + n])])
     return Mesh(vertices, np.vstack([top[:, ::-1], top + n, sides]).astype(np.int32), color)
-
-
-def distance_between(ring: Array, border: Array, edges: NDArray[np.int64]) -> tuple[float, Array, Array]:
-    """Where a closed ring of points is nearest to some edges of a polygon; 0 where they cross.
-
-    Args:
-        ring: Shape (n, 2) [m].
-        border: Corners of the polygon, shape (m, 2) [m].
-        edges: Which of its edges.
-
-    Returns:
-        Distance [m], the point on the ring and the point on the border, (2,) [m].
-    """
-    p, q = ring, np.roll(ring, -1, axis=0)
-    a, b = border[edges], np.roll(border, -1, axis=0)[edges]
-    for i in range(len(p)):
-        for j in range(len(a)):
-            if len(ring) > 1 and _touch(*((float(x[0]), float(x[1])) for x in (p[i], q[i], a[j], b[j]))):
-                return 0.0, p[i], p[i]
-    best = (np.inf, p[0], a[0])
-    for points, (start, end), on_ring in ((p, (a, b), True), (a, (p, q), False), (b, (p, q), False)):
-        edge = end - start
-        away = points[:, None] - start
-        length = np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-300)
-        share = np.clip(np.einsum("nij,ij->ni", away, edge) / length, 0.0, 1.0)
-        gap = np.linalg.norm(away - share[..., None] * edge, axis=2)
-        i, j = divmod(int(gap.argmin()), gap.shape[1])
-        if gap[i, j] < best[0]:
-            foot = start[j] + share[i, j] * edge[j]
-            best = (float(gap[i, j]), points[i], foot) if on_ring else (float(gap[i, j]), foot, points[i])
-    return best

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from seerob import collision
-from seerob.model import Frame, Mechanism, Model
+from seerob.model import Mechanism, Model
 from seerob.state import State
 from seerob.transforms import Array
 
@@ -32,16 +32,16 @@ def moving_masses(model: Model, robot: Mechanism) -> tuple[float, float]:
 
 
 def masses_along_motion(
-    state: State, robot: Mechanism, frames: Sequence[Frame], bodies: Sequence[int], *, standstill: float
+    state: State, robot: Mechanism, bodies: Sequence[int], *, standstill: float, M: Array | None = None
 ) -> Array:
     r"""Effective mass of each body at its fastest point along its motion [kg], shape (b,).
 
     Args:
         state: The twin.
         robot: The robot.
-        frames: A frame at the origin of each body.
         bodies: The bodies, by index.
         standstill: Speed below which a motion has no direction [m/s].
+        M: Another mass matrix than that of the state, shape (n, n).
 
     Returns:
         NaN where a body stands still.
@@ -49,17 +49,13 @@ def masses_along_motion(
     Raises:
         Undecided: Not heard, or a mass that nobody gave.
     """
-    M = state.mass_matrix(robot)
+    M = state.mass_matrix(robot) if M is None else M
     masses = np.full(len(bodies), np.nan)
-    J_v, u, rows = [], [], []
-    for row, body in enumerate(bodies):
-        _, point, velocity = state.fastest_point(body)
-        speed = float(np.sqrt(velocity @ velocity))
-        if speed > standstill:
-            offset = state.rotations[body].T @ (point - state.positions[body])
-            J_v.append(state.jacobian(frames[row], robot, offset)[:3])
-            u.append(velocity / speed)
-            rows.append(row)
-    if rows:
-        masses[rows] = collision.mass_along(np.array(J_v), M, np.array(u))
+    _, points, velocities = state.fastest_points(tuple(bodies))
+    speeds = np.sqrt(np.einsum("ij,ij->i", velocities, velocities))
+    moving = speeds > standstill
+    if moving.any():
+        u = velocities / np.where(moving, speeds, 1.0)[:, None]
+        rows = state.along(tuple(bodies), robot, points, u)
+        masses[moving] = collision.mass_of_rows(rows[moving], M)
     return masses

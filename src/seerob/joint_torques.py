@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from seerob.errors import Undecided
+from seerob.kernels.chain import held
 from seerob.model import Mechanism
 from seerob.state import State
 from seerob.transforms import Array
@@ -28,17 +29,13 @@ def gravity(state: State, mechanism: Mechanism) -> Array:
         Undecided: Not heard, or a mass that nobody gave.
     """
     _need_masses(state, mechanism)
-    mj, data = state.model.mj, state.data
-    joints = mj.dof_jntid[mechanism.v_address]
-    bodies = mj.jnt_bodyid[joints]
-    gravity = mj.opt.gravity
-    gx, gy, gz = gravity.tolist()
-    x, y, z = (data.subtree_com[bodies] - data.xanchor[joints]).T
-    turns = mj.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE
-    # (axis × arm) · g is axis · (arm × g) of a joint that turns; one that slides falls along its axis.
-    moments = np.stack([y * gz - z * gy, z * gx - x * gz, x * gy - y * gx], axis=1)
-    falls = (data.xaxis[joints] * np.where(turns[:, None], moments, gravity)).sum(axis=1)
-    return np.asarray(mechanism.coupling.T @ -(mj.body_subtreemass[bodies] * falls))
+    data, columns = state.data, state.columns[mechanism.name]
+    found = np.empty(len(columns.joints))
+    held(
+        data.subtree_com, data.xanchor, data.xaxis, columns.bodies, columns.joints, columns.turns,
+        columns.masses, state.model.mj.opt.gravity, found,
+    )  # fmt: skip
+    return found if columns.coupling is None else np.asarray(columns.coupling.T @ found)
 
 
 def bias(state: State, mechanism: Mechanism) -> Array:

@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from seerob.errors import Problem, suggestion
 
-NAMED = ("robots", "tools", "workpieces", "parts", "areas", "sensors", "humans")
+NAMED = ("robots", "tools", "workpieces", "parts", "machines", "areas", "sensors", "humans")
 """Tables whose entries have a name that is theirs alone."""
 
 Entries = Mapping[str, Mapping[int, Any]]
@@ -62,12 +62,13 @@ def _taken(names: Sequence[Named], file: str) -> Iterator[Problem]:
 def _mounts(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Problem]:
     robots = [n.name for n in names if n.table == "robots"]
     people = [n.name for n in names if n.table == "humans"]
+    machines = [n.name for n in names if n.table == "machines"]
     movable = [n.name for n in names if n.table in ("tools", "workpieces")]
     on = {
         thing.name: thing.on for group in ("tools", "workpieces") for thing in entries.get(group, {}).values()
     }
     for group in ("tools", "workpieces", "areas", "sensors"):
-        carriers = [*robots, *people] if group in ("areas", "sensors") else robots
+        carriers = [*robots, *people, *(machines if group in ("areas", "sensors") else ())]
         for i, thing in entries.get(group, {}).items():
             at, steps = thing.on, 0
             while at in on and steps <= len(on):
@@ -78,7 +79,7 @@ def _mounts(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Pro
                     file,
                     key,
                     f"{thing.name!r} is mounted on itself in a circle",
-                    "mount one of them on a robot",
+                    "mount one of them on a robot or a person",
                 )
             elif at is not None and at not in movable and at.split("/")[0] not in carriers:
                 known = [*(f"{carrier}/<link>" for carrier in carriers), *movable]
@@ -87,13 +88,15 @@ def _mounts(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Pro
 
 
 def _sources(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Problem]:
-    kinds = {n.name: n.table.removesuffix("s") for n in names if n.table in ("robots", "humans")}
+    kinds = {n.name: n.table.removesuffix("s") for n in names if n.table in ("robots", "humans", "machines")}
     driven: dict[str, int] = {}
     for i, source in entries.get("sources", {}).items():
         target = source.target()
         key = f"sources[{i}]" + "".join(f".{field}" for field, _ in _fields_with(source, target))
         wanted = next((kind for kind in ("robot", "human") if hasattr(source, kind)), None)
-        fitting = [name for name, kind in kinds.items() if wanted in (None, kind)]
+        # A machine is a chain of joints like a robot, and follows the same files.
+        fits = {None: ("robot", "human", "machine"), "robot": ("robot", "machine"), "human": ("human",)}
+        fitting = [name for name, kind in kinds.items() if kind in fits[wanted]]
         if not target:
             continue
         if target in kinds and target not in fitting:

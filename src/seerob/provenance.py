@@ -8,7 +8,9 @@ import numpy as np
 
 from seerob.model import Gap, Mechanism, Model
 from seerob.snapshot import Input, Origin
+from seerob.workstation import Mounted, Robot
 
+FILE = "workstation file"
 WORST_FIRST = list(reversed(Origin))
 
 
@@ -65,6 +67,19 @@ def masses(model: Model, mechanism: Mechanism) -> tuple[Input, ...]:
                     source=body.mass.source,
                 )
             )
+    station = model.workstation
+    tables: tuple[Robot | Mounted, ...] = (*station.robots, *station.tools, *station.workpieces)
+    carried = {model.bodies[index].owner for index in mechanism.carried}
+    found += [
+        Input(
+            name=f"mass_tolerance of {table.name}",
+            value=table.mass_tolerance,
+            origin=Origin.GIVEN,
+            source=FILE,
+        )
+        for table in tables
+        if table.mass_tolerance and (table.name == mechanism.name or table.name in carried)
+    ]
     rotors = [joint.armature for joint in mechanism.joints if joint.armature is not None]
     found.append(
         Input(

@@ -28,6 +28,8 @@ Corner = Annotated[tuple[Coordinate, Coordinate], unit("m")]
 Corners = Annotated[tuple[Corner, ...], unit("m", min_length=3, max_length=200)]
 """Corners (x, y) of a polygon [m]."""
 Share = Annotated[float, Meta(ge=0, le=1)]
+Tolerance = Annotated[float, Meta(ge=0, lt=1)]
+"""Either way, as a share of the figure itself."""
 Name = Annotated[
     str,
     Meta(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=80, description="letters, digits, '_', '.' and '-' only"),

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.depth import place_solid
 from seerob.kernels.rays import cast
 from seerob.kernels.shapes import Shapes
+from seerob.kernels.signed_distance import place
 from seerob.transforms import Array
 
 Indices = NDArray[np.int64]
@@ -44,9 +44,12 @@ class Rays:
             met: Set to the body that a ray meets, where it does, shape (k,).
         """
         s = self.shapes
-        for body in self.bodies:
-            for solid in s.solids[body]:
-                place_solid(s, rotations, positions, body, solid, self._world)
+        if not len(self._solids):
+            return
+        place(
+            np.ascontiguousarray(rotations, float), np.ascontiguousarray(positions, float), s.which, s.local,
+            self._solids, self._world,
+        )  # fmt: skip
         starts = np.ascontiguousarray(origins, float)
         along = np.ascontiguousarray(directions, float)
         cast(

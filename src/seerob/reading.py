@@ -11,6 +11,7 @@ import msgspec
 from msgspec import Struct
 
 from seerob import naming, plugin
+from seerob.controller_zones import zones_of
 from seerob.conversion import convert, tables
 from seerob.criterion import Criterion
 from seerob.errors import InputError, Problem, SeerobError
@@ -66,9 +67,16 @@ def readable(path: Path | str) -> Readable:
     """
     file = locate(path)
     table, raw = read_toml(file)
+    files = {file.name: raw}
+    problems: list[Problem] = []
+    if "zones" in table:
+        zones = zones_of(table["zones"], file.parent, str(file), problems)
+        files |= zones.files
+        own = table.get("areas", [])
+        table |= {"areas": [*own, *zones.areas] if isinstance(own, list) else own}
     found = _convert(table, str(file))
-    head = msgspec.structs.replace(found.head, folder=str(file.parent.resolve()), files={file.name: raw})
-    return found._replace(head=head)
+    head = msgspec.structs.replace(found.head, folder=str(file.parent.resolve()), files=files)
+    return found._replace(head=head, problems=[*problems, *found.problems])
 
 
 def convert_workstation(table: Mapping[str, Any], file: str) -> tuple[Workstation | None, list[Problem]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterable, Iterator
 
@@ -10,8 +9,12 @@ from msgspec.structs import replace
 
 from seerob.errors import InputError, Problem
 from seerob.live import Listening, LiveSource
-from seerob.samples import Quality, Sample, SignalSample, key
+from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample, key
 from seerob.workstation import Workstation
+
+
+AFTER = 1e-6
+"""Between a sample and its repetition [s]: two of one instant there are not."""
 
 
 class Clock:
@@ -48,8 +51,8 @@ def hear(
 
     Run time t is the world's instant ``clock.start + t - delay``: when a tick is computed, what it
     speaks of is a delay old, and samples on either side of it have been heard. The run begins at the
-    first sample, or without one when that takes too long. Where the clock slipped, the next sample of
-    each robot is degraded.
+    first sample, or without one when that takes too long. Where the clock slipped, what each robot said
+    last is older than run time shows, and is degraded from then on; so is its next sample.
 
     Args:
         recorded: From `seerob.run.pump`, endless.
@@ -59,12 +62,13 @@ def hear(
     heard = listening.first()
     origin = max((sample.t for sample in heard), default=time.monotonic() - listening.delay)
     clock.begin(origin + listening.delay)
-    newest: dict[tuple[str, ...], float] = {}
+    newest: dict[tuple[str, ...], JointSample | PoseSample | BodySample] = {}
     doubtful: set[tuple[str, ...]] = set()
     slipped = clock.slipped
     for samples in recorded:
+        waiting: set[tuple[str, ...]] = set()
         if clock.slipped > slipped:
-            slipped, doubtful = clock.slipped, set(newest)
+            slipped, doubtful, waiting = clock.slipped, set(newest), set(newest)
         zero = clock.start - listening.delay
         taken: list[Sample] = []
         for sample in (*heard, *listening.take()):
@@ -73,15 +77,20 @@ def hear(
                 taken.append(replace(sample, t=t))
                 continue
             what = key(sample)
-            if t <= newest.get(what, -math.inf):
+            if what in newest and t <= newest[what].t:
                 continue
             quality = sample.quality
             if what in doubtful and quality is Quality.GOOD:
                 # Run time stood still while the robot went on: the speed between both samples is false.
                 quality = Quality.DEGRADED
             doubtful.discard(what)
-            newest[what] = t
-            taken.append(replace(sample, t=t, quality=quality))
+            waiting.discard(what)
+            newest[what] = replace(sample, t=t, quality=quality)
+            taken.append(newest[what])
+        for what in sorted(waiting):
+            if newest[what].quality is Quality.GOOD:
+                newest[what] = replace(newest[what], t=newest[what].t + AFTER, quality=Quality.DEGRADED)
+                taken.append(newest[what])
         yield (*samples, *taken)
         heard = ()
 

@@ -28,7 +28,8 @@ SNAPSHOT = "/seerob/snapshot"
 BASIS = "/seerob/basis"
 
 VIEW_SCENE, VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS = "/scene", "/markers", "/tf", "/results"
-VIEWS = (VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS)
+VIEW_PEOPLE = "/people"
+VIEWS = (VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS, VIEW_PEOPLE)
 """For foreign viewers; `VIEW_SCENE` is sent once, these from time to time."""
 
 MESH_PREFIX = "mesh/"

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
+from seerob.bone_errors import BoneErrors
 from seerob.errors import UnknownName
 from seerob.series import Series, Spread, Worst, WorstTracker, worst_verdict
 from seerob.snapshot import CriterionInfo, History, Result, Snapshot, Verdict
@@ -38,6 +40,7 @@ class ResultLog(Mapping[str, Series]):
         self._series: dict[str, Series] = {}
         self._worst: dict[str, WorstTracker] = {}
         self._tracking: dict[str, JointLog] = {}
+        self._bones: dict[str, BoneErrors] = {}
         self.ticks = 0
         """Snapshots that were added."""
         self.start: float | None = None
@@ -75,6 +78,8 @@ class ResultLog(Mapping[str, Series]):
             # A nan is not at most anything, so it shows; and nothing replaces it.
             if known is None or not (error <= known.error or math.isnan(known.error)):
                 self._tracking[name] = JointLog(name, error, snapshot.t)
+        for name, bones in snapshot.bones.items():
+            self._bones.setdefault(name, BoneErrors()).add(bones, snapshot.t)
         return tuple(worse)
 
     def _begin(self, name: str, unit: str, at_most: bool) -> Series:
@@ -111,6 +116,11 @@ class ResultLog(Mapping[str, Series]):
     def tracking(self) -> tuple[JointLog, ...]:
         """Largest tracking error per robot and human."""
         return tuple(self._tracking.values())
+
+    @property
+    def bones(self) -> Mapping[str, BoneErrors]:
+        """Tracking error per bone of the people that devices see, by the person's name."""
+        return MappingProxyType(self._bones)
 
     def ranked(self) -> tuple[Series, ...]:
         """The series, worst verdict first and, within one verdict, in their own order."""

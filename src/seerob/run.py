@@ -12,13 +12,14 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 
-import numpy as np
 from msgspec.structs import replace
 
 from seerob.compilation import pose_matrix
-from seerob.criterion import Criterion, Evaluate
+from seerob.displays import Looks
 from seerob.engine import Engine
-from seerob.errors import InputError, Problem, SeerobError, Undecided
+from seerob.errors import InputError, Problem, SeerobError
+from seerob.judging import Bound as Bound  # noqa: PLC0414
+from seerob.judging import Judge as Judge  # noqa: PLC0414
 from seerob.live import LiveSource, delay_of
 from seerob.model import Model
 from seerob.real_time import Clock
@@ -26,7 +27,6 @@ from seerob.results import ResultLog
 from seerob.samples import Sample
 from seerob.sink import Writer
 from seerob.snapshot import (
-    Basis,
     CriterionInfo,
     Finding,
     JointInfo,
@@ -48,16 +48,6 @@ Feed = Iterator[tuple[Sample, ...]]
 # -- before the run -----------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Bound:
-    """A criterion whose names are resolved."""
-
-    criterion: Criterion
-    group: str
-    evaluate: Evaluate
-    basis: Basis
-
-
 def bind(model: Model) -> tuple[Bound, ...]:
     """Bind every criterion and rule of the workstation.
 
@@ -67,6 +57,11 @@ def bind(model: Model) -> tuple[Bound, ...]:
     bound: list[Bound] = []
     problems: list[Problem] = []
     file = next(iter(model.workstation.files), "workstation")
+    for i, display in enumerate(model.workstation.displays):
+        try:
+            model.select(display.of)
+        except SeerobError as error:
+            problems.append(Problem(file, f"displays[{i}].of", str(error)))
     for group in ("safety", "ergonomics"):
         for i, criterion in enumerate(getattr(model.workstation, group)):
             try:
@@ -103,6 +98,22 @@ def source_target(model: Model, source: Source) -> Target | None:
     if not source.reads_variables:
         return driven
     return replace(driven or Target(), variables=variables, folder=str(model.folder))
+
+
+def signal_timeouts(model: Model) -> tuple[dict[str, float], dict[str, float]]:
+    """Time-outs [s] of the sources of variables, and of the machines that follow those, by name."""
+    delay = delay_of(model.workstation.sources)
+    sources = {
+        s.name: s.timeout - (delay if isinstance(s, LiveSource) else 0.0)
+        for s in model.workstation.sources
+        if s.reads_variables
+    }
+    followed = {
+        machine.name: {model.dictionary[name].source for name in names}
+        for machine in model.workstation.machines
+        if (names := machine.motion.variables())
+    }
+    return sources, {name: min(sources[s] for s in by) for name, by in followed.items()}
 
 
 def _world_from_base(model: Model, name: str) -> Matrix4 | None:
@@ -227,49 +238,7 @@ def pump(opened: Sequence[tuple[Source, Opened]], period: float, *, endless: boo
 # -- the loop -----------------------------------------------------------------------------------
 
 
-class Judge:
-    """Asks every criterion at its period; what it cannot know becomes UNDECIDED."""
-
-    def __init__(self, bound: Sequence[Bound]) -> None:
-        self._bound = bound
-        self._due = [0.0] * len(bound)
-        self._last: list[Result | None] = [None] * len(bound)
-        self._asked: list[tuple[str, ...]] = [()] * len(bound)
-
-    def __call__(self, state: State) -> tuple[Result, ...]:
-        """Results at this state, in the order of the file."""
-        return tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
-
-    def _one(self, i: int, bound: Bound, state: State) -> Result:
-        last = self._last[i]
-        criterion = bound.criterion
-        # A result between two evaluations lasts only as long as what it rests on is heard.
-        if last is not None and state.t < self._due[i] - 1e-9 and not any(map(state.doubt, self._asked[i])):
-            return last
-        state.asked.clear()
-        try:
-            result = bound.evaluate(state)
-            if result.value is not None and not np.isfinite(result.value):
-                raise Undecided(f"the value is {result.value}, not a finite number")
-        except Undecided as reason:
-            result = Result(
-                name=criterion.name,
-                unit=criterion.unit,
-                limit=getattr(criterion, "limit", None),
-                at_most=criterion.at_most,
-                verdict=Verdict.UNDECIDED,
-                reason=str(reason),
-            )
-        result = replace(result, basis=bound.basis)
-        if criterion.every is not None:
-            result = replace(result, t=state.t)
-            self._due[i] = state.t + criterion.every
-            self._last[i] = result
-            self._asked[i] = tuple(sorted(state.asked))
-        return result
-
-
-def snapshot(state: State, seq: int, results: tuple[Result, ...]) -> Snapshot:
+def snapshot(state: State, seq: int, results: tuple[Result, ...], looks: Looks | None = None) -> Snapshot:
     """What goes out of a state."""
     mechanisms = state.model.mechanisms.values()
     return Snapshot(
@@ -280,6 +249,7 @@ def snapshot(state: State, seq: int, results: tuple[Result, ...]) -> Snapshot:
         tracking={m.name: state.hearings[m.name].error for m in mechanisms},
         bones={m.name: bones for m in mechanisms if (bones := state.hearings[m.name].bones)},
         results=results,
+        looks={} if looks is None else looks.at(state),
     )
 
 
@@ -294,14 +264,30 @@ def warm_up(model: Model) -> None:
     Engine(model).tick()
 
 
+def engine_of(model: Model) -> Engine:
+    """The twin as the workstation's sources drive it."""
+    # What is shown is a delay old: silence shows that much earlier, so that it shows within the time-out.
+    delay = delay_of(model.workstation.sources)
+    driven: dict[str, float] = {}
+    for source in model.workstation.sources:
+        if source.target():
+            timeout = source.timeout - (delay if isinstance(source, LiveSource) else 0.0)
+            # Devices that complement one another may fall silent one by one.
+            driven[source.target()] = max(timeout, driven.get(source.target(), timeout))
+    live = {s.target() for s in model.workstation.sources if isinstance(s, LiveSource)}
+    signals, following = signal_timeouts(model)
+    return Engine(model, driven={**following, **driven}, live={*live, *following}, signals=signals)
+
+
 def ticks(
     engine: Engine, judge: Callable[[State], tuple[Result, ...]], feed: Feed
 ) -> Iterator[tuple[Snapshot, tuple[Sample, ...]]]:
     """The road: for each tick what goes out, and the samples it was made from."""
+    looks = Looks(engine.model)
     for seq, samples in enumerate(feed):
         engine.take(samples)
         state = engine.tick() if seq else engine.start()
-        yield snapshot(state, seq, judge(state)), samples
+        yield snapshot(state, seq, judge(state), looks), samples
 
 
 @contextmanager
@@ -358,22 +344,13 @@ def run(
         stop: Asked once per tick.
         progress: Told the run time once per tick [s].
     """
-    # What is shown is a delay old: silence shows that much earlier, so that it shows within the time-out.
-    delay = delay_of(model.workstation.sources)
-    driven: dict[str, float] = {}
-    for source in model.workstation.sources:
-        if source.target():
-            timeout = source.timeout - (delay if isinstance(source, LiveSource) else 0.0)
-            # Devices that complement one another may fall silent one by one.
-            driven[source.target()] = max(timeout, driven.get(source.target(), timeout))
     log = ResultLog(scene.criteria)
     begun = time.perf_counter()
     count, t = 0, 0.0
     with ExitStack() as open_writers, settled():
         for writer in writers:
             open_writers.enter_context(writer)
-        live = {s.target() for s in model.workstation.sources if isinstance(s, LiveSource)}
-        engine = Engine(model, driven=driven, live=live)
+        engine = engine_of(model)
         for out, samples in ticks(engine, Judge(bound), feed):
             count, t = count + 1, out.t
             log.add(out)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.floor_polygon import signed_area
 from seerob.sensor_tables import LaserScanner, MonitoredField
@@ -56,25 +57,41 @@ def seen_area(within: Array, distance: Array, resolution: float) -> float:
     return float(resolution / 2 * (reached[:, 1::2] ** 2 - reached[:, ::2] ** 2).sum())
 
 
-def blind_area(
-    field: MonitoredField, angles: Array, within: Array, distance: Array, resolution: float
-) -> float:
-    """Area of the part of a field that no beam reaches [m²]; not below 0.
+class Coverage:
+    """What of a field beams reach, and what is blind."""
 
-    What rounding to beams makes of a whole circle sector is taken out of the difference by scaling the
-    seen area with the area that beams of any length see, where they look all over the field.
-    """
-    unbounded = seen_area(within, np.full(len(angles), np.inf), resolution)
-    whole = abs(signed_area(field.corners))
-    share = seen_area(within, distance, resolution) / unbounded if unbounded > 0 else 0.0
-    return max(whole - share * min(unbounded, whole), 0.0)
+    def __init__(self, field: MonitoredField, within: Array, resolution: float) -> None:
+        """Of a field.
+
+        Args:
+            field: The field.
+            within: From `spans`.
+            resolution: Angle between beams [rad].
+        """
+        self.within, self.resolution = within, resolution
+        self.whole = abs(signed_area(field.corners))
+        """Area of the field [m²]."""
+        self._unbounded = seen_area(within, np.full(len(within), np.inf), resolution)
+
+    def blind(self, distance: Array) -> float:
+        """Area of the part of the field that no beam reaches [m²]; not below 0.
+
+        What rounding to beams makes of a whole circle sector is taken out of the difference by scaling the
+        seen area with the area that beams of any length see, where they look all over the field.
+
+        Args:
+            distance: How far each beam gets [m], shape (n,).
+        """
+        unbounded = self._unbounded
+        share = seen_area(self.within, distance, self.resolution) / unbounded if unbounded > 0 else 0.0
+        return max(self.whole - share * min(unbounded, self.whole), 0.0)
 
 
-def outline(within: Array, distance: Array, angles: Array) -> tuple[Array, list[tuple[int, int, int]]]:
-    """The part of a field that beams see from the scanner on, as few triangles in its plane.
+def outline(within: Array, distance: Array, angles: Array) -> tuple[Array, NDArray[np.int64]]:
+    """The part of a field that beams see from the scanner on, by as few of its beams as show its border.
 
     Returns:
-        Points (n, 3) [m], the first of them the scanner; triangles.
+        Ends of these beams in the scanner's plane, shape (n, 3) [m]; which beams they are, shape (n,).
     """
     first = within[:, 0]
     reach = np.where(first <= 0, np.minimum(within[:, 1], distance), 0.0)
@@ -84,6 +101,4 @@ def outline(within: Array, distance: Array, angles: Array) -> tuple[Array, list[
     kept[::every] = kept[-1] = True
     steps = np.flatnonzero(np.abs(np.diff(reach)) > STEP)
     kept[steps] = kept[np.minimum(steps + 1, len(angles) - 1)] = True
-    rim = directions(angles[kept]) * reach[kept, None]
-    points = np.vstack([np.zeros((1, 3)), rim])
-    return points, [(0, i, i + 1) for i in range(1, len(rim))]
+    return directions(angles[kept]) * reach[kept, None], np.flatnonzero(kept)

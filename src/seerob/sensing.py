@@ -118,8 +118,10 @@ class Presence:
         elif self._since is None:
             self._since = state.t
             self.unseen += way
-        elif self.sensor.response is not None and state.t - self._since <= self.sensor.response:
-            self.until_output += way
+        elif self.sensor.response is not None and self._last is not None:
+            # Of the way since the last evaluation, the share that lies before the output switched.
+            left = self._since + self.sensor.response - self._last[0]
+            self.until_output += way * min(max(left / (state.t - self._last[0]), 0.0), 1.0)
         self._last = state.t, now
 
     def result(

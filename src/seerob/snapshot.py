@@ -61,6 +61,8 @@ __all__ = [
     "Snapshot",
     "Sphere",
     "Trace",
+    "Tracked",
+    "Tracking",
     "Transport",
     "Vec3",
     "Vec4",
@@ -230,6 +232,8 @@ class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot"):
     """Of people that devices see: bone → how far the twin's bone is from the device's, position [m] and
     angle [rad]; null where the device has none."""
     results: tuple[Result, ...] = ()
+    looks: dict[str, tuple[float, float, float] | None] = {}
+    """Nodes whose look follows a variable: red, green, blue in 0…1; null where one is not drawn."""
 
 
 # -- what does not change during a run ----------------------------------------------------------
@@ -364,6 +368,31 @@ class Transport(Struct, frozen=True, kw_only=True, tag="transport"):
     live: bool = False
     loop: bool = False
     """Whether the player starts again at the end."""
+
+
+class Tracking(Struct, frozen=True, kw_only=True, tag="tracking"):
+    """What a page's headset sees of the person who wears it; only a live run that waits for it takes it."""
+
+    human: str
+    """Name of the person in the workstation file."""
+    t: float
+    """On the page's clock [s]."""
+    names: tuple[str, ...]
+    """``viewer``, ``left-grip``, ``right-grip``, and joints as WebXR Body Tracking names them."""
+    poses: bytes
+    """Little-endian float32, seven per name: x, y, z [m], w, x, y, z in ``local-floor`` (x right, y up,
+    z backward); NaN for what is not tracked."""
+    guessed: bytes = b""
+    """One byte per name, 1 where the headset itself only estimates the position; empty for nowhere."""
+
+
+class Tracked(Struct, frozen=True, kw_only=True, tag="tracked"):
+    """What became of a page's `Tracking`; sent at its first, and when that changes."""
+
+    human: str
+    accepted: bool
+    reason: str = ""
+    """Why not."""
 
 
 class Command(Struct, frozen=True, kw_only=True, tag="command"):

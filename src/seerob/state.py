@@ -7,117 +7,44 @@ heard, or has a mass that nobody gave: a stale or guessed number can never be gr
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.dictionary import Value
 from seerob.distance import Closest, Closests, Per, Query
 from seerob.errors import Undecided
+from seerob.hearing import SLACK
+from seerob.hearing import Hearing as Hearing  # noqa: PLC0414
+from seerob.joint_columns import Columns, moving_dofs
+from seerob.kernels.chain import along
 from seerob.kernels.speed import fastest, placed, stacked, velocities
 from seerob.model import Frame, Gap, Mechanism, Model
+from seerob.signals import Signals
 from seerob.surveying import Surveyor
 from seerob.transforms import Array
 
 Indices = NDArray[np.int64]
 
-SLACK = 1e-9
-"""Instants that differ by less are the same [s]: a source's clock and the run's are sums of decimals."""
-
-
-@dataclass
-class Hearing:
-    """What is known of where a robot or human really is."""
-
-    given: bool
-    """It stands where the workstation file puts it; no source drives it."""
-    driven: bool
-    """A source drives it."""
-    timeout: float = 0.2
-    """[s]"""
-    heard: list[tuple[float, str]] = field(default_factory=list)
-    """Instant [s] of the newest samples and why one may not be relied on (empty: it may), oldest first;
-    some may lie ahead of the tick."""
-    torques: list[Array | None] = field(default_factory=list)
-    """Measured joint torques of the same samples [N·m or N], each (n,); None where there were none."""
-    error: float = 0.0
-    """Largest joint error between twin and reference [rad or m]."""
-    bones: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
-    """Of a person that devices see: bone → how far the twin's is from the device's, position [m] and angle
-    [rad]; None where none was seen."""
-    lost: float = -np.inf
-    """When the physics last lost it, so that it was put back [s]."""
-    saturated: bool = False
-    """A joint's torque limit was reached: the twin cannot do what was heard."""
-
-    def forget(self, t: float) -> None:
-        """Drop what is older than the last sample at or before ``t`` [s]."""
-        while len(self.heard) > 1 and self.heard[1][0] <= t:
-            del self.heard[0]
-            del self.torques[:1]
-
-    def doubt(self, t: float) -> str:
-        """Why what was heard does not tell where it is at ``t`` [s]; empty when it does.
-
-        A sample ahead of the tick does not make up for silence before it: what happened between two
-        samples that are further apart than the time-out is a guess.
-        """
-        if not self.driven:
-            return "" if self.given else "no source drives it and the file gives no position (q)"
-        k = sum(1 for instant, _ in self.heard if instant <= t + SLACK)
-        if k == 0:
-            return "nothing heard yet"
-        age = t - self.heard[k - 1][0]
-        if age > self.timeout + SLACK:
-            return f"not heard for {age:.2f} s (time-out {self.timeout:g} s)"
-        return next((reason for _, reason in self.heard[k - 1 : k + 1] if reason), "")
-
-
-@dataclass(frozen=True, eq=False)
-class _Columns:
-    """Where the joints of a mechanism are among all of the workstation, bound once."""
-
-    own_q: Indices
-    """Of the commanded joints, in ``MjData.qpos``."""
-    own_v: Indices
-    """Likewise in ``MjData.qvel``."""
-    all_v: Indices | slice
-    coupling: Array | None
-    """None where every joint is commanded itself."""
-
-    @classmethod
-    def of(cls, mechanism: Mechanism) -> _Columns:
-        v, n = mechanism.v_address, len(mechanism.v_address)
-        in_turn = n > 0 and np.array_equal(v, v[0] + np.arange(n))
-        return cls(
-            mechanism.q_address[mechanism.own],
-            v[mechanism.own],
-            slice(int(v[0]), int(v[0]) + n) if in_turn else v,
-            None if np.array_equal(mechanism.coupling, np.eye(n)) else mechanism.coupling,
-        )
-
-    def of_rows(self, every: Array) -> Array:
-        """Columns of the commanded joints, (r, nv) to (r, n)."""
-        own = every[:, self.all_v]
-        return own.copy() if self.coupling is None else own @ self.coupling
-
-    def of_matrix(self, every: Array) -> Array:
-        """Block of the commanded joints, (nv, nv) to (n, n)."""
-        own = every[self.all_v][:, self.all_v]
-        return own.copy() if self.coupling is None else self.coupling.T @ own @ self.coupling
+VARIABLE = "variable "
+"""Before the name of a variable among the names that answers depend on: robots have no blank in theirs."""
 
 
 class State:
     """A view of the engine's `mujoco.MjData`; never keep one beyond its tick."""
 
-    def __init__(self, model: Model, data: Any, hearings: dict[str, Hearing]) -> None:
+    def __init__(
+        self, model: Model, data: Any, hearings: dict[str, Hearing], signals: Signals | None = None
+    ) -> None:
         self.model = model
         self.data = data
         self.t = 0.0
         """Run time [s]."""
         self.hearings = hearings
+        self.signals = signals or Signals(model.dictionary, {})
+        """What machines say; `signal` raises when it may not be relied on."""
         self.asked: set[str] = set()
         """Robots and humans that answers have depended on since the set was last cleared."""
         self._mj_ids = np.array([body.mj for body in model.bodies], np.int64)
@@ -129,15 +56,22 @@ class State:
         self.quaternions = np.zeros((n, 4))
         self._period = model.workstation.engine.tick
         engine = model.workstation.engine
-        self._tracking_limits = {"robot": engine.tracking_limit, "human": engine.human_tracking_limit}
+        self._tracking_limits = {
+            "robot": engine.tracking_limit,
+            "machine": engine.tracking_limit,
+            "human": engine.human_tracking_limit,
+        }
         self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
         self._cache: dict[Any, Any] = {}
         self._jacobian = np.zeros((6, model.mj.nv))
-        self._columns = {m.name: _Columns.of(m) for m in model.mechanisms.values()}
+        self.columns = {m.name: Columns.of(m, model.mj) for m in model.mechanisms.values()}
+        """Where the joints of each robot and human are among all."""
         self._mj_roots = model.mj.body_rootid[self._mj_ids].astype(np.int64)
         # Views that MuJoCo writes through; to ask the data for them takes longer than to use them.
         self._xmat, self._xpos, self._xquat = data.xmat, data.xpos, data.xquat
         self._surveyor = Surveyor(model.shapes)
+        self._cdof, self._com = data.cdof, data.subtree_com
+        self._moves: dict[tuple[int, ...], NDArray[np.bool_]] = {}
         self._carriers: dict[tuple[int, ...], tuple[Indices, tuple[str, ...]]] = {}
         self._corners = stacked([body.corners for body in model.bodies])
         self._reach = np.array([body.radius + body.deviation for body in model.bodies])
@@ -180,7 +114,28 @@ class State:
                 raise Undecided(reason)
 
     def doubt(self, name: str) -> str:
-        """Why a twin may not be where the real one is; empty when it may be relied on."""
+        """Why a twin may not be where the real one is; empty when it may be relied on.
+
+        After `VARIABLE`, the name of a variable: why it may not be relied on.
+        """
+        if name.startswith(VARIABLE):
+            return self.signals.at(name.removeprefix(VARIABLE), self.t).doubt
+        parts = self.hearings[name].doubted(self.t)
+        return self._doubt(name) or (f"{name}: {parts[0][0]}" if parts else "")
+
+    def bones_in_doubt(self, name: str) -> tuple[str, ...]:
+        """Bones of a person that may not be where the twin shows them, when the others are.
+
+        Raises:
+            Undecided: Nothing of the person may be relied on.
+        """
+        self.asked.add(name)
+        if reason := self._doubt(name):
+            raise Undecided(reason)
+        told = self.hearings[name].doubted(self.t)
+        return tuple(dict.fromkeys(bone for _, bones in told for bone in bones))
+
+    def _doubt(self, name: str) -> str:
         hearing = self.hearings[name]
         reason = hearing.doubt(self.t)
         if reason:
@@ -193,6 +148,15 @@ class State:
             return f"{name}: the twin is off by {hearing.error:.3g} rad or m, more than {limit:g}{why}"
         return ""
 
+    def signal(self, name: str) -> Value:
+        """The value of a variable of the dictionary now, in SI.
+
+        Raises:
+            Undecided: It was not heard lately, its source calls it bad, or it cannot be.
+        """
+        self.asked.add(VARIABLE + name)
+        return self.signals.value(name, self.t)
+
     # -- joints -----------------------------------------------------------------------------
 
     def q(self, mechanism: Mechanism) -> Array:
@@ -202,12 +166,12 @@ class State:
 
     def joint_positions(self, mechanism: Mechanism) -> Array:
         """The same without asking whether it was heard: for the picture, never for a verdict."""
-        return np.asarray(self.data.qpos[self._columns[mechanism.name].own_q])
+        return np.asarray(self.data.qpos[self.columns[mechanism.name].own_q])
 
     def qd(self, mechanism: Mechanism) -> Array:
         """Joint velocities of the twin [rad/s or m/s], shape (n,)."""
         self.require(mechanism.name)
-        return np.asarray(self.data.qvel[self._columns[mechanism.name].own_v])
+        return np.asarray(self.data.qvel[self.columns[mechanism.name].own_v])
 
     def measured_torques(self, mechanism: Mechanism) -> Array:
         """Joint torques that its source measured, between samples as positions are [N·m or N], shape (n,).
@@ -242,7 +206,7 @@ class State:
                 mujoco.mj_makeM(self.model.mj, self.data)
                 mujoco.mj_fullM(self.model.mj, self.data, self._full_mass_matrix)
                 self._cache["M"] = self._full_mass_matrix
-            self._cache[key] = self._columns[mechanism.name].of_matrix(self._full_mass_matrix)
+            self._cache[key] = self.columns[mechanism.name].of_matrix(self._full_mass_matrix)
         return np.asarray(self._cache[key])
 
     # -- kinematics -------------------------------------------------------------------------
@@ -274,8 +238,26 @@ class State:
                 position = position + rotation @ offset
             every = self._jacobian
             mujoco.mj_jac(self.model.mj, self.data, every[:3], every[3:], position, frame.mj)
-            self._cache[key] = self._columns[mechanism.name].of_rows(every)
+            self._cache[key] = self.columns[mechanism.name].of_rows(every)
         return np.asarray(self._cache[key])
+
+    def along(self, bodies: tuple[int, ...], mechanism: Mechanism, points: Array, directions: Array) -> Array:
+        r"""Rows :math:`u^T J_v` of points of several bodies, shape (b, n); see `jacobian`.
+
+        Args:
+            bodies: By index.
+            mechanism: Whose joints the columns are.
+            points: One of each body, in the world [m], shape (b, 3).
+            directions: Likewise, shape (b, 3).
+        """
+        self.require(mechanism.name)
+        if bodies not in self._moves:
+            mj = self.model.mj
+            self._moves[bodies] = np.array([moving_dofs(mj, self._mj_ids[i]) for i in bodies])
+        rows = np.array(bodies, np.int64)
+        every = np.empty((len(rows), self.model.mj.nv))
+        along(self._cdof, self._com, self._mj_roots[rows], self._moves[bodies], points, directions, every)
+        return self.columns[mechanism.name].of_rows(every)
 
     def body_velocity(self, index: int) -> tuple[Array, Array]:
         """Linear velocity at its origin [m/s] and angular velocity [rad/s] of a body, world axes."""

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from msgspec.structs import replace
+from numpy.typing import ArrayLike
 
+from seerob import batch
 from seerob import run as road
+from seerob.batch import Batch
 from seerob.compilation import Progress, compile_workstation
 from seerob.criterion import Criterion
 from seerob.errors import InputError, Problem
 from seerob.filing import SOURCES, source_files
+from seerob.given_states import motion_of
 from seerob.live import Listening, LiveSource
 from seerob.model import Model
 from seerob.permissible import evaluation
@@ -93,6 +98,7 @@ class Station:
         named = [getattr(source, "file", None) for source in station.sources]
         named += [getattr(rule, "limits", None) for rule in (*station.safety, *station.ergonomics)]
         named += [getattr(rule, "table", None) for rule in station.ergonomics]
+        named += [getattr(rule, "map", None) for rule in station.safety]
         references = [name for name in named if isinstance(name, str)]
         return {**self.model.files, **source_files(references, folder=self.model.folder)}
 
@@ -191,11 +197,47 @@ class Station:
                 progress=progress,
             )
 
+    def batch(
+        self,
+        q: Mapping[str, ArrayLike] | None = None,
+        qd: Mapping[str, ArrayLike] | None = None,
+        *,
+        t: ArrayLike | None = None,
+        threads: int | None = None,
+    ) -> Batch:
+        """Every criterion at many instants, in arrays; nothing is pulled, drawn or recorded.
+
+        Every criterion is asked at every instant, also one with a period; see `seerob.batch`.
+
+        Args:
+            q: Positions of the commanded joints of robots and humans by name [rad or m], shape (N, n) each;
+                who is not named stands where the file says. Without it, what the workstation's sources
+                say at every tick.
+            qd: Velocities likewise [rad/s or m/s].
+            t: Instants of ``q``, increasing [s], shape (N,); a tick apart when not given.
+            threads: How many work at once; as many as there are processors when not given.
+
+        Returns:
+            By criterion values, limits and verdicts: ``station.batch()["tcp speed"].value``.
+
+        Raises:
+            InputError: Arrays that do not fit, or a live source without them.
+        """
+        if q is None:
+            if qd is not None or t is not None:
+                raise InputError.at("batch", "q", "missing", "give positions with qd and t, or none of them")
+            require_recorded(self.workstation)
+            motion = batch.recorded(self.model, road.pump(self.sources, self.workstation.engine.tick))
+        else:
+            motion = motion_of(self.model, q, qd or {}, t)
+        return batch.judged(self.model, self.bound, motion, threads=threads or os.cpu_count() or 1)
+
     def permissible_speed(
         self,
         robot: str | None = None,
         *,
         wish: Wish | None = None,
+        sources: evaluation.Sources | None = None,
         velocity: Given = None,
         acceleration: Given = None,
         jerk: Given = None,
@@ -210,6 +252,7 @@ class Station:
         Args:
             robot: Its name; the only robot when not given.
             wish: Whose ceilings count, tolerances and spacings.
+            sources: Opened, instead of the workstation's own, such as those of a recording.
             velocity: Limits of the joints, one for all or one each, instead of the robot's [rad/s or m/s].
             acceleration: Likewise [rad/s² or m/s²]; never assumed.
             jerk: Likewise [rad/s³ or m/s³]; never assumed.
@@ -221,9 +264,10 @@ class Station:
 
         Raises:
             InputError: A limit that nobody gave, no criterion that limits the speed, a live source, or not
-                exactly one source of the robot's joint positions.
+                exactly one source of the robot's motion.
         """
-        require_recorded(self.workstation)
+        if sources is None:
+            require_recorded(self.workstation)
         names = [r.name for r in self.workstation.robots]
         if robot is None and len(names) != 1:
             what = f"missing, and there are {len(names)} robots"
@@ -231,7 +275,8 @@ class Station:
                 "permissible speed", "robot", what, f"name one of {', '.join(names) or 'none'}"
             )
         subject = self.model.robot(names[0] if robot is None else robot)
-        motion = evaluation.given_motion(self.sources, subject.name)
+        played = self.sources if sources is None else sources
+        motion, solved_from = evaluation.given_motion(self.model, played, subject.name)
         file = next(iter(self.workstation.files), "workstation")
         own = next(r for r in self.workstation.robots if r.name == subject.name)
         asked = {"acceleration": acceleration, "jerk": jerk}
@@ -243,22 +288,23 @@ class Station:
             file=file,
             written=[key for key, value in asked.items() if value is None],
         )
-        seen = evaluation.witness(self.model, self.sources, self.bound, self.scene().criteria, say)
+        scene = self.scene(with_sources=sources is None)
+        seen = evaluation.witness(self.model, played, self.bound, scene.criteria, say)
 
         def again(feed: Feed, duration: float) -> Summary:
             def told(t: float) -> None:
                 say("the rescaled motion", min(1.0, t / duration))
 
-            scene = self.scene()
             return self.run(
                 folder=folder, sinks=sinks, writers=writers, feed=feed, scene=scene, progress=told
             )
 
         return evaluation.evaluation(
             self.model,
-            self.sources,
+            played,
             seen=seen,
             motion=motion,
+            solved_from=solved_from,
             limits=limits,
             wish=wish or evaluation.Wish(),
             again=again,
@@ -266,12 +312,18 @@ class Station:
             say=say,
         )
 
+    def replay_scene(self, recording: Recording) -> Scene:
+        """The scene of a recording that is computed again, with what was found when it was made."""
+        findings = [f for f in recording.scene.findings if f not in self.model.findings]
+        return road.scene(self.model, self.bound, findings, files=self.files)
+
     def replay(
         self,
         recording: Recording,
         *,
         folder: Path | str | None = None,
         sinks: Sequence[Sink] = (),
+        writers: Sequence[Writer] = (),
         stop: Callable[[], bool] = lambda: False,
         progress: Callable[[float], None] = lambda _: None,
     ) -> Summary:
@@ -287,10 +339,17 @@ class Station:
                 f"recorded with a tick of {recording.scene.period} s",
                 f"set engine.tick = {recording.scene.period} in the workstation file",
             )
-        findings = [f for f in recording.scene.findings if f not in self.model.findings]
-        scene = road.scene(self.model, self.bound, findings, files=self.files)
+        scene = self.replay_scene(recording)
         feed = (tuple(tick.samples) for tick in recording.ticks())
-        return self.run(folder=folder, sinks=sinks, feed=feed, scene=scene, stop=stop, progress=progress)
+        return self.run(
+            folder=folder,
+            sinks=sinks,
+            writers=writers,
+            feed=feed,
+            scene=scene,
+            stop=stop,
+            progress=progress,
+        )
 
 
 def load(path: Path | str, *, cache: Path | None = None) -> Station:
@@ -323,6 +382,7 @@ def load_recorded(recording: Recording, *, cache: Path | None = None) -> Station
             ) from error
         # Read while the folder is there.
         now, then = station.files, recording.files
+        _ = station.bound
     compared = (name for name in {*now, *then} if not name.startswith(SOURCES))
     changed = sorted(name for name in compared if now.get(name) != then.get(name))
     if changed:

@@ -32,17 +32,28 @@ from seerob.transforms import Array
 
 SHARE = 0.8
 """Of the torque limits, unless the file says otherwise."""
+SHARES = {"bound": BOUND, "constant_deceleration": CONSTANT}
+"""Of v_r T_s, by how a stop is modelled whose time is known."""
 MOVING = 1e-6
 """Speed above which a robot moves [m/s]."""
 INSTANTS = 16
 """At most this many instants of a stop are asked for their distance to the person."""
 
 
+class StopTolerance(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How far figures of a stop may be off, either way."""
+
+    reaction: Annotated[float, Meta(ge=0, extra={"unit": "s"})] = 0.0
+    stopping: Annotated[float, Meta(ge=0, extra={"unit": "s"})] = 0.0
+    deceleration: Annotated[float, Meta(ge=0, extra={"unit": "m/s²"})] = 0.0
+
+
 class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How the robot stops."""
 
     reaction: Annotated[float, Meta(gt=0, extra={"unit": "s"})]
-    """T_r: from the event to the onset of braking, detection and processing included [s]."""
+    """T_r: from the event to the onset of braking, detection and processing included [s]; without the
+    response time of a ``sensor`` that the criterion names, which is added."""
     stopping: Annotated[float, Meta(gt=0, extra={"unit": "s"})] | None = None
     """T_s: from the onset of braking to standstill [s]; with a table, of the joints that it does not have."""
     model: Literal["bound", "constant_deceleration", "table", "simulated"] = "bound"
@@ -62,8 +73,15 @@ class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Share of the torque limits that brakes, with ``simulated``."""
     direction: Literal["path", "toward"] = "path"
     """With ``simulated``: whole path of the part, or how much nearer to the person it comes."""
+    tolerance: StopTolerance | None = None
+    """How far ``reaction``, ``stopping`` and ``deceleration`` may be off, either way."""
 
     def __post_init__(self) -> None:
+        for key in StopTolerance.__struct_fields__ if self.tolerance is not None else ():
+            half, figure = getattr(self.tolerance, key), getattr(self, key)
+            if half and (figure is None or half >= figure):
+                what = "is not given" if figure is None else f"= {figure:g} is not more"
+                raise ValueError(f"tolerance.{key} = {half:g}, but {key} {what}")
         needs = {
             "bound": self.stopping is not None,
             "constant_deceleration": (self.stopping is None) != (self.deceleration is None),
@@ -146,7 +164,7 @@ def fastest(state: State, gap: Gap) -> Array:
 
 
 def _timed(stop: Stop, gap: Gap) -> StopModel:
-    share = BOUND if stop.model == "bound" else CONSTANT
+    share = SHARES[stop.model]
 
     def courses(state: State) -> At:
         v = fastest(state, gap)

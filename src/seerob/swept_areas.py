@@ -246,6 +246,9 @@ class _Maker:
         largest = max((max(each.values(), default=0.0) for each in wanted), default=0.0)
         if not np.isfinite(largest) or largest > 100:
             raise InputError.at("swept", "separation", f"S_p grows to {largest:g} m", "mend the criterion")
+        low, high = reach_box(self.model, bodies)
+        wide = swept.margin + largest
+        check_room(low - wide, high + wide, swept.voxel)
 
         def beyond(k: int) -> Array:
             return np.array([wanted[k].get(name, 0.0) + swept.margin for name in names])

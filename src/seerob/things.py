@@ -18,8 +18,8 @@ from seerob.model_io.mesh_bodies import is_closed, joined
 from seerob.model_io.moments import signed_volume
 from seerob.snapshot import Finding, Origin
 from seerob.transforms import Array
+from seerob.workstation import Area, Shape, Thing
 from seerob.workstation import Body as BodyTable
-from seerob.workstation import Shape, Thing
 
 Color = tuple[float, float, float, float]
 TOOL_COLOR: Color = (0.33, 0.38, 0.45, 1.0)
@@ -95,6 +95,7 @@ def load_thing(
         pieces = tuple(_piece("" if single else name, mesh) for name, mesh in meshes)
         source = f"shape of {thing.mesh}"
         whole = [mesh for _, mesh in meshes]
+        findings += _holes(thing, whole, path)
     else:
         assert thing.shape is not None
         piece, whole = _simple(thing.shape, color)
@@ -183,7 +184,13 @@ def _spread(thing: Thing, meshes: list[Mesh]) -> tuple[Inertial, tuple[Finding, 
     """Mass properties at uniform density, and what was noticed."""
     rounded = _round(thing.shape)
     if rounded is None:
-        return mass_properties.from_shape(meshes, density=thing.density, mass=thing.mass, subject=thing.name)
+        try:
+            return mass_properties.from_shape(
+                meshes, density=thing.density, mass=thing.mass, subject=thing.name
+            )
+        except InputError as error:
+            source = thing.mesh or thing.name
+            raise InputError([problem._replace(file=source) for problem in error.problems]) from None
     volume, moments = _capsule(*rounded)
     what = "capsule" if rounded[1] else "sphere"
     mass, origin, source = thing.mass, Origin.GIVEN, f"{what}, shape in the workstation file"
@@ -201,6 +208,25 @@ def _capsule(radius: float, length: float) -> tuple[float, Array]:
     along = middle * radius**2 / 2 + ends * 0.4 * radius**2
     volume = float(middle + ends)
     return volume, np.array([across, across, along]) / volume
+
+
+def _holes(thing: Thing, meshes: Sequence[Mesh], path: Path) -> tuple[Finding, ...]:
+    """What an open surface means for distances.
+
+    Raises:
+        InputError: An area, of which only the inside matters.
+    """
+    if all(map(is_closed, meshes)) or is_closed(joined(meshes)[0]):
+        return ()
+    if isinstance(thing, Area):
+        raise InputError.at(
+            path,
+            "mesh",
+            "the mesh is open: nothing can be said to be inside of it",
+            "close it, or give a shape",
+        )
+    text = "mesh is open: distances are to its surface, and what counts as inside goes by the winding number"
+    return (Finding(level="note", subject=thing.name, text=text),)
 
 
 def _odd(thing: Thing, solids: tuple[Solid, ...], meshes: list[Mesh]) -> tuple[Finding, ...]:

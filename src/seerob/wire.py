@@ -25,9 +25,16 @@ from msgspec import Struct
 from seerob import markers, snapshot, verdict
 from seerob.errors import InputError
 
-FROM_SERVER = (snapshot.Hello, snapshot.Scene, snapshot.History, snapshot.Transport, snapshot.Snapshot)
+FROM_SERVER = (
+    snapshot.Hello,
+    snapshot.Scene,
+    snapshot.History,
+    snapshot.Transport,
+    snapshot.Snapshot,
+    snapshot.Tracked,
+)
 """Messages that a page receives."""
-FROM_PAGE = (snapshot.Command,)
+FROM_PAGE = (snapshot.Command, snapshot.Tracking)
 """Messages that a page sends; what has a default may be left out."""
 
 SOURCES = (verdict, markers, snapshot)

@@ -13,11 +13,11 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Struct
 
+from seerob.display_table import Display
 from seerob.errors import InputError
-from seerob.floor_polygon import check_polygon
+from seerob.machine_tables import Belt, Motion, Slide, Turn, Vehicle
 from seerob.quantities import (
     Coordinate,
-    Corners,
     Density,
     Length,
     Mass,
@@ -26,20 +26,20 @@ from seerob.quantities import (
     Radian,
     Radians,
     Share,
+    Tolerance,
     unit,
 )
 from seerob.quantities import Metres3 as Metres3  # noqa: PLC0414
 from seerob.quantities import Pose as Pose  # noqa: PLC0414
 from seerob.sensor_tables import Sensor
+from seerob.simple_shape import Shape as Shape  # noqa: PLC0414
 from seerob.task_phase import TaskPhase
+from seerob.trigger_table import Trigger
 
 MAX_FILE_SIZE = 4 << 20
 """A workstation file larger than this [byte] is not one."""
 
 FILE_NAME = "workstation.toml"
-
-MAX_SIZE = 1000.0
-"""Of a simple shape [m]."""
 
 
 class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -104,6 +104,8 @@ class Robot(_Table, frozen=True, kw_only=True):
     """Largest jerk per joint [rad/s³], likewise."""
     masses: dict[str, Body] = {}
     """Mass properties by hand, per link name."""
+    mass_tolerance: Tolerance | None = None
+    """How far the masses of its links may be off, all alike, as a share: 0.05 for ± 5 %."""
 
 
 class Body(_Table, frozen=True, kw_only=True):
@@ -115,40 +117,6 @@ class Body(_Table, frozen=True, kw_only=True):
     inertia: Annotated[tuple[float, float, float, float, float, float], unit("kg·m²")] | None = None
     """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]; from the shape when not given."""
     source: str = "workstation file"
-
-
-class Shape(_Table, frozen=True, kw_only=True):
-    """A simple shape instead of a mesh file, centred at the origin of its frame."""
-
-    box: Annotated[tuple[float, float, float], unit("m")] | None = None
-    """Edge lengths [m]."""
-    sphere: Length | None = None
-    """Radius [m]."""
-    cylinder: Annotated[tuple[float, float], unit("m")] | None = None
-    """Radius and height along z [m]."""
-    capsule: Annotated[tuple[float, float], unit("m")] | None = None
-    """Radius, and length along z between the centres of its two half balls [m]."""
-    polygon: Corners | None = None
-    """Corners (x, y) of a floor plan, in either sense, concave or not, extruded along z [m]; not centred."""
-    height: Annotated[tuple[Coordinate, Coordinate], unit("m")] | None = None
-    """Lower and upper end along z of what is extruded from ``polygon`` [m]."""
-
-    def __post_init__(self) -> None:
-        given = [x for x in (self.box, self.sphere, self.cylinder, self.capsule) if x is not None]
-        if len(given) + (self.polygon is not None) != 1:
-            raise ValueError("give exactly one of box, sphere, cylinder, capsule, polygon")
-        if (self.polygon is None) != (self.height is None):
-            raise ValueError("polygon and height = [lower, upper] belong together")
-        if self.polygon is not None and self.height is not None:
-            check_polygon(self.polygon)
-            if self.height[0] >= self.height[1]:
-                raise ValueError(f"height = {list(self.height)} is no interval: the lower end comes first")
-            return
-        sizes = (given[0],) if isinstance(given[0], float) else given[0]
-        if min(sizes) <= 0:
-            raise ValueError(f"sizes must be larger than 0 m, not {list(sizes)}")
-        if max(sizes) > MAX_SIZE:
-            raise ValueError(f"sizes must be at most {MAX_SIZE:g} m, not {list(sizes)}")
 
 
 class Thing(_Table, frozen=True, kw_only=True):
@@ -190,6 +158,8 @@ class Mounted(Thing, frozen=True, kw_only=True):
 
     on: str
     """Full name of the link that carries it, such as ``ur10/tool0``, or of another tool."""
+    mass_tolerance: Tolerance | None = None
+    """How far its mass may be off, as a share: 0.05 for ± 5 %."""
 
 
 class Tool(Mounted, frozen=True, kw_only=True):
@@ -205,6 +175,29 @@ class Workpiece(Mounted, frozen=True, kw_only=True):
 
 class Part(Thing, frozen=True, kw_only=True):
     """Something of the environment that stands still."""
+
+
+class Machine(Thing, frozen=True, kw_only=True):
+    """Something of the environment that moves: an axis, a door, a turntable, what a belt carries, a cart."""
+
+    slide: Slide | None = None
+    turn: Turn | None = None
+    belt: Belt | None = None
+    vehicle: Vehicle | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if "/" in self.name:
+            raise ValueError(f"name = {self.name!r}: the name of a machine has no /")
+        if sum(m is not None for m in (self.slide, self.turn, self.belt, self.vehicle)) != 1:
+            raise ValueError("give exactly one of slide, turn, belt, vehicle")
+
+    @property
+    def motion(self) -> Motion:
+        """How it moves."""
+        motion = self.slide or self.turn or self.belt or self.vehicle
+        assert motion is not None
+        return motion
 
 
 class SweptArea(_Table, frozen=True, kw_only=True):
@@ -258,8 +251,8 @@ class Human(_Table, frozen=True, kw_only=True):
     """A person."""
 
     name: Name
-    stature: Annotated[float, unit("m", ge=1.2, le=2.3)]
-    """[m]"""
+    stature: Annotated[float, unit("m", ge=1.2, le=2.3)] | str
+    """[m], or a percentile of a published population: ``"germany P50"``."""
     mass: Annotated[float, unit("kg", ge=30, le=250)]
     """[kg]"""
     sex: Literal["male", "female"]
@@ -271,6 +264,8 @@ class Human(_Table, frozen=True, kw_only=True):
     masses: Literal["deleva", "zatsiorsky"] | dict[str, Mass] = "deleva"
     """Data set of segment masses; or masses by hand [kg], ``{ thigh = 9.5, … }``, the others then from
     ``deleva`` so that all weigh the body mass."""
+    follow: Literal["posture", "task"] = "posture"
+    """What the controllers that pull the twin hold: each joint at its value, or each bone at its place."""
     at: Pose = Pose()
     """Where the person stands: the point on the floor between the feet."""
     posture: str = "standing"
@@ -294,15 +289,22 @@ class Workstation(_Table, frozen=True, kw_only=True):
     description: str = ""
     variables: str | None = None
     """Dictionary of the variables of controllers and machines, a TOML file beside this one."""
+    zones: str | None = None
+    """Zones of a robot controller as more ``[[areas]]``, a TOML or JSON file beside this one."""
+    allow_writing: bool = False
+    """Whether ``[[triggers]]`` may write to machines; the command line must allow it too."""
     engine: Engine = Engine()
     robots: tuple[Robot, ...] = ()
     tools: tuple[Tool, ...] = ()
     workpieces: tuple[Workpiece, ...] = ()
     parts: tuple[Part, ...] = ()
+    machines: tuple[Machine, ...] = ()
     areas: tuple[Area, ...] = ()
     sensors: tuple[Sensor, ...] = ()
     humans: tuple[Human, ...] = ()
     phases: tuple[TaskPhase, ...] = ()
+    displays: tuple[Display, ...] = ()
+    triggers: tuple[Trigger, ...] = ()
     contacts: tuple[Contact, ...] = ()
     sources: tuple[Any, ...] = ()
     """`Source`s, each of the type that its ``kind`` names."""
@@ -324,10 +326,13 @@ TABLES: dict[str, type[Struct]] = {
     "tools": Tool,
     "workpieces": Workpiece,
     "parts": Part,
+    "machines": Machine,
     "areas": Area,
     "sensors": Sensor,
     "humans": Human,
     "phases": TaskPhase,
+    "displays": Display,
+    "triggers": Trigger,
     "contacts": Contact,
 }
 """Lists of tables and the type of their entries."""

@@ -9,11 +9,14 @@ from pathlib import Path
 import numpy as np
 from msgspec.structs import replace
 
+from seerob import run as road
+from seerob.engine import Engine
 from seerob.human import keyframes, manikin, motion
 from seerob.human.captured import Captured, CaptureFrame, Layout, Seen
 from seerob.human.skeleton import BONES, bone_poses
 from seerob.reading import convert_workstation
 from seerob.sources._capture_file import CaptureFile
+from seerob.station import Station
 from seerob.transforms import wxyz_from_rotation
 from seerob.workstation import Workstation
 
@@ -58,8 +61,29 @@ def source(recording: Captured, **options: object) -> Made:
     return Made(made=lambda: recording, **given)  # type: ignore[arg-type]
 
 
-def workstation(*sources: CaptureFile, **tables: object) -> Workstation:
-    """One person, and what ``tables`` add."""
-    made, problems = convert_workstation({"humans": [TABLE], **tables}, "made.toml")
+def workstation(
+    *sources: CaptureFile, person: dict[str, object] | None = None, **tables: object
+) -> Workstation:
+    """One person, with more of the table in ``person``, and what ``tables`` add."""
+    made, problems = convert_workstation({"humans": [TABLE | (person or {})], **tables}, "made.toml")
     assert made is not None, problems
     return replace(made, sources=sources, folder=".")
+
+
+Told = tuple[float, str, dict[str, tuple[float | None, float | None]], float, np.ndarray]
+
+
+def play(*sources: CaptureFile, **tables: object) -> list[Told]:
+    """Tick by tick: time, doubt, errors per bone, largest joint speed, positions of the joints."""
+    station = Station(workstation(*sources, **tables))
+    engine = Engine(station.model, driven={"operator": 0.2})
+    mechanism = station.model.mechanisms["operator"]
+    told = []
+    for seq, samples in enumerate(road.pump(station.sources, 0.01)):
+        engine.take(samples)
+        state = engine.tick() if seq else engine.start()
+        hearing = state.hearings["operator"]
+        speed = float(np.abs(state.data.qvel[mechanism.v_address]).max())
+        q = state.joint_positions(mechanism).copy()
+        told.append((state.t, state.doubt("operator"), dict(hearing.bones), speed, q))
+    return told

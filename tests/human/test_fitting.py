@@ -58,14 +58,14 @@ def test_a_posture_comes_back_from_its_bones_wherever_the_person_stands(seed):
     q = random_posture(seed)
     world = transform(rotation_from_rpy([0, 0, 0.7 * seed]), [seed, -2.0, 0.1])
     found, error = FITTER.fit(seen_of(q, world=world), None)
-    assert found == pytest.approx(q, abs=0.01)
-    assert np.abs(error).max() < 5e-3
+    assert found == pytest.approx(q, abs=2e-3)
+    assert np.abs(error).max() < 1e-3
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_joint_centres_alone_tell_where_every_bone_begins(seed):
     _, error = FITTER.fit(seen_of(random_posture(seed), turned=False), None)
-    assert np.abs(error[:, :3]).max() < 5e-3
+    assert np.abs(error[:, :3]).max() < 1e-3
 
 
 def test_the_fit_is_a_minimum():

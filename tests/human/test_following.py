@@ -5,10 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from made_capture import PERSON, captured, frames_of, source, walking, workstation
+from made_capture import PERSON, captured, frames_of, play, source, walking, workstation
 
-from seerob import run as road
-from seerob.engine import Engine
 from seerob.human.following import POINT_SPEED, Following
 from seerob.human.skeleton import BONES, JOINTS, bone_poses
 from seerob.quantities import Pose
@@ -17,22 +15,6 @@ from seerob.station import Station
 from seerob.transforms import rotation_from_axis_angle, rotation_from_wxyz, wxyz_from_rotation
 
 HAND = BONES.index("right_hand")
-
-
-def play(*sources, **tables):
-    """Tick by tick: time, doubt, errors per bone, positions of the joints."""
-    station = Station(workstation(*sources, **tables))
-    engine = Engine(station.model, driven={"operator": 0.2})
-    mechanism = station.model.mechanisms["operator"]
-    told = []
-    for seq, samples in enumerate(road.pump(station.sources, 0.01)):
-        engine.take(samples)
-        state = engine.tick() if seq else engine.start()
-        hearing = state.hearings["operator"]
-        speed = float(np.abs(state.data.qvel[mechanism.v_address]).max())
-        q = state.joint_positions(mechanism).copy()
-        told.append((state.t, state.doubt("operator"), dict(hearing.bones), speed, q))
-    return told
 
 
 def test_a_walk_is_followed_by_every_bone():
@@ -200,7 +182,7 @@ def test_a_device_that_falls_silent_leaves_its_bones_to_the_others_or_in_doubt()
         if seq < 8:
             hand = points(["right_hand"], q[0])
             following.hear(BodySample(source="glove", target="operator", seq=seq, t=t, points=hand, hold=0.3))
-    told = {found.t: found.reason for found in following.until(0.9)}
+    told = {found.t: "; ".join(why for why, _ in found.parts) for found in following.until(0.9)}
     assert all(reason == "" for t, reason in told.items() if t < 0.6)
     assert all("right_hand" in reason and "glove" in reason for t, reason in told.items() if t > 0.7)
 
@@ -249,3 +231,28 @@ def test_mujoco_agrees_where_the_bones_are():
     _, p = Following(PERSON, np.eye(4))._fitter.bones(q)
     for i, bone in enumerate(BONES):
         assert data.xpos[model.frames[f"operator/{bone}"].mj] == pytest.approx(p[i], abs=1e-12)
+
+
+def test_hostile_samples_are_refused_and_what_waits_is_bounded():
+    from seerob.human import following as module
+
+    _, q = walking()
+    good = points(BONES, q[0])
+    following = Following(PERSON, np.eye(4))
+
+    def hear(source="d", t=0.0, what=good, hold=0.5):
+        return following.hear(
+            BodySample(source=source, target="operator", seq=0, t=t, points=what, hold=hold)
+        )
+
+    assert not hear(what=good * 200)
+    for hold in (np.nan, -1.0, np.inf):
+        assert not hear(hold=hold)
+    assert hear()
+    assert not hear()
+    # A clock that runs ahead: what it says waits, but not without end.
+    for k in range(module.MOST_KEPT + 100):
+        assert hear(t=1e6 + k, what=good[:1])
+    assert len(following._instants) <= module.MOST_KEPT
+    heard = [hear(source=f"d{k}", t=0.5) for k in range(module.MOST_DEVICES + 5)]
+    assert sum(heard) == module.MOST_DEVICES - 1

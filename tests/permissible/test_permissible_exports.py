@@ -12,7 +12,8 @@ import pytest
 
 from made_cell import FLOATING, UR10, made
 from seerob.errors import InputError
-from seerob.permissible.tables import MAP_HEAD, csv_bytes, map_rows, trajectory_head, trajectory_rows
+from seerob.permissible.segments import segments
+from seerob.permissible.tables import csv_bytes, map_head, map_rows, trajectory_head, trajectory_rows
 from seerob.permissible.urscript import refusal, urscript
 from seerob.permissible.workbook import workbook
 from seerob.samples import JointSample
@@ -60,8 +61,10 @@ def test_our_own_csv_is_the_same_trajectory_when_read_back(made_up, tmp_path):
 
 def test_the_workbook_holds_the_trajectory_the_map_and_sources(made_up):
     _, station, found = made_up
-    book = openpyxl.load_workbook(io.BytesIO(workbook(found, station.scene(), period=0.008)))
-    assert book.sheetnames[:4] == ["Summary", "Map", "Map by region", "Rescaled"]
+    book = openpyxl.load_workbook(
+        io.BytesIO(workbook(found, segments(found.map), station.scene(), period=0.008))
+    )
+    assert book.sheetnames[:5] == ["Summary", "Segments", "Map", "Map by region", "Rescaled"]
     rows = list(book["Rescaled"].iter_rows(values_only=True))
     assert rows[0][:2] == ("t [s]", "J1 [rad]")
     trajectory = found.rescaled.trajectory(0.008)
@@ -75,7 +78,7 @@ def test_the_workbook_holds_the_trajectory_the_map_and_sources(made_up):
 
 def test_the_map_as_a_table_has_its_units_and_reasons(made_up):
     _, _, found = made_up
-    rows = list(csv.DictReader(io.StringIO(csv_bytes(MAP_HEAD, map_rows(found.map)).decode())))
+    rows = list(csv.DictReader(io.StringIO(csv_bytes(map_head(found.map), map_rows(found.map)).decode())))
     (stations,) = found.map.stations
     column = "permissible path speed [rad/s or m/s]"
     np.testing.assert_array_equal([float(row[column]) for row in rows], stations.permissible)

@@ -12,8 +12,8 @@ from seerob import cli
 from seerob.errors import InputError
 from seerob.permissible import evaluation
 from seerob.permissible.evaluation import Wish
+from seerob.permissible.methods import By
 from seerob.permissible.rescaled import Rescaled
-from seerob.permissible.speed_map import Permit
 
 LIMITS = "acceleration_limits = [6.0, 6.0]\njerk_limits = [60.0, 60.0]\n"
 PERSON = (
@@ -45,7 +45,7 @@ def cell(folder, *criteria, x=3.2, more="", masses=(1.0, 1.0), limits=LIMITS):
     return made(folder, text, {"arm.urdf": two_r(masses=masses), "motion.csv": turn()})
 
 
-COARSE = Wish(spacing=0.1)
+COARSE = Wish(spacing=0.1, verify=0.02)
 
 LEVER = np.hypot(2, 0.05)
 """Of the arm's farthest corner [m]."""
@@ -54,7 +54,7 @@ LEVER = np.hypot(2, 0.05)
 def test_separation_permits_the_speed_of_the_closed_form(tmp_path):
     """(v + v_h)(T_r + T_s) + K = d at the part that governs, with d of the same pose."""
     station = cell(tmp_path, KNOWN)
-    found = station.permissible_speed()
+    found = station.permissible_speed(wish=Wish(verify=0.02))
     (stations,) = found.map.stations
     model = station.model
     gap = model.gap(model.select("op"), model.robot("arm").moving)
@@ -93,7 +93,7 @@ def test_contact_permits_the_published_speed_of_the_hand(tmp_path):
 
 @pytest.mark.parametrize("criteria", [(PFL + KEPT_OUT,), (KNOWN,), (PFL + KEPT_OUT, KNOWN)])
 def test_the_rescaled_motion_is_within_where_the_given_one_was_not(tmp_path, criteria):
-    found = cell(tmp_path, *criteria).permissible_speed()
+    found = cell(tmp_path, *criteria).permissible_speed(wish=Wish(verify=0.02))
     assert found.rescaled is not None
     assert "exceeded" in {series.verdict for series in found.before.values()}
     assert {series.verdict for series in found.after.results.values()} == {"within"}
@@ -137,7 +137,7 @@ def test_what_is_missing_makes_the_map_undecided(tmp_path):
 
 def test_criteria_that_were_not_asked_do_not_count(tmp_path):
     station = cell(tmp_path, PFL + KEPT_OUT, SSM.format(Z_r=""))
-    found = station.permissible_speed(wish=Wish(permit=Permit.CONTACT, spacing=0.1))
+    found = station.permissible_speed(wish=Wish(by=By.PFL, spacing=0.1, verify=0.02))
     assert found.map.asked == ("F",)
     assert found.rescaled is not None
     assert found.after.results["S"].verdict in ("undecided", "exceeded")
@@ -145,7 +145,7 @@ def test_criteria_that_were_not_asked_do_not_count(tmp_path):
 
 def test_a_limit_of_a_tool_speed_is_one_more_ceiling(tmp_path):
     tip = '[[safety]]\nkind = "velocity"\nname = "V"\nat = "arm"\nlimit = 0.5\n'
-    found = cell(tmp_path, tip).permissible_speed()
+    found = cell(tmp_path, tip).permissible_speed(wish=COARSE)
     np.testing.assert_allclose(found.map.stations[0].permissible, 0.25, rtol=1e-6)
     assert found.after.verdict == "within"
     assert found.after.results["V"].max() == pytest.approx(0.49, rel=1e-2)
@@ -154,14 +154,16 @@ def test_a_limit_of_a_tool_speed_is_one_more_ceiling(tmp_path):
 def test_energy_falls_with_the_square_of_the_speed(tmp_path):
     """½ (1 + 4) q̇² of the point masses at 1 m and 2 m."""
     energy = '[[safety]]\nkind = "kinetic_energy"\nname = "E"\nrobot = "arm"\nlimit = 0.4\n'
-    found = cell(tmp_path, energy).permissible_speed()
+    found = cell(tmp_path, energy).permissible_speed(wish=COARSE)
     np.testing.assert_allclose(found.map.stations[0].permissible, 0.4, rtol=1e-6)
 
 
 def test_not_faster_than_given(tmp_path):
     tip = '[[safety]]\nkind = "velocity"\nname = "V"\nat = "arm"\nlimit = 9.0\n'
     station = cell(tmp_path, tip)
-    free, held = (station.permissible_speed(wish=Wish(not_faster=x)).rescaled for x in (False, True))
+    free, held = (
+        station.permissible_speed(wish=Wish(not_faster=x, verify=0.02)).rescaled for x in (False, True)
+    )
     assert isinstance(free, Rescaled)
     assert isinstance(held, Rescaled)
     assert free.duration < held.duration
@@ -215,7 +217,7 @@ def test_who_ends_early_stands_still_and_that_is_said(tmp_path):
     rows = [f"{t:.1f},{0.1 * np.sin(t):.6f},0" for t in np.arange(0, 0.95, 0.1)]
     short = "t [s],J1 [rad],J2 [rad]\n" + "\n".join(rows) + "\n"
     station = made(tmp_path, text, {"arm.urdf": two_r(), "motion.csv": turn(), "other.csv": short})
-    found = station.permissible_speed("arm", wish=Wish(rounds=2, spacing=0.1))
+    found = station.permissible_speed("arm", wish=Wish(rounds=2, spacing=0.1, verify=0.02))
     assert "other" in {f.subject for f in found.findings if "stands still after" in f.text}
     assert found.after.verdict == "within"
 
@@ -232,13 +234,20 @@ def test_the_samples_of_a_given_motion():
 def test_the_command(tmp_path, capsys):
     cell(tmp_path / "cell", PFL + KEPT_OUT, KNOWN)
     out = tmp_path / "out"
-    words = ["permissible", str(tmp_path / "cell"), "-o", str(out), "--spacing", "0.1"]
+    words = ["permissible", str(tmp_path / "cell"), "-o", str(out), "--spacing", "0.1", "--verify", "0.02"]
     assert cli.main([*words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["verdict"] == "within"
     assert {b["side"] for b in told["bounds"]} == {"at least", "at most"}
     names = {path.name for path in out.iterdir()}
-    assert names == {"map.csv", "map_by_region.csv", "rescaled.csv", "permissible.xlsx", "report.html"}
+    assert names == {
+        "map.csv",
+        "map_by_region.csv",
+        "rescaled.csv",
+        "permissible.xlsx",
+        "report.html",
+        "segments.csv",
+    }
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "Permissible speed along the path" in page
     assert "Between the samples" in page

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, judged, made, results_at, state_at, two_r
+from made_cell import FLOATING, TWO_R, heard, judged, made, results_at, state_at, two_r
 from seerob.engine import Engine
 from seerob.errors import InputError
 from seerob.run import Judge
@@ -79,8 +79,10 @@ def test_the_shadow_of_a_block_has_the_area_of_its_trapezoid(tmp_path):
 
 def test_the_picture_ends_at_the_first_thing_in_each_beam(tmp_path):
     s = results(tmp_path, SCANNER + BLOCK + POLE.format(r=0.1, x=9, y=9) + WATCH.format(of="pole"))["s"]
-    hull = next(m for m in s.markers if type(m).__name__ == "Hull")
-    points = np.array(hull.vertices)
+    fan = next(m for m in s.markers if type(m).__name__ == "Rays")
+    assert fan.filled
+    assert fan.starts == ((0.0, 0.0, 0.3),)
+    points = np.array(fan.ends)
     np.testing.assert_allclose(points[:, 2], 0.3, atol=1e-3)
     behind = (points[:, 0] > 1.26) & (np.abs(points[:, 1]) < 0.19 * points[:, 0])
     assert not behind.any()
@@ -112,6 +114,43 @@ def test_the_way_before_detection_is_measured(tmp_path):
     first = judge(state_at(station, arm=((np.pi - 0.02, 0.0), (0, 0))))[0]
     assert part(first, "walked before detection").value == 0.0
     assert "in the shadow of block" in first.reason
+
+
+def test_the_way_in_the_shadow_and_until_the_output_switched_is_the_path_of_the_link(tmp_path):
+    """At 1 rad/s out of the shadow, whose edge is the ray past the block's near corner, atan(0.25/1.25).
+
+    The first beam beyond it is that of 11.5°; the link's own frame turns 1 m from the base.
+    """
+    arm = TWO_R + "base = { position = [3.8, 0, 0.3] }\n"
+    text = "engine = { gravity = [0, 0, 0], physics = false }\n" + arm + BLOCK + SCANNER
+    station = made(tmp_path, text + WATCH.format(of="arm/l2"), {"arm.urdf": two_r()})
+    engine, judge = Engine(station.model, driven={"arm": 1.0}), Judge(station.bound)
+    corners = np.array([[x, y] for x in (1.0, 2.0) for y in (-0.05, 0.05)])
+    unseen = until = 0.0
+    seen_at = last = None
+    for k in range(60):
+        t = 0.01 * k
+        q = np.pi - 0.02 - t
+        engine.take([heard("arm", t, (q, 0.0), (-1.0, 0.0))])
+        state = engine.tick() if k else engine.start()
+        result = judge(state)[0]
+        R = np.array([[np.cos(q), -np.sin(q)], [np.sin(q), np.cos(q)]])
+        at = corners @ R.T + [3.8, 0]
+        joint = R @ [1.0, 0.0]
+        chord = 0.0 if last is None else np.linalg.norm(joint - last)
+        last = joint
+        if seen_at is None:
+            unseen += chord
+            if np.degrees(np.arctan2(at[:, 1], at[:, 0])).max() >= 11.5:
+                seen_at = t
+        elif t - seen_at <= 0.08 + 1e-9:
+            until += chord
+        assert part(result, "walked before detection").value == pytest.approx(unseen, abs=1e-6)
+        assert ("NOT" in result.reason) == (seen_at is None)
+        if seen_at is not None:
+            assert part(result, "walked until the output switched").value == pytest.approx(until, abs=1e-6)
+    assert 0.05 < unseen < 0.3
+    assert until == pytest.approx(0.08, abs=1e-4)
 
 
 def test_an_unheard_robot_may_cast_a_shadow(tmp_path):

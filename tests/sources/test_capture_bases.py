@@ -252,6 +252,9 @@ def test_a_stream_is_silent_while_it_is_calibrated_and_says_what_it_found(caplog
 
     with caplog.at_level(logging.INFO):
         samples = asyncio.run(all_of())
+    told, *samples = samples
+    assert told.values["calibration left_hand turned [rad]"] == pytest.approx(np.pi / 2)
+    assert told.values["calibration head off [m]"] == pytest.approx(0.0, abs=1e-9)
     assert 0 < len(samples) < 400
     assert "left_hand on left_hand is mounted a quarter turn" in caplog.text
     R, _ = bone_poses(PERSON, posture(PERSON, pose))

@@ -13,6 +13,7 @@ import {
   stale,
   traces,
   tracesRevision,
+  tracked,
   transport,
 } from "./page_state";
 import { PoseReader } from "./poses";
@@ -92,6 +93,9 @@ export class Connection {
         return;
       case "transport":
         transport.value = message.transport;
+        return;
+      case "tracked":
+        tracked.value = message.tracked;
         return;
       case "points":
         for (const points of message.points) traces.get(points.name)?.append(points);

@@ -36,6 +36,7 @@ function begin(element: HTMLElement): void {
     frame: (frame) => viewer.show(frame),
   });
   actions.time.connect((message) => connection.send(message));
+  actions.offer = (tracking) => connection.send({ kind: "tracking", tracking });
   actions.look = (preset) => viewer.viewpoint.go(preset);
   actions.frameSelection = () => {
     const names = selectedNodes.value;
@@ -58,6 +59,7 @@ function begin(element: HTMLElement): void {
 const actions: Actions = {
   time: new TimeControl(),
   look: () => {},
+  offer: () => {},
   frameSelection: () => {},
 };
 listenToKeys(actions);

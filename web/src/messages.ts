@@ -1,6 +1,6 @@
 // What the worker and the page tell each other. The worker owns the socket; the page owns the screen.
 
-import type { Hello, History, Result, Scene, Transport } from "./wire";
+import type { Hello, History, Result, Scene, Snapshot, Tracked, Tracking, Transport } from "./wire";
 
 /** What a page asks of the server; `ack` is the worker's own affair. */
 export type Action = "play" | "pause" | "seek" | "speed" | "step" | "loop";
@@ -24,6 +24,7 @@ export interface Frame {
   joints: { [name: string]: number[] };
   tracking: { [name: string]: number };
   results: Result[];
+  looks: Snapshot["looks"];
 }
 
 export type FromWorker =
@@ -32,6 +33,8 @@ export type FromWorker =
   | { kind: "scene"; scene: Scene; shared: SharedArrayBuffer | null }
   | { kind: "history"; history: History }
   | { kind: "transport"; transport: Transport }
+  /** What became of what this page's headset sees. */
+  | { kind: "tracked"; tracked: Tracked }
   | { kind: "frame"; frame: Frame }
   | { kind: "points"; points: TracePoints[]; newest: number; oldest: number }
   | { kind: "poses"; buffer: ArrayBuffer; t: number; seq: number };
@@ -42,5 +45,6 @@ export type ToWorker =
   | { kind: "want" }
   | { kind: "recycle"; buffer: ArrayBuffer }
   | { kind: "command"; action: Action; value: number | null }
+  | { kind: "tracking"; tracking: Tracking }
   /** While live: show the kept snapshot of this run time, or follow the newest (null). */
   | { kind: "look"; t: number | null };

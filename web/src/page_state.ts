@@ -5,7 +5,7 @@ import { type Elsewhere, worseElsewhere } from "./elsewhere";
 import type { Frame, LinkState } from "./messages";
 import { Trace } from "./traces";
 import { type State, stateOf, worstState } from "./verdicts";
-import type { CriterionInfo, Hello, Node, Result, Scene, Transport } from "./wire";
+import type { CriterionInfo, Hello, Node, Result, Scene, Tracked, Transport } from "./wire";
 
 export interface Selection {
   /** `node` and `criterion` name one thing; `owner` a whole robot, human, tool or part. */
@@ -36,6 +36,9 @@ export const transport = signal<Transport>({
   live: false,
   loop: false,
 });
+
+/** What became of what this page's headset sees; null before it offered anything. */
+export const tracked = signal<Tracked | null>(null);
 
 /** Shown results and joints; replaced at most ten times a second. */
 export const frame = signal<Frame | null>(null);

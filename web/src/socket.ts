@@ -2,7 +2,7 @@
 
 import { Decoder, encode } from "@msgpack/msgpack";
 import type { LinkState } from "./messages";
-import { type Command, PROTOCOL, type ServerMessage } from "./wire";
+import { type PageMessage, PROTOCOL, type ServerMessage } from "./wire";
 
 const FIRST_WAIT_MS = 300;
 const LONGEST_WAIT_MS = 5000;
@@ -26,9 +26,9 @@ export class Socket {
     this.open();
   }
 
-  /** Send a command; dropped when there is nobody to hear it. */
-  send(command: Command): void {
-    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(encode(command));
+  /** Send a message; dropped when there is nobody to hear it. */
+  send(message: PageMessage): void {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(encode(message));
   }
 
   private open(): void {

@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "12ea4272cab5a876";
+export const SCHEMA = "cf996722825fe543";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -295,6 +295,8 @@ export interface Snapshot {
    */
   bones: Record<string, Record<string, [number | null, number | null]>>;
   results: Result[];
+  /** Nodes whose look follows a variable: red, green, blue in 0…1; null where one is not drawn. */
+  looks: Record<string, Vec3 | null>;
 }
 
 /** One body of the scene; its index is its slot in `Snapshot.poses`. */
@@ -419,6 +421,33 @@ export interface Transport {
   loop: boolean;
 }
 
+/** What a page's headset sees of the person who wears it; only a live run that waits for it takes it. */
+export interface Tracking {
+  type: "tracking";
+  /** Name of the person in the workstation file. */
+  human: string;
+  /** On the page's clock [s]. */
+  t: number;
+  /** `viewer`, `left-grip`, `right-grip`, and joints as WebXR Body Tracking names them. */
+  names: string[];
+  /**
+   * Little-endian float32, seven per name: x, y, z [m], w, x, y, z in `local-floor` (x right, y up,
+   * z backward); NaN for what is not tracked.
+   */
+  poses: Uint8Array;
+  /** One byte per name, 1 where the headset itself only estimates the position; empty for nowhere. */
+  guessed?: Uint8Array;
+}
+
+/** What became of a page's `Tracking`; sent at its first, and when that changes. */
+export interface Tracked {
+  type: "tracked";
+  human: string;
+  accepted: boolean;
+  /** Why not. */
+  reason: string;
+}
+
 /** What a page asks of the server. */
 export interface Command {
   type: "command";
@@ -431,6 +460,6 @@ export interface Command {
   value?: number | null;
 }
 
-export type ServerMessage = Hello | Scene | History | Transport | Snapshot;
+export type ServerMessage = Hello | Scene | History | Transport | Snapshot | Tracked;
 
-export type PageMessage = Command;
+export type PageMessage = Command | Tracking;

@@ -50,6 +50,9 @@ function received(message: ServerMessage, raw: Uint8Array): void {
     case "transport":
       post({ kind: "transport", transport: message });
       return;
+    case "tracked":
+      post({ kind: "tracked", tracked: message });
+      return;
   }
 }
 
@@ -88,8 +91,8 @@ function show(snapshot: Snapshot): void {
     new Uint8Array(buffer).set(snapshot.poses);
     post({ kind: "poses", buffer, t: snapshot.t, seq: snapshot.seq }, [buffer]);
   }
-  const { seq, t, joints, tracking, results } = snapshot;
-  waiting = { seq, t, joints, tracking, results };
+  const { seq, t, joints, tracking, results, looks } = snapshot;
+  waiting = { seq, t, joints, tracking, results, looks };
   deliver();
 }
 
@@ -135,6 +138,9 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
       return;
     case "command":
       socket?.send({ type: "command", action: message.action, value: message.value });
+      return;
+    case "tracking":
+      socket?.send(message.tracking);
       return;
     case "look":
       look(message.t);

@@ -17,6 +17,7 @@ from seerob.figures import against, with_unit
 from seerob.snapshot import Finding, Verdict
 
 if TYPE_CHECKING:
+    from seerob.bone_errors import BoneErrors
     from seerob.results import Series
     from seerob.run import Summary
     from seerob.station import Station
@@ -214,8 +215,23 @@ def tell_results(summary: Summary) -> None:
     for name, series in summary.results.items():
         word, style = WORDS[series.verdict]
         line(word, f"{name:<{width}}  {extreme(series)}", style)
+    for person, errors in summary.results.bones.items():
+        line("bones", f"{person}: {_missing(errors)}")
     if summary.verdict is None:
         line("nothing judged", "no criterion has a verdict: give one a limit", WORDS[Verdict.UNDECIDED][1])
+
+
+def _missing(errors: BoneErrors) -> str:
+    """How far bones are from where devices see them: ``9.2 mm median, P95 23 mm, worst right_hand …``."""
+    parts = []
+    for whole in errors.all():
+        worst = max((e for e in errors.bones() if e.what == whole.what), key=lambda e: e.median)
+        unit, factor = ("mm", 1e3) if whole.unit == "m" else ("°", math.degrees(1.0))
+        shown = [f"{factor * value:.3g} {unit}" for value in (whole.median, whole.p95, worst.median)]
+        parts.append(
+            f"{whole.what} {shown[0]} median, {shown[1]} P95, worst {worst.bone} with {shown[2]} median"
+        )
+    return "; ".join(parts)
 
 
 def extreme(series: Series) -> str:
@@ -252,6 +268,10 @@ def results_json(summary: Summary, **more: Any) -> str:
         "ticks": summary.ticks,
         "workstation_hash": summary.scene.workstation_hash,
         "criteria": criteria,
+        "bones": {
+            name: [error._asdict() for error in (*errors.all(), *errors.bones())]
+            for name, errors in summary.results.bones.items()
+        },
         "findings": [
             {"level": f.level, "subject": f.subject, "text": f.text} for f in summary.scene.findings
         ],

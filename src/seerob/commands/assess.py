@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from seerob.commands import (
     OUT,
@@ -18,6 +18,14 @@ from seerob.commands import (
     run_folder,
     tell,
     tell_results,
+)
+from seerob.commands.permissible_result import (
+    add_permissible,
+    add_sections,
+    permissible_found,
+    permissible_json,
+    tell_plan,
+    work_progress,
 )
 from seerob.commands.progress import announced, progress
 from seerob.commands.sinks import file_of, refuse_existing, sinks_of, tell_files
@@ -38,6 +46,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     add_output(sub)
     text = "also bounds on distances and speeds that hold at every instant between the samples"
     sub.add_argument("--between-samples", action="store_true", help=text)
+    add_permissible(sub)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -54,19 +63,31 @@ def run(options: argparse.Namespace) -> int:
         describe(station)
         tell(scene.findings)
     bounds = _bounds(station) if options.between_samples else []
+    every = []
+    if options.permissible:
+        with work_progress(quiet=options.json) as say:
+            every = permissible_found(station, options.permissible, say)
     with progress(station.duration, f"{station.duration:.1f} s of motion") as tick:
         opened = station.open_sinks(sinks, folder, scene)
+        for found, cut in every:
+            add_sections(opened, station, found, cut)
         if bounds:
             add_section(opened, bounds)
         writers = announced(opened, list(map(file_of, sinks)), tick.say)
         summary = station.run(writers=writers, scene=scene, progress=tick)
         moving, writing = tick.moving, tick.writing
     if options.json:
-        more = {"bounds": [bound.figures() for bound in bounds]} if options.between_samples else {}
+        more: dict[str, Any] = {}
+        if options.between_samples:
+            more["bounds"] = [bound.figures() for bound in bounds]
+        if options.permissible:
+            more["permissible"] = [permissible_json(found, cut, [], folder) for found, cut in every]
         OUT.print(results_json(summary, folder=str(folder), **more), markup=False)
         return exit_code(summary.verdict)
     line("ran", f"{summary.duration:.1f} s of motion in {moving:.1f} s, then wrote for {writing:.1f} s")
     tell_results(summary)
+    for found, cut in every:
+        tell_plan(found, cut)
     for bound in bounds:
         line("bound", bound.sentence())
     tell_files(sinks, folder)

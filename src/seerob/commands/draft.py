@@ -41,7 +41,7 @@ class Draft:
     @property
     def empty(self) -> bool:
         """Whether nothing is left that could be compiled."""
-        return not any(self.entries[group] for group in ("robots", "humans", "parts"))
+        return not any(self.entries[group] for group in ("robots", "humans", "parts", "machines"))
 
     def in_file(self, problems: Iterable[Problem]) -> list[Problem]:
         """Problems of `station` by the file's full name, with the numbers that its entries have there."""
@@ -133,7 +133,7 @@ def _freed(entry: Any, lost: set[str]) -> Any:
 
 def _speaks_of(group: str, entry: Any, lost: set[str]) -> bool:
     """Whether an entry needs one of the names that are lost."""
-    if not lost or group in ("robots", "humans", "parts", "sinks"):
+    if not lost or group in ("robots", "humans", "parts", "machines", "sinks"):
         return False
     if group in ("safety", "ergonomics") and not any(entry.subjects()):
         return True  # of all, or of the only one: who that is cannot be told any more

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from seerob.commands import OUT, Exit, line
 from seerob.errors import InputError
+
+if TYPE_CHECKING:
+    from seerob.human.morphology import Morphology
+    from seerob.snapshot import Finding
+    from seerob.sources._capture_file import CaptureFile
 
 HELP = "measure the bones of a recorded person (depth camera, skeleton file) for [[humans]]"
 EXAMPLE = "seerob measure kinect_recording session.json --mass 72 --sex female"
@@ -14,6 +20,11 @@ EXAMPLE = "seerob measure kinect_recording session.json --mass 72 --sex female"
 
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
+    add_person(sub)
+
+
+def add_person(sub: argparse.ArgumentParser) -> None:
+    """Arguments about a recording and the person in it."""
     sub.add_argument("kind", help="kind of source that reads the file, such as kinect_recording or bvh")
     sub.add_argument("file", help="the recording")
     sub.add_argument("--mass", type=float, required=True, help="body mass [kg]")
@@ -21,23 +32,60 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--stature", type=float, help="[m]; estimated from the lengths when not given")
     sub.add_argument("--name", default="operator", help="of the person")
     sub.add_argument("--subject", default="", help="which person of the recording")
+    sub.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="an option of the source, value as in the workstation file; may be repeated",
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Measure, tell, and print the table."""
-    from seerob.human import manikin
-    from seerob.human.morphology import measure
+    found, findings = measured(reader(options), Path(options.file), options)
+    for finding in (*findings, *found.findings):
+        line(finding.level, finding.text, "" if finding.level == "note" else "yellow")
+    OUT.print(person_table(options, found.stature, found.lengths), markup=False, soft_wrap=True)
+    return Exit.WITHIN
+
+
+def reader(options: argparse.Namespace) -> CaptureFile:
+    """The source that reads a recording.
+
+    Raises:
+        InputError: It is none of a person's motion.
+    """
+    import msgspec
+
+    from seerob.commands.probe import options_of
     from seerob.plugin import load
     from seerob.source import Source
     from seerob.sources._capture_file import CaptureFile
-    from seerob.sources._capture_options import observer
 
     kind = load("sources", options.kind, Source)
     if not issubclass(kind, CaptureFile):
         what = f"{options.kind} reads no recording of a person"
         raise InputError.at("seerob measure", "kind", what, "see: seerob kinds sources")
-    path = Path(options.file)
-    source = kind(human=options.name, file=path.name, subject=options.subject)
+    given = {"human": options.name, "file": Path(options.file).name, "subject": options.subject}
+    try:
+        return msgspec.convert(given | options_of(options.set), kind)
+    except msgspec.ValidationError as error:
+        raise InputError.at(f"seerob measure {options.kind}", "", str(error)) from error
+
+
+def measured(
+    source: CaptureFile, path: Path, options: argparse.Namespace
+) -> tuple[Morphology, tuple[Finding, ...]]:
+    """The size of a recorded person, and what was found in the recording.
+
+    Raises:
+        InputError: The recording cannot be read, or has no joint centres to measure between.
+    """
+    from seerob.human import manikin
+    from seerob.human.morphology import measure
+    from seerob.sources._capture_options import observer
+
     captured = source.read(path)
     somebody = manikin.build(
         name=options.name, stature=options.stature or 1.75, mass=options.mass, sex=options.sex
@@ -51,12 +99,14 @@ def run(options: argparse.Namespace) -> int:
         mass=options.mass,
         stature=options.stature,
     )
-    for finding in (*captured.findings, *findings, *found.findings):
-        line(finding.level, finding.text, "" if finding.level == "note" else "yellow")
-    shown = ", ".join(f"{key} = {value:.4f}" for key, value in found.lengths.items())
+    return found, (*captured.findings, *findings)
+
+
+def person_table(options: argparse.Namespace, stature: float, lengths: dict[str, float]) -> str:
+    """The table ``[[humans]]``; lengths of the tables where none are given [m]."""
+    shown = ", ".join(f"{key} = {value:.4f}" for key, value in lengths.items())
     table = (
-        f'[[humans]]\nname = "{options.name}"\nstature = {found.stature:.4f}\nmass = {options.mass:g}\n'
-        f'sex = "{options.sex}"\nlengths = {{ {shown} }}'
+        f'[[humans]]\nname = "{options.name}"\nstature = {stature:.4f}\nmass = {options.mass:g}\n'
+        f'sex = "{options.sex}"'
     )
-    OUT.print(table, markup=False, soft_wrap=True)
-    return Exit.WITHIN
+    return f"{table}\nlengths = {{ {shown} }}" if shown else table

@@ -5,16 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from seerob.commands import (
     OUT,
-    STATUS,
-    WORDS,
-    Exit,
     add_output,
     add_workstation,
     compiled,
@@ -24,21 +20,37 @@ from seerob.commands import (
     run_folder,
     seconds,
     tell,
-    tell_results,
+)
+from seerob.commands.permissible_result import (
+    BY,
+    CHOICES,
+    add_sections,
+    permissible_json,
+    tell_permissible,
+    work_progress,
 )
 from seerob.commands.sinks import refuse_existing
+from seerob.commands.whole_folder import whole_folder
 from seerob.errors import InputError
-from seerob.snapshot import Verdict
 
 if TYPE_CHECKING:
     from seerob.permissible.between_samples import Bound
     from seerob.permissible.evaluation import PermissibleSpeed
-    from seerob.sinks.dossier import DossierWriter
+    from seerob.permissible.segments import PathSegment
+    from seerob.sink import Writer
     from seerob.station import Station
 
 HELP = "how fast a robot may go along its path: map, rescaled motion, cycle time, CSV, Excel, URScript"
 EXAMPLE = "seerob permissible my_cell --acceleration 5 --jerk 50"
-FILES = ("map.csv", "map_by_region.csv", "rescaled.csv", "permissible.xlsx", "rescaled.script", "report.html")
+FILES = (
+    "segments.csv",
+    "map.csv",
+    "map_by_region.csv",
+    "rescaled.csv",
+    "permissible.xlsx",
+    "rescaled.script",
+    "report.html",
+)
 
 
 def share(text: str) -> float:
@@ -73,12 +85,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     add_workstation(sub)
     sub.add_argument("--robot", help="whose motion (default: the only robot)")
-    sub.add_argument(
-        "--permit",
-        choices=("all", "separation", "contact"),
-        default="all",
-        help="whose limits count: separation monitoring, contact (power and force), or every criterion",
-    )
+    sub.add_argument("--by", choices=CHOICES, default="all", help=BY)
     for name, unit in (("velocity", "rad/s"), ("acceleration", "rad/s²"), ("jerk", "rad/s³")):
         own = "instead of the robot's" if name == "velocity" else f"instead of the file's {name}_limits"
         text = f"limit of the joints [{unit}], one for all or one each with commas, {own}"
@@ -87,6 +94,12 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--margin", type=share, default=0.02, help="share of the map that is not used")
     sub.add_argument("--tolerance", type=above_zero, default=5e-4, help="of the path, per joint [rad or m]")
     sub.add_argument("--spacing", type=above_zero, default=0.02, help="of the map, in joint space [rad or m]")
+    sub.add_argument(
+        "--segment", type=above_zero, default=0.25, help="longest way of the tool point in a segment [m]"
+    )
+    sub.add_argument(
+        "--verify", type=seconds, default=1e-3, help="period at which the criteria are asked of the plan [s]"
+    )
     sub.add_argument("--period", type=seconds, default=0.008, help="of the rescaled motion [s]")
     sub.add_argument(
         "--bound", type=above_zero, default=1e-3, help="tolerance of bounds between samples [m, m/s]"
@@ -98,9 +111,9 @@ def run(options: argparse.Namespace) -> int:
     """Map, rescale, evaluate again, write, and return the exit code of the second evaluation."""
     station = compiled(options.workstation, quiet=options.json)
     from seerob.permissible.evaluation import Wish
-    from seerob.permissible.speed_map import Permit
-    from seerob.permissible.summary import bounds_section, section
-    from seerob.sinks.dossier import Dossier, DossierWriter
+    from seerob.permissible.methods import By
+    from seerob.permissible.segments import segments
+    from seerob.sinks.dossier import Dossier
 
     folder = run_folder(station.model.folder, options.output)
     refuse_existing([Dossier()], folder)
@@ -111,27 +124,26 @@ def run(options: argparse.Namespace) -> int:
         describe(station)
         tell(station.scene().findings)
     wish = Wish(
-        permit=Permit(options.permit),
+        by=By(options.by),
         tolerance=options.tolerance,
         spacing=options.spacing,
         margin=options.margin,
         not_faster=options.not_faster,
         period=options.period,
+        verify=options.verify,
     )
-    writers: list[DossierWriter] = []
     bounds: list[Bound] = []
-    with _progress(quiet=options.json) as say:
+    cut: list[PathSegment] = []
+    with whole_folder(folder) as working, work_progress(quiet=options.json) as say:
+        writers: list[Writer] = []
 
         def ready(found: PermissibleSpeed) -> None:
+            cut.extend(segments(found.map, length=options.segment))
             say("bounds between samples", 0.0)
             bounds.extend(_bounds(station, found, options.bound))
-            if found.rescaled is None:
-                return
-            (writer,) = station.open_sinks([Dossier()], folder, station.scene())
-            assert isinstance(writer, DossierWriter)
-            writer.sections += [section(found), bounds_section(bounds)]
-            writer.findings += found.findings
-            writers.append(writer)
+            say("the report", 0.0)
+            if found.rescaled is not None:
+                writers.extend(_report(station, found, cut, bounds, working))
 
         found = station.permissible_speed(
             options.robot,
@@ -143,25 +155,44 @@ def run(options: argparse.Namespace) -> int:
             ready=ready,
             say=say,
         )
-    written = _write(station, found, folder, options.period)
-    code = _code(found)
+        if found.rescaled is None:
+            # The report is then that of the given motion, with the map that forbids another.
+            station.run(writers=_report(station, found, cut, bounds, working), scene=station.scene())
+        say("the files", 0.0)
+        _write(station, found, cut, working, options.period)
+    code = exit_code(found.verdict)
     if options.json:
-        OUT.print(json.dumps(_json(found, bounds, folder), ensure_ascii=False, indent=1), markup=False)
+        told = permissible_json(found, cut, bounds, folder)
+        OUT.print(json.dumps(told, ensure_ascii=False, indent=1), markup=False)
         return code
-    _tell(found, bounds)
-    for name in written:
-        line("wrote", str(folder / name))
+    tell_permissible(found, cut, bounds)
+    for name in FILES:
+        if (folder / name).exists():
+            line("wrote", str(folder / name))
+    watch = f'kind = "path_speed", robot = "{found.map.robot}", map = "map.csv"'
+    line("next", f"watch a run against the map, copied beside the workstation file: [[safety]] {watch}")
     return code
+
+
+def _report(
+    station: Station,
+    found: PermissibleSpeed,
+    cut: Sequence[PathSegment],
+    bounds: Sequence[Bound],
+    folder: Path,
+) -> list[Writer]:
+    """The report of a run, with what was found before it."""
+    from seerob.commands.assess import add_section
+    from seerob.sinks.dossier import Dossier
+
+    writers = station.open_sinks([Dossier()], folder, station.scene())
+    add_sections(writers, station, found, cut)
+    add_section(writers, bounds)
+    return writers
 
 
 def _each(values: list[float] | None) -> list[float] | float | None:
     return values[0] if values is not None and len(values) == 1 else values
-
-
-def _code(found: PermissibleSpeed) -> Exit:
-    if found.after is not None:
-        return exit_code(found.after.verdict)
-    return Exit.UNDECIDED if found.map.undecided else Exit.EXCEEDED
 
 
 def _bounds(station: Station, found: PermissibleSpeed, tolerance: float) -> list[Bound]:
@@ -172,8 +203,10 @@ def _bounds(station: Station, found: PermissibleSpeed, tolerance: float) -> list
     return wanted_bounds(station.model, motions, tolerance=tolerance, most=MOST)
 
 
-def _write(station: Station, found: PermissibleSpeed, folder: Path, period: float) -> list[str]:
-    """The tables, each whole or not at all; nothing before all of them could be made."""
+def _write(
+    station: Station, found: PermissibleSpeed, cut: Sequence[PathSegment], folder: Path, period: float
+) -> None:
+    """The tables."""
     from seerob.permissible import tables
     from seerob.permissible.urscript import PERIODS, refusal, urscript
     from seerob.permissible.workbook import workbook
@@ -181,9 +214,10 @@ def _write(station: Station, found: PermissibleSpeed, folder: Path, period: floa
 
     scene = station.scene()
     files = {
-        "map.csv": tables.csv_bytes(tables.MAP_HEAD, tables.map_rows(found.map)),
+        "segments.csv": tables.csv_bytes(tables.SEGMENT_HEAD, tables.segment_rows(cut)),
+        "map.csv": tables.csv_bytes(tables.map_head(found.map), tables.map_rows(found.map)),
         "map_by_region.csv": tables.csv_bytes(tables.REGION_HEAD, tables.region_rows(found.map)),
-        "permissible.xlsx": workbook(found, scene, period=period),
+        "permissible.xlsx": workbook(found, cut, scene, period=period),
     }
     robot = station.model.robot(found.map.robot)
     if found.rescaled is not None:
@@ -200,58 +234,5 @@ def _write(station: Station, found: PermissibleSpeed, folder: Path, period: floa
                 digest=scene.workstation_hash,
             )
             files["rescaled.script"] = program.encode()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        what = f"cannot be made: {error.strerror}"
-        raise InputError.at(folder, "", what, "give a folder that may be written") from error
     for name, data in files.items():
         write_whole(folder / name, data)
-    return [name for name in FILES if (folder / name).exists()]
-
-
-def _tell(found: PermissibleSpeed, bounds: list[Bound]) -> None:
-    from seerob.permissible.summary import sentences
-
-    for text in sentences(found):
-        line("permissible", text)
-    for spent in found.spent[:6]:
-        line("time", f"{spent.time:7.3f} s  {spent.what}")
-    tell(found.findings)
-    for bound in bounds:
-        line("bound", bound.sentence())
-    if found.after is None:
-        word, style = WORDS[Verdict.UNDECIDED if found.map.undecided else Verdict.EXCEEDED]
-        line(word, found.refused, style)
-        return
-    tell_results(found.after)
-
-
-def _json(found: PermissibleSpeed, bounds: list[Bound], folder: Path) -> dict[str, Any]:
-    motion, after = found.rescaled, found.after
-    return {
-        "robot": found.map.robot,
-        "asked": list(found.map.asked),
-        "before": found.motion.duration,
-        "after": None if motion is None else motion.duration,
-        "refused": found.refused,
-        "verdict": None if after is None else after.verdict,
-        "criteria": {} if after is None else {name: series.verdict for name, series in after.results.items()},
-        "time": {spent.what: spent.time for spent in found.spent},
-        "bounds": [bound.figures() for bound in bounds],
-        "findings": [{"level": f.level, "subject": f.subject, "text": f.text} for f in found.findings],
-        "folder": str(folder),
-    }
-
-
-@contextmanager
-def _progress(*, quiet: bool) -> Iterator[Any]:
-    """A bar on a terminal that says which part of the work is done; silence elsewhere."""
-    if quiet or not STATUS.is_terminal:
-        yield lambda what, share: None
-        return
-    from rich.progress import BarColumn, Progress, TextColumn
-
-    with Progress(BarColumn(), TextColumn("{task.description}"), console=STATUS, transient=True) as bars:
-        task = bars.add_task("", total=1.0)
-        yield lambda what, share: bars.update(task, description=what, completed=share)

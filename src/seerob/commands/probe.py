@@ -108,14 +108,15 @@ def _source(options: argparse.Namespace) -> tuple[LiveSource, dict[str, Any]]:
             what = f"{options.kind} has no address: it is sent to this machine"
             raise InputError.at("seerob probe", "address", what, "leave it out")
         given[where] = options.address
-    given |= _set(options.set)
+    given |= options_of(options.set)
     try:
         return msgspec.convert(given, kind), given
     except msgspec.ValidationError as error:
         raise InputError.at(f"seerob probe {options.kind}", "", str(error)) from error
 
 
-def _set(pairs: list[str]) -> dict[str, Any]:
+def options_of(pairs: list[str]) -> dict[str, Any]:
+    """Options of a source from ``KEY=VALUE`` texts, values as in the workstation file."""
     import tomllib
 
     found: dict[str, Any] = {}
@@ -131,9 +132,17 @@ def _set(pairs: list[str]) -> dict[str, Any]:
 
 
 def _tell(sample: Sample) -> None:
-    from seerob.samples import JointSample, SignalSample
+    from seerob.samples import BodySample, JointSample, SignalSample
 
-    if isinstance(sample, JointSample):
+    if isinstance(sample, BodySample):
+        seen = [point for point in sample.points if point.position is not None or point.wxyz is not None]
+        line("person", f"{sample.subject or 'no name'}: {len(seen)} of {len(sample.points)} points are seen")
+        for point in sample.points:
+            text = (
+                "not seen" if point.position is None else "{:+.3f} {:+.3f} {:+.3f} m".format(*point.position)
+            )
+            line("point", f"{point.name} ({point.bone}): {text}")
+    elif isinstance(sample, JointSample):
         for name, unit, values in (
             ("q", "rad", sample.q),
             ("qd", "rad/s", sample.qd),
@@ -144,6 +153,8 @@ def _tell(sample: Sample) -> None:
     elif isinstance(sample, SignalSample):
         for name, value in sample.values.items():
             line("signal", f"{name} = {value:.4f}" if isinstance(value, float) else f"{name} = {value}")
+        for doubt in sample.doubts.values():
+            line("doubt", doubt, "yellow")
 
 
 def _snippet(kind: str, given: dict[str, Any]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from seerob.commands import (
     OUT,
@@ -21,6 +21,14 @@ from seerob.commands import (
     tell_results,
 )
 from seerob.commands.loops import tell_compiling
+from seerob.commands.permissible_result import (
+    add_permissible,
+    add_sections,
+    permissible_found,
+    permissible_json,
+    tell_plan,
+    work_progress,
+)
 from seerob.commands.progress import progress
 from seerob.commands.sinks import refuse_existing, sinks_of, tell_files
 
@@ -35,6 +43,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     sub.add_argument("recording", type=Path, help="an MCAP file that seerob wrote")
     sub.add_argument("--workstation", type=Path, help="judge by this workstation instead of the recorded one")
+    add_permissible(sub)
     add_output(sub)
 
 
@@ -54,19 +63,37 @@ def run(options: argparse.Namespace) -> int:
     folder = run_folder(options.recording.parent, options.output)
     sinks = sinks_of(station.workstation, lossless=True, record=False)
     refuse_existing(sinks, folder)
+    every = []
+    if options.permissible:
+        from seerob.permissible.recorded_sources import recorded_sources
+
+        samples = (sample for tick in recording.ticks() for sample in tick.samples)
+        sources = recorded_sources(station.workstation.sources, samples, recording.duration)
+        with work_progress(quiet=options.json) as say:
+            every = permissible_found(station, options.permissible, say, sources)
     with progress(recording.duration, f"{recording.duration:.1f} s recorded") as tick:
-        summary = station.replay(recording, folder=folder, sinks=sinks, progress=tick)
+        opened = station.open_sinks(sinks, folder, station.replay_scene(recording)) if every else []
+        for found, cut in every:
+            add_sections(opened, station, found, cut)
+        summary = station.replay(
+            recording, folder=folder, sinks=() if every else sinks, writers=opened, progress=tick
+        )
     before = log_of(recording.snapshots(), recording.scene.criteria)
     changes = changes_since(before, summary.results)
     if recording.scene.workstation_hash != summary.scene.workstation_hash:
         changes.insert(0, "the workstation is not the one that was recorded")
     if options.json:
-        OUT.print(results_json(summary, folder=str(folder), changes=changes), markup=False)
+        more: dict[str, Any] = {}
+        if every:
+            more["permissible"] = [permissible_json(found, cut, [], folder) for found, cut in every]
+        OUT.print(results_json(summary, folder=str(folder), changes=changes, **more), markup=False)
         return exit_code(summary.verdict)
     line("recording", f"{recording.scene.title}: {summary.duration:.1f} s", "bold")
     for finding in recording.findings:
         line(finding.level, finding.text, "yellow")
     tell_results(summary)
+    for found, cut in every:
+        tell_plan(found, cut)
     for change in changes:
         line("changed", change, "yellow")
     tell_files(sinks, folder)

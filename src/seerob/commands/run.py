@@ -26,6 +26,7 @@ from seerob.errors import InputError
 if TYPE_CHECKING:
     from seerob.snapshot import Scene
     from seerob.station import Station
+    from seerob.triggers import Triggers
 
 HELP = "run a workstation live: sources connect, the page opens, recording starts"
 EXAMPLE = "seerob run my_cell            (then open the address it prints; Ctrl-C ends the run)"
@@ -41,6 +42,11 @@ def add(sub: argparse.ArgumentParser) -> None:
         "-o", "--output", type=Path, help="folder to write to (default: runs/<time> beside the workstation)"
     )
     sub.add_argument("--no-record", action="store_true", help="no recording and no report")
+    sub.add_argument(
+        "--allow-writing",
+        action="store_true",
+        help="let the workstation's triggers write to machines, where its file allows it too",
+    )
     sub.add_argument("--seconds", type=seconds, help="end the run after this time")
     sub.add_argument("--replay", type=Path, metavar="FILE", help="show this recording, as seerob replay does")
 
@@ -114,11 +120,30 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
         with spinner() as say:
             writers = announced(station.open_sinks(sinks, folder, scene), list(map(file_of, sinks)), say)
             line("page", f"{view.url}  (Ctrl-C ends the run)", "bold")
+            writers += _triggers(station, allow=options.allow_writing)
             summary = station.run(writers=[view, *writers], live=True, scene=scene, stop=over, progress=note)
     line("ran", f"{summary.duration:.1f} s" + _slipped(summary.slipped))
     tell_results(summary)
     tell_files(sinks, folder)
     return exit_code(summary.verdict)
+
+
+def _triggers(station: Station, *, allow: bool) -> list[Triggers]:
+    """What writes to machines; nothing unless file and command line both allow it, which is said."""
+    from seerob.triggers import Triggers, allowed
+
+    names = ", ".join(trigger.variable for trigger in station.workstation.triggers)
+    if allowed(station.model, on_command_line=allow):
+        line("writes", f"{names}: workstation file and command line both allow it", "yellow")
+        return [Triggers(station.model, on_command_line=allow)]
+    if names:
+        missing = (
+            "--allow-writing" if station.workstation.allow_writing else "allow_writing = true in the file"
+        )
+        line("note", f"writes nothing: {names} would need {missing}")
+    elif allow:
+        line("note", "writes nothing: the workstation has no triggers")
+    return []
 
 
 def _slipped(lost: float) -> str:

@@ -68,6 +68,38 @@ def stature(population: str, sex: str, percentile: int) -> float:
     return float(people[key]) * 1e-3
 
 
+def stature_given(given: float | str, sex: str, *, name: str) -> tuple[float, tuple[Finding, ...]]:
+    """Stature [m] of a number, or of a population and percentile, with what is to be said of it.
+
+    Args:
+        given: [m], or ``"germany P50"``: of that sex, from ``data/statures.toml``.
+        sex: ``male`` or ``female``.
+        name: Of the person, for messages.
+
+    Raises:
+        InputError: No such population or percentile.
+    """
+    if not isinstance(given, str):
+        return given, ()
+    population, _, percentile = given.strip().rpartition(" ")
+    digits = percentile[1:]
+    known = table("statures")
+    example = f'give metres or one of {", ".join(known)} with P5, P50 or P95, such as "germany P50"'
+    if not (percentile[:1] in ("P", "p") and digits.isdecimal() and len(digits) <= 2):
+        raise InputError.at(name, "stature", f"{given!r} is no percentile of a population", example)
+    try:
+        found = stature(population.strip(), sex, int(digits))
+    except UnknownName as error:
+        raise InputError.at(name, "stature", str(error), example) from error
+    people = known[population.strip()]
+    text = (
+        f"stature {found:.3f} m: P{int(digits)} of {sex} {people['source']} "
+        f"(figure {'read in a publication' if people['confidence'] == 'read' else 'quoted from memory'}); "
+        "no other dimension is of that percentile"
+    )
+    return found, (Finding(level="assumed", subject=name, text=text),)
+
+
 class Masses(StrEnum):
     """Where the segments' masses and moments of inertia come from."""
 

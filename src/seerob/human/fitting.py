@@ -19,7 +19,7 @@ REST = 0.2
 """Pull of the posture of rest: a joint 5 rad away from it counts as much as a point 2 cm away."""
 TURN_REST = 0.7
 """The same of joints about a bone's own axis: a straight arm or leg hardly shows how it is turned."""
-KEEP = 4.0
+KEEP = 6.0
 """Pull of the posture a `KEEP_TIME` before, in the same measure: it smooths what is hardly seen, such as
 how a forearm is turned, and hardly delays what is."""
 KEEP_TIME = 1 / 60
@@ -27,6 +27,8 @@ KEEP_TIME = 1 / 60
 ENOUGH = 1e-5
 """A step this small [rad or m] ends the iteration."""
 FIRST_ITERATIONS, NEXT_ITERATIONS = 80, 10
+AGAIN, AGAIN_ITERATIONS = 2, 4
+"""Fits that follow, each with the result of the one before as its posture of rest and of before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,13 +177,16 @@ class Fitter:
         reach = np.inf if before is None else reach
         error = np.zeros((len(seen.bone), 6))
         keep = self._w_keep * (0.0 if before is None else KEEP_TIME / max(since, 1e-3))
-        kernel.fit(
-            q, np.maximum(self.lower, near - reach), np.minimum(self.upper, near + reach),
-            self.rest, self._w_rest, near.copy(), keep,
-            self._parent, self._first, self._prismatic, self._axis, self._anchor, self._offset, self._mount,
-            self._chain, self._length, seen.bone + 1, seen.at, seen.position, seen.wp, seen.rotation,
-            seen.wo, FIRST_ITERATIONS if before is None else NEXT_ITERATIONS, ENOUGH, error,
-        )  # fmt: skip
+        lower, upper = np.maximum(self.lower, near - reach), np.minimum(self.upper, near + reach)
+        rest, iterations = self.rest, FIRST_ITERATIONS if before is None else NEXT_ITERATIONS
+        for _ in range(1 + AGAIN):
+            kernel.fit(
+                q, lower, upper, rest, self._w_rest, near.copy(), keep,
+                self._parent, self._first, self._prismatic, self._axis, self._anchor, self._offset,
+                self._mount, self._chain, self._length, seen.bone + 1, seen.at, seen.position, seen.wp,
+                seen.rotation, seen.wo, iterations, ENOUGH, error,
+            )  # fmt: skip
+            rest, iterations = q.copy(), AGAIN_ITERATIONS
         return q, error
 
     def bones(self, q: Array) -> tuple[Array, Array]:

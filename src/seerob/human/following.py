@@ -13,11 +13,12 @@ appears elsewhere is put there, not dragged. Whatever is left out or held says w
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from seerob.human.estimated import in_doubt_with
 from seerob.human.fitting import Fitter, Pulls, pulls
 from seerob.human.skeleton import AXES, BONES
 from seerob.model_io.description import Description, JointKind
@@ -37,6 +38,8 @@ TURNED = np.radians(45.0)
 MOST_KEPT = 4096
 """Samples per device at most; many times what lies between two ticks."""
 MOST_DEVICES = 32
+MOST_POINTS = 2000
+"""Of one sample."""
 LARGEST = 1e6
 """No number of a point is larger, in SI."""
 SLACK = 1e-9
@@ -45,6 +48,10 @@ MANY = 0.3
 """Share of a device's points that jump at once, beyond which none of them is believed."""
 ELSEWHERE = 0.1
 """Whoever was not seen for a while and is farther from before [rad or m] is put there, not pulled."""
+
+
+PartDoubt = tuple[str, tuple[str, ...]]
+"""Why some bones may not be relied on, and which."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +64,24 @@ class Followed:
     """Joint reference [rad or m], shape (53,)."""
     reason: str
     """Why it may not be relied on; empty when it may."""
+    parts: tuple[PartDoubt, ...]
+    """Why single bones may not be, and which, when the others may."""
     anew: bool
     """Nobody knows how the person came here: it is to be put there."""
     seen: Pulls
     """What it was made of, in the root's frame."""
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What one device says of an instant."""
+
+    points: list[BodyPoint]
+    reason: str = ""
+    """Why all of it may not be relied on."""
+    part: PartDoubt | None = None
+    jumped: bool = False
+    """Something was left out because it jumped."""
 
 
 @dataclass
@@ -108,11 +129,14 @@ class Following:
         device = self._devices.setdefault(sample.source, _Device())
         if not np.isfinite(sample.t) or (device.times and sample.t <= device.times[-1]):
             return False
+        if len(sample.points) > MOST_POINTS or not 0 < sample.hold < LARGEST:
+            return False
         device.times.append(sample.t)
         device.samples.append(sample)
         k = bisect_right(self._instants, sample.t)
         if k == 0 or self._instants[k - 1] < sample.t:
             self._instants.insert(k, sample.t)
+            del self._instants[:-MOST_KEPT]
         return True
 
     def until(self, t: float) -> Iterator[Followed]:
@@ -126,25 +150,26 @@ class Following:
                 continue
             self._last = found
             self._history.append(found)
+            del self._history[:-MOST_KEPT]
             yield found
         for device in self._devices.values():
             device.forget(min(t, np.inf if self._last is None else self._last.t))
 
     def _at(self, t: float) -> Followed | None:
-        points, reasons, jumped = [], [], False
-        for name, device in self._devices.items():
-            seen, reason, leapt = self._device_at(device, name, t)
-            points.append(seen)
-            jumped |= leapt
-            if reason:
-                reasons.append(reason)
+        told = [self._device_at(device, name, t) for name, device in self._devices.items()]
+        points = [each.points for each in told]
+        reasons = [each.reason for each in told if each.reason]
+        parts = [each.part for each in told if each.part is not None]
         chosen, last = _best(points), self._last
         if not chosen:
-            if last is None or not jumped:
+            if last is None or not any(each.jumped for each in told):
                 return None
             self._waits = True
-            return Followed(t, last.q, "; ".join(reasons[:4]), False, pulls((), self._root_from_world))
-        reasons += self._lost(t)
+            reasons += [why for why, _ in parts]
+            return Followed(t, last.q, "; ".join(reasons[:4]), (), False, pulls((), self._root_from_world))
+        parts += self._lost(t)
+        here = {point.bone for point in chosen}
+        parts = [(why, _with_others(bones, here)) for why, bones in parts]
         found = pulls(chosen, self._root_from_world)
         # After a silence, or where nothing was believed, a person may be anywhere, in any posture.
         hold = max(device.samples[-1].hold for device in self._devices.values() if device.samples)
@@ -161,21 +186,17 @@ class Following:
         reasons += _residual(found, error)
         if anew:
             reasons.append("appeared elsewhere")
-        return Followed(t, q, "; ".join(reasons[:4]), anew, found)
+        return Followed(t, q, "; ".join(reasons[:4]), tuple(parts), anew, found)
 
-    def _device_at(self, device: _Device, name: str, t: float) -> tuple[list[BodyPoint], str, bool]:
-        """What a device sees at ``t``: between two samples, or the newest while it counts.
-
-        Returns:
-            Points, why they may not be relied on, and whether some were left out that jumped.
-        """
+    def _device_at(self, device: _Device, name: str, t: float) -> _Told:
+        """What a device sees at ``t``: between two samples, or the newest while it counts."""
         k = bisect_right(device.times, t) - 1
         if k < 0:
-            return [], "", False
+            return _Told([])
         sample = device.samples[k]
         age = t - device.times[k]
         if age > sample.hold:
-            return [], f"{name} was not heard for {age:.2f} s", False
+            return _Told([], part=(f"{name} was not heard for {age:.2f} s", tuple(device.seen)))
         points: Sequence[BodyPoint] = sample.points
         instant = device.times[k]
         if age > 0 and k + 1 < len(device.times) and device.times[k + 1] - device.times[k] <= sample.hold:
@@ -184,15 +205,13 @@ class Following:
             points = _between(points, device.samples[k + 1].points, share)
         reason = "" if sample.quality is Quality.GOOD else f"{name} says {sample.quality.value}"
         if sample.quality is Quality.INVALID:
-            return [], reason, False
+            return _Told([], reason)
         return self._believed(device, points, instant, reason)
 
-    def _believed(
-        self, device: _Device, points: Sequence[BodyPoint], t: float, reason: str
-    ) -> tuple[list[BodyPoint], str, bool]:
+    def _believed(self, device: _Device, points: Sequence[BodyPoint], t: float, reason: str) -> _Told:
         """Without what cannot have moved so far; what is believed is remembered."""
         out: list[BodyPoint] = []
-        jumped: list[str] = []
+        jumped: dict[str, str] = {}
         for point in points:
             device.seen.setdefault(point.bone, t)
             if not _finite(point):
@@ -202,21 +221,21 @@ class Following:
                 if before is not None:
                     away = float(np.linalg.norm(np.subtract(point.position, before[1])))
                     if away > POINT_SLACK + POINT_SPEED * (t - before[0]):
-                        jumped.append(point.name)
+                        jumped[point.name] = point.bone
                         continue
                 device.believed[point.name] = t, point.position
             if point.position is not None or point.wxyz is not None:
                 device.seen[point.bone] = t
                 out.append(point)
+        if not jumped:
+            return _Told(out, reason)
+        why = ", ".join(list(jumped)[:4]) + (" …" if len(jumped) > 4 else "") + " jumped"
         if len(jumped) > MANY * max(1, len(points)):
             # What a device loses so much of, it has lost altogether.
-            out = []
-        if jumped:
-            shown = ", ".join(jumped[:4]) + (" …" if len(jumped) > 4 else "")
-            reason = "; ".join(filter(None, (reason, f"{shown} jumped")))
-        return out, reason, bool(jumped)
+            return _Told([], "; ".join(filter(None, (reason, why))), jumped=True)
+        return _Told(out, reason, (why, tuple(dict.fromkeys(jumped.values()))), jumped=True)
 
-    def _lost(self, t: float) -> list[str]:
+    def _lost(self, t: float) -> list[PartDoubt]:
         """Bones that a device has and that nobody has seen for too long."""
         newest: dict[str, tuple[float, float]] = {}
         for device in self._devices.values():
@@ -226,8 +245,9 @@ class Following:
             for bone, seen in device.seen.items():
                 before = newest.get(bone, (-np.inf, hold))
                 newest[bone] = max(seen, before[0]), max(hold, before[1])
-        lost = [bone for bone, (seen, hold) in newest.items() if t - seen > hold]
-        return [f"not seen any more: {', '.join(sorted(lost, key=BONES.index)[:6])}"] if lost else []
+        gone = [bone for bone, (seen, hold) in newest.items() if t - seen > hold]
+        gone.sort(key=BONES.index)
+        return [(f"not seen any more: {', '.join(gone[:6])}", tuple(gone))] if gone else []
 
     def errors(self, t: float, q: Array) -> dict[str, tuple[float | None, float | None]]:
         """How far the twin is from what devices saw at ``t``: bone → position [m] and angle [rad].
@@ -253,6 +273,11 @@ class Following:
         if here.seen.same(after.seen):
             return self._fitter.errors(here.seen.toward(after.seen, share), q)
         return self._fitter.errors(here.seen if share < 0.5 else after.seen, q)
+
+
+def _with_others(bones: Sequence[str], seen: Collection[str]) -> tuple[str, ...]:
+    """Bones in doubt with all that are in doubt for want of them."""
+    return tuple(dict.fromkeys(other for bone in bones for other in in_doubt_with(bone, seen)))
 
 
 def _best(devices: Sequence[Sequence[BodyPoint]]) -> list[BodyPoint]:

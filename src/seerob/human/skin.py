@@ -20,6 +20,7 @@ import numpy as np
 
 from seerob.geometry import Solid, capsule, dilated_rectangle
 from seerob.human.anthropometry import Body
+from seerob.human.body_areas import eyes, in_front, outer_shoulder
 from seerob.human.skeleton import without_side
 from seerob.human.tables import table
 from seerob.transforms import Array
@@ -43,12 +44,9 @@ BODY_REGION: dict[str, tuple[str | None, str | None]] = {
 }
 """Bone without side → body region of ISO/TS 15066:2016 Table A.3 in front and behind.
 
-The shoulder girdle counts as chest in front, the stricter of its neighbours.
+The shoulder girdle counts in front as chest, its outer half as shoulder.
 Feet are in no region of that table. The face is the front of the head below the eyes.
 """
-
-EYE_HEIGHT = 0.936
-"""Share of the stature (Drillis and Contini)."""
 
 
 def body_region(bone: str, point: Vector, *, body: Body) -> str | None:
@@ -61,9 +59,10 @@ def body_region(bone: str, point: Vector, *, body: Body) -> str | None:
     """
     front, behind = BODY_REGION[without_side(bone)]
     if bone == "head":
-        eyes = body.length["head"] - (1 - EYE_HEIGHT) * body.stature
-        return front if point[0] > 0 and point[1] < eyes else behind
-    return front if point[0] > 0 else behind
+        return front if in_front(bone, point, body) and point[1] < eyes(body) else behind
+    if without_side(bone) == "clavicle" and outer_shoulder(bone, point, body):
+        return behind
+    return front if in_front(bone, point, body) else behind
 
 
 def density(bone: str) -> float:

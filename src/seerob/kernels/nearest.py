@@ -81,7 +81,8 @@ def nearest(
         pair: Solids of each pair, meshes first, shape (m, 2).
         start: Where the pairs of each group begin in ``members``, shape (g + 1,).
         members: By group, a pair, and 1 where its first solid belongs to the second set, shape (k, 2).
-        cap: Distance above which the answer does not matter, of each group [m], shape (g,).
+        cap: Distance above which the answer does not matter, of each group [m], shape (g,); -infinity
+            where there is no question.
         whether: Of which groups only that is asked: whether anything is nearer than the cap, shape (g,).
         at: State: world corners at the last call, infinity before the first, shape (ns, 8, 3).
         low: State: lower bound of each pair's distance then, -infinity before the first.
@@ -107,6 +108,11 @@ def nearest(
     value = np.empty(m)
     found = np.empty((m, 6))
     deep = np.zeros(m, np.bool_)
+    asked = np.zeros(m, np.bool_)
+    for g in range(len(start) - 1):
+        if cap[g] > -np.inf:
+            for e in range(start[g], start[g + 1]):
+                asked[members[e, 0]] = True
     stack = np.empty((256, 2), np.int32)
     bounds = np.empty(256)
     R = np.empty(9)
@@ -119,6 +125,10 @@ def nearest(
         for p in range(m):
             i = pair[p, 0]
             j = pair[p, 1]
+            if not asked[p]:
+                low[p] -= moved[i] + moved[j]
+                high[p] += moved[i] + moved[j]
+                continue
             r = radius[i] + radius[j]
             gap = math.sqrt(
                 (centre[i, 0] - centre[j, 0]) ** 2
@@ -142,6 +152,10 @@ def nearest(
         for g in range(len(start) - 1):
             best = cap[g]
             winning = -1
+            if best == -np.inf:
+                distance[n, g], winner[n, g], status[n, g] = best, -1, BEYOND_CAP
+                points[n, g] = np.nan
+                continue
             for e in range(start[g], start[g + 1]):
                 q = members[e, 0]
                 if state[q] == 2 and value[q] < best:

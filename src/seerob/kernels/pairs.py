@@ -13,9 +13,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from seerob.kernels.boxes import box_box, segment_box
+from seerob.kernels.crossings import encloses
 from seerob.kernels.primitives import segment_segment
 from seerob.kernels.search import mesh_mesh, mesh_segment
-from seerob.kernels.winding import contains
 from seerob.transforms import Array
 
 Links = NDArray[np.int32]
@@ -114,10 +114,11 @@ def inside(
             + world[i, 11]
         )
         x, y, z = _into(world, j, x, y, z)
-        if contains(
+        if encloses(
             nodes[which[j, NODE] : which[j, NODE_END]],
             links[which[j, NODE] : which[j, NODE_END]],
             T[which[j, TRIANGLE] : which[j, TRIANGLE_END]],
+            which[j, CLOSED] == 1,
             x,
             y,
             z,

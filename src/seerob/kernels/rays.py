@@ -15,9 +15,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from seerob.kernels.pairs import CORNERS, MESH, NODE, NODE_END, TRIANGLE, TRIANGLE_END, VOLUME
+from seerob.kernels.crossings import encloses
+from seerob.kernels.pairs import CLOSED, CORNERS, MESH, NODE, NODE_END, TRIANGLE, TRIANGLE_END, VOLUME
 from seerob.kernels.search import mesh_segment
-from seerob.kernels.winding import contains
 from seerob.transforms import Array
 
 Links = NDArray[np.int32]
@@ -229,7 +229,9 @@ def cast(
             if which[s, MESH] == 0:
                 far = corners[s, 1] if which[s, CORNERS] > 1 else corners[s, 0]
                 t = _capsule(corners[s, 0], far, radius[s], o, u, best)
-            elif which[s, VOLUME] == 1 and contains(nodes[n0:n1], links[n0:n1], T[t0:t1], o[0], o[1], o[2]):
+            elif which[s, VOLUME] == 1 and encloses(
+                nodes[n0:n1], links[n0:n1], T[t0:t1], which[s, CLOSED] == 1, o[0], o[1], o[2]
+            ):
                 t = 0.0
             elif radius[s] > 0.0:
                 t = _traced(nodes[n0:n1], links[n0:n1], T[t0:t1], o, u, radius[s], best, stack, bounds, W)

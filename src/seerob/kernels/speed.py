@@ -140,3 +140,33 @@ def stacked(parts: list[Array]) -> tuple[Array, Indices]:
     """Corners of all bodies in one array, and where each body's start."""
     start = np.concatenate([[0], np.cumsum([len(part) for part in parts])]).astype(np.int64)
     return np.ascontiguousarray(np.concatenate([np.zeros((0, 3)), *parts])), start
+
+
+@njit(cache=True, nogil=True)
+def velocities_many(
+    cvel: Array, subtree_com: Array, positions: Array, ids: Indices, roots: Indices, found: Array
+) -> None:
+    """`velocities` at many instants, to linear and angular ones, shape (2, N, n, 3)."""
+    for k in range(len(cvel)):
+        velocities(cvel[k], subtree_com[k], positions[k], ids, roots, found[0, k], found[1, k])
+
+
+@njit(cache=True, nogil=True)
+def fastest_many(
+    rotations: Array,
+    positions: Array,
+    linear: Array,
+    angular: Array,
+    corners: Array,
+    start: Indices,
+    reach: Array,
+    speed: Array,
+    point: Array,
+    velocity: Array,
+) -> None:
+    """`fastest` at many instants: arrays that move have one more dimension in front."""
+    for k in range(len(speed)):
+        fastest(
+            rotations[k], positions[k], linear[k], angular[k], corners, start, reach,
+            speed[k], point[k], velocity[k],
+        )  # fmt: skip

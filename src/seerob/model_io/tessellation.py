@@ -87,6 +87,9 @@ def _capsule(points: Array, radius: float) -> tuple[Array, NDArray[np.int64]]:
 
 def _rounded_rectangle(points: Array, radius: float) -> tuple[Array, NDArray[np.int64]]:
     corner, u, v = points[0], points[1] - points[0], points[2] - points[0]
+    if min(np.linalg.norm(u), np.linalg.norm(v)) < 1e-12:
+        # As narrow as that it is a capsule: a person who is round there has such a trunk.
+        return _capsule(np.array([corner, corner + u + v]), radius)
     frame = np.column_stack([u / np.linalg.norm(u), v / np.linalg.norm(v), np.zeros(3)])
     frame[:, 2] = np.cross(frame[:, 0], frame[:, 1])
     quarter = _ROUND // 4

@@ -62,6 +62,11 @@ def is_length(name: str) -> bool:
     return name in PLACE
 
 
+def in_its_world(points: Array) -> Array:
+    """Points of a world with z up in OpenSim's (x forward, y up, z right), shape (..., 3)."""
+    return np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1)
+
+
 def from_joints(q: Array, pelvis: Array) -> Array:
     """OpenSim's coordinates of postures.
 
@@ -76,7 +81,7 @@ def from_joints(q: Array, pelvis: Array) -> Array:
     found: dict[str, Array] = {}
     turn = _turn("YXZ", q[:, _places("pelvis_turn_left", "pelvis_list_right", "pelvis_tilt_back")])
     found |= zip(PELVIS, _angles("ZXY", turn).T, strict=True)
-    found |= zip(PLACE, (pelvis[:, 0], pelvis[:, 2], -pelvis[:, 1]), strict=True)
+    found |= zip(PLACE, in_its_world(pelvis).T, strict=True)
     back = _turn("ZXY", q[:, _spine("lumbar")]) * _turn("ZXY", q[:, _spine("thorax")])
     found |= zip(BACK, _angles("ZXY", back).T, strict=True)
     for side in SIDES:

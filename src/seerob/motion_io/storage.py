@@ -145,12 +145,22 @@ def written(
     """
     if values.shape != (len(t), len(labels)):
         raise ValueError(f"{values.shape} values for {len(labels)} labels at {len(t)} instants")
+    yield from head(labels, len(t), name=name, degrees=degrees)
+    for instant, row in zip(t.tolist(), values.tolist(), strict=True):
+        yield "\t".join([f"{instant:.6f}", *cells(row)]) + "\n"
+
+
+def head(labels: Sequence[str], rows: int, *, name: str = "motion", degrees: bool = True) -> Iterator[str]:
+    """Lines of a storage file before its rows; see `written`."""
     yield f"{' '.join(name.split())}\n"
     yield "version=1\n"
-    yield f"nRows={len(t)}\n"
+    yield f"nRows={rows}\n"
     yield f"nColumns={len(labels) + 1}\n"
     yield f"inDegrees={'yes' if degrees else 'no'}\n"
     yield "endheader\n"
     yield "\t".join(["time", *("_".join(label.split()) for label in labels)]) + "\n"
-    for instant, row in zip(t.tolist(), values.tolist(), strict=True):
-        yield "\t".join([f"{instant:.6f}", *("NaN" if isnan(x) else f"{x:.8f}" for x in row)]) + "\n"
+
+
+def cells(row: Sequence[float]) -> list[str]:
+    """Cells of a row of a storage file, without the time."""
+    return ["NaN" if isnan(x) else f"{x:.8f}" for x in row]

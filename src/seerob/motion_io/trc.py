@@ -178,21 +178,44 @@ def written(
     Raises:
         ValueError: Shapes that do not fit, or fewer than two instants.
     """
-    count = len(names)
-    if positions.shape != (len(t), count, 3) or len(t) < 2:
-        raise ValueError(f"{positions.shape} positions of {count} markers at {len(t)} instants")
+    if positions.shape != (len(t), len(names), 3) or len(t) < 2:
+        raise ValueError(f"{positions.shape} positions of {len(names)} markers at {len(t)} instants")
     rate = 1 / float(np.median(np.diff(t)))
-    values = np.asarray(positions @ world_from_file(up)) / LENGTHS[unit]
+    yield from head(names, len(t), rate, name=name, unit=unit)
+    rows = cells(np.asarray(positions @ world_from_file(up)), unit=unit)
+    for number, (instant, row) in enumerate(zip(t.tolist(), rows, strict=True)):
+        yield "\t".join([str(number + 1), f"{instant:.6f}", *row]) + "\n"
+
+
+def head(
+    names: Sequence[str], frames: int, rate: float, *, name: str = "markers.trc", unit: str = "mm"
+) -> Iterator[str]:
+    """Lines of a TRC file before its rows.
+
+    Args:
+        names: Of the markers; blanks become underscores.
+        frames: How many rows follow.
+        rate: Of the rows [1/s].
+        name: That the file states of itself.
+        unit: Of the file.
+    """
     plain = ["_".join(text.split()) or f"M{k + 1}" for k, text in enumerate(names)]
-    shown = f"{rate:.6g}"
+    shown, count = f"{rate:.6g}", len(names)
     yield f"PathFileType\t4\t(X/Y/Z)\t{' '.join(name.split())}\n"
     yield "\t".join(HEAD) + "\n"
-    yield f"{shown}\t{shown}\t{len(t)}\t{count}\t{unit}\t{shown}\t1\t{len(t)}\n"
+    yield f"{shown}\t{shown}\t{frames}\t{count}\t{unit}\t{shown}\t1\t{frames}\n"
     yield "Frame#\tTime\t" + "\t\t\t".join(plain) + "\t\t\n"
     yield "\t\t" + "\t".join(f"{axis}{k + 1}" for k in range(count) for axis in "XYZ") + "\n"
     yield "\n"
-    for number, (instant, row) in enumerate(
-        zip(t.tolist(), values.reshape(len(t), -1).tolist(), strict=True)
-    ):
-        cells = "\t".join("NaN" if isnan(x) else f"{x:.5f}" for x in row)
-        yield f"{number + 1}\t{instant:.6f}\t{cells}\n"
+
+
+def cells(positions: Array, *, unit: str = "mm") -> Iterator[list[str]]:
+    """Cells of the markers in each row of a TRC file, three per marker.
+
+    Args:
+        positions: In the axes of the file [m], shape (n, k, 3); NaN where not known.
+        unit: Of the file.
+    """
+    values = positions / LENGTHS[unit]
+    for row in values.reshape(len(values), -1).tolist():
+        yield ["NaN" if isnan(x) else f"{x:.5f}" for x in row]

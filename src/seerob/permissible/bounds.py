@@ -32,6 +32,8 @@ def motions_of(sources: Sources, found: PermissibleSpeed | None = None) -> dict[
     for source, opened in sources:
         if not source.target():
             continue
+        if found is not None and found.rescaled is not None and source.target() == found.map.robot:
+            continue
         samples = list(opened.samples)
         joints = [s for s in samples if isinstance(s, JointSample)]
         if len(joints) != len(samples) or len(joints) < 2 or source.target() in motions:

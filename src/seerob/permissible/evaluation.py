@@ -13,14 +13,19 @@ from seerob.errors import InputError
 from seerob.model import Model
 from seerob.permissible.given_motion import GivenMotion
 from seerob.permissible.joint_limits import JointLimits
+from seerob.permissible.methods import By
 from seerob.permissible.path import Path, path_of
 from seerob.permissible.rescaled import Check, Rescaled, Spent, check, rescale, spent
-from seerob.permissible.speed_map import Permit, SpeedMap, Stations, speed_map
+from seerob.permissible.solved_motion import solved
+from seerob.permissible.speed_map import SpeedMap, Stations
+from seerob.permissible.survey import SPACING, Survey
+from seerob.permissible.verification import Verified, verify
 from seerob.permissible.witness import Clock, Witness
 from seerob.results import ResultLog
 from seerob.run import Bound, Feed, Judge, Summary, pump, ticks
-from seerob.samples import JointSample, Sample
-from seerob.snapshot import CriterionInfo, Finding
+from seerob.samples import JointSample, PoseSample, Sample
+from seerob.series import worst_verdict
+from seerob.snapshot import CriterionInfo, Finding, Snapshot, Verdict
 from seerob.source import HOLD, Opened, Source
 from seerob.trajectory import TrajectorySamples
 
@@ -33,10 +38,10 @@ Say = Callable[[str, float], None]
 class Wish:
     """What is asked for."""
 
-    permit: Permit = Permit.ALL
+    by: By = By.ALL
     tolerance: float = 5e-4
     """Of the path, in any joint [rad or m]."""
-    spacing: float = 0.02
+    spacing: float = SPACING
     """Largest way between two stations of the map in joint space [rad or m]."""
     margin: float = 0.02
     """Share of the map's speeds that is not used."""
@@ -45,7 +50,10 @@ class Wish:
     period: float = 0.008
     """Of the rescaled trajectory [s]."""
     rounds: int = 3
-    """How often the map is made anew when somebody else moves: rescaled, the robot meets them elsewhere."""
+    """How often the map is made anew when somebody else moves: rescaled, the robot meets them elsewhere; and
+    how often it gets more stations where the plan uses more than is permitted between two of them."""
+    verify: float = 1e-3
+    """Period at which the criteria are asked of the plan [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,22 +65,46 @@ class PermissibleSpeed:
     path: Path
     before: ResultLog
     """Every criterion during the given motion."""
+    first: Snapshot
+    """Of the given motion, for pictures."""
     rescaled: Rescaled | None
     """None where the map does not permit any motion along the path."""
     refused: str
     """Why there is no rescaled motion; else empty."""
     check: Check | None
+    verified: Verified | None
+    """What the criteria that count say of the plan at a fixed period; None without a plan."""
     spent: tuple[Spent, ...]
     after: Summary | None
     """Every criterion during the rescaled motion, by the same road."""
     findings: tuple[Finding, ...]
 
+    @property
+    def verdict(self) -> Verdict | None:
+        """Of the rescaled motion, or why there is none.
 
-def given_motion(sources: Sources, robot: str) -> GivenMotion:
-    """The recorded or planned motion of a robot.
+        That of every criterion in the run of it; with `By.EITHER` the two methods count together, as they
+        were asked at `Verified.period`, instead of each by itself.
+        """
+        if self.after is None or self.verified is None:
+            return Verdict.UNDECIDED if self.map.undecided else Verdict.EXCEEDED
+        planned = Verdict.UNDECIDED if self.verified.undecided else Verdict.EXCEEDED
+        if self.verified.kept:
+            planned = Verdict.WITHIN
+        alone = {
+            name: series.verdict
+            for name, series in self.after.results.items()
+            if self.map.by is not By.EITHER or name not in self.map.methods
+        }
+        return worst_verdict([planned, *alone.values()])
+
+
+def given_motion(model: Model, sources: Sources, robot: str) -> tuple[GivenMotion, tuple[Finding, ...]]:
+    """The recorded or planned motion of a robot; poses of its tool are solved as the engine solves them.
 
     Raises:
-        InputError: Not exactly one source of joint positions drives it.
+        InputError: Not exactly one source drives it, or it gives neither joint positions nor poses, or a
+            pose is out of reach.
     """
     driving = [opened for source, opened in sources if source.target() == robot]
     if len(driving) != 1:
@@ -80,59 +112,74 @@ def given_motion(sources: Sources, robot: str) -> GivenMotion:
         raise InputError.at("permissible speed", robot, what, "give one recorded or planned motion")
     samples = list(driving[0].samples)
     joints = [s for s in samples if isinstance(s, JointSample)]
-    if len(joints) != len(samples):
-        what = f"its source gives poses of {robot}'s tool, not joint positions"
-        raise InputError.at("permissible speed", robot, what, "give a joint trajectory")
-    return GivenMotion.of(joints)
+    poses = [s for s in samples if isinstance(s, PoseSample)]
+    if len(joints) == len(samples):
+        return GivenMotion.of(joints), ()
+    if len(poses) != len(samples):
+        what = f"its source gives neither only joint positions nor only poses of {robot}'s tool"
+        raise InputError.at("permissible speed", robot, what, "give a joint trajectory or a tool path")
+    text = (
+        "joint positions of the given motion are solved from poses of its tool, on the branch that is "
+        "nearest from pose to pose; the controller may choose another, and then this map is not its map"
+    )
+    finding = Finding(level="assumed", subject=robot, text=text)
+    return GivenMotion.of(solved(model, model.robot(robot), poses)), (finding,)
 
 
 def witness(
     model: Model, sources: Sources, bound: Sequence[Bound], infos: Sequence[CriterionInfo], say: Say
-) -> tuple[Witness, ResultLog]:
-    """Run the given motion once: where everybody is, and what the criteria say of it."""
+) -> tuple[Witness, ResultLog, Snapshot]:
+    """Run the given motion once: where everybody is, what the criteria say of it, and its first tick."""
     driven = {s.target(): s.timeout for s, _ in sources if s.target()}
     seen, log = Witness(Judge(bound)), ResultLog(infos)
     duration = max((opened.duration for _, opened in sources), default=0.0)
     engine = Engine(model, driven=driven)
+    first: Snapshot | None = None
     for out, _ in ticks(engine, seen, pump(sources, model.workstation.engine.tick)):
+        first = first or out
         log.add(out)
         say("the given motion", min(1.0, out.t / duration) if duration else 1.0)
-    return seen, log
+    assert first is not None  # there always is a tick
+    return seen, log, first
 
 
 def mapped(
     model: Model,
-    sources: Sources,
+    survey: Survey,
     seen: Witness,
     motion: GivenMotion,
-    limits: JointLimits,
     wish: Wish,
     say: Say,
-) -> tuple[SpeedMap, Rescaled | None, str]:
-    """The map and the rescaled motion; again while others move and are met elsewhere."""
-    robot = model.robot(motion.target)
-    path = path_of(motion, tolerance=wish.tolerance)
-    elsewhere = [m for name, m in model.mechanisms.items() if name != robot.name and seen.moves(m)]
+) -> tuple[SpeedMap, Rescaled | None, Verified | None, str]:
+    """The map, the rescaled motion and what was found in it; again while others are met elsewhere."""
+    elsewhere = [m for name, m in model.mechanisms.items() if name != motion.target and seen.moves(m)]
     found: SpeedMap | None = None
     rescaled: Rescaled | None = None
-    for turn in range(wish.rounds if elsewhere else 1):
-        told = f"the map, round {turn + 1}" if elsewhere else "the map"
-        clock: Clock = _same if rescaled is None else rescaled.own_instant
-        more = speed_map(
-            model, robot, motion, path, limits, seen,
-            criteria=model.workstation.safety, permit=wish.permit, spacing=wish.spacing,
-            others_at=clock, progress=partial(say, told),
-        )  # fmt: skip
-        found = more if found is None else _both(found, more)
-        try:
+    verified: Verified | None = None
+    try:
+        for turn in range(wish.rounds if elsewhere else 1):
+            told = f"the map, round {turn + 1}" if elsewhere else "the map"
+            clock: Clock = _same if rescaled is None else rescaled.own_instant
+            more = survey.map(spacing=wish.spacing, others_at=clock, progress=partial(say, told))
+            found = more if found is None else _both(found, more)
             say("the timing", 0.0)
             rescaled = rescale(found, not_faster=wish.not_faster, margin=wish.margin)
-        except InputError as refused:
-            if refused.problems[0].key != robot.name:
-                raise
-            return found, None, refused.problems[0].what
+        for turn in range(wish.rounds):
+            assert found is not None
+            assert rescaled is not None
+            looked = f"what lies between, round {turn + 1}"
+            verified = verify(rescaled, survey, period=wish.verify, progress=partial(say, looked))
+            if verified.kept or turn == wish.rounds - 1:
+                break
+            found = survey.denser(found, verified.over, rescaled.own_instant)
+            rescaled = rescale(found, not_faster=wish.not_faster, margin=wish.margin)
+    except InputError as refused:
+        if found is None or refused.problems[0].key != motion.target:
+            raise
+        first = refused.problems[0]
+        return found, None, None, f"{first.what}; {first.remedy}"
     assert found is not None
-    return found, rescaled, ""
+    return found, rescaled, verified, ""
 
 
 def _same(t: float) -> float:
@@ -152,8 +199,9 @@ def evaluation(
     model: Model,
     sources: Sources,
     *,
-    seen: tuple[Witness, ResultLog],
+    seen: tuple[Witness, ResultLog, Snapshot],
     motion: GivenMotion,
+    solved_from: Sequence[Finding],
     limits: JointLimits,
     wish: Wish,
     again: Callable[[Feed, float], Summary],
@@ -167,14 +215,19 @@ def evaluation(
         sources: Its sources, opened.
         seen: From `witness`.
         motion: From `given_motion`.
+        solved_from: Likewise.
         limits: Of the robot's joints.
         wish: What is asked for.
         again: Runs the road over what is heard, whose length is told [s].
         ready: Told what was found before that.
         say: See `Say`.
     """
-    found, rescaled, refused = mapped(model, sources, seen[0], motion, limits, wish, say)
-    findings = list(_about(found, motion, wish))
+    robot = model.robot(motion.target)
+    path = path_of(motion, tolerance=wish.tolerance)
+    criteria = model.workstation.safety
+    survey = Survey(model, robot, motion, path, limits, seen[0], criteria=criteria, by=wish.by)
+    found, rescaled, verified, refused = mapped(model, survey, seen[0], motion, wish, say)
+    findings = [*solved_from, *_about(found, motion, wish)]
     checked: Check | None = None
     where_to: tuple[Spent, ...] = ()
     whole: Sources = ()
@@ -182,8 +235,21 @@ def evaluation(
         checked, where_to = check(rescaled), spent(rescaled)
         whole, more = played(sources, rescaled, wish.period)
         findings += more
+        if verified is not None:
+            findings += _between_stations(verified, robot.name)
     answer = PermissibleSpeed(
-        found, motion, found.path, seen[1], rescaled, refused, checked, where_to, None, tuple(findings)
+        found,
+        motion,
+        path,
+        seen[1],
+        seen[2],
+        rescaled,
+        refused,
+        checked,
+        verified,
+        where_to,
+        None,
+        tuple(findings),
     )
     ready(answer)
     if not whole:
@@ -235,6 +301,15 @@ class _Held:
                 held = changed(held, qd=(0.0,) * len(held.qd))
             yield held
             k, t = k + 1, t + HOLD
+
+
+def _between_stations(verified: Verified, robot: str) -> Iterator[Finding]:
+    if not verified.kept:
+        what = f"uses {verified.use:.4f} of what is permitted at {verified.at:.3f} s ({verified.what})"
+        if verified.undecided:
+            what = f"cannot be judged at {verified.undecided} of {verified.asked} instants"
+        text = f"between the stations of the map the plan {what}: give a smaller spacing or a larger margin"
+        yield Finding(level="warning", subject=robot, text=text)
 
 
 def _about(found: SpeedMap, motion: GivenMotion, wish: Wish) -> Iterator[Finding]:

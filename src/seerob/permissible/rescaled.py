@@ -13,6 +13,7 @@ from seerob.permissible.timing import CHECK, Ceiling, Timed, timed
 from seerob.trajectory import Trajectory
 from seerob.transforms import Array
 
+BLOCKED = "change the path or the cell there; where contact may be permitted, power_and_force, --by either"
 USED = 0.98
 """A limit that is used by this share governs."""
 MARGIN = 0.02
@@ -117,7 +118,11 @@ def rescale(found: SpeedMap, *, not_faster: bool = False, margin: float = MARGIN
         raise InputError.at("permissible speed", "margin", f"{margin}", "give 0 or more, and less than 1")
     for where, what, remedy in (
         (found.undecided, "cannot be told", "give what is missing, or ask fewer criteria"),
-        (found.blocked, "is none", "change the path or the cell there, or ask fewer criteria"),
+        (
+            found.blocked,
+            "is none",
+            BLOCKED,
+        ),
     ):
         if where:
             t, why = where[0]
@@ -211,8 +216,7 @@ def _governs(
         reason = stations.governing[lower]
         if reason is None:
             return "speed of the given motion, or of a joint"
-        where = ", ".join(x for x in (reason.region, reason.contact, reason.governs) if x)
-        return f"{reason.criterion}: {where}" if where else reason.criterion
+        return reason.words()
     for used, what in ((qd, "speed"), (qdd, "acceleration"), (qddd, "jerk")):
         if used.max() >= USED:
             return f"{what} of {names[int(used.argmax())]}"

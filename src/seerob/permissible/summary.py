@@ -8,8 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from seerob.permissible.between_samples import METHOD, Bound
+from seerob.permissible.ceiling import Ceiling
 from seerob.permissible.evaluation import PermissibleSpeed
+from seerob.permissible.methods import BY, EITHER_NEEDS, By
+from seerob.permissible.report_place import ReportPlace
+from seerob.permissible.segments import PathSegment
 from seerob.permissible.tables import COST_HEAD, Cell, cost_rows, least_by_region
+from seerob.permissible.verification import Verified
 from seerob.report_section import ReportSection, ReportTable
 from seerob.transforms import Array
 
@@ -17,35 +22,62 @@ LONGEST = 12
 """Rows of what governs; the rest is in the workbook."""
 BOUNDS_TITLE = "Between the samples"
 TITLE = "Permissible speed along the path"
+BY_REGION = "Permissible speed by body region"
 
 
 def sentences(found: PermissibleSpeed) -> tuple[str, ...]:
     """The result in words."""
     asked = ", ".join(found.map.asked)
-    head = (
-        f"The largest speed of {found.map.robot} along the path of its given motion that the limits of its "
-        f"joints and these criteria permit: {asked}."
-    )
-    if found.rescaled is None or found.check is None:
-        return head, f"There is no rescaled motion: {found.refused}."
-    motion, used = found.rescaled, found.check
+    head = [
+        f"The largest speed of {found.map.robot} along the path of its given motion, {BY[found.map.by]}, and "
+        f"within the speed limits of its joints. Criteria: {asked}."
+    ]
+    if found.map.by is By.EITHER:
+        head.append(f"What this rests on: {EITHER_NEEDS}.")
+    if found.rescaled is None or found.check is None or found.verified is None:
+        return *head, f"There is no rescaled motion: {found.refused}."
+    motion, used, verified = found.rescaled, found.check, found.verified
     change = motion.duration - motion.before
     return (
-        head,
+        *head,
         f"Cycle time {motion.before:.3f} s as given, {motion.duration:.3f} s rescaled ({change:+.3f} s); "
         f"the map is kept with a margin of {motion.margin:.1%}.",
         f"At 1 kHz and wherever the jerk jumps, the rescaled motion uses at most {used.map:.1%} of the map, "
         f"{used.velocity:.1%} of a joint's speed, {used.acceleration:.1%} of its acceleration and "
         f"{used.jerk:.1%} of its jerk. Its path is off the given one by at most "
         f"{float(found.path.deviation.max()):.2g} rad or m in any joint.",
-        "The rescaled motion is a plan: no controller has executed it. Between two stations of the map the "
-        "lesser of their speeds counts, which is a convention, not a bound; the criteria were asked of the "
-        "rescaled motion again, and their verdicts are those of the whole run.",
+        _between(verified),
+        "The rescaled motion is a plan: no controller has executed it. The criteria were asked again of a "
+        "run of it, and their verdicts are those of the whole run.",
     )
 
 
-def section(found: PermissibleSpeed) -> ReportSection:
-    """For the report."""
+def _between(verified: Verified) -> str:
+    """What holds between two stations of the map, and how that is known."""
+    head = f"Between the stations of the map: the criteria were asked of the plan every {verified.period:g} s"
+    if verified.undecided:
+        return f"{head}; at {verified.undecided} of {verified.asked} instants it cannot be told."
+    worst = f", at {verified.at:.3f} s ({verified.what})" if verified.use > 0 else ""
+    return (
+        f"{head} while it moves, {verified.asked} times; it uses at most {verified.use:.1%} of what they "
+        f"permit there{worst}. That is a sampling, not a bound."
+    )
+
+
+def sections(found: PermissibleSpeed, place: ReportPlace) -> tuple[ReportSection, ...]:
+    """For the report: the segments with the way in the room, then what governs and where the time goes.
+
+    Args:
+        found: What was found.
+        place: The cell it is drawn in.
+    """
+    by_segment = ReportTable(
+        ("segment", "from, to", "way", "permitted", "largest given", "criterion, body region", "contact",
+         "governed by", "limit", "part"),
+        tuple(_segment(one) for one in place.segments),
+        "Permitted: speed of the tool point at the place where it may be slowest. Cut where the robot stands "
+        "or turns back, and into parts of equal way.",
+    )  # fmt: skip
     tables = [
         ReportTable(
             ("criterion, body region", "least permissible speed", "contact", "governed by", "part", "at"),
@@ -63,10 +95,57 @@ def section(found: PermissibleSpeed) -> ReportSection:
                 "Where the time of the rescaled motion goes.",
             )
         )
-    return ReportSection(TITLE, sentences(found), tuple(tables), picture(found), _CAPTION)
+    return (
+        ReportSection(TITLE, sentences(found), (by_segment,), place.picture(found), _IN_THE_ROOM),
+        ReportSection(BY_REGION, (), tuple(tables), picture(found), _CAPTION),
+    )
 
 
 _CAPTION = "Path speed over the given motion's time: permissible, and as given. Gaps are undecided."
+_IN_THE_ROOM = (
+    "The way of the tool point, coloured by what the given motion does there: within what is permitted, "
+    "above it, or undecided."
+)
+
+
+def limit_words(ceiling: Ceiling | None) -> str:
+    """``190 N/cm²``: the figure that governs, in the unit of its table."""
+    if ceiling is None or ceiling.limit is None:
+        return "–"
+    value, unit = ceiling.limit.value, ceiling.limit.unit
+    return f"{value / 1e4:.4g} N/cm²" if unit == "Pa" else f"{value:.4g} {unit}"
+
+
+def segment_words(one: PathSegment) -> str:
+    """One segment as a line."""
+    number, when, way, permitted, given, name, contact, governs, limit, part = _segment(one)
+    why = ", ".join(x for x in (contact, governs, limit, part) if x not in {"–", name})
+    if permitted in {"none", "undecided"}:
+        permitted, why = "no speed" if permitted == "none" else "an undecided speed", governs
+    return f"{number:>3}  {when}, {way}: tool point {permitted} permitted, {given} given; {name}: {why}"
+
+
+def _segment(one: PathSegment) -> tuple[str, ...]:
+    c = one.governing
+    blocked = c is not None and c.share == 0
+    permitted = (
+        "undecided" if np.isnan(one.permissible) else "none" if blocked else f"{one.tool_speed:.3f} m/s"
+    )
+    name = "speed of a joint" if c is None else f"{c.criterion}: {c.region}" if c.region else c.criterion
+    governs = one.joint if c is None else c.reason if c.undecided or blocked else c.governs
+    part = "–" if c is None or blocked else c.surface or "–"
+    return (
+        str(one.number),
+        f"{one.start:.2f} s to {one.end:.2f} s",
+        f"{one.way:.3f} m",
+        permitted,
+        f"{one.given:.3f} m/s",
+        name,
+        (c.contact if c is not None else "") or "–",
+        governs,
+        limit_words(c),
+        part,
+    )
 
 
 def _float(cell: Cell) -> float:

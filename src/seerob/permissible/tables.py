@@ -9,40 +9,66 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from seerob.permissible.ceilings import Ceiling
+from seerob.path_map import (
+    GIVEN,
+    PERMISSIBLE,
+    PIECE,
+    TOOL,
+    TOOL_GIVEN,
+    TOOL_PERMISSIBLE,
+    WHO,
+    WHY,
+    joint_columns,
+)
+from seerob.permissible.ceiling import Ceiling
 from seerob.permissible.evaluation import PermissibleSpeed
+from seerob.permissible.segments import PathSegment
 from seerob.permissible.speed_map import SpeedMap
 from seerob.trajectory import Trajectory
 
 Cell = str | float | int | None
 
 MAP_HEAD: tuple[str, ...] = (
-    "piece",
+    PIECE,
     "way in joint space [rad or m]",
     "given motion is there at [s]",
-    "permissible path speed [rad/s or m/s]",
-    "path speed of the given motion [rad/s or m/s]",
+    PERMISSIBLE,
+    GIVEN,
     "path speed at the joints' limits [rad/s or m/s]",
     "permissible share of it",
     "permissible speed of the governing part [m/s]",
-    "criterion",
-    "body region",
-    "contact",
-    "governed by",
+    TOOL_PERMISSIBLE,
+    TOOL_GIVEN,
+    *TOOL,
+    *WHO,
     "part of the robot",
-    "why undecided, or why none",
+    WHY,
+    "limit that governs",
+    "unit of that limit",
+    "source of that limit",
+)
+SEGMENT_HEAD: tuple[str, ...] = (
+    "segment",
+    "piece",
+    "from [s]",
+    "to [s]",
+    "way of the tool point [m]",
+    *(f"{end} {axis} [m]" for end in ("from", "to") for axis in "xyz"),
+    TOOL_PERMISSIBLE,
+    "least at [s]",
+    "largest speed of the tool point as given [m/s]",
+    "least permissible share of the given speed",
+    PERMISSIBLE,
+    *MAP_HEAD[13:],
 )
 REGION_HEAD: tuple[str, ...] = (
-    "piece",
+    PIECE,
     "given motion is there at [s]",
-    "criterion",
-    "body region",
-    "contact",
-    "governed by",
+    *WHO,
     "part of the robot",
-    "permissible path speed [rad/s or m/s]",
+    PERMISSIBLE,
     "permissible speed of that part [m/s]",
-    "why undecided, or why none",
+    *MAP_HEAD[18:],
 )
 
 
@@ -51,16 +77,17 @@ def _number(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
+def map_head(found: SpeedMap) -> list[str]:
+    """Of `map_rows`: `MAP_HEAD`, and the joint positions of each place."""
+    return [*MAP_HEAD, *joint_columns(found.limits.units)]
+
+
 def map_rows(found: SpeedMap) -> Iterator[list[Cell]]:
-    """One row per station, in `MAP_HEAD`'s order."""
+    """One row per station, in `map_head`'s order."""
     for n, stations in enumerate(found.stations, 1):
         permissible, share = stations.permissible, stations.share
         for k, ceiling in enumerate(stations.governing):
-            joint = found.limits.joints[int(stations.joint[k])]
-            about: list[Cell] = ["joint speed", "", "", joint, "", ""]
-            speed: float | None = None
-            if ceiling is not None:
-                about, speed = _about(ceiling), _number(ceiling.speed)
+            lever = float(stations.lever[k])
             yield [
                 n,
                 float(stations.s[k]),
@@ -69,20 +96,39 @@ def map_rows(found: SpeedMap) -> Iterator[list[Cell]]:
                 float(stations.given[k]),
                 float(stations.reference[k]),
                 _number(float(share[k])),
-                speed,
-                *about,
+                None if ceiling is None else _number(ceiling.speed),
+                _number(float(permissible[k]) * lever),
+                float(stations.given[k]) * lever,
+                *stations.tool[k].tolist(),
+                *_about(ceiling, found.limits.joints[int(stations.joint[k])]),
+                *stations.q[k].tolist(),
             ]
 
 
-def _about(ceiling: Ceiling) -> list[Cell]:
-    governs = "undecided" if ceiling.undecided else ceiling.governs
+def segment_rows(found: Sequence[PathSegment]) -> Iterator[list[Cell]]:
+    """One row per segment, in `SEGMENT_HEAD`'s order."""
+    for one in found:
+        (x, y, z), (x2, y2, z2) = (end.tolist() for end in one.tool)
+        yield [
+            one.number, one.piece, one.start, one.end, one.way, x, y, z, x2, y2, z2,
+            _number(one.tool_speed), one.at, one.given, _number(one.share), _number(one.permissible),
+            *_about(one.governing, one.joint),
+        ]  # fmt: skip
+
+
+def _about(ceiling: Ceiling | None, joint: str = "") -> list[Cell]:
+    """Criterion, region, contact, what governs, part, why, and the figure with its unit and source."""
+    if ceiling is None:
+        return ["joint speed", "", "", "", joint, "", None, "", ""]
+    figure = ceiling.limit
     return [
         ceiling.criterion,
         ceiling.region,
         ceiling.contact,
-        governs,
+        "undecided" if ceiling.undecided else ceiling.governs,
         ceiling.surface,
         ceiling.reason,
+        *((None, "", "") if figure is None else (figure.value, figure.unit, figure.source)),
     ]
 
 
@@ -91,11 +137,11 @@ def region_rows(found: SpeedMap) -> Iterator[list[Cell]]:
     for n, stations in enumerate(found.stations, 1):
         for k, ceilings in enumerate(stations.ceilings):
             for c in ceilings:
-                criterion, region, contact, governs, surface, reason = _about(c)
+                criterion, region, contact, governs, surface, *rest = _about(c)
                 path_speed = _number(c.share * float(stations.reference[k]))
                 yield [
                     n, float(stations.t[k]), criterion, region, contact, governs, surface,
-                    path_speed, _number(c.speed), reason,
+                    path_speed, _number(c.speed), *rest,
                 ]  # fmt: skip
 
 
@@ -115,7 +161,7 @@ def least_by_region(found: SpeedMap) -> list[tuple[Ceiling, float, bool]]:
 
 def trajectory_head(trajectory: Trajectory, units: Sequence[str]) -> list[str]:
     """Columns that `seerob.sources.csv` and `excel` read back as they are."""
-    joints = [f"J{j + 1} [{unit}]" for j, unit in enumerate(units)]
+    joints = joint_columns(units)
     speeds = [f"J{j + 1} velocity [{unit}/s]" for j, unit in enumerate(units)]
     return ["t [s]", *joints, *speeds]
 

@@ -4,7 +4,8 @@ r"""Timing of a smooth piece of path: as fast as the map and the joints' speed, 
    speeds and accelerations; its accelerations jump.
 2. Averaged over a window (`seerob.permissible.profile`), which bounds the jerk and keeps the path.
 3. Where the average is beyond a limit at any of its breaks or every millisecond, the timing is made again
-   with less speed there, a few times; of several windows the quickest counts.
+   with less speed there, a few times; of several windows, with and without short peaks of the map, the
+   quickest counts.
 4. What is still beyond is removed by stretching the time of the whole piece by the largest of
    :math:`r_v, r_{map}, \sqrt{r_a}, \sqrt[3]{r_j}`, the ratios to the limits.
 
@@ -36,6 +37,9 @@ PER_WAY = 0.005
 """Way of one of them in joint space [rad or m]."""
 WINDOWS = (0.5, 1.0, 2.0)
 """Windows to try, as shares of the time in which the jerk limit reverses the acceleration limit."""
+FLATTENED = (0.0, 0.2)
+"""Peaks of the map narrower than these shares of a piece are also tried without: under a jerk limit a short
+peak can cost more than it gives."""
 ROUNDS = 6
 MARGIN = 1e-9
 """Relative; rounding stays below it."""
@@ -136,12 +140,26 @@ def timed(piece: Piece, ceiling: Ceiling, limits: JointLimits) -> Timed:
         raise InputError.at("permissible speed", "path", what, "change the path or the cell there")
     swing = float((limits.acceleration / limits.jerk).max())
     best: Timed | None = None
-    for share in WINDOWS:
-        found = _with_window(piece, ceiling, limits, s, top, 2 * swing * share)
-        if best is None or found.duration < best.duration:
-            best = found
+    for width in FLATTENED:
+        flat = _opened(top, round(width * n))
+        if width and np.allclose(flat, top, rtol=1e-3):
+            continue
+        for share in WINDOWS:
+            found = _with_window(piece, ceiling, limits, s, flat, 2 * swing * share)
+            if best is None or found.duration < best.duration:
+                best = found
     assert best is not None
     return best
+
+
+def _opened(top: Array, width: int) -> Array:
+    """Nowhere above ``top``, and without its peaks that are narrower than so many intervals."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    if width < 1:
+        return top
+    size = 2 * width + 1
+    return np.asarray(maximum_filter1d(minimum_filter1d(top, size), size))
 
 
 def _with_window(
@@ -150,7 +168,7 @@ def _with_window(
     slower = np.ones(len(s))
     best: Timed | None = None
     for _ in range(ROUNDS):
-        raw = Parabolas.of(s, _fastest(piece, s, top * slower, limits))
+        raw = Parabolas.of(s, fastest(piece, s, top * slower, limits))
         # A window that is longer than the motion would be all that one sees of it.
         now = Timed(piece, Profile(raw, min(window, max(float(raw.t[-1]), 1e-3))))
         t = now.instants()
@@ -177,15 +195,15 @@ def _spread(s: Array, now: Timed, t: Array, over: Array) -> Array:
     """By how much to be slower at each path coordinate: what the average mixes counts for all of it."""
     wanted = np.ones(len(s))
     w = now.profile.window
-    for i in np.flatnonzero(over > 1 + 1e-4).tolist():
-        ends = now.profile.raw.at(np.array([t[i] - w, t[i]]))[1]
-        a, b = np.searchsorted(s, ends)
-        part = slice(max(int(a) - 1, 0), int(b) + 1)
+    at = np.flatnonzero(over > 1 + 1e-4)
+    low, high = (np.searchsorted(s, now.profile.raw.at(when)[1]) for when in (t[at] - w, t[at]))
+    for i, a, b in zip(at.tolist(), low.tolist(), high.tolist(), strict=True):
+        part = slice(max(a - 1, 0), b + 1)
         wanted[part] = np.maximum(wanted[part], over[i])
     return wanted
 
 
-def _fastest(piece: Piece, s: Array, top: Array, limits: JointLimits) -> Array:
+def fastest(piece: Piece, s: Array, top: Array, limits: JointLimits) -> Array:
     """Fastest path speeds under the map and the joints' speeds and accelerations, by toppra; shape (n,)."""
     from toppra import algorithm, constraint, interpolator
     from toppra.constraint.linear_constraint import LinearConstraint

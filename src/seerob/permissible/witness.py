@@ -63,7 +63,8 @@ class Posed(State):
         hearings = {name: Hearing(given=True, driven=False) for name in model.mechanisms}
         super().__init__(model, data, hearings)
         self._robot, self._witness = robot, witness
-        self._doubts: dict[str, str] = {}
+        self.doubts: dict[str, str] = {}
+        """Why somebody's place may not be relied on, by name; empty when it may."""
 
     def place(self, t: float, others_at: float, q: Array, qd: Array, own_doubt: str = "") -> None:
         """Put everybody where they are.
@@ -80,13 +81,13 @@ class Posed(State):
         robot = self._robot
         self.data.qpos[robot.q_address] = robot.coupling @ q + robot.offset
         self.data.qvel[robot.v_address] = robot.coupling @ qd
-        self._doubts = {**doubts, robot.name: own_doubt}
+        self.doubts = {**doubts, robot.name: own_doubt}
         self.asked.clear()
         self.refresh(t)
 
     def doubt(self, name: str) -> str:
         """See `State.doubt`; of the others what the run knew of them then."""
-        return self._doubts[name]
+        return self.doubts.get(name, "")
 
 
 Clock = Callable[[float], float]

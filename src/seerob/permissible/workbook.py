@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
+
+import numpy as np
 
 from seerob.permissible.evaluation import PermissibleSpeed
+from seerob.permissible.methods import BY
+from seerob.permissible.segments import PathSegment
 from seerob.permissible.tables import (
     COST_HEAD,
-    MAP_HEAD,
     REGION_HEAD,
+    SEGMENT_HEAD,
     Cell,
     cost_rows,
+    map_head,
     map_rows,
     region_rows,
+    segment_rows,
     trajectory_head,
     trajectory_rows,
 )
@@ -32,11 +39,12 @@ PROOF_HEAD: list[Cell] = [
 ]
 
 
-def workbook(found: PermissibleSpeed, scene: Scene, *, period: float) -> bytes:
+def workbook(found: PermissibleSpeed, cut: Sequence[PathSegment], scene: Scene, *, period: float) -> bytes:
     """The workbook.
 
     Args:
         found: What was found.
+        cut: The segments of its map.
         scene: Of the workstation, for hashes and where inputs are from.
         period: Of the rescaled motion's rows [s].
     """
@@ -46,7 +54,8 @@ def workbook(found: PermissibleSpeed, scene: Scene, *, period: float) -> bytes:
     sheets = Sheets(book)
     try:
         sheets.add("Summary", ["what", "value"], _summary(found, scene), fit=True)
-        sheets.add("Map", list(MAP_HEAD), map_rows(found.map))
+        sheets.add("Segments", list(SEGMENT_HEAD), segment_rows(cut))
+        sheets.add("Map", list(map_head(found.map)), map_rows(found.map))
         sheets.add("Map by region", list(REGION_HEAD), region_rows(found.map))
         if found.rescaled is not None:
             trajectory = found.rescaled.trajectory(period)
@@ -91,12 +100,13 @@ def _summary(found: PermissibleSpeed, scene: Scene) -> list[list[Cell]]:
         ["seerob", scene.version],
         ["edition", scene.edition],
         ["robot", found.map.robot],
+        ["by", BY[found.map.by]],
         ["criteria asked", ", ".join(found.map.asked)],
         ["cycle time before [s]", found.motion.duration],
     ]
-    if found.rescaled is None or found.check is None:
+    if found.rescaled is None or found.check is None or found.verified is None:
         return [*rows, ["rescaled motion", f"none: {found.refused}"]]
-    used = found.check
+    used, verified = found.check, found.verified
     return [
         *rows,
         ["cycle time after [s]", found.rescaled.duration],
@@ -106,6 +116,9 @@ def _summary(found: PermissibleSpeed, scene: Scene) -> list[list[Cell]]:
         ["largest use of a joint's speed", used.velocity],
         ["largest use of a joint's acceleration", used.acceleration],
         ["largest use of a joint's jerk", used.jerk],
+        ["criteria asked of the plan every [s]", verified.period],
+        ["largest use of what they permit then", verified.use if np.isfinite(verified.use) else "beyond"],
+        ["instants that cannot be told", verified.undecided],
     ]
 
 

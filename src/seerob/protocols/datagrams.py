@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import socket
 import time
 from collections import deque
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from typing import Any, NamedTuple
 
+from seerob.protocols.reception import Reception
+
 WAITING = 512
 """Datagrams that wait for whoever reads; after that the oldest is dropped."""
+AT_ONCE = 64
+"""Datagrams that are read before others in the same loop have their turn."""
+LARGEST = 1 << 16
+"""More than any datagram has [B]."""
 
 
 class Datagram(NamedTuple):
     """What arrived."""
 
     arrived: float
-    """Host's monotonic time [s]."""
+    """Host's monotonic time [s]: when the kernel received it, where the platform says so."""
     data: bytes
 
 
@@ -39,26 +47,54 @@ class Datagrams(asyncio.DatagramProtocol):
         self._waiting: deque[Datagram] = deque(maxlen=WAITING)
         self._arrived = asyncio.Event()
         self._error: OSError | None = None
-        self._transport: Any = None
+        self._send: Callable[[bytes, Any], object] = lambda data, to: None
         self.port = 0
         self.dropped = self.strangers = 0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Called by the loop."""
-        self._transport = transport
+        if isinstance(transport, asyncio.DatagramTransport):
+            self._send = transport.sendto
         self.port = transport.get_extra_info("sockname")[1]
+
+    def attach(self, link: socket.socket) -> Callable[[], None]:
+        """Call back for a loop that says when the socket can be read."""
+        reception = Reception(link)
+        self.port = link.getsockname()[1]
+
+        def send(data: bytes, to: Any) -> None:
+            # An answer that cannot be delivered, or not now, is no reason to stop listening.
+            with contextlib.suppress(OSError):
+                link.sendto(data, to)
+
+        def read() -> None:
+            for _ in range(AT_ONCE):
+                try:
+                    arrived, data, sender = reception.read(LARGEST)
+                except OSError:  # all was read, or an answer was refused
+                    return
+                self._take(arrived, data, sender)
+
+        self._send = send
+        return read
 
     def datagram_received(self, data: bytes, addr: tuple[str | Any, int]) -> None:
         """Called by the loop."""
-        now = time.monotonic()
-        if self._sender is not None and addr[0] != self._sender:
+        self._take(time.monotonic(), data, addr)
+
+    def _take(self, arrived: float, data: bytes, sender: tuple[str | Any, int]) -> None:
+        if self._sender is not None and sender[0] != self._sender:
             self.strangers += 1
             return
         if self._answer is not None and (reply := self._answer(data)) is not None:
-            self._transport.sendto(reply, addr)
+            self._send(reply, sender)
         self.dropped += len(self._waiting) == WAITING
-        self._waiting.append(Datagram(now, data))
+        self._waiting.append(Datagram(arrived, data))
         self._arrived.set()
+
+    def send(self, data: bytes, to: tuple[str, int]) -> None:
+        """Send a datagram from this port."""
+        self._send(data, to)
 
     def error_received(self, exc: Exception) -> None:
         """Called by the loop: an answer could not be delivered, which is no reason to stop listening."""
@@ -88,7 +124,8 @@ class Datagrams(asyncio.DatagramProtocol):
                 async with asyncio.timeout(silence):
                     await self._arrived.wait()
             except TimeoutError as error:
-                # On a busy machine this thread may have slept, with data waiting.
+                # On a busy machine this thread may have slept, with data waiting: the loop looks twice.
+                await asyncio.sleep(0)
                 await asyncio.sleep(0)
                 if not self._waiting:
                     raise TimeoutError(f"nothing sent to port {self.port} for {silence:g} s") from error
@@ -96,7 +133,12 @@ class Datagrams(asyncio.DatagramProtocol):
 
 @asynccontextmanager
 async def listening(
-    bind: str, port: int, *, sender: str | None = None, answer: Answer | None = None
+    bind: str,
+    port: int,
+    *,
+    sender: str | None = None,
+    answer: Answer | None = None,
+    group: str | None = None,
 ) -> AsyncGenerator[Datagrams, None]:
     """Listen on a port of this machine.
 
@@ -105,15 +147,54 @@ async def listening(
         port: 0 is any free one.
         sender: Address whose datagrams count; anyone's when None.
         answer: Asked at once for each datagram that counts; must not raise.
+        group: Multicast group to join, on the interface that has the address ``bind``.
 
     Raises:
         OSError: The port is taken, or the address is not of this machine.
     """
     loop = asyncio.get_running_loop()
-    transport, protocol = await loop.create_datagram_endpoint(
-        lambda: Datagrams(sender, answer), local_addr=(bind, port)
-    )
+    (found, *_) = await loop.getaddrinfo(bind, port, type=socket.SOCK_DGRAM)
+    link = _bound(found[0], found[4]) if group is None else _member(bind, port, group)
+    heard = Datagrams(sender, answer)
     try:
-        yield protocol
+        loop.add_reader(link, heard.attach(link))
+    except NotImplementedError:  # a loop of Windows
+        transport, _ = await loop.create_datagram_endpoint(lambda: heard, sock=link)
+        leave: Callable[[], object] = transport.abort
+    else:
+
+        def leave() -> None:
+            loop.remove_reader(link)
+            link.close()
+
+    try:
+        yield heard
     finally:
-        transport.abort()
+        leave()
+
+
+def _bound(family: int, address: Any) -> socket.socket:
+    """A socket with an address of this machine."""
+    link = socket.socket(family, socket.SOCK_DGRAM)
+    try:
+        link.bind(address)
+        link.setblocking(False)
+    except OSError:
+        link.close()
+        raise
+    return link
+
+
+def _member(bind: str, port: int, group: str) -> socket.socket:
+    """A socket that hears a multicast group, beside others on this machine that do."""
+    link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        link.bind(("", port))
+        membership = socket.inet_aton(group) + socket.inet_aton(bind)
+        link.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+        link.setblocking(False)
+    except OSError:
+        link.close()
+        raise
+    return link

@@ -77,7 +77,7 @@ class OpenVr:
                 self._known.pop(index, None)
                 continue
             serial, role = self._name(index)
-            if not serial or not role and self._system.getTrackedDeviceClass(index) != TRACKER:
+            if not serial or (not role and self._system.getTrackedDeviceClass(index) != TRACKER):
                 continue
             found[serial] = _device(serial, role, pose)
         return Devices(time.monotonic(), tuple(found.values()), self._epoch)

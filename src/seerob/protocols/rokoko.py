@@ -135,7 +135,7 @@ def _unpacked(raw: bytes) -> bytes:
 
     frame = LZ4FrameDecompressor()
     try:
-        text = frame.decompress(raw, max_length=UNPACKED + 1)
+        text: bytes = frame.decompress(raw, max_length=UNPACKED + 1)
     except (RuntimeError, MemoryError, ValueError) as error:
         raise ProtocolError(f"a damaged LZ4 frame: {error}") from error
     if len(text) > UNPACKED:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
-import time
 from collections.abc import AsyncGenerator, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 
 from seerob.protocols import ProtocolError
+from seerob.protocols.connection import Connection, connected
 from seerob.protocols.rtde import (
     MAX_FIELD_NAMES,
     NOT_FOUND,
@@ -101,20 +100,13 @@ async def connect(
         TimeoutError: It does not answer.
         ProtocolError: It answers nonsense, or refuses.
     """
-    async with asyncio.timeout(ANSWER_WITHIN):
-        reader, writer = await asyncio.open_connection(host, port)
-    try:
-        stream = _Stream(reader, writer)
-        yield await _set_up(stream, fields, frequency)
-    finally:
-        # Not close(): whatever is left to be sent, a stop does not wait for it.
-        writer.transport.abort()
+    async with connected(host, port, ANSWER_WITHIN) as connection:
+        yield await _set_up(_Stream(connection), fields, frequency)
 
 
 @dataclass(eq=False)
 class _Stream:
-    reader: asyncio.StreamReader
-    writer: asyncio.StreamWriter
+    connection: Connection
     version: int = 2
     arrived: float = 0.0
     """When the newest bytes arrived, host's monotonic time [s]."""
@@ -128,22 +120,13 @@ class _Stream:
 
     async def read(self, patience: float) -> bool:
         """Wait for more; False when the other end has closed."""
-        for last in (False, True):
-            try:
-                async with asyncio.timeout(patience / 2):
-                    data = await self.reader.read(CHUNK)
-                break
-            except TimeoutError as error:
-                # On a busy machine this thread may have slept, with data waiting: look again.
-                if last:
-                    raise TimeoutError(f"connected, but silent for {patience:g} s") from error
-        self.arrived = time.monotonic()
+        self.arrived, data, _ = await self.connection.read(CHUNK, patience)
         self._waiting += self._splitter.feed(data)
         return bool(data)
 
     async def ask(self, request: Request, kind: Kind) -> tuple[Reply, ...]:
         """Send a request, and wait for the answer of a kind; what was said before it comes first."""
-        self.writer.write(encode_request(request, self.version))
+        await self.connection.write(encode_request(request, self.version))
         said: list[Reply] = []
         while True:
             while self._waiting:

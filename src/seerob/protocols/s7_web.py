@@ -1,13 +1,13 @@
 """Siemens S7 web API: requests and answers of JSON-RPC 2.0. Pure functions.
 
-Methods as the maker documents them for S7-1200 from firmware 4.5 and S7-1500 from 2.8; this only logs in,
-reads and logs out.
+Methods as the maker documents them for S7-1200 from firmware 4.5 and S7-1500 from 2.8; this logs in,
+reads, writes the bools of triggers, and logs out.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from seerob.protocols import ProtocolError
@@ -35,6 +35,13 @@ def reading(addresses: Sequence[str]) -> bytes:
     return json.dumps(calls).encode()
 
 
+def writing(address: str, value: bool) -> bytes:
+    """The request to write one bool; the only one that changes anything in the PLC."""
+    return json.dumps(
+        _call("PlcProgram.Write", 0, {"var": address, "value": value, "mode": "simple"})
+    ).encode()
+
+
 def browsing(address: str) -> bytes:
     """The request for what is below an address; the whole program for an empty one."""
     return _request("PlcProgram.Browse", 0, **({"var": address} if address else {}), mode="children")
@@ -44,8 +51,8 @@ def _request(method: str, number: int, **params: str) -> bytes:
     return json.dumps(_call(method, number, params)).encode()
 
 
-def _call(method: str, number: int, params: dict[str, str]) -> dict[str, Any]:
-    return {"jsonrpc": "2.0", "method": method, "id": number, "params": params}
+def _call(method: str, number: int, params: Mapping[str, str | bool]) -> dict[str, Any]:
+    return {"jsonrpc": "2.0", "method": method, "id": number, "params": dict(params)}
 
 
 def result(data: bytes) -> Any:

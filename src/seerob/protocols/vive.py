@@ -1,5 +1,4 @@
-"""Trackers worn on the body (Vive and others of OpenVR, OpenXR): our live message, which is also a line of
-a recording.
+"""Trackers worn on the body (Vive and others of OpenVR, OpenXR): our live message, a line of a recording.
 
 SteamVR runs on another computer as a rule, so that a small program there says what it sees. Positions and
 rotations stay as OpenVR has them (x right, y up, -z forward; metres) on the wire; here z is up.
@@ -42,7 +41,7 @@ class DeviceObject(Struct, kw_only=True, omit_defaults=True):
 
     serial: Annotated[str, Meta(min_length=1, max_length=128)]
     role: _Text = ""
-    """As the runtime has it: ``vive_tracker_waist``, ``/user/vive_tracker_htcx/role/left_foot``, ``waist``."""
+    """As the runtime has it: ``vive_tracker_waist``, ``/user/vive_tracker_htcx/role/waist``, ``waist``."""
     tracking: bool = True
     """``bPoseIsValid`` of OpenVR; the location is valid and tracked in OpenXR."""
     result: int = RUNNING_OK

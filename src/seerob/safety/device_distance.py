@@ -8,16 +8,17 @@ hazard. See `seerob.norms.iso_13855` for the editions and how sure their figures
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
 
 from seerob import provenance
 from seerob.criterion import Criterion, Evaluate, judge
 from seerob.errors import InputError, Undecided, UnknownName
-from seerob.floor_polygon import contains, distance_between, signed_area
+from seerob.kernels.floor import bodies_to_border
+from seerob.kernels.speed import stacked
 from seerob.model import Model
 from seerob.norms import iso_13855
 from seerob.norms.iso_13855 import Approach, Edition
@@ -92,7 +93,8 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
         hazard = bodies_of(model, self.hazard)
         carriers = carriers_of(model, (*hazard, plane))
         gap = model.gap((plane,), hazard) if corners is None else None
-        ring = None if corners is None else np.asarray(corners, float)
+        border = None if corners is None else self._border(model, plane, np.asarray(corners, float), hazard)
+        deviation = max(model.bodies[i].deviation for i in hazard)
 
         def evaluate(state: State) -> Result:
             state.require(*carriers)
@@ -102,10 +104,9 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
                 value, who = found.distance, model.bodies[found.body_b].name
                 ends = found.point_a, found.point_b
             else:
-                assert ring is not None
-                value, body, ends = self._to_border(model, state, plane, ring, hazard)
+                assert border is not None
+                value, body, ends = border(state)
                 who = model.bodies[body].name
-            deviation = max(model.bodies[i].deviation for i in hazard)
             verdict = judge(value - deviation, S, at_most=False)
             if verdict is not judge(value, S, at_most=False):
                 verdict = Verdict.UNDECIDED
@@ -158,37 +159,26 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
         except InputError as error:
             raise Undecided(str(error)) from None
 
-    def _to_border(
-        self, model: Model, state: State, plane: int, ring: Array, hazard: tuple[int, ...]
-    ) -> tuple[float, int, tuple[Array, Array]]:
+    def _border(
+        self, model: Model, plane: int, ring: Array, hazard: tuple[int, ...]
+    ) -> Callable[[State], tuple[float, int, tuple[Array, Array]]]:
         """Least distance in the field's plane from a hazard inside it to its border; not above 0 outside."""
-        R, x = state.rotations[plane], state.positions[plane]
-        best: tuple[float, int, tuple[Array, Array]] | None = None
-        edges = np.arange(len(ring)) if self.edges is None else np.array(self.edges)
-        for i in hazard:
-            body = model.bodies[i]
-            corners = body.corners @ state.rotations[i].T + state.positions[i]
-            flat = _hull(((corners - x) @ R)[:, :2])
-            distance, a, b = distance_between(flat, ring, edges)
-            outside = self.edges is None and not contains(ring, flat).all()
-            value = -distance if outside or self._beyond(ring, edges, a) else distance
-            value -= body.radius
-            if best is None or value < best[0]:
-                level = float(corners[:, 2].min())
-                ends = tuple(np.array([*((R @ [*p, 0.0]) + x)[:2], level]) for p in (b, a))
-                best = value, i, (ends[0], ends[1])
-        assert best is not None
-        return best
+        edges = np.arange(len(ring)) if self.edges is None else np.array(self.edges, np.int64)
+        corners, start = stacked([model.bodies[i].corners for i in hazard])
+        radius = np.array([model.bodies[i].radius for i in hazard])
+        bodies = np.array(hazard, np.int64)
+        ends = np.empty(5)
 
-    @staticmethod
-    def _beyond(ring: Array, edges: NDArray[np.int64], point: Array) -> bool:
-        """Whether a point lies on the outer side of the edge that it is nearest to."""
-        a, b = ring[edges], np.roll(ring, -1, axis=0)[edges]
-        e, r = b - a, point - a
-        share = np.clip((r * e).sum(axis=1) / (e * e).sum(axis=1), 0.0, 1.0)
-        k = int(np.linalg.norm(r - share[:, None] * e, axis=1).argmin())
-        left = e[k, 0] * r[k, 1] - e[k, 1] * r[k, 0]
-        return bool(left * np.sign(signed_area([(float(x), float(y)) for x, y in ring])) < 0)
+        def ask(state: State) -> tuple[float, int, tuple[Array, Array]]:
+            value, row = bodies_to_border(
+                bodies, state.rotations, state.positions, corners, start, radius, plane, ring, edges,
+                self.edges is None, ends,
+            )  # fmt: skip
+            R, x = state.rotations[plane], state.positions[plane]
+            flat = [np.append((R[:, :2] @ p + x)[:2], ends[4]) for p in (ends[0:2], ends[2:4])]
+            return value, hazard[row], (flat[0], flat[1])
+
+        return ask
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
@@ -220,13 +210,3 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
                 *(("edges that are left out, which other measures must guard",) if self.edges else ()),
             ),
         )
-
-
-def _hull(points: Array) -> Array:
-    """Corners of the convex hull of points in the plane, in order, shape (k, 2)."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except (QhullError, ValueError):
-        return points

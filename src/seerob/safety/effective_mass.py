@@ -9,18 +9,24 @@ import numpy as np
 from msgspec import Meta
 
 from seerob import provenance
-from seerob.criterion import Criterion, Evaluate, judge
+from seerob.answers import Answers
+from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
 from seerob.impact_mass import simplified_mass
 from seerob.kernels.axes import mobility, principal_axes
-from seerob.model import Model
+from seerob.mass_tolerances import MassTolerances, Matrices
+from seerob.model import Mechanism, Model
 from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Ellipsoid, Result, Verdict
 from seerob.state import State
+from seerob.states import States
+from seerob.tolerances import Shifts, Spread, deciding, spread
 from seerob.transforms import Array, wxyz_from_rotation
 
 DRAWN = 0.02
 """Half axis, or arrow, drawn for 1 kg [m]."""
 LARGEST_DRAWN = 0.6
+TOUCHING = 1e-9
+"""Length below which a line to a person has no direction [m]."""
 STANDSTILL = 1e-3
 """Speed below which a motion has no direction [m/s]."""
 
@@ -99,14 +105,15 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         robot = model.carrier(frame)
         offset = np.array(self.offset)
         gap = None if self.toward is None else model.gap(robot.moving, model.select(self.toward))
-        simplified = Result(name="M/2 + m_L", value=simplified_mass(model, robot), unit="kg")
+        tolerances = MassTolerances(model, robot)
+        simplified = self._simplified(model, robot, tolerances)
 
         def direction(state: State, J_v: Array, masses: Array, axes: Array) -> tuple[Array | None, str]:
             if gap is not None:
                 closest = state.closest(gap)
                 line = closest.point_b - closest.point_a
                 length = math.sqrt(float(line @ line))
-                if length < 1e-9:
+                if length < TOUCHING:
                     return None, "touching: the line to the person has no direction"
                 return line / length, ""
             if self.along == "worst":
@@ -122,7 +129,12 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
             masses, axes = principal_masses(inverse)
             u, reason = direction(state, J_v, masses, axes)
             mass = None if u is None else float(projected_mass(inverse, u))
-            verdict = self._verdict(mass)
+            verdict, interval, open_ = self._verdict(mass), None, ""
+            if len(tolerances) and u is not None and mass is not None and np.isfinite(mass):
+                ends = self._ends(tolerances.matrices(state), len(tolerances), J_v, u)
+                interval = float(ends.low), float(ends.high)
+                verdict = judge_interval(interval, self.limit)
+                open_ = deciding(tolerances.tolerances, ends.widths) if verdict is Verdict.UNDECIDED else ""
             if u is None and gap is not None and self.limit is not None:
                 verdict = Verdict.UNDECIDED
             rotation, position = state.pose(frame)
@@ -150,7 +162,9 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                 unit=self.unit,
                 limit=self.limit,
                 verdict=verdict,
+                interval=interval,
                 reason=reason
+                or open_
                 or ("" if mass is None or np.isfinite(mass) else "cannot be pushed that way: infinite"),
                 parts=(
                     *(
@@ -161,6 +175,53 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                 ),
                 markers=(ellipsoid, *arrows),
             )
+
+        return evaluate
+
+    def _ends(self, matrices: Matrices, inputs: int, J_v: Array, u: Array) -> Spread:
+        """Of the mass along u, or of the heaviest direction there is at each end."""
+
+        def at(shifts: Shifts) -> Array:
+            inverse = inverse_effective_mass(J_v, matrices.at(shifts))
+            heaviest = self.along == "worst" and self.toward is None
+            return principal_masses(inverse)[0][-1] if heaviest else projected_mass(inverse, u)
+
+        return spread(at, inputs)
+
+    @staticmethod
+    def _simplified(model: Model, robot: Mechanism, tolerances: MassTolerances) -> Result:
+        mass = simplified_mass(model, robot)
+        interval = None
+        if len(tolerances):
+            ends = spread(lambda shifts: np.array(tolerances.simplified(mass, shifts)), len(tolerances))
+            interval = float(ends.low), float(ends.high)
+        return Result(name="M/2 + m_L", value=mass, unit="kg", interval=interval)
+
+    def batch(self, model: Model) -> EvaluateMany | None:
+        """See `Criterion.batch`; where no mass has a tolerance."""
+        frame, offset = model.frame(self.at), np.array(self.offset)
+        robot = model.carrier(frame)
+        if len(MassTolerances(model, robot)):
+            return None
+        gap = None if self.toward is None else model.gap(robot.moving, model.select(self.toward))
+
+        def evaluate(states: States) -> Answers:
+            J_v = states.jacobian(frame, robot, offset)[:, :3]
+            inverse = inverse_effective_mass(J_v, states.mass_matrix(robot))
+            if gap is not None:
+                closest = states.closest(gap)
+                along = closest.point_b - closest.point_a
+            elif self.along == "worst":
+                along = principal_masses(inverse)[1][..., -1]
+            else:
+                along = (J_v @ states.qd(robot)[..., None])[..., 0]
+            length = np.sqrt(np.einsum("ij,ij->i", along, along))
+            known = length > STANDSTILL if gap is None else length >= TOUCHING
+            u = along / np.where(known, length, 1.0)[:, None]
+            mass = np.where(known, projected_mass(inverse, u), np.nan)
+            found = Answers.against(mass, self.limit, at_most=self.at_most).finite()
+            # Without a direction there is nothing to judge, unless a limit was to hold toward somebody.
+            return found if gap is not None else found.without_verdict(~known)
 
         return evaluate
 

@@ -11,13 +11,16 @@ import numpy as np
 from msgspec import Meta
 
 from seerob import joint_torques, provenance
-from seerob.criterion import Criterion, Evaluate, judge
+from seerob.answers import Answers
+from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge
 from seerob.errors import InputError, Undecided
+from seerob.kernels.polytope import largest
 from seerob.model import Mechanism, Model
 from seerob.polytope import Polytope, free_moment, torque_box, zero_moment
 from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Hull, Input, Marker, Origin, Result, Sphere, Verdict
 from seerob.state import State
+from seerob.states import States
 from seerob.transforms import Array
 
 DRAWN = 0.001
@@ -80,6 +83,26 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
                 )
             rotation, position = state.pose(frame)
             return self._result(polytope, position + rotation @ offset)
+
+        return evaluate
+
+    def batch(self, model: Model) -> EvaluateMany | None:
+        """See `Criterion.batch`; of ``zero_moment`` only, whose corners are found without a hull."""
+        if self.definition != "zero_moment" or self.load == "motion":
+            return None
+        frame, offset = model.frame(self.at), np.array(self.offset)
+        robot = model.carrier(frame)
+        lower, upper, unknown = self._torques(model, robot)
+
+        def evaluate(states: States) -> Answers:
+            states.require(robot.name)
+            if unknown:
+                raise Undecided(unknown)
+            held = states.held(robot) if self.load == "gravity" else np.zeros((len(states), len(lower)))
+            J_v = np.ascontiguousarray(states.jacobian(frame, robot, offset)[:, :3])
+            norm, _, _ = largest(J_v, lower - held, upper - held)
+            # Unbounded is infinite: it exceeds any limit and is no figure. Empty is nan, and undecided.
+            return Answers.against(norm, self.limit, at_most=self.at_most).finite()
 
         return evaluate
 

@@ -8,10 +8,14 @@ import numpy as np
 from msgspec import Meta
 
 from seerob import provenance
-from seerob.criterion import Criterion, Evaluate, judge
+from seerob.answers import Answers
+from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
+from seerob.mass_tolerances import MassTolerances
 from seerob.model import Model
-from seerob.snapshot import Basis, Result, Sphere
+from seerob.snapshot import Basis, Result, Sphere, Verdict
 from seerob.state import State
+from seerob.states import States
+from seerob.tolerances import deciding, spread
 from seerob.transforms import Array
 
 DRAWN = 0.1
@@ -47,10 +51,18 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         robot = model.robot(self.robot)
+        masses = MassTolerances(model, robot)
 
         def evaluate(state: State) -> Result:
-            energy = float(kinetic_energy(state.mass_matrix(robot), state.qd(robot)))
-            verdict = judge(energy, self.limit)
+            qd = state.qd(robot)
+            energy = float(kinetic_energy(state.mass_matrix(robot), qd))
+            verdict, interval, reason = judge(energy, self.limit), None, ""
+            if len(masses):
+                matrices = masses.matrices(state)
+                ends = spread(lambda shifts: kinetic_energy(matrices.at(shifts), qd), len(masses))
+                interval = float(ends.low), float(ends.high)
+                verdict = judge_interval(interval, self.limit)
+                reason = deciding(masses.tolerances, ends.widths) if verdict is Verdict.UNDECIDED else ""
             _, position = state.pose(robot.tip)
             sphere = Sphere(
                 center=tuple(position.tolist()),
@@ -64,8 +76,22 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
                 unit=self.unit,
                 limit=self.limit,
                 verdict=verdict,
+                reason=reason,
+                interval=interval,
                 markers=(sphere,),
             )
+
+        return evaluate
+
+    def batch(self, model: Model) -> EvaluateMany | None:
+        """See `Criterion.batch`; where no mass has a tolerance."""
+        robot = model.robot(self.robot)
+        if len(MassTolerances(model, robot)):
+            return None
+
+        def evaluate(states: States) -> Answers:
+            energy = kinetic_energy(states.mass_matrix(robot), states.qd(robot))
+            return Answers.against(energy, self.limit, at_most=self.at_most)
 
         return evaluate
 

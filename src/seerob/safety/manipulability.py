@@ -9,14 +9,18 @@ import numpy as np
 from msgspec import Meta
 
 from seerob import provenance
-from seerob.criterion import Criterion, Evaluate, judge
+from seerob.answers import Answers
+from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge
 from seerob.kernels.axes import principal_axes
 from seerob.model import Model
 from seerob.quantities import Metres3
-from seerob.snapshot import Basis, Ellipsoid, Result
+from seerob.snapshot import Basis, Ellipsoid, Result, Verdict
 from seerob.state import State
+from seerob.states import States
 from seerob.transforms import Array, wxyz_from_rotation
 
+NOTHING = 1e-9
+"""Change of a singular value below which a joint does not change it [m/rad²]."""
 DRAWN = 0.3
 """Half axis drawn for a singular value of 1 m/rad [m]."""
 
@@ -42,6 +46,26 @@ def singular_values(J_v: Array) -> tuple[Array, Array]:
     return values.reshape(*batch, 3), directions.reshape(*batch, 3, 3)
 
 
+def least_value_by_joint(J: Array) -> Array:
+    r"""How the smallest singular value of J_v changes with each joint, unsigned [m/rad²], shape (n,).
+
+    :math:`|\partial\sigma_3 / \partial q_j| = |u_3^T (\partial J_v / \partial q_j) v_3|`, where the column of
+    joint i changes by :math:`\omega_j \times J_{v,i}` when j is not farther out, else by
+    :math:`\omega_i \times J_{v,j}`. The joint with the largest one leads out of a singularity the soonest.
+
+    Args:
+        J: Jacobian of a chain from its base outward, linear rows first, shape (6, n).
+    """
+    linear, angular = J[:3].T, J[3:].T
+    n = len(linear)
+    axes, _, Vt = np.linalg.svd(J[:3], full_matrices=False)
+    u, v = axes[:, -1], Vt[-1]
+    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    first, last = np.minimum(i, j), np.maximum(i, j)
+    turned = np.cross(angular[first], linear[last])
+    return np.asarray(np.abs(np.einsum("k,ijk,i->j", u, turned, v)))
+
+
 class Manipulability(Criterion, frozen=True, kw_only=True):
     """How well a point can move in its worst direction; near zero the robot is near a singularity."""
 
@@ -64,13 +88,21 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
         frame = model.frame(self.at)
         mechanism = model.carrier(frame)
         offset = np.array(self.offset)
+        names = [joint.name for joint in mechanism.joints]
 
         def evaluate(state: State) -> Result:
             state.require(mechanism.name)
-            J_v = state.jacobian(frame, mechanism, offset)[:3]
-            sigma, axes = singular_values(J_v)
+            J = state.jacobian(frame, mechanism, offset)
+            sigma, axes = singular_values(J[:3])
             smallest = float(sigma[2])
             verdict = judge(smallest, self.limit, at_most=False)
+            reason = ""
+            if verdict is Verdict.EXCEEDED and len(names) >= 3:
+                by_joint = least_value_by_joint(J)
+                joint = names[int(by_joint.argmax())]
+                reason = f"near a singularity: {joint} leads out of it the soonest"
+                if by_joint.max() < NOTHING:
+                    reason = "singular in every pose nearby: no joint leads out of it"
             rotation, position = state.pose(frame)
             ellipsoid = Ellipsoid(
                 center=tuple((position + rotation @ offset).tolist()),
@@ -91,9 +123,21 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
                 limit=self.limit,
                 at_most=False,
                 verdict=verdict,
+                reason=reason,
                 parts=parts,
                 markers=(ellipsoid,),
             )
+
+        return evaluate
+
+    def batch(self, model: Model) -> EvaluateMany:
+        """See `Criterion.batch`."""
+        frame, offset = model.frame(self.at), np.array(self.offset)
+        mechanism = model.carrier(frame)
+
+        def evaluate(states: States) -> Answers:
+            sigma, _ = singular_values(states.jacobian(frame, mechanism, offset)[:, :3])
+            return Answers.against(sigma[:, 2], self.limit, at_most=self.at_most)
 
         return evaluate
 

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
+import numpy as np
 from msgspec import Meta
 
 from seerob import provenance
-from seerob.criterion import Criterion, Evaluate, judge_interval
+from seerob.answers import Answers
+from seerob.body_place import BodyPlaces
+from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge_interval
 from seerob.distance import Reach
 from seerob.errors import InputError
-from seerob.model import Model
+from seerob.model import Gap, Model
 from seerob.snapshot import Basis, Result, Segment, Verdict
 from seerob.state import State
+from seerob.states import States
+from seerob.tolerances import Tolerance, deciding
+from seerob.tracking_error import TrackingError, tracking
 
 
 class MinimumDistance(Criterion, frozen=True, kw_only=True):
@@ -25,30 +31,40 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
     """Two names: robots, humans, tools, parts or links; wildcards allowed."""
     limit: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
     """Least admissible distance [m]."""
+    uncertainty: Annotated[float, Meta(ge=0, extra={"unit": "m"})] = 0.0
+    """How much nearer or farther the two may be: bases, mounting, devices that see people [m]."""
 
     def subjects(self) -> tuple[str, ...]:
         """The two sets."""
         return self.between
 
-    def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+    def _gap(self, model: Model) -> Gap:
         a, b = (model.select(name) for name in self.between)
         if set(a) & set(b):
             shared = model.bodies[min(set(a) & set(b))].name
             raise InputError.at(
                 self.name, "between", f"{shared} is in both sets", "name two sets that share nothing"
             )
-        gap = model.gap(a, b)
+        return model.gap(a, b)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        gap, places = self._gap(model), BodyPlaces(model)
+        off = TrackingError(model, (*gap.a, *gap.b))
 
         def evaluate(state: State) -> Result:
             closest = state.closest(gap)
             distance = closest.distance
-            interval = (distance - gap.deviation, distance)
+            seen = float(off.at(state).max(initial=0.0))
+            either = self.uncertainty + seen
+            interval = (distance - gap.deviation - either, distance + either)
             verdict = judge_interval(interval, self.limit, at_most=False)
+            open_ = f"; {_deciding(self.uncertainty, seen, gap)}" if verdict is Verdict.UNDECIDED else ""
             if closest.reach == Reach.DEPTH_AT_LEAST and self.limit is not None:
                 # Crossing shapes are deeper than the figure says: never within, not even of 0.
                 verdict = Verdict.EXCEEDED
-            names = model.bodies[closest.body_a].name, model.bodies[closest.body_b].name
+            a_named = places.named(state, closest.body_a, closest.point_a)
+            b_named = places.named(state, closest.body_b, closest.point_b)
             deeper = " (overlap, at least this deep)" if closest.reach == Reach.DEPTH_AT_LEAST else ""
             segment = Segment(
                 start=tuple(closest.point_a.tolist()),
@@ -63,10 +79,25 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
                 limit=self.limit,
                 at_most=False,
                 verdict=verdict,
-                reason=f"{names[0]} ↔ {names[1]}{deeper}",
-                interval=interval if gap.deviation > 0 else None,
+                reason=f"{a_named} ↔ {b_named}{deeper}{open_}",
+                interval=interval if interval[0] < interval[1] else None,
                 markers=(segment,),
             )
+
+        return evaluate
+
+    def batch(self, model: Model) -> EvaluateMany:
+        """See `Criterion.batch`."""
+        gap, either = self._gap(model), self.uncertainty
+
+        def evaluate(states: States) -> Answers:
+            closest = states.closest(gap)
+            low, high = closest.distance - gap.deviation - either, closest.distance + either
+            found = Answers.against(closest.distance, self.limit, at_most=False)
+            if gap.deviation + either > 0:
+                found = found.between(low, high, at_most=False)
+            crossing = closest.reach == Reach.DEPTH_AT_LEAST
+            return found if self.limit is None else found.exceeded(crossing)
 
         return evaluate
 
@@ -78,6 +109,17 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
             source="Weistroffer et al. 2022, section 2.2.2.6",
             inputs=provenance.motion(model, *gap.carriers)
             + provenance.shapes(gap)
+            + (provenance.given("uncertainty", self.uncertainty, "m"),) * (self.uncertainty > 0)
             + provenance.limit(self.limit, "m"),
             not_modelled=("clothing, hair, cables and hoses that are not in the model",),
         )
+
+
+def _deciding(uncertainty: float, seen: float, gap: Gap) -> str:
+    inputs = (
+        Tolerance("uncertainty", uncertainty, "m"),
+        tracking(seen),
+        # One-sided: the real surface is never farther than the shape.
+        Tolerance("surfaces that may stick out", gap.deviation / 2, "m"),
+    )
+    return deciding(inputs, np.array([tolerance.half for tolerance in inputs]))

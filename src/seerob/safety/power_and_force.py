@@ -12,9 +12,12 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from seerob import clamping, collision, contact_limits, contact_shape, figures, provenance
+from seerob.closing_gaps import ClosingGaps
+from seerob.contact_areas import NOT_MODELLED, area_results, margin
 from seerob.contact_limits import Judged
 from seerob.contact_regions import REGIONS, Person, without_limit
 from seerob.contact_rows import ContactRows
+from seerob.contact_tolerances import ContactEnds, ranks, robot_masses
 from seerob.criterion import Criterion, Evaluate, worst
 from seerob.errors import Undecided, UnknownName
 from seerob.impact_mass import masses_along_motion, moving_masses, simplified_mass
@@ -22,11 +25,12 @@ from seerob.model import Frame, Model
 from seerob.norms import body_limits
 from seerob.norms.crushing_gaps import NOT_VERIFIED, crushing_gaps, gap_inputs
 from seerob.norms.limit_inputs import excluded_input, limit_inputs, table_input
+from seerob.quantities import Tolerance
 from seerob.snapshot import Arrow, Basis, Highlight, Input, Origin, Result, Verdict
 from seerob.state import State
+from seerob.tolerances import Spread, deciding
 from seerob.transforms import Array
 
-Flags = NDArray[np.bool_]
 STANDSTILL = 1e-3
 """Speed below which a part of the robot hits nobody [m/s]."""
 FAR = 1e6
@@ -68,6 +72,10 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     """Smallest contact area of parts by name [m²], instead of what their meshes tell."""
     largest_area: _Credited = CAP
     """Area above which a contact is not credited [m²]; never more than 1 cm²."""
+    stiffness_tolerance: Tolerance = 0.0
+    """How far the stiffness k of every body region may be off, as a share: 0.1 for ± 10 %."""
+    area_tolerance: Tolerance = 0.0
+    """Likewise every contact area."""
     thickness: dict[str, _Positive] = field(default_factory=dict)
     """Gap in which a body region can be clamped [m], instead of the gaps of ISO 13854."""
 
@@ -159,13 +167,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
             not_modelled=(
                 "a design estimate: power and force limiting needs measurement at the real robot",
                 *doubts,
-                "larynx, eyes, ears and feet have no row in the table",
-                "people other than adults, protective padding, clothing",
-                "the contact itself: its area grows with the indentation F/k by a convention of seerob; "
-                "up to the permitted force the pressure is within its limit",
-                "free or clamped is decided by gaps that are not verified (M), unless thickness is given",
-                "duration of the contact: what is free counts as transient, what is clamped as quasi-static",
-                "forces that drives keep up after the impact, detection and stop of the robot",
+                *NOT_MODELLED,
                 *(
                     ()
                     if robot.rotor_inertia_known
@@ -190,6 +192,9 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         found = [links, *carried]
         if self.human is not None:
             found.append(provenance.given("horizon", self.horizon, "m"))
+        for key in ("stiffness_tolerance", "area_tolerance"):
+            if getattr(self, key):
+                found.append(provenance.given(key, getattr(self, key), ""))
         if self.person_speed is not None:
             found.append(provenance.given("person_speed", self.person_speed, "m/s"))
         radii, areas = self._by_body(model, self.contact_radius), self._by_body(model, self.contact_area)
@@ -228,15 +233,22 @@ class Contacts:
             for shape, force in zip(shapes, self.forces, strict=True)
         ]
         self.simplified = simplified_mass(model, self.robot)
+        self.ends = ContactEnds(
+            model,
+            self.robot,
+            self.arrays,
+            lambda arrays: arrays.by_region(spec.pressure_forces(model, arrays)),
+            stiffness=spec.stiffness_tolerance,
+            area=spec.area_tolerance,
+        )
         gaps = {**crushing_gaps()[0], **spec.thickness}
         others = [b for b in model.bodies if b.role not in ("human", "area")]
         deviation = 2 * max((body.deviation for body in others), default=0.0)
         # The real surfaces may be nearer than the shapes.
         self.thickness = np.array([gaps[region.name] + deviation for region in self.arrays.regions])
-        self.pinch = clamping.robot_pinch_pairs(
-            model, self.robot, cap=float(self.thickness.max(initial=0.0)) + 0.1
-        )
-        self.memory = clamping.Memory()
+        cap = float(self.thickness.max(initial=0.0)) + 0.1
+        pinch = clamping.robot_pinch_pairs(model, self.robot, cap=cap)
+        self.gaps = ClosingGaps(model.shapes, pinch, self.thickness, cap=cap)
         self.robots = [name for name, m in model.mechanisms.items() if m.role == "robot"]
         if spec.human is not None:
             model.human(spec.human)
@@ -257,23 +269,22 @@ class Contacts:
         spec, robot = self.spec, self.robot
         if not self.moving:
             raise Undecided(f"{robot.name} has no moving part with a shape")
-        projected = masses_along_motion(state, robot, self.frames, self.moving, standstill=STANDSTILL)
+        projected = masses_along_motion(state, robot, self.moving, standstill=STANDSTILL)
         v_r = state.fastest_points(self.moving)[0]
-        masses = np.full(len(v_r), self.simplified)
-        if spec.mass != "simplified":
-            # A part that stands still has no direction of motion, and hits nobody.
-            either = np.fmax if spec.mass == "larger" else (lambda m, m_u: np.where(np.isnan(m_u), m, m_u))
-            masses = either(masses, projected)
-        clamped = self._clamped(state)
-        speeds = self.arrays.speeds(masses, self.least, clamped)
+        masses = robot_masses(spec.mass, self.simplified, projected)
         if self.people is None:
-            near: Flags = np.ones((len(v_r), len(REGIONS)), bool)
+            near: NDArray[np.bool_] = np.ones((len(v_r), len(REGIONS)), bool)
             v_h = np.full(len(REGIONS), spec.person_speed or 0.0)
         else:
             near, v_h = self.people.near(state, spec.person_speed)
         near &= (v_r > STANDSTILL)[:, None]
-        v = v_r[:, None] + v_h
-        return Judged(v_r, v_h, near, projected, speeds, clamped, *self._governing(v, near, speeds))
+        clamped = self._clamped(state, near)
+        speeds = self.arrays.speeds(masses, self.least, clamped)
+        ends = None
+        if self.ends.tolerances:
+            ends = self.ends.at(state, self.moving, spec.mass, self.simplified, clamped, STANDSTILL)
+        governing = self._governing(v_r[:, None] + v_h, near, speeds, ends)
+        return Judged(v_r, v_h, near, projected, speeds, clamped, *governing, ends)
 
     def evaluate(self, state: State) -> Result:
         """The result at a state."""
@@ -292,7 +303,7 @@ class Contacts:
             return Result(name=spec.name, unit="m/s", reason=reason, parts=mass_parts)
         verdict = worst([part.verdict for part, _ in found])
         chosen = [entry for entry in found if entry[0].verdict is verdict]
-        part, row = min(chosen, key=_margin)
+        part, row = min(chosen, key=margin)
         body = self.model.bodies[self.moving[row]]
         _, point, velocity = state.fastest_point(self.moving[row])
         shown = figures.against(part.value, part.limit, spec.unit, at_most=spec.at_most)
@@ -310,18 +321,21 @@ class Contacts:
             limit=part.limit,
             verdict=verdict,
             reason=f"{part.name}: {part.reason}",
+            interval=part.interval,
             parts=(*(part for part, _ in found), *mass_parts),
             markers=(arrow, Highlight(body=body.name, verdict=verdict)),
             rows=self.rows.of(found, judged, (lambda _: ()) if self.people is None else self.people.hit),
         )
 
-    def _clamped(self, state: State) -> Flags:
-        """Which moving body clamps which region, shape (b, r)."""
+    def _clamped(self, state: State, near: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which moving body clamps which region that it could hit, shape (b, r)."""
         state.require(*self.robots)
-        gaps, _ = self.pinch.asked(state.distances)
-        return self.pinch.per_body(self.memory.step(state.t, gaps, self.thickness, self.pinch.opened))
+        wanted = near[:, self.in_regions]
+        return self.gaps.clamped(state.t, state.rotations, state.positions, wanted)
 
-    def _governing(self, v: Array, near: Flags, speeds: contact_limits.Speeds) -> tuple[Array, Array]:
+    def _governing(
+        self, v: Array, near: NDArray[np.bool_], speeds: contact_limits.Speeds, ends: Spread | None
+    ) -> tuple[Array, Array]:
         """Row of the moving body that governs each of `REGIONS`, and its rank: 2 exceeded, 1 open, 0 within.
 
         Without a limit it is the fastest.
@@ -329,7 +343,7 @@ class Contacts:
         badness, rank = np.where(near, v, -np.inf), np.zeros(v.shape, int)
         rows = self.in_regions
         margin = speeds.permissible - v[:, rows]
-        rank[:, rows] = np.where(margin < 0, 2, np.where(np.isnan(speeds.pressure), 1, 0))
+        rank[:, rows] = ranks(v[:, rows], speeds, ends)
         badness[:, rows] = np.where(near[:, rows], rank[:, rows] * FAR - margin, -np.inf)
         worst_rows = badness.argmax(axis=0)
         return worst_rows, rank[worst_rows, np.arange(len(worst_rows))]
@@ -359,38 +373,29 @@ class Contacts:
             )
         if verdict is Verdict.WITHIN and how == "free" and name not in self.spec.thickness:
             reason += f"; not clamped {NOT_VERIFIED}"
-        if verdict is Verdict.UNDECIDED:
+        limit, interval, ends = float(speeds.permissible[row, column]), None, judged.ends
+        if ends is not None:
+            low, high = float(ends.low[row, column]), float(ends.high[row, column])
+            interval = value - (high - limit), value + (limit - low)
+        if verdict is Verdict.UNDECIDED and ends is not None and not math.isnan(speeds.pressure[row, column]):
+            reason += f"; {deciding(self.ends.tolerances, ends.widths[:, row, column])}"
+        elif verdict is Verdict.UNDECIDED:
             reason = f"contact pressure of {body} ({how}): {self.unknown[row]}"
         return Result(
             name=name,
             value=value,
             unit="m/s",
-            limit=float(speeds.permissible[row, column]),
+            limit=limit,
             verdict=verdict,
             reason=reason,
-            parts=self._area_results(row, column, value, judged),
+            interval=interval,
+            parts=area_results(
+                self.arrays,
+                self.forces[row, int(judged.clamped[row, column])],
+                (row, column),
+                judged,
+                whole=verdict,
+                unknown=self.unknown[row],
+                v=value,
+            ),
         ), row
-
-    def _area_results(self, row: int, column: int, v: float, judged: Judged) -> tuple[Result, ...]:
-        """The same for each specific area: force belongs to the region, pressure to the area."""
-        speeds = judged.speeds
-        others = min(float(speeds.force[row, column]), float(speeds.energy[row, column]))
-        forces = self.forces[row, int(judged.clamped[row, column]), self.arrays.owner == column]
-        region = self.arrays.regions[column]
-        pressed = collision.speed_at_force(forces, speeds.mu[row, column], region.stiffness.value)
-        found = []
-        for area, v_P in zip(region.areas, pressed.tolist(), strict=True):
-            open_ = math.isnan(v_P)
-            limit = others if open_ else min(others, v_P)
-            verdict = Verdict.EXCEEDED if v > limit else Verdict.UNDECIDED if open_ else Verdict.WITHIN
-            reason = self.unknown[row] if verdict is Verdict.UNDECIDED else ""
-            found.append(
-                Result(name=area.name, value=v, unit="m/s", limit=limit, verdict=verdict, reason=reason)
-            )
-        return tuple(found)
-
-
-def _margin(entry: tuple[Result, int]) -> float:
-    """Without a limit it is the worst: nothing is permitted or known."""
-    part = entry[0]
-    return -np.inf if part.limit is None or part.value is None else part.limit - part.value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -11,13 +11,15 @@ from msgspec import Meta
 
 from seerob import provenance
 from seerob.criterion import Criterion, Evaluate
-from seerob.depth import Depth, depth
+from seerob.depth import Depth, Depths
+from seerob.distance import Closests
 from seerob.errors import InputError, UnknownName
 from seerob.model import Gap, Model
 from seerob.snapshot import Basis, Highlight, Marker, Result, Segment, Verdict
 from seerob.state import State
+from seerob.transforms import Array
 
-CELLS, FEWEST = 400, 20
+CELLS, FEWEST = 130, 5
 """Of the search for depths at one tick, shared by all that is inside; the interval says what it left open."""
 
 
@@ -47,41 +49,37 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
         """See `Criterion.bind`."""
         watched = self._watched(model)
         several = len(_names(self.area)) > 1
+        depths = Depths(model.shapes, tolerance=self.tolerance, cells=CELLS, fewest=FEWEST)
 
         def evaluate(state: State) -> Result:
             outside = (np.inf, "", 0.0)
             parts: list[Result] = []
             lit: list[Marker] = []
             asked = [state.closest_per_body(each.gap) for each in watched]
-            cells = max(CELLS // max(sum(int((a.distance <= 0).sum()) for a in asked), 1), FEWEST)
+            entered: list[tuple[_Watched, Closests, int]] = []
             for each, found in zip(watched, asked, strict=True):
                 nearest = int(found.distance.argmin())
                 room = float(found.distance[nearest])
                 if room < outside[0]:
                     outside = room, _where(model, each, nearest, several), each.gap.deviation
-                for i in np.flatnonzero(found.distance <= 0):
-                    body = model.bodies[each.gap.b[i]]
-                    area = int(found.body_a[i])
-                    deep = depth(
-                        model.shapes, state.rotations, state.positions, area, body.index,
-                        tolerance=self.tolerance, cells=cells,
-                    )  # fmt: skip
-                    least = max(deep.at_least, -float(found.distance[i]))
-                    parts.append(
-                        Result(
-                            name=_where(model, each, int(i), several),
-                            value=-least,
-                            unit="m",
-                            limit=0.0,
-                            at_most=False,
-                            verdict=Verdict.EXCEEDED,
-                            interval=(-max(deep.at_most, least), -least),
-                        )
+                if room <= 0:
+                    entered += [(each, found, i) for i in np.flatnonzero(found.distance <= 0).tolist()]
+            pairs = [(int(found.body_a[i]), each.gap.b[i]) for each, found, i in entered]
+            deeps = depths.ask(state.rotations, state.positions, pairs) if pairs else []
+            for (each, found, i), deep in zip(entered, deeps, strict=True):
+                parts.append(
+                    Result(
+                        name=_where(model, each, i, several),
+                        value=-deep.at_least,
+                        unit="m",
+                        limit=0.0,
+                        at_most=False,
+                        verdict=Verdict.EXCEEDED,
+                        interval=(-deep.at_most, -deep.at_least),
                     )
-                    lit += [
-                        Highlight(body=body.name, verdict=Verdict.EXCEEDED),
-                        *_line(deep, found.point_a[i]),
-                    ]
+                )
+                lit.append(Highlight(body=model.bodies[each.gap.b[i]].name, verdict=Verdict.EXCEEDED))
+                lit += _line(deep, found.point_a[i])
             return self._result(outside, parts, lit)
 
         return evaluate
@@ -163,10 +161,10 @@ def _where(model: Model, watched: _Watched, i: int, several: bool) -> str:
     return f"{body} in {watched.area}" if several else body
 
 
-def _line(deep: Depth, border: Iterable[float]) -> tuple[Segment, ...]:
+def _line(deep: Depth, border: Array) -> tuple[Segment, ...]:
     """From the border to the deepest point."""
-    if not np.isfinite(deep.point).all():
-        return ()
-    start = tuple(float(x) for x in border)
     end = tuple(deep.point.tolist())
-    return (Segment(start=start, end=end, label=f"{deep.at_least:.3f} m deep", verdict=Verdict.EXCEEDED),)  # type: ignore[arg-type]
+    if not all(map(math.isfinite, end)):
+        return ()
+    start = tuple(border.tolist())
+    return (Segment(start=start, end=end, label=f"{deep.at_least:.3f} m deep", verdict=Verdict.EXCEEDED),)

@@ -9,12 +9,13 @@ from msgspec import Meta
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from seerob import markers
 from seerob.criterion import Criterion, Evaluate
 from seerob.errors import InputError, Undecided
-from seerob.floor_polygon import contains, signed_area
+from seerob.floor_polygon import contains
 from seerob.model import Model
 from seerob.rays import Rays
-from seerob.scan import beam_angles, blind_area, directions, outline, spans
+from seerob.scan import Coverage, beam_angles, directions, outline, spans
 from seerob.sensing import (
     Names,
     Presence,
@@ -28,7 +29,7 @@ from seerob.sensing import (
 )
 from seerob.sensor_tables import MonitoredField as Field
 from seerob.sensor_tables import Sensor
-from seerob.snapshot import Basis, Hull, Result
+from seerob.snapshot import Basis, Result
 from seerob.state import State
 from seerob.transforms import Array
 
@@ -98,10 +99,14 @@ class _Scan:
         self.still, self.moving = Rays(model.shapes, still), Rays(model.shapes, (*bodies, *moving))
         self.carriers = carriers_of(model, (*bodies, *moving, self.plane))
         self.angles = beam_angles(self.scanner)
+        self.beams = directions(self.angles)
         self.spans = spans(chosen, self.angles)
+        self.coverage = Coverage(chosen, self.spans, self.scanner.resolution)
+        self.watched = np.zeros(len(model.bodies) + 1, bool)
+        self.watched[list(bodies)] = True
         self.fixed = not model.bodies[self.plane].carrier
         self.background: tuple[Array, NDArray[np.int64]] | None = None
-        self.drawn: tuple[float, Hull] | None = None
+        self.drawn: tuple[float, markers.Rays] | None = None
         self.blind = 0.0
         farthest = max(float(np.hypot(x, y)) for x, y in chosen.corners)
         self.spacing = farthest * self.scanner.resolution
@@ -114,59 +119,73 @@ class _Scan:
             self.doubts = (f"{what}, more than the detection capability of {capability * 1e3:.0f} mm",)
 
     def cast(
-        self, state: State, angles: Array, *, background: bool = True
+        self, state: State, beams: Array, before: tuple[Array, NDArray[np.int64]] | None = None
     ) -> tuple[Array, NDArray[np.int64]]:
-        """How far beams get [m], and the body each meets (-1: none)."""
-        R, x = state.rotations[self.plane], state.positions[self.plane]
-        u = directions(angles) @ R.T
-        origins = np.broadcast_to(x, u.shape)
-        distance, met = np.full(len(u), self.scanner.range), np.full(len(u), -1, np.int64)
-        if background:
-            self.still.cast(state.rotations, state.positions, origins, u, distance, met)
-        else:
-            assert self.background is not None
-            distance, met = self.background[0].copy(), self.background[1].copy()
-        self.moving.cast(state.rotations, state.positions, origins, u, distance, met)
+        """How far beams get [m], and the body each meets (-1: none).
+
+        Args:
+            state: The twin.
+            beams: Their directions in the scanner's plane, shape (n, 3).
+            before: The same against what stands still, where that is known.
+        """
+        distance, met = self._against(self.still, state, beams) if before is None else before
+        return self._against(self.moving, state, beams, distance.copy(), met.copy())
+
+    def _against(
+        self,
+        rays: Rays,
+        state: State,
+        beams: Array,
+        distance: Array | None = None,
+        met: NDArray[np.int64] | None = None,
+    ) -> tuple[Array, NDArray[np.int64]]:
+        u = beams @ state.rotations[self.plane].T
+        origins = np.empty_like(u)
+        origins[:] = state.positions[self.plane]
+        if distance is None or met is None:
+            distance, met = np.full(len(u), self.scanner.range), np.full(len(u), -1, np.int64)
+        rays.cast(state.rotations, state.positions, origins, u, distance, met)
         return distance, met
 
     def judge(self, name: str, state: State) -> Result:
         state.require(*self.carriers)
         self._look_at_what_stands(state)
-        distance, met = self.cast(state, self.angles, background=not self.fixed)
-        hit = np.isin(met, self.presence.bodies)
-        points = directions(self.angles)[:, :2] * distance[:, None]
-        hit[hit] = contains(self.chosen.corners, points[hit])
+        distance, met = self.cast(state, self.beams, self.background)
+        # The last one is for beams that meet nothing, -1.
+        hit = self.watched[met]
+        if hit.any():
+            hit[hit] = contains(self.chosen.corners, self.beams[hit, :2] * distance[hit, None])
+        seen = set(met[hit].tolist())
         _, inside = self.presence.inside(state)
         sights = {
             i: self._seen(state, i, np.flatnonzero(hit & (met == i)), distance)
             for k, i in enumerate(self.presence.bodies)
-            if inside[k] or (hit & (met == i)).any()
+            if inside[k] or i in seen
         }
-        now = blind_area(self.chosen, self.angles, self.spans, distance, self.scanner.resolution)
+        assert self.background is not None
+        alone = np.array_equal(distance, self.background[0])
+        now = self.blind if alone else self.coverage.blind(distance)
         parts = (
             Result(
                 name="blind area",
                 value=self.blind,
                 unit="m²",
-                reason=f"of {abs(signed_area(self.chosen.corners)):.3g} m², behind what stands still",
+                reason=f"of {self.coverage.whole:.3g} m², behind what stands still",
             ),
             Result(name="blind area now", value=now, unit="m²"),
         )
         result = self.presence.result(name, state, sights, doubts=self.doubts, parts=parts)
-        return replace(result, markers=(*result.markers, self._picture(state, distance, result)))
+        return replace(result, markers=(*result.markers, self._picture(state, distance, hit, result)))
 
     def _look_at_what_stands(self, state: State) -> None:
         if self.background is not None and self.fixed:
             return
-        R, x = state.rotations[self.plane], state.positions[self.plane]
-        u = directions(self.angles) @ R.T
-        distance, met = np.full(len(u), self.scanner.range), np.full(len(u), -1, np.int64)
-        self.still.cast(state.rotations, state.positions, np.broadcast_to(x, u.shape), u, distance, met)
+        distance, met = self._against(self.still, state, self.beams)
         if not distance.any():
             what = self.model.bodies[int(met[0])].name
             raise Undecided(f"{self.sensor.name} is inside {what}: name it in its ignores, or move it")
         self.background = distance, met
-        self.blind = blind_area(self.chosen, self.angles, self.spans, distance, self.scanner.resolution)
+        self.blind = self.coverage.blind(distance)
 
     def _seen(self, state: State, body: int, beams: NDArray[np.int64], distance: Array) -> Sight:
         """What the scanner makes of a body of which some beams, or none, end on it inside the field."""
@@ -185,12 +204,12 @@ class _Scan:
         """Extent of what is seen of a body, between finer beams that still end on it [m]."""
         step = self.scanner.resolution
         low, high = self.angles[beams[0]] - step, self.angles[beams[-1]] + step
-        finer = np.linspace(low, high, FINER)
+        finer = directions(np.linspace(low, high, FINER))
         distance, met = self.cast(state, finer)
         on = np.flatnonzero(met == body)
         if not len(on):
             return 0.0
-        ends = directions(finer[on]) * distance[on, None]
+        ends = finer[on] * distance[on, None]
         return float(np.linalg.norm(ends - ends[0], axis=1).max())
 
     def _hidden(self, state: State, body: int) -> str:
@@ -202,22 +221,29 @@ class _Scan:
         if not self.angles[0] - 1e-9 <= angle <= self.angles[-1] + 1e-9:
             return "outside the angle that is scanned"
         far = float(np.hypot(at[0], at[1]))
-        distance, met = self.cast(state, np.array([angle]))
+        distance, met = self.cast(state, directions(np.array([angle])))
         blocker = int(met[0])
         if blocker >= 0 and blocker != body and distance[0] <= far:
             return f"in the shadow of {self.model.bodies[blocker].name}"
         return "between two beams" if far <= self.scanner.range else "beyond the range"
 
-    def _picture(self, state: State, distance: Array, result: Result) -> Hull:
+    def _picture(self, state: State, distance: Array, hit: NDArray[np.bool_], result: Result) -> markers.Rays:
         stale = self.drawn is None or not 0 <= state.t - self.drawn[0] < self.redraw
         if self.drawn is None or stale or not self.fixed or self.drawn[1].verdict is not result.verdict:
-            points, faces = outline(self.spans, distance, self.angles)
-            world = points @ state.rotations[self.plane].T + state.positions[self.plane]
-            hull = Hull(
-                vertices=tuple((x, y, z) for x, y, z in world.round(3).tolist()),
-                faces=tuple(faces),
+            R, x = state.rotations[self.plane], state.positions[self.plane]
+            ends, beams = outline(self.spans, distance, self.angles)
+            fan = markers.Rays(
+                starts=(_rounded(x),),
+                ends=tuple(map(_rounded, ends @ R.T + x)),
+                hits=tuple(np.flatnonzero(hit[beams]).tolist()),
+                filled=True,
                 label=self.chosen.name,
                 verdict=result.verdict,
             )
-            self.drawn = state.t, hull
+            self.drawn = state.t, fan
         return self.drawn[1]
+
+
+def _rounded(point: Array) -> tuple[float, float, float]:
+    x, y, z = point.round(3).tolist()
+    return x, y, z

@@ -2,23 +2,30 @@ r"""Protective separation distance, ISO/TS 15066:2016 5.5.4.2.3; upper bound: [W
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Callable
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from msgspec import Meta, Struct
+from msgspec import Meta
+from msgspec.structs import replace
 
 from seerob import figures, provenance
-from seerob.criterion import Criterion, Evaluate, judge
+from seerob.body_place import BodyPlaces
+from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge_interval, worst
+from seerob.detection import Detection, device_of
 from seerob.errors import InputError, Undecided
+from seerob.largest_separation import LargestSeparation
 from seerob.model import Gap, Model
 from seerob.norms import iso_13855
 from seerob.norms.iso_13855 import WALKING
+from seerob.separation_many import separations
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.state import State
 from seerob.stop_models import MOVING, Stop, StopModel, bind_stop
-from seerob.stopping import At, Course, largest_scale, separation_distance, way_of_person, worst_case
+from seerob.stop_tolerances import SIMULATED, SeparationEnds, intervals, tolerances
+from seerob.stopping import At, Course, largest_scale, separation_distance, way_of_person
+from seerob.tolerances import deciding
+from seerob.tracking_error import TrackingError, tracking
 from seerob.transforms import Array
 
 __all__ = ["Detection", "Separation", "Stop", "separation_bound"]
@@ -47,27 +54,6 @@ def separation_bound(v_r: Array, v_h: float, T_r: float, T_s: float, xi: float) 
     return (np.maximum(v_r, 0.0) + v_h) * (T_r + T_s) + xi
 
 
-class Detection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How the person is detected, for C by ISO 13855."""
-
-    edition: Literal["2010", "2024"] = "2024"
-    """Of ISO 13855."""
-    approach: Literal["orthogonal", "parallel"] = "parallel"
-    """Across the field, or along it over the floor."""
-    capability: Annotated[float, Meta(gt=0, extra={"unit": "m"})] | None = None
-    """Smallest object that is always seen [m]; when none was demonstrated, the largest C holds."""
-    height: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
-    """Of a field along the floor [m]."""
-    reach_over: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
-    """C_RO (D_DO) for reaching over a field across the approach, from the norm's table [m]; 0 where other
-    measures exclude it. C is the larger of it and what the field gives."""
-    reach_under: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
-    """D_DU for reaching under the field, or crawling under one more than 0.2 m above the floor [m]; 0 where
-    other measures exclude it."""
-    supplement: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
-    """Z of the 2024 edition [m]."""
-
-
 class Separation(Criterion, frozen=True, kw_only=True):
     """Speed and separation monitoring: every moving part of the robot against every part of the person."""
 
@@ -86,6 +72,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
     """C: how far a person may reach in before being detected [m], ISO 13855."""
     detection: Detection | None = None
     """Instead of ``intrusion``: what C follows from."""
+    sensor: str | None = None
+    """An entry of ``[[sensors]]`` that detects the person: its response time is added to ``stop.reaction``,
+    and its detection capability and height give C unless ``intrusion`` does."""
     human_uncertainty: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
     """Z_d: uncertainty of the person's position [m]."""
     robot_uncertainty: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
@@ -118,28 +107,18 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
     def _intrusion(self) -> tuple[float | None, str, str]:
         """C [m] when known, why it is not complete, and its source."""
-        if self.detection is None:
-            return self.intrusion, "" if self.intrusion is not None else "intrusion (C)", "workstation file"
-        d = self.detection
-        try:
-            found = iso_13855.intrusion(
-                iso_13855.Approach(d.approach),
-                iso_13855.Edition(d.edition),
-                capability=d.capability,
-                height=d.height,
-                over=d.reach_over,
-                under=d.reach_under,
-            )
-        except Undecided as unknown:
-            return None, str(unknown), ""
-        source = f"{found.source}; {found.note}" if found.note else found.source
-        missing = [
-            f"detection.{'reach_over' if 'over' in way else 'reach_under'} ({way}; 0 where it is excluded)"
-            for way in found.uncovered
-        ]
-        if d.edition == "2024" and d.supplement is None:
-            missing.append("detection.supplement (Z of ISO 13855:2024)")
-        return found.value + (d.supplement or 0.0), ", ".join(missing), source
+        if self.detection is not None:
+            return self.detection.intrusion()
+        return self.intrusion, "" if self.intrusion is not None else "intrusion (C)", "workstation file"
+
+    def _by_device(self, model: Model) -> tuple[Separation, tuple[str, ...], tuple[Input, ...]]:
+        """The same without a sensor, with what the sensor adds; what is not known of it; inputs."""
+        if self.sensor is None:
+            return self, (), ()
+        device = device_of(model, self.name, self.sensor, self.detection)
+        stop = replace(self.stop, reaction=self.stop.reaction + device.response)
+        detection = device.detection if self.intrusion is None else None
+        return replace(self, stop=stop, detection=detection, sensor=None), device.doubts, device.inputs
 
     def _terms(self) -> tuple[tuple[float, float, float], list[str]]:
         """C, Z_d and Z_r [m], 0 where not known, and what is not known."""
@@ -153,7 +132,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
     def unknown(self, model: Model) -> str:
         """Why S_p may be larger than what is computed; empty when it is not."""
-        return self._unknown(self._terms()[1], self._stop(model))
+        own, doubts, _ = self._by_device(model)
+        return self._unknown([*own._terms()[1], *doubts], own._stop(model))
 
     @staticmethod
     def _unknown(missing: list[str], stop: StopModel) -> str:
@@ -168,12 +148,17 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
+        own, _, _ = self._by_device(model)
+        return own._bound(model, self.unknown(model))
+
+    def _bound(self, model: Model, unknown: str) -> Evaluate:
         gap, stop = self._gap(model), self._stop(model)
-        (C, Z_d, Z_r), missing = self._terms()
+        C, Z_d, Z_r = self._terms()[0]
         K = C + Z_d + Z_r + gap.deviation
-        unknown = self._unknown(missing, stop)
         unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
-        largest = _Largest()
+        largest, places = LargestSeparation(), BodyPlaces(model)
+        ends = SeparationEnds(self.stop, lambda changed: replace(self, stop=changed).required(model))
+        off = TrackingError(model, gap.a)
 
         def evaluate(state: State) -> Result:
             found = state.closest_per_body(gap)
@@ -182,6 +167,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
             S_p = self._distance(now, K)
             if self.mode == "fixed":
                 S_p = largest.including(state, S_p)
+            seen = float(off.at(state).max(initial=0.0))
+            span = ends.at(state) if ends.tolerances else None
+            spans = intervals(found.distance, S_p, seen, span)
             parts = tuple(
                 Result(
                     name=model.bodies[body].name,
@@ -189,14 +177,21 @@ class Separation(Criterion, frozen=True, kw_only=True):
                     unit="m",
                     limit=float(S_p[i]),
                     at_most=False,
-                    verdict=self._verdict(float(found.distance[i]), float(S_p[i]), bool(unknown)),
+                    verdict=self._verdict(spans[i], float(S_p[i]), bool(unknown)),
+                    interval=spans[i] if span is not None or seen else None,
                     reason=model.bodies[int(found.body_a[i])].name,
                 )
                 for i, body in enumerate(gap.b)
             )
-            k = int((found.distance - S_p).argmin())
-            verdict = parts[k].verdict
-            where = f"{parts[k].name} ↔ {parts[k].reason}"
+            verdict = worst([part.verdict for part in parts])
+            worst_ones = [i for i, part in enumerate(parts) if part.verdict is verdict]
+            k = min(worst_ones, key=lambda i: float(found.distance[i] - S_p[i]))
+            open_ = unknown
+            if verdict is Verdict.UNDECIDED and not unknown:
+                widths = np.zeros(0) if span is None else span.widths[:, k]
+                open_ = deciding((*ends.tolerances, tracking(seen)), np.append(widths, 2 * seen))
+            near = places.named(state, int(found.body_a[k]), found.point_a[k])
+            where = f"{parts[k].name} ↔ {near}"
             shown = figures.against(float(found.distance[k]), float(S_p[k]), self.unit, at_most=self.at_most)
             segment = Segment(
                 start=tuple(found.point_b[k].tolist()),
@@ -211,7 +206,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 limit=float(S_p[k]),
                 at_most=False,
                 verdict=verdict,
-                reason=f"{where}: {unknown}" if verdict is Verdict.UNDECIDED else where,
+                reason=f"{where}: {open_}" if verdict is Verdict.UNDECIDED else where,
+                interval=parts[k].interval,
                 parts=(
                     *parts,
                     *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r)),
@@ -236,6 +232,42 @@ class Separation(Criterion, frozen=True, kw_only=True):
             "Z_r": rest[2],
         }
         return tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
+
+    def batch(self, model: Model) -> EvaluateMany | None:
+        """See `Criterion.batch`; where the stopping time is given and S_p is that of the present speeds."""
+        own, _, _ = self._by_device(model)
+        gap = own._gap(model)
+        K = sum(own._terms()[0]) + gap.deviation
+        if self.mode == "fixed":
+            return None
+        incomplete = bool(self.unknown(model))
+        return separations(own.stop, gap, lambda now: own._distance(now, K), incomplete=incomplete)
+
+    def required(self, model: Model) -> Callable[[State], Array]:
+        """S_p of each of `Mechanism.moving` of the robot [m], in that order; to be asked at every tick."""
+        own, _, _ = self._by_device(model)
+        stop, largest = own._stop(model), LargestSeparation()
+        K = sum(own._terms()[0]) + own._gap(model).deviation
+
+        def at(state: State) -> Array:
+            S_p = own._distance(stop.courses(state)(1.0), K)
+            return largest.including(state, S_p) if own.mode == "fixed" else S_p
+
+        return at
+
+    def inverse(self, model: Model) -> Callable[[State, Array], tuple[Array, tuple[Result, ...]]]:
+        """S_p of every moving part [m] and the largest permissible speed, at given distances of them [m]."""
+        if self.sensor is not None:
+            return self._by_device(model)[0].inverse(model)
+        gap, stop = self._gap(model), self._stop(model)
+        K = sum(self._terms()[0]) + gap.deviation
+
+        def at(state: State, distance: Array) -> tuple[Array, tuple[Result, ...]]:
+            course = stop.courses(state)
+            now = course(1.0)
+            return self._distance(now, K), self._permissible(stop, course, now, distance, K)
+
+        return at
 
     def _permissible(
         self, stop: StopModel, course: At, now: Course, distance: Array, K: float
@@ -264,19 +296,24 @@ class Separation(Criterion, frozen=True, kw_only=True):
         )
 
     @staticmethod
-    def _verdict(distance: float, S_p: float, incomplete: bool) -> Verdict | None:
+    def _verdict(interval: tuple[float, float], S_p: float, incomplete: bool) -> Verdict | None:
         """Below an incomplete S_p is EXCEEDED all the same; above it nothing follows."""
-        verdict = judge(distance, S_p, at_most=False)
+        verdict = judge_interval(interval, S_p, at_most=False)
         return Verdict.UNDECIDED if incomplete and verdict is Verdict.WITHIN else verdict
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
+        if self.sensor is not None:
+            own, _, of_device = self._by_device(model)
+            found = own.basis(model)
+            return replace(found, inputs=(*found.inputs, *of_device))
         robot, human = self._sides(model)
         stop = self._stop(model)
         inputs = [
             *provenance.motion(model, robot, human),
             *provenance.shapes(self._gap(model)),
             provenance.given("T_r", self.stop.reaction, "s"),
+            *(provenance.given(f"tolerance of {t.name}", t.half, t.unit) for t in tolerances(self.stop)),
             *stop.inputs,
         ]
         if self.stop.model == "simulated":
@@ -306,8 +343,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
             inputs=tuple(inputs),
             not_modelled=(
                 *stop.not_modelled,
+                *((SIMULATED,) if self.stop.model == "simulated" and tolerances(self.stop) else ()),
                 *(() if toward else ("direction: the speed counts in full, also of parts that move away",)),
-                *self._ways_around(),
+                *(self.detection.ways_around() if self.detection is not None else ()),
                 "a person whose own speed exceeds v_h",
             ),
         )
@@ -332,41 +370,13 @@ class Separation(Criterion, frozen=True, kw_only=True):
             )
         return provenance.given("v_h", self.human_speed, "m/s")
 
-    def _ways_around(self) -> tuple[str, ...]:
-        if self.detection is None:
-            return ()
-        if self.detection.approach == "orthogonal":
-            return ("reaching over or under the detection field, beyond reach_over and reach_under",)
-        return ("crawling under the detection field, beyond reach_under",)
-
     def _intrusion_input(self) -> Input:
-        C, missing, source = self._intrusion()
-        if self.detection is None:
-            return (
-                Input(name="C", unit="m", origin=Origin.MISSING)
-                if C is None
-                else provenance.given("C", C, "m")
-            )
-        origin = Origin.MISSING if missing else Origin.STATED
-        note = f"{source}; not known: {missing}" if missing else source
-        return Input(name="C", value=C, unit="m", origin=origin, source=note)
-
-
-class _Largest:
-    """Largest S_p of each part since a run began."""
-
-    def __init__(self) -> None:
-        self._run: Callable[[], State | None] = lambda: None
-        self._t = -np.inf
-        self._S_p = np.zeros(0)
-
-    def including(self, state: State, S_p: Array) -> Array:
-        """The largest, with that of this tick."""
-        if self._run() is not state or state.t < self._t:
-            self._run, self._S_p = weakref.ref(state), S_p
-        self._t = state.t
-        self._S_p = worst_case(np.stack([self._S_p, S_p]))
-        return self._S_p
+        if self.detection is not None:
+            return self.detection.stated()
+        C = self.intrusion
+        return (
+            Input(name="C", unit="m", origin=Origin.MISSING) if C is None else provenance.given("C", C, "m")
+        )
 
 
 def _factor(S_p: Callable[[float], Array], distance: Array, costly: bool) -> float:

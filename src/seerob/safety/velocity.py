@@ -9,12 +9,14 @@ import numpy as np
 from msgspec import Meta
 
 from seerob import provenance
-from seerob.criterion import Criterion, Evaluate, judge
+from seerob.answers import Answers
+from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge
 from seerob.errors import InputError
 from seerob.model import Model
 from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Input, Result
 from seerob.state import State
+from seerob.states import States
 from seerob.transforms import Array
 
 DRAWN = 0.5
@@ -72,10 +74,14 @@ class Velocity(Criterion, frozen=True, kw_only=True):
 
         return evaluate
 
-    def _bind_set(self, model: Model) -> Evaluate:
+    def _bodies(self, model: Model) -> tuple[int, ...]:
         bodies = tuple(i for i in model.select(self.of or "") if model.bodies[i].carrier)
         if not bodies:
             raise InputError.at(self.name, "of", f"nothing of {self.of!r} moves", "name a robot or human")
+        return bodies
+
+    def _bind_set(self, model: Model) -> Evaluate:
+        bodies = self._bodies(model)
 
         def evaluate(state: State) -> Result:
             speeds, points, velocities = state.fastest_points(bodies)
@@ -101,6 +107,23 @@ class Velocity(Criterion, frozen=True, kw_only=True):
             reason=where,
             markers=(arrow,),
         )
+
+    def batch(self, model: Model) -> EvaluateMany:
+        """See `Criterion.batch`."""
+        if self.at is None:
+            bodies = self._bodies(model)
+            return lambda states: self._answers(states.fastest_points(bodies)[0].max(axis=1))
+        frame, offset = model.frame(self.at), np.array(self.offset)
+        mechanism = model.carrier(frame)
+
+        def evaluate(states: States) -> Answers:
+            v = point_velocity(states.jacobian(frame, mechanism, offset), states.qd(mechanism))[:, :3]
+            return self._answers(np.sqrt(np.einsum("ij,ij->i", v, v)))
+
+        return evaluate
+
+    def _answers(self, speed: Array) -> Answers:
+        return Answers.against(speed, self.limit, at_most=self.at_most)
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

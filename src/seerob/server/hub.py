@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from math import isfinite
@@ -12,9 +13,21 @@ import msgspec
 from msgspec.structs import replace
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from seerob import headset_offers
+from seerob.headset_offers import OFFERS
 from seerob.server.client import Client, Closing
 from seerob.server.feed import KNOWN_ACTIONS, Feed
-from seerob.snapshot import PROTOCOL, Command, Hello, History, Scene, Snapshot, Transport
+from seerob.snapshot import (
+    PROTOCOL,
+    Command,
+    Hello,
+    History,
+    Scene,
+    Snapshot,
+    Tracked,
+    Tracking,
+    Transport,
+)
 from seerob.wire import schema
 
 MOST_CLIENTS = 64
@@ -22,7 +35,9 @@ PATIENCE = 10.0
 """How long a page may leave a frame waiting [s]."""
 
 _encode = msgspec.msgpack.Encoder().encode
-_decode = msgspec.msgpack.Decoder(Command).decode
+_decode: Callable[[bytes], Command | Tracking] = msgspec.msgpack.Decoder(Command | Tracking).decode
+LARGEST_COMMAND = 512
+"""[B]; one has less than 100."""
 
 
 def on_the_wire(snapshot: Snapshot) -> Snapshot:
@@ -32,16 +47,20 @@ def on_the_wire(snapshot: Snapshot) -> Snapshot:
     return replace(snapshot, results=tuple(replace(r, basis=None) for r in snapshot.results))
 
 
-def read_command(data: bytes) -> Command:
+def read_message(data: bytes) -> Command | Tracking:
     """Decode what a page sent.
 
     Raises:
-        ValueError: It is no command, an unknown one, or its value is missing or not finite.
+        ValueError: It is no message of a page, an unknown command, or a value is missing or not finite.
     """
     try:
         command = _decode(data)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
         raise ValueError(f"not a command: {error}") from None
+    if isinstance(command, Tracking):
+        return command
+    if len(data) > LARGEST_COMMAND:
+        raise ValueError(f"a command of {len(data)} bytes")
     if command.action not in KNOWN_ACTIONS | {"ack"}:
         raise ValueError("unknown action")
     if command.action not in ("play", "pause") and (command.value is None or not isfinite(command.value)):
@@ -116,15 +135,20 @@ class Hub:
             closing = await client.over
         finally:
             self.clients.discard(client)
+            OFFERS.gone(client)
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
         await _close(socket, closing)
 
     async def _listen(self, client: Client, socket: WebSocket) -> None:
+        told: Tracked | None = None
         try:
             while True:
-                command = read_command(await socket.receive_bytes())
+                command = read_message(await socket.receive_bytes())
+                if isinstance(command, Tracking):
+                    told = _offer(client, command, told)
+                    continue
                 if command.action == "ack":
                     client.acknowledge(int(command.value or 0))
                     continue
@@ -134,6 +158,20 @@ class Hub:
             client.end(Closing(1007, str(error)))
         except (WebSocketDisconnect, RuntimeError):
             client.end(Closing(1006, "gone"))
+
+
+def _offer(client: Client, tracking: Tracking, told: Tracked | None) -> Tracked:
+    """Pass on what a headset sees; the page is told what became of it when that changes.
+
+    Raises:
+        ValueError: It contradicts itself.
+    """
+    offer = headset_offers.read(tracking, headset_offers.now())
+    refusal = OFFERS.offer(tracking.human, client, offer)
+    answer = Tracked(human=tracking.human, accepted=not refusal, reason=refusal)
+    if answer != told:
+        client.offer("Tracked", _encode(answer))
+    return answer
 
 
 def _name() -> str:

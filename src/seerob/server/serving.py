@@ -29,8 +29,8 @@ from seerob.snapshot import Scene
 
 _log = logging.getLogger(__name__)
 
-LARGEST_MESSAGE = 512
-"""From a page [B]; a command has less than 100."""
+LARGEST_MESSAGE = 16384
+"""From a page [B]; what a headset sees of a body with both hands has 10 000, a command less than 100."""
 PORTS_TRIED = 20
 SHORTEST_TOKEN = 16
 

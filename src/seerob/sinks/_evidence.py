@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 
 from seerob.figures import figure
+from seerob.sinks._bone_errors import bones_told
 from seerob.sinks._html import Html, joined, table, tag
 from seerob.sinks._report import DOUBTFUL, WHO, Report, input_row
 from seerob.sinks._sentences import number
@@ -102,6 +103,7 @@ def evaluated(report: Report) -> Html:
         [
             tag("h2", "What was evaluated"),
             table(["", ""], facts),
+            bones_told(log.bones),
             tag("h4", "Sources"),
             _sources(heads, how),
             tag("h4", "With what"),

@@ -27,6 +27,7 @@ from seerob.recording_format import (
     VERSION,
     VIEW_FRAMES,
     VIEW_MARKERS,
+    VIEW_PEOPLE,
     VIEW_RESULTS,
     VIEW_SCENE,
     BasisChange,
@@ -61,6 +62,23 @@ _RESULTS_SCHEMA = {
         },
     },
 }
+_NUMBERS = {"type": "object", "additionalProperties": {"type": ["number", "null"]}}
+_PEOPLE_SCHEMA = {
+    "type": "object",
+    "properties": {
+        "t": {"type": "number"},
+        "people": {
+            "type": "object",
+            "additionalProperties": {
+                "type": "object",
+                "properties": {
+                    "joints": _NUMBERS,
+                    "errors": {"type": "object", "additionalProperties": _NUMBERS},
+                },
+            },
+        },
+    },
+}
 
 
 class McapTape:
@@ -73,6 +91,7 @@ class McapTape:
             OSError: The file exists or cannot be written.
         """
         self._scene = scene
+        self._people = {m.name: [j.name for j in m.joints] for m in scene.mechanisms if m.role == "human"}
         self._encode = msgspec.msgpack.Encoder(enc_hook=_plain).encode
         self._bases: dict[tuple[int, str], Basis | None] = {}
         self._next_view = -math.inf
@@ -116,11 +135,17 @@ class McapTape:
         results = self._mcap.register_schema(
             "seerob.Results", "jsonschema", json.dumps(_RESULTS_SCHEMA).encode()
         )
+        people = 0
+        if self._people:
+            people = self._mcap.register_schema(
+                "seerob.People", "jsonschema", json.dumps(_PEOPLE_SCHEMA).encode()
+            )
         for topic, encoding, schema in (
             (VIEW_SCENE, "protobuf", update),
             (VIEW_MARKERS, "protobuf", update),
             (VIEW_FRAMES, "protobuf", transforms),
             (VIEW_RESULTS, "json", results),
+            *([(VIEW_PEOPLE, "json", people)] if self._people else []),
         ):
             channels[topic] = self._mcap.register_channel(topic, encoding, schema)
         return channels
@@ -137,6 +162,21 @@ class McapTape:
             self._put(VIEW_FRAMES, seq, t, frame_transforms(self._scene, snapshot).SerializeToString())
             self._put(VIEW_MARKERS, seq, t, marker_update(snapshot).SerializeToString())
             self._put(VIEW_RESULTS, seq, t, _results_json(snapshot))
+            if self._people:
+                self._put(VIEW_PEOPLE, seq, t, self._people_json(snapshot))
+
+    def _people_json(self, snapshot: Snapshot) -> bytes:
+        people = {
+            name: {
+                "joints": dict(zip(joints, snapshot.joints.get(name, ()), strict=False)),
+                "errors": {
+                    bone: {"position": position, "angle": angle}
+                    for bone, (position, angle) in snapshot.bones.get(name, {}).items()
+                },
+            }
+            for name, joints in self._people.items()
+        }
+        return msgspec.json.encode({"t": snapshot.t, "people": people}, enc_hook=_plain)
 
     def flush(self) -> None:
         """End the chunk and hand it to the disk: what was written so far survives the process."""

@@ -10,6 +10,7 @@ from seerob.sinks._added import added
 from seerob.sinks._evidence import assumed, evaluated, not_covered
 from seerob.sinks._html import Html, joined, table, tag
 from seerob.sinks._page_style import STYLE
+from seerob.sinks._posture_safety import told
 from seerob.sinks._report import Report, badge, input_row
 from seerob.sinks._sentences import about, bound, extremum, percent, reached, summary
 from seerob.sinks._time_shares import spread_over_time
@@ -38,6 +39,7 @@ def page(report: Report) -> str:
         _opening(report),
         _verdicts(report),
         _criteria(report),
+        told(report.scene, report.log),
         added(report.sections),
         assumed(report),
         not_covered(report),

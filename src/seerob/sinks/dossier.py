@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from types import TracebackType
-from typing import Annotated, Self
+from typing import Annotated
 
 from msgspec import Meta
 
@@ -17,10 +15,8 @@ from seerob.report_section import ReportSection
 from seerob.results import ResultLog, result_named
 from seerob.samples import Sample
 from seerob.sink import Sink
+from seerob.sinks._at_end import AtEnd
 from seerob.snapshot import Basis, Finding, Scene, Snapshot
-
-Progress = Callable[[int, int], None]
-"""Called with how many of how many steps of writing are done."""
 
 
 class Dossier(Sink, frozen=True, kw_only=True):
@@ -50,16 +46,17 @@ class Dossier(Sink, frozen=True, kw_only=True):
         return DossierWriter(scene, meshes, files, folder / self.file, pictures=self.pictures)
 
 
-class DossierWriter:
-    """Collects results; keeps one snapshot per criterion, that of its worst instant."""
+class DossierWriter(AtEnd):
+    """Collects results; keeps one snapshot per criterion, that of its worst instant.
+
+    Of its progress every picture is a step, and so is the page.
+    """
 
     def __init__(
         self, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes], path: Path, *, pictures: int
     ) -> None:
         """Use `Dossier.open`."""
         self.path = path
-        self.progress: Progress | None = None
-        """Called while `close` works; every picture is a step, and so is the page."""
         self.findings: list[Finding] = list(scene.findings)
         """What the report lists as found; the run may add to it."""
         self.sections: list[ReportSection] = []
@@ -100,20 +97,6 @@ class DossierWriter:
         )
         write_whole(self.path, page(report).encode())
         self._tell(len(pictures) + 1, len(pictures) + 1)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        # Whoever interrupts a run a second time does not want to wait for this.
-        if kind is None or not issubclass(kind, KeyboardInterrupt):
-            self.close()
-
-    def _tell(self, done: int, total: int) -> None:
-        if self.progress is not None:
-            self.progress(done, total)
 
     def _drawn(self) -> dict[str, bytes]:
         from seerob.sinks._picture import Stage

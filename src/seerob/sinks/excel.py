@@ -1,15 +1,12 @@
-"""An Excel workbook: a summary, one sheet per criterion, joints, and what was found."""
+"""An Excel workbook: a summary, one sheet per criterion, motion, what was heard, and what was found."""
 
 from __future__ import annotations
 
-import math
 import os
-from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from tempfile import mkstemp
-from types import TracebackType
-from typing import Annotated, Self
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
@@ -18,6 +15,11 @@ from seerob.results import ResultLog, result_named
 from seerob.samples import Sample
 from seerob.series import CODES, Series
 from seerob.sink import Sink
+from seerob.sinks import _posture_safety
+from seerob.sinks._at_end import AtEnd
+from seerob.sinks._bone_errors import HEAD as ERRORS
+from seerob.sinks._bone_errors import bone_rows
+from seerob.sinks._motion_sheets import MotionSheets
 from seerob.sinks._sheets import Cell, Sheets
 from seerob.sinks._time_shares import HEAD, time_rows
 from seerob.snapshot import Basis, Scene, Snapshot
@@ -33,8 +35,13 @@ class Excel(Sink, frozen=True, kw_only=True):
     )
     """Name in the run's folder; an earlier workbook of that name is replaced."""
     rows: Annotated[int, Meta(ge=7)] = 100_000
-    """Most ticks written per criterion; beyond it they are thinned without losing an extremum or an
-    exceedance, and the summary says so."""
+    """Most ticks written per criterion and of joints; beyond it they are thinned without losing an extremum
+    or an exceedance of a criterion, and the summary says so."""
+    motion_rows: Annotated[int, Meta(ge=0)] = 3_000
+    """Most rows of each sheet of bones, tracking errors, samples, and of posture against safety; beyond it
+    they are thinned evenly. 0 leaves these sheets out. The sink ``csv`` writes all of them."""
+    bones: Literal["captured", "all"] = "captured"
+    """Whose bones have a sheet: of people whom devices see, or of all."""
 
     def open(
         self, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes], folder: Path
@@ -50,23 +57,29 @@ class Excel(Sink, frozen=True, kw_only=True):
             )
         if self.rows < 7:
             raise InputError.at(folder, "excel.rows", f"{self.rows} rows hold nothing", "7 or more")
-        return ExcelWriter(scene, folder / self.file, rows=self.rows)
+        if self.motion_rows == 1 or self.motion_rows < 0:
+            what = f"{self.motion_rows} rows hold no motion"
+            raise InputError.at(folder, "excel.motion_rows", what, "2 or more, or 0 for no sheets of motion")
+        motion = MotionSheets(
+            scene,
+            joint_rows=self.rows,
+            rows=self.motion_rows,
+            everybody=self.bones == "all",
+        )
+        return ExcelWriter(scene, folder / self.file, motion, rows=self.rows, motion_rows=self.motion_rows)
 
 
-class ExcelWriter:
-    """Collects results and joints."""
+class ExcelWriter(AtEnd):
+    """Collects results and motion."""
 
-    def __init__(self, scene: Scene, path: Path, *, rows: int) -> None:
+    def __init__(
+        self, scene: Scene, path: Path, motion: MotionSheets, *, rows: int, motion_rows: int
+    ) -> None:
         """Use `Excel.open`."""
         self.path = path
-        self.progress: Callable[[int, int], None] | None = None
-        """Called while `close` works with how many of how many sheets are done."""
         self.log = ResultLog(scene.criteria)
-        self._scene, self._rows = scene, rows
+        self._scene, self._motion, self._rows, self._motion_rows = scene, motion, rows, motion_rows
         self._bases: dict[str, Basis] = {i.name: i.basis for i in scene.criteria if i.basis is not None}
-        self._t = array("d")
-        self._joints: dict[str, list[array[float]]] = {}
-        self._tracking: dict[str, array[float]] = {}
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Take one tick."""
@@ -74,19 +87,7 @@ class ExcelWriter:
             result = result_named(snapshot, name)
             if result is not None and result.basis is not None:
                 self._bases[name] = result.basis
-        ticks = len(self._t)
-        self._t.append(snapshot.t)
-        for name, q in snapshot.joints.items():
-            columns = self._joints.setdefault(name, [])
-            while len(columns) < len(q):
-                columns.append(array("d", [math.nan] * ticks))
-            for column, value in zip(columns, q, strict=False):
-                column.append(value)
-        for name, error in snapshot.tracking.items():
-            self._tracking.setdefault(name, array("d", [math.nan] * ticks)).append(error)
-        for column in (*self._tracking.values(), *(c for cs in self._joints.values() for c in cs)):
-            if len(column) <= ticks:
-                column.append(math.nan)
+        self._motion.take(snapshot, samples)
 
     def close(self) -> None:
         """Write the workbook, whole or not at all.
@@ -114,14 +115,19 @@ class ExcelWriter:
         book = Workbook(write_only=True)
         sheets = Sheets(book)
         try:
-            steps = len(self.log) + len(self._joints) + 1
+            steps = len(self.log) + len(self._motion) + 1
             sheets.add("Summary", _SUMMARY, list(self._summary()), fit=True)
             for k, series in enumerate(self.log.values()):
                 sheets.add(series.name, _head(series), _rows(series, self._rows))
                 self._tell(k + 1, steps)
-            for k, (name, columns) in enumerate(self._joints.items()):
-                sheets.add(f"joints {name}", self._joint_head(name, len(columns)), self._joint_rows(name))
+            for one in _posture_safety.sides(self._scene, self.log) if self._motion_rows else ():
+                head, instants = _posture_safety.head(one), _posture_safety.rows(one, self._motion_rows)
+                sheets.add(f"posture, safety {one.person}", head, instants)
+            for k, (name, table) in enumerate(self._motion.sheets()):
+                sheets.add(name, table.titles, table.rows())
                 self._tell(len(self.log) + k + 1, steps)
+            if self.log.bones:
+                sheets.add("Bone errors", ERRORS, list(bone_rows(self.log.bones)), fit=True)
             infos = {info.name: info for info in self._scene.criteria}
             if any(info.group == "ergonomics" for info in infos.values()):
                 sheets.add("Time shares", HEAD, time_rows(self.log, infos))
@@ -133,20 +139,6 @@ class ExcelWriter:
             sheets.close()
         book.save(path)
         self._tell(steps, steps)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        # Whoever interrupts a run a second time does not want to wait for this.
-        if kind is None or not issubclass(kind, KeyboardInterrupt):
-            self.close()
-
-    def _tell(self, done: int, total: int) -> None:
-        if self.progress is not None:
-            self.progress(done, total)
 
     def _summary(self) -> Iterator[list[Cell]]:
         for series in self.log.ranked():
@@ -182,21 +174,9 @@ class ExcelWriter:
             if len(series) > self._rows:
                 text = f"thinned from {len(series)} ticks to at most {self._rows}"
                 yield [series.name, f"{text}; extrema and exceedances are kept"]
-
-    def _joint_head(self, mechanism: str, n: int) -> list[Cell]:
-        known = {m.name: m.joints for m in self._scene.mechanisms}.get(mechanism, ())
-        names = [f"{j.name} [{j.unit}]" for j in known]
-        names += [f"joint {k + 1} [rad or m]" for k in range(len(names), n)]
-        return ["t [s]", *names[:n], "tracking error [rad or m]"]
-
-    def _joint_rows(self, mechanism: str) -> Iterator[list[Cell]]:
-        columns = [
-            *self._joints[mechanism],
-            self._tracking.get(mechanism, array("d", [math.nan] * len(self._t))),
-        ]
-        stride = max(1, math.ceil(len(self._t) / self._rows))
-        for i in range(0, len(self._t), stride):
-            yield [self._t[i], *(column[i] for column in columns)]
+        for name, table in self._motion.sheets():
+            if table.thinned:
+                yield [name, f"thinned evenly from {table.offered} rows"]
 
     def _inputs(self) -> Iterator[list[Cell]]:
         for name, basis in self._bases.items():

@@ -99,8 +99,8 @@ class CaptureFile(Source, frozen=True, kw_only=True):
         )
         if self.calibration.pose is not CalibrationPose.NONE:
             window = self._window(captured)
-            bound, more = calibrated(self, window, captured.layout, bound, description)
-            findings = (*findings, *more)
+            bound, found = calibrated(self, window, captured.layout, bound, description)
+            findings = (*findings, *found.findings)
         world_from_root = np.eye(4) if target is None else np.array(target.world_from_base or np.eye(4))
         bound, fit = registered(captured, bound, description, world_from_root, subject)
         findings = (*findings, *fit)

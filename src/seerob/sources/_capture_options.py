@@ -10,7 +10,7 @@ from msgspec import Meta, Struct
 
 from seerob.errors import InputError, Problem, UnknownName, suggestion
 from seerob.human import mapping as names
-from seerob.human.calibration import CalibrationPose, calibrate
+from seerob.human.calibration import Calibrated, CalibrationPose, calibrate
 from seerob.human.captured import CaptureFrame, Layout
 from seerob.human.observing import Observer, bind, with_mounts
 from seerob.human.skeleton import BONES
@@ -142,12 +142,12 @@ def calibrated(
     layout: Layout,
     bound: Observer,
     description: Description,
-) -> tuple[Observer, tuple[Finding, ...]]:
-    """The same observer with the mounting that frames of the calibration show."""
+) -> tuple[Observer, Calibrated]:
+    """The same observer with the mounting that frames of the calibration show, and what was found."""
     found = calibrate(
         list(frames), bound, description, options.calibration.pose, seen=layout.seen, subject=options.human
     )
-    return with_mounts(bound, found.mounts), found.findings
+    return with_mounts(bound, found.mounts), found
 
 
 def placement(at: Pose) -> Array:

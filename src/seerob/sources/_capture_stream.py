@@ -12,13 +12,13 @@ import numpy as np
 from msgspec import field
 
 from seerob.human import manikin
-from seerob.human.calibration import CalibrationPose
+from seerob.human.calibration import Calibrated, CalibrationPose
 from seerob.human.captured import CaptureFrame, Layout
 from seerob.human.observing import Observer
 from seerob.live import LiveSource
 from seerob.model_io.description import Description
 from seerob.quantities import Pose
-from seerob.samples import BodyPoint, BodySample, Quality, Sample
+from seerob.samples import BodyPoint, BodySample, Quality, Sample, SignalSample
 from seerob.snapshot import Finding
 from seerob.source import Target
 from seerob.sources._capture_options import (
@@ -108,7 +108,7 @@ class _Hearing:
         self._window: list[CaptureFrame] = []
         self._calibrated = source.calibration.pose is CalibrationPose.NONE
 
-    def take(self, layout: Layout, frame: CaptureFrame, now: float) -> BodySample | None:
+    def take(self, layout: Layout, frame: CaptureFrame, now: float) -> BodySample | SignalSample | None:
         """The sample of a frame that arrived at ``now`` [s]; None while there is nothing to say."""
         bound = self._bind(layout)
         if len(frame.positions) != len(layout.names):
@@ -117,8 +117,7 @@ class _Hearing:
         if not followed:
             return None
         if not self._calibrated:
-            self._calibrate(layout, frame, now)
-            return None
+            return self._calibrate(layout, frame, now)
         points = bound.points(frame)
         return BodySample(
             source=self._source.name,
@@ -174,21 +173,33 @@ class _Hearing:
         if place is not None:
             self._last_place, self._last_seen = place, now
 
-    def _calibrate(self, layout: Layout, frame: CaptureFrame, now: float) -> None:
+    def _calibrate(self, layout: Layout, frame: CaptureFrame, now: float) -> SignalSample | None:
+        """What a calibration found, when it has ended."""
         wanted = self._source.calibration
         self._begun = now if self._begun is None else self._begun
         since = now - self._begun - wanted.start
         if since < 0:
-            return
+            return None
         if since <= wanted.duration and len(self._window) < MOST_CALIBRATION_FRAMES:
             self._window.append(frame)
-            return
+            return None
         assert self._observer is not None  # bound before
-        self._observer, findings = calibrated(
+        self._observer, found = calibrated(
             self._source, self._window, layout, self._observer, self._description
         )
-        _say(findings)
+        _say(found.findings)
         self._window, self._calibrated = [], True
+        return SignalSample(source=self._source.name, seq=0, t=now, values=_residuals(found))
+
+
+def _residuals(found: Calibrated) -> dict[str, float | bool | str]:
+    """Per sensor how far it was from where it is expected [m] and how it is turned [rad], where known."""
+    values: dict[str, float | bool | str] = {"calibration heading [rad]": found.heading}
+    for r in found.residuals:
+        for what, value in (("off [m]", r.off), ("moved [m]", r.moved), ("turned [rad]", r.turn)):
+            if np.isfinite(value):
+                values[f"calibration {r.name} {what}"] = value
+    return values
 
 
 def _say(findings: tuple[Finding, ...]) -> None:

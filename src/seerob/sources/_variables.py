@@ -12,7 +12,9 @@ import time
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing
 from pathlib import Path
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Self
+
+from msgspec.structs import replace
 
 from seerob.dictionary import BadValue, Value, Variable
 from seerob.live import LiveSource
@@ -22,6 +24,10 @@ from seerob.source import Target
 
 BEAT = 0.05
 """A sample is sent at least this often while there is a connection [s]: no news is news, too."""
+
+
+FILES = ("ca", "certificate", "key", "server_certificate")
+"""Options that name a file beside the workstation."""
 
 
 class Change(NamedTuple):
@@ -64,6 +70,11 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
     def period(self) -> float:
         """Interval between samples that is expected [s]."""
         return BEAT
+
+    def beside(self, folder: Path) -> Self:
+        """The same source with the files that it names found from the folder of the workstation file."""
+        named = {key: getattr(self, key, None) for key in FILES}
+        return replace(self, **{key: str(folder / path) for key, path in named.items() if path is not None})
 
     def changes(
         self, variables: tuple[Variable, ...], folder: Path

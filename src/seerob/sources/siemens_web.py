@@ -123,6 +123,11 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
                     elif not entry.get("has_children"):
                         yield Node(below, str(entry.get("datatype", "")), "", "")
 
+    async def write(self, variable: Variable, raw: bool, folder: Path) -> None:
+        """Write one bool; called by `seerob.triggers` alone."""
+        async with self._session(folder) as session:
+            s7_web.result(await session.post(s7_web.writing(variable.address, raw)))
+
     @asynccontextmanager
     async def _session(self, folder: Path) -> AsyncGenerator[_Session, None]:
         import ssl

@@ -5,6 +5,7 @@ import { elsewhere, frame, hello, isLive, link, lookingAt, overall, rows, scene,
 import { orderedRows } from "../row_order";
 import { STATE_ICONS, type State } from "../verdicts";
 import { ElsewhereNote } from "./ElsewhereNote";
+import { HeadsetOffer } from "./HeadsetOffer";
 
 export function TopBar() {
   const run = scene.value;
@@ -18,6 +19,7 @@ export function TopBar() {
         <h1 title={run?.title}>{run?.title ?? "…"}</h1>
         {run && <span class="edition">{run.edition || "no edition stated"}</span>}
       </div>
+      <HeadsetOffer />
       <SourceState />
       <StatusPill />
     </header>

@@ -14,7 +14,7 @@ import {
 } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { FLOATS_PER_NODE } from "../poses";
-import type { Node, Scene, Verdict } from "../wire";
+import type { Node, Scene, Snapshot, Verdict } from "../wire";
 import { bodyMaterial, lineMaterial, markerMaterial, scoreMaterial } from "./materials";
 
 /** Role of what is only room: a safety area. */
@@ -22,6 +22,8 @@ const AREA = "area";
 
 /** Light that a selected body gives off. */
 const SELECTED_GLOW = 0x1c4a7d;
+
+type Looks = Snapshot["looks"];
 
 const ONE = new Vector3(1, 1, 1);
 
@@ -34,6 +36,8 @@ export class Body {
   private painted: Verdict | null | undefined = undefined;
   /** Colour of a score; undefined while it has its own or a verdict's. */
   tint: number | undefined = undefined;
+  /** Colour that a variable gives it; undefined for its own. */
+  private worn: number | undefined = undefined;
   private lit = false;
 
   constructor(readonly node: Node) {
@@ -89,6 +93,13 @@ export class Body {
     this.repaint();
   }
 
+  /** Show it in the colour of a lamp, sRGB; goes after a verdict's; `undefined` for none. */
+  wear(color: number | undefined): void {
+    if (color === this.worn) return;
+    this.worn = color;
+    this.repaint();
+  }
+
   /** Make it stand out as selected. */
   light(on: boolean): void {
     if (on === this.lit) return;
@@ -103,7 +114,8 @@ export class Body {
     }
     for (const { mesh, own } of this.dressed) {
       if (this.tint !== undefined) mesh.material = scoreMaterial(this.tint);
-      else mesh.material = this.painted === undefined ? own : bodyMaterial(this.painted);
+      else if (this.painted !== undefined) mesh.material = bodyMaterial(this.painted);
+      else mesh.material = this.worn === undefined ? own : scoreMaterial(this.worn);
       for (const material of [own].flat()) {
         if (material instanceof MeshStandardMaterial) material.emissive.setHex(this.lit ? SELECTED_GLOW : 0);
       }
@@ -115,6 +127,8 @@ export class Bodies {
   readonly root = new Group();
   readonly byName = new Map<string, Body>();
   private list: Body[] = [];
+  private hidden: ReadonlySet<string> = new Set();
+  private absent: ReadonlySet<string> = new Set();
   private generation = 0;
   private readonly position = new Vector3();
   private readonly orientation = new Quaternion();
@@ -168,7 +182,24 @@ export class Bodies {
   }
 
   hide(names: ReadonlySet<string>): void {
-    for (const body of this.list) body.group.visible = !names.has(body.node.name);
+    this.hidden = names;
+    this.reveal();
+  }
+
+  /** Looks that follow variables: colours in 0…1, null for what is not drawn. */
+  wear(looks: Looks): void {
+    this.absent = new Set(Object.keys(looks).filter((name) => looks[name] === null));
+    for (const body of this.list) {
+      const look = looks[body.node.name];
+      body.wear(look ? look.reduce((sum, part) => sum * 256 + Math.round(255 * part), 0) : undefined);
+    }
+    this.reveal();
+  }
+
+  private reveal(): void {
+    for (const { group, node } of this.list) {
+      group.visible = !this.hidden.has(node.name) && !this.absent.has(node.name);
+    }
   }
 
   /** Make these stand out as selected, and only these. */

@@ -127,6 +127,7 @@ export class Viewer {
       showCaptions.peek(),
     );
     this.bodies.paint(this.markers.painted);
+    this.bodies.wear(this.frame?.looks ?? {});
     this.stage.invalidate();
   }
 

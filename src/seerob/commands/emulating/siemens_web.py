@@ -1,4 +1,4 @@
-"""``seerob emulate siemens_web``: a PLC with a web server, and a belt that starts and stops."""
+"""``seerob emulate siemens_web``: a PLC with a web server, and a cell with a belt."""
 
 from __future__ import annotations
 
@@ -7,11 +7,7 @@ import argparse
 from seerob.commands import port
 from seerob.commands.emulating import Emulated
 
-HELP = "a Siemens PLC's web server (S7 web API): a belt that starts and stops"
-PERIOD = 10.0
-"""Of the belt [s]; it runs for the first half."""
-SPEED = 250.0
-"""[mm/s]"""
+HELP = "a Siemens PLC's web server (S7 web API): a belt, a light curtain and a door"
 
 
 def add(sub: argparse.ArgumentParser) -> None:
@@ -23,13 +19,23 @@ def add(sub: argparse.ArgumentParser) -> None:
 
 def emulated(options: argparse.Namespace) -> Emulated:
     """The PLC."""
+    from seerob.emulators import plc_cell
     from seerob.emulators.siemens_web import SiemensWebServer
 
-    def runs(t: float) -> bool:
-        return t % PERIOD < PERIOD / 2
-
-    program = {'"Belt".running': runs, '"Belt".speed': lambda t: SPEED if runs(t) else 0.0}
+    program = {
+        '"Belt".running': plc_cell.running,
+        '"Belt".speed': plc_cell.speed,
+        '"Belt".position': plc_cell.position,
+        '"Curtain".clear': plc_cell.clear,
+        '"Door".open': plc_cell.door_open,
+    }
     server = SiemensWebServer(
-        program, user=options.user, password=options.password, host=options.host, port=options.port
+        program,
+        user=options.user,
+        password=options.password,
+        host=options.host,
+        port=options.port,
+        outputs=('"Twin".too_close',),
     )
-    return Emulated(server, 'variables "Belt".running, "Belt".speed [mm/s]', f"{options.host}:{options.port}")
+    what = f"variables {', '.join(program)}; speeds in mm/s, positions in mm"
+    return Emulated(server, what, f"{options.host}:{options.port}")

@@ -1,0 +1,70 @@
+"""What a criterion says of many instants, in arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.series import CODES, NO_VERDICT
+from seerob.snapshot import Verdict
+from seerob.transforms import Array
+
+Codes = NDArray[np.uint8]
+"""Verdicts; see `seerob.series.CODES`."""
+Flags = NDArray[np.bool_]
+
+WITHIN, EXCEEDED, UNDECIDED = CODES[Verdict.WITHIN], CODES[Verdict.EXCEEDED], CODES[Verdict.UNDECIDED]
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """Values, limits and verdicts of N instants."""
+
+    value: Array
+    """In the criterion's unit, shape (N,); NaN where there is none."""
+    limit: Array
+    """Likewise."""
+    verdict: Codes
+    """Shape (N,)."""
+    interval: tuple[Array, Array] | None = None
+    """Where the true values lie, as far as tolerances are known, shape (N,) each."""
+
+    @classmethod
+    def against(cls, value: Array, limit: Array | float | None, *, at_most: bool) -> Answers:
+        """Values against a limit or limits, by the rule of `seerob.criterion.judge`."""
+        limits = np.full(value.shape, np.nan) if limit is None else np.broadcast_to(limit, value.shape)
+        return cls(value, limits, judge_many(value, limit, at_most=at_most))
+
+    def between(self, low: Array, high: Array, *, at_most: bool) -> Answers:
+        """The same of values between two; the rule is `seerob.criterion.judge_interval`."""
+        ends = [judge_many(end, self.limit, at_most=at_most) for end in (low, high)]
+        either = np.where(ends[0] == ends[1], ends[0], UNDECIDED).astype(np.uint8)
+        verdict = np.where(np.isnan(self.limit), self.verdict, either)
+        return replace(self, verdict=verdict, interval=(low, high))
+
+    def finite(self) -> Answers:
+        """The same without values that are infinite; the verdicts stay."""
+        return replace(self, value=np.where(np.isinf(self.value), np.nan, self.value))
+
+    def exceeded(self, where: Flags) -> Answers:
+        """The same, exceeded at some instants."""
+        return replace(self, verdict=np.where(where, EXCEEDED, self.verdict).astype(np.uint8))
+
+    def without_verdict(self, where: Flags) -> Answers:
+        """The same without a verdict at some instants."""
+        return replace(self, verdict=np.where(where, NO_VERDICT, self.verdict).astype(np.uint8))
+
+    def open(self) -> Answers:
+        """The same where limits may be worse than they say: what is within them is undecided."""
+        verdict = np.where(self.verdict == WITHIN, UNDECIDED, self.verdict)
+        return replace(self, verdict=verdict.astype(np.uint8))
+
+
+def judge_many(value: Array, limit: Array | float | None, *, at_most: bool) -> Codes:
+    """Verdicts of values against a limit or limits; the rule is `seerob.criterion.judge`."""
+    if limit is None:
+        return np.where(np.isnan(value), UNDECIDED, NO_VERDICT).astype(np.uint8)
+    within = value <= limit if at_most else value >= limit
+    return np.where(np.isnan(value), UNDECIDED, np.where(within, WITHIN, EXCEEDED)).astype(np.uint8)

@@ -1,0 +1,70 @@
+"""What is known of where a robot, a machine or a person really is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from seerob.human.following import PartDoubt
+from seerob.transforms import Array
+
+SLACK = 1e-9
+"""Instants that differ by less are the same [s]: a source's clock and the run's are sums of decimals."""
+
+
+@dataclass
+class Hearing:
+    """What is known of where a robot or human really is."""
+
+    given: bool
+    """It stands where the workstation file puts it; no source drives it."""
+    driven: bool
+    """A source drives it."""
+    timeout: float = 0.2
+    """[s]"""
+    heard: list[tuple[float, str]] = field(default_factory=list)
+    """Instant [s] of the newest samples and why one may not be relied on (empty: it may), oldest first;
+    some may lie ahead of the tick."""
+    torques: list[Array | None] = field(default_factory=list)
+    """Measured joint torques of the same samples [N·m or N], each (n,); None where there were none."""
+    error: float = 0.0
+    """Largest joint error between twin and reference [rad or m]."""
+    bones: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
+    """Of a person that devices see: bone → how far the twin's is from the device's, position [m] and angle
+    [rad]; None where none was seen."""
+    parts: list[tuple[float, tuple[PartDoubt, ...]]] = field(default_factory=list)
+    """The same of single bones of a person, when the rest may be relied on."""
+    lost: float = -np.inf
+    """When the physics last lost it, so that it was put back [s]."""
+    saturated: bool = False
+    """A joint's torque limit was reached: the twin cannot do what was heard."""
+
+    def forget(self, t: float) -> None:
+        """Drop what is older than the last sample at or before ``t`` [s]."""
+        while len(self.heard) > 1 and self.heard[1][0] <= t:
+            del self.heard[0]
+            del self.torques[:1]
+        while len(self.parts) > 1 and self.parts[1][0] <= t:
+            del self.parts[0]
+
+    def doubt(self, t: float) -> str:
+        """Why what was heard does not tell where it is at ``t`` [s]; empty when it does.
+
+        A sample ahead of the tick does not make up for silence before it: what happened between two
+        samples that are further apart than the time-out is a guess.
+        """
+        if not self.driven:
+            return "" if self.given else "no source drives it and the file gives no position (q)"
+        k = sum(1 for instant, _ in self.heard if instant <= t + SLACK)
+        if k == 0:
+            return "nothing heard yet"
+        age = t - self.heard[k - 1][0]
+        if age > self.timeout + SLACK:
+            return f"not heard for {age:.2f} s (time-out {self.timeout:g} s)"
+        return next((reason for _, reason in self.heard[k - 1 : k + 1] if reason), "")
+
+    def doubted(self, t: float) -> tuple[PartDoubt, ...]:
+        """Bones that may not be relied on at ``t`` [s], with the reasons."""
+        k = sum(1 for instant, _ in self.parts if instant <= t + SLACK)
+        return tuple(part for _, told in self.parts[max(k - 1, 0) : k + 1] for part in told)

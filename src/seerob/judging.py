@@ -1,0 +1,79 @@
+"""Asking the criteria: each at its period, and what it cannot know becomes UNDECIDED."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from msgspec.structs import replace
+
+from seerob.criterion import Criterion, Evaluate
+from seerob.errors import Undecided
+from seerob.snapshot import Basis, Result, Verdict
+from seerob.state import State
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A criterion whose names are resolved."""
+
+    criterion: Criterion
+    group: str
+    evaluate: Evaluate
+    basis: Basis
+
+
+class Judge:
+    """Asks every criterion at its period; what it cannot know becomes UNDECIDED."""
+
+    def __init__(self, bound: Sequence[Bound]) -> None:
+        self._bound = bound
+        self._due = [0.0] * len(bound)
+        self._last: list[Result | None] = [None] * len(bound)
+        self._asked: list[tuple[str, ...]] = [()] * len(bound)
+
+    def __call__(self, state: State) -> tuple[Result, ...]:
+        """Results at this state, in the order of the file."""
+        return tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
+
+    def _one(self, i: int, bound: Bound, state: State) -> Result:
+        last = self._last[i]
+        criterion = bound.criterion
+        # A result between two evaluations lasts only as long as what it rests on is heard.
+        if last is not None and state.t < self._due[i] - 1e-9 and not any(map(state.doubt, self._asked[i])):
+            return last
+        state.asked.clear()
+        try:
+            result = self._muted(criterion, state) or bound.evaluate(state)
+            if result.value is not None and not np.isfinite(result.value):
+                raise Undecided(f"the value is {result.value}, not a finite number")
+        except Undecided as reason:
+            result = Result(
+                name=criterion.name,
+                unit=criterion.unit,
+                limit=getattr(criterion, "limit", None),
+                at_most=criterion.at_most,
+                verdict=Verdict.UNDECIDED,
+                reason=str(reason),
+            )
+        result = replace(result, basis=bound.basis)
+        if criterion.every is not None:
+            result = replace(result, t=state.t)
+            self._due[i] = state.t + criterion.every
+            self._last[i] = result
+            self._asked[i] = tuple(sorted(state.asked))
+        return result
+
+    @staticmethod
+    def _muted(criterion: Criterion, state: State) -> Result | None:
+        """The result of a criterion that its variable says does not apply now; None when it applies."""
+        if criterion.active is None or state.signal(criterion.active):
+            return None
+        return Result(
+            name=criterion.name,
+            unit=criterion.unit,
+            limit=getattr(criterion, "limit", None),
+            at_most=criterion.at_most,
+            reason=f"not asked: {criterion.active} is false",
+        )

@@ -1,0 +1,133 @@
+"""Where one solid is, and how far a point is from its surface, inside or out."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from seerob.kernels.crossings import encloses
+from seerob.kernels.pairs import CLOSED, CORNERS, MESH, NODE, NODE_END, TRIANGLE, TRIANGLE_END, VOLUME
+from seerob.kernels.primitives import point_segment
+from seerob.kernels.search import cut_of, mesh_segment
+from seerob.transforms import Array
+
+Links = NDArray[np.int32]
+Indices = NDArray[np.int64]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def signed_distance(
+    s: int,
+    which: Indices,
+    corners: Array,
+    radius: Array,
+    nodes: Array,
+    links: Links,
+    T: Array,
+    world: Array,
+    x: Array,
+    known: Array,
+    sign: int,
+    stack: Links,
+    bounds: Array,
+    W: Array,
+    near: Array,
+) -> float:
+    """Distance of a point to the surface of a solid, negative inside; ``near`` is its nearest surface point.
+
+    Args:
+        s: The solid.
+        which: See `seerob.kernels.shapes.Shapes`; ``corners`` to ``T`` likewise.
+        corners: Likewise.
+        radius: Likewise.
+        nodes: Likewise.
+        links: Likewise.
+        T: Likewise.
+        world: world_from_solid, nine of the rotation and three of the position, shape (ns, 12).
+        x: The point in the world [m], shape (3,).
+        known: A point of its surface in the world [m], or NaN, shape (3,).
+        sign: -1 where it is known to be inside the core, 1 outside, 0 where that is not known.
+        stack: Scratch, shape (128,).
+        bounds: Scratch, shape (128,).
+        W: Scratch, shape (6,).
+        near: Receives the point in the world [m], shape (3,); may be ``known``.
+    """
+    p = np.empty(3)
+    for c in range(3):
+        p[c] = 0.0
+        for d in range(3):
+            p[c] += world[s, 3 * d + c] * (x[d] - world[s, 9 + d])
+    q = np.empty(3)
+    outside = 1.0
+    if which[s, MESH] == 1:
+        n0, n1 = which[s, NODE], which[s, NODE_END]
+        t0, t1 = which[s, TRIANGLE], which[s, TRIANGLE_END]
+        limit = np.inf
+        if radius[s] == 0.0 and not math.isnan(known[0]):
+            limit = cut_of((x[0] - known[0]) ** 2 + (x[1] - known[1]) ** 2 + (x[2] - known[2]) ** 2) + 1e-12
+        d2, _ = mesh_segment(
+            nodes[n0:n1], links[n0:n1], T[t0:t1], p[0], p[1], p[2], 0.0, 0.0, 0.0, limit, -1,
+            stack, bounds, W,
+        )  # fmt: skip
+        q[:] = W[:3]
+        if which[s, VOLUME] == 1 and sign <= 0:
+            closed = which[s, CLOSED] == 1
+            if sign < 0 or encloses(nodes[n0:n1], links[n0:n1], T[t0:t1], closed, p[0], p[1], p[2]):
+                outside = -1.0
+    else:
+        a = corners[s, 0]
+        e = corners[s, 1] - a if which[s, CORNERS] > 1 else np.zeros(3)
+        dd = e[0] * e[0] + e[1] * e[1] + e[2] * e[2]
+        d2, t = point_segment(p[0], p[1], p[2], a[0], a[1], a[2], e[0], e[1], e[2], dd)
+        for c in range(3):
+            q[c] = a[c] + t * e[c]
+    gap = math.sqrt(d2)
+    if radius[s] > 0.0:
+        # The surface lies the radius farther along the line through the core's nearest point.
+        if gap > 1e-12:
+            for c in range(3):
+                q[c] += outside * (p[c] - q[c]) * radius[s] / gap
+        else:
+            q[0] += radius[s]
+    for c in range(3):
+        near[c] = world[s, 9 + c]
+        for d in range(3):
+            near[c] += world[s, 3 * c + d] * q[d]
+    return float(outside * gap - radius[s])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def place_one(rotation: Array, position: Array, local: Array, s: int, world: Array) -> None:
+    """World pose of a solid from that of its body, to its row of ``world``."""
+    for c in range(3):
+        world[s, 9 + c] = position[c]
+        for d in range(3):
+            world[s, 3 * c + d] = 0.0
+            world[s, 9 + c] += rotation[c, d] * local[s, 9 + d]
+            for e in range(3):
+                world[s, 3 * c + d] += rotation[c, e] * local[s, 3 * e + d]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def place(
+    rotations: Array, positions: Array, which: Indices, local: Array, solids: Indices, world: Array
+) -> None:
+    """World poses of some solids, to their rows of ``world``, shape (ns, 12); see `deepest`."""
+    for s in solids:
+        place_one(rotations[which[s, 0]], positions[which[s, 0]], local, s, world)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def bounds_of(which: Indices, corners: Array, radius: Array, world: Array, s: int, box: Array) -> None:
+    """Upright box around a solid in the world, to ``box`` (2, 3)."""
+    box[0], box[1] = np.inf, -np.inf
+    for k in range(which[s, CORNERS]):
+        for c in range(3):
+            x = world[s, 9 + c]
+            for d in range(3):
+                x += world[s, 3 * c + d] * corners[s, k, d]
+            box[0, c] = min(box[0, c], x - radius[s] - 1e-12)
+            box[1, c] = max(box[1, c], x + radius[s] + 1e-12)

@@ -1,0 +1,79 @@
+r"""Torques that pull the bones of a person, each as a rigid body, to where they are to be.
+
+Every bone with mass m and inertia I is pulled at its centre of mass and turned with
+
+.. math:: F = m \omega^2 \Delta x, \qquad N = I \omega^2 \Delta\theta
+
+and the joints receive :math:`\tau = \sum_b J_b^T (F_b, N_b)`. As :math:`\sum_b J_b^T M_b J_b` is the mass
+matrix M, this is to first order :math:`\omega^2 M(q) \Delta q`: every bone moves at the same natural
+frequency, and what one joint cannot do others help with.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from seerob.kernels.posture_fit import logarithm
+from seerob.transforms import Array
+
+Indices = NDArray[np.int64]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def torques(
+    bodies: Indices, up: Indices, mass: Array, inertia: Array, x: Array, R: Array, wanted_x: Array,
+    wanted_R: Array, dof: Indices, at: Indices, joint: Indices, turns: NDArray[np.bool_], anchor: Array,
+    axis: Array, omega: float, out: Array,
+) -> None:  # fmt: skip
+    """Writes the torque of each joint into ``out``.
+
+    Args:
+        bodies: MuJoCo's bodies that the joints move, parents first, shape (b,).
+        up: Row of each one's parent among them, -1 for none, shape (b,).
+        mass: Of each [kg], shape (b,).
+        inertia: Principal moments [kg·m²], shape (b, 3).
+        x: World positions of all centres of mass [m], ``MjData.xipos``.
+        R: World from principal axes, ``MjData.ximat`` as (n, 9).
+        wanted_x: As ``x``, of where the bones are to be.
+        wanted_R: As ``R``.
+        dof: Degree of freedom of each joint, for ``out``, shape (m,).
+        at: Row of the body of each joint, shape (m,).
+        joint: MuJoCo's joints, shape (m,).
+        turns: Whether each turns; otherwise it slides, shape (m,).
+        anchor: ``MjData.xanchor`` [m].
+        axis: ``MjData.xaxis``.
+        omega: Natural frequency [rad/s].
+        out: Torques [N·m or N] of all degrees of freedom; only those of ``dof`` are written.
+    """
+    count = len(bodies)
+    force, moment = np.zeros((count, 3)), np.zeros((count, 3))
+    turned = np.empty(3)
+    for k in range(count):
+        body = bodies[k]
+        here, there = R[body].copy().reshape(3, 3), wanted_R[body].copy().reshape(3, 3)
+        logarithm(there, here, turned)
+        own = here.T @ turned
+        for i in range(3):
+            force[k, i] = mass[k] * omega * omega * (wanted_x[body, i] - x[body, i])
+            own[i] *= inertia[k, i] * omega * omega
+        own = here @ own
+        for i in range(3):
+            j, h = (i + 1) % 3, (i + 2) % 3
+            moment[k, i] = own[i] + x[body, j] * force[k, h] - x[body, h] * force[k, j]
+    for k in range(count - 1, -1, -1):
+        if up[k] >= 0:
+            for i in range(3):
+                force[up[k], i] += force[k, i]
+                moment[up[k], i] += moment[k, i]
+    for c in range(len(dof)):
+        k, line, through = at[c], axis[joint[c]], anchor[joint[c]]
+        total = 0.0
+        for i in range(3):
+            j, h = (i + 1) % 3, (i + 2) % 3
+            if turns[c]:
+                total += line[i] * (moment[k, i] - through[j] * force[k, h] + through[h] * force[k, j])
+            else:
+                total += line[i] * force[k, i]
+        out[dof[c]] = total

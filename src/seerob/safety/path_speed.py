@@ -1,0 +1,157 @@
+r"""Speed along a known path against its permissible-speed map, place by place."""
+
+from __future__ import annotations
+
+import hashlib
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, ClassVar, NamedTuple
+
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from seerob import provenance
+from seerob.criterion import Criterion, Evaluate
+from seerob.errors import InputError, Undecided
+from seerob.markers import Marker
+from seerob.model import Model
+from seerob.path_map import MAX_SIZE, PathMap, read_map
+from seerob.path_markers import Place, path_markers
+from seerob.snapshot import Basis, Input, Origin, Result, Verdict
+from seerob.state import State
+from seerob.transforms import Array
+
+SAME = 1e-3
+"""Places of the path that are nearer than the nearest and this are passed at once [rad or m]."""
+STANDSTILL = 1e-3
+"""Below this the robot stands [rad/s or m/s]."""
+
+
+class Passed(NamedTuple):
+    """Where on a path a robot is."""
+
+    distance: float
+    """From the path in joint space [rad or m]."""
+    legs: NDArray[np.int64]
+    """Indices of the stretches, from a place to the next one, that it may be on, shape (k,)."""
+
+
+def passed(q: Array, qd: Array, legs: tuple[Array, Array]) -> Passed:
+    r"""Which stretches of a path a robot is on: the nearest, and of those as near the ones it follows.
+
+    Args:
+        q: Joint positions [rad or m], shape (d,).
+        qd: Joint velocities [rad/s or m/s], shape (d,).
+        legs: Starts and ways of the stretches [rad or m], shape (n, d) each.
+    """
+    start, way = legs
+    off = q - start
+    length = np.maximum((way * way).sum(axis=1), 1e-300)
+    x = np.clip((off * way).sum(axis=1) / length, 0.0, 1.0)
+    distance = np.linalg.norm(off - x[:, None] * way, axis=1)
+    nearest = float(distance.min())
+    near = np.flatnonzero(distance <= nearest + SAME)
+    along = near[way[near] @ qd > 0]
+    return Passed(nearest, along if len(along) else near)
+
+
+class PathSpeed(Criterion, frozen=True, kw_only=True):
+    """Speed of a robot along a known path against the permissible-speed map of that path."""
+
+    unit: ClassVar[str] = ""
+
+    robot: str
+    """The robot."""
+    map: str
+    """Its map, a ``map.csv`` of `seerob permissible`; path from the folder of the workstation file."""
+    tolerance: Annotated[float, Meta(gt=0, le=1, extra={"unit": "rad or m"})] = 0.02
+    """Distance from the path, in joint space, beyond which the map says nothing [rad or m]."""
+
+    def subjects(self) -> tuple[str, ...]:
+        """The robot."""
+        return (self.robot,)
+
+    def _data(self, model: Model) -> bytes:
+        path = Path(model.folder, self.map)
+        try:
+            if path.stat().st_size > MAX_SIZE:
+                raise InputError.at(self.map, "", "is too large", f"at most {MAX_SIZE} bytes")
+            return path.read_bytes()
+        except OSError as error:
+            what = f"cannot be read: {error.strerror}"
+            raise InputError.at(self.map, "", what, "give a map.csv of `seerob permissible`") from error
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        robot = model.robot(self.robot)
+        found = read_map(self._data(model), name=self.map, units=robot.units)
+        same = np.flatnonzero(found.piece[1:] == found.piece[:-1])
+        if not len(same):
+            raise InputError.at(self.map, "piece", "no two places follow each other", "give a whole map")
+        legs = found.q[same], found.q[same + 1] - found.q[same]
+        # Of two neighbours the lesser counts; one that is not known leaves both open.
+        permitted = np.minimum(found.permissible[same], found.permissible[same + 1])
+        drawn = path_markers(_places(found))
+
+        def evaluate(state: State) -> Result:
+            qd = state.qd(robot)
+            here = passed(state.q(robot), qd, legs)
+            speed = float(np.linalg.norm(qd))
+            if here.distance > self.tolerance:
+                raise Undecided(
+                    f"{self.robot} is {here.distance:.3g} rad or m off the path: the map does not say"
+                )
+            on = here.legs[int(permitted[here.legs].argmin())]
+            limit = float(permitted[on])
+            k = int(same[on])
+            place = k + int(found.permissible[k + 1] < found.permissible[k])
+            why = found.words[place]
+            if np.isnan(limit):
+                raise Undecided(f"the map is undecided here: {why}")
+            if speed <= STANDSTILL:
+                return self._result(0.0, Verdict.WITHIN, "stands still", drawn)
+            if limit == 0:
+                return self._result(
+                    None, Verdict.EXCEEDED, f"moves where no speed is permitted: {why}", drawn
+                )
+            share = speed / limit
+            return self._result(share, Verdict.WITHIN if share <= 1 else Verdict.EXCEEDED, why, drawn)
+
+        return evaluate
+
+    def _result(self, share: float | None, verdict: Verdict, why: str, drawn: tuple[Marker, ...]) -> Result:
+        return Result(name=self.name, value=share, limit=1.0, verdict=verdict, reason=why, markers=drawn)
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        digest = hashlib.sha256(self._data(model)).hexdigest()
+        return Basis(
+            formula="|q̇| as a share of the permissible path speed at the nearest place of the path; "
+            "between two places the lesser",
+            source="permissible-speed map of seerob; the criteria that made it are named in it",
+            inputs=(
+                *provenance.motion(model, self.robot),
+                Input(name="map", value=self.map, origin=Origin.COMPUTED, source=f"SHA-256 {digest}"),
+                Input(
+                    name="tolerance",
+                    value=self.tolerance,
+                    unit="rad or m",
+                    origin=Origin.CHOICE if self.tolerance == 0.02 else Origin.GIVEN,
+                    source="seerob" if self.tolerance == 0.02 else "workstation file",
+                ),
+            ),
+            not_modelled=(
+                "people and things that are elsewhere than when the map was made",
+                "changes of the cell, tool or workpiece since the map was made",
+                "how the robot gets back to the path when it is off it",
+            ),
+        )
+
+
+def _places(found: PathMap) -> list[list[Place]]:
+    points = [(x, y, z) for x, y, z in found.tool.tolist()]
+    rows = list(zip(points, found.tool_permissible.tolist(), found.tool_given.tolist(), strict=True))
+    cuts = np.flatnonzero(np.diff(found.piece)) + 1
+    ends = [0, *cuts.tolist(), len(rows)]
+    return [[Place(*row) for row in rows[a:b]] for a, b in pairwise(ends)]

@@ -1,0 +1,40 @@
+"""Base of the writers whose files are there, whole, only when the run is over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+Progress = Callable[[int, int], None]
+"""Called with how many of how many steps of writing are done."""
+
+
+class AtEnd:
+    """What such writers do alike: they say how far they are, and an impatient user does not wait."""
+
+    progress: Progress | None = None
+    """Called while `close` works."""
+
+    def close(self) -> None:
+        """Write, whole or not at all."""
+        raise NotImplementedError
+
+    def abandon(self) -> None:
+        """Leave nothing behind: called in place of `close` when somebody does not want to wait."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        # Whoever interrupts a run a second time does not want to wait for this.
+        if kind is not None and issubclass(kind, KeyboardInterrupt):
+            self.abandon()
+        else:
+            self.close()
+
+    def _tell(self, done: int, total: int) -> None:
+        if self.progress is not None:
+            self.progress(done, total)

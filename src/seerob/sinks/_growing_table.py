@@ -1,0 +1,90 @@
+"""Text tables that are written row by row to disk, whose columns may become more as the run goes on.
+
+What a table has at its head (the number of rows, the names of columns that turned up late) is known only
+at the end: the rows wait in a file of their own, and are put below the head when the run is over. Memory
+does not grow with the length of the run.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from itertools import pairwise
+from pathlib import Path
+from typing import IO
+
+MOST_COLUMNS = 8192
+"""Of one table; columns beyond are left out and counted."""
+_COPIED = 1 << 20
+
+
+class GrowingTable:
+    """One table. Cells are text already, without line ends and without separators that are not quoted.
+
+    Args:
+        path: Of the finished file; its rows wait beside it.
+        separator: Between cells.
+        missing: What stands where a row has nothing.
+        columns: That are known before the first row.
+    """
+
+    def __init__(self, path: Path, *, separator: str, missing: str, columns: Sequence[str] = ()) -> None:
+        self.path = path
+        self.columns: list[str] = list(columns)
+        self.rows = 0
+        self.left_out: set[str] = set()
+        """Columns that were one too many."""
+        self._separator, self._missing = separator, missing
+        self._places = {name: k for k, name in enumerate(self.columns)}
+        self._widths: list[tuple[int, int]] = []
+        """Row from which on rows are so wide."""
+        self._waiting = path.with_name(path.name + ".rows")
+        self._file: IO[str] = self._waiting.open("w+", encoding="utf-8", newline="")
+
+    def add(self, cells: Mapping[str, str]) -> None:
+        """Append a row; a column that is new goes to the end."""
+        for name in cells:
+            if name not in self._places:
+                if len(self.columns) >= MOST_COLUMNS:
+                    self.left_out.add(name)
+                    continue
+                self._places[name] = len(self.columns)
+                self.columns.append(name)
+        row = [self._missing] * len(self.columns)
+        for name, cell in cells.items():
+            place = self._places.get(name)
+            if place is not None:
+                row[place] = cell
+        self.append(row)
+
+    def append(self, row: Sequence[str]) -> None:
+        """Append a row with a cell for each column there is."""
+        if not self._widths or self._widths[-1][1] != len(row):
+            self._widths.append((self.rows, len(row)))
+        self._file.write(self._separator.join(row) + "\n")
+        self.rows += 1
+
+    def finish(self, head: Iterable[str]) -> None:
+        """Write the file: the head, line by line, then all rows, equally wide."""
+        self._file.seek(0)
+        with self.path.open("w", encoding="utf-8", newline="") as out:
+            out.writelines(head)
+            if len(self._widths) <= 1 and all(width == len(self.columns) for _, width in self._widths):
+                shutil.copyfileobj(self._file, out, _COPIED)
+            else:
+                out.writelines(self._filled())
+        self.discard()
+
+    def _filled(self) -> Iterator[str]:
+        for (first, width), (last, _) in pairwise([*self._widths, (self.rows, 0)]):
+            fill = (self._separator + self._missing) * (len(self.columns) - width)
+            for _ in range(last - first):
+                line = self._file.readline()
+                yield line[:-1] + fill + "\n"
+
+    def discard(self) -> None:
+        """Remove the rows that wait."""
+        with suppress(OSError):  # of a full disk, once more; the file is closed all the same
+            self._file.close()
+        self._waiting.unlink(missing_ok=True)

@@ -1,0 +1,83 @@
+"""Sheets of a workbook about motion: joints, bones and how far they are off, and what was heard."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from seerob.samples import BodySample, Sample
+from seerob.sinks import _sample_cells
+from seerob.sinks._people import people
+from seerob.sinks._thinning import ThinnedTable
+from seerob.snapshot import Scene, Snapshot
+
+MOST_SHEETS = 200
+"""Of samples; a workbook with more is of no use."""
+
+
+class MotionSheets:
+    """What a workbook says of motion, thinned as it comes, so that memory is bounded.
+
+    Args:
+        scene: Of the run.
+        joint_rows: Rows of joints at most.
+        rows: Rows of each other sheet at most; 0 for none of these sheets.
+        everybody: Bones also of people whom no device sees.
+    """
+
+    def __init__(self, scene: Scene, *, joint_rows: int, rows: int, everybody: bool) -> None:
+        self._joint_rows, self._most = joint_rows, rows
+        self._joints = _sample_cells.joint_titles(scene)
+        self._people = people(scene) if rows else ()
+        self._wanted = {person.name for person in self._people} if everybody else set()
+        self._tables: dict[str, ThinnedTable] = {}
+
+    def take(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
+        """Take one tick."""
+        t = snapshot.t
+        for name, q in snapshot.joints.items():
+            key = f"joints {name}"
+            table = self._tables.get(key)
+            if table is None:
+                titles = _sample_cells.joint_head(self._joints, name, len(q))
+                table = self._begin(key, self._joint_rows, titles)
+            if table.wants():
+                table.keep_numbers([t, *q, snapshot.tracking.get(name)])
+        if not self._most:
+            return
+        for sample in samples:
+            self._heard(sample)
+        for person in self._people:
+            if person.name in self._wanted:
+                key = f"bones {person.name}"
+                table = self._tables.get(key) or self._begin(key, self._most, person.bone_titles)
+                if table.wants():
+                    table.keep_numbers([t, *person.poses(snapshot).ravel().tolist()])
+            if snapshot.bones.get(person.name):
+                key = f"errors {person.name}"
+                table = self._tables.get(key) or self._begin(key, self._most, person.error_titles)
+                if table.wants():
+                    table.keep_numbers([t, *person.errors(snapshot)])
+
+    def _heard(self, sample: Sample) -> None:
+        if isinstance(sample, BodySample):
+            self._wanted.add(sample.target)
+        name = f"heard {_sample_cells.title(sample)}"
+        if name not in self._tables and len(self._tables) >= MOST_SHEETS:
+            return
+        table = self._tables.setdefault(name, ThinnedTable(self._most))
+        if table.wants():
+            table.keep(_sample_cells.cells(sample, self._joints))
+
+    def _begin(self, name: str, most: int, titles: list[str]) -> ThinnedTable:
+        table = self._tables[name] = ThinnedTable(most, [_sample_cells.TIME, *titles])
+        return table
+
+    def __len__(self) -> int:
+        return len(self._tables)
+
+    def sheets(self) -> Iterator[tuple[str, ThinnedTable]]:
+        """Name and table of each sheet."""
+        yield from sorted(self._tables.items(), key=lambda item: _ORDER.index(item[0].split(" ")[0]))
+
+
+_ORDER = ("joints", "bones", "errors", "heard")

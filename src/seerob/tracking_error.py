@@ -1,0 +1,49 @@
+"""How far a person's surface is from where devices see it, for the intervals of distances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from seerob.model import Model
+from seerob.state import State
+from seerob.tolerances import Tolerance
+from seerob.transforms import Array
+
+
+class TrackingError:
+    """Bound on the distance of every point of bones of the twin from the same point as devices see it.
+
+    A bone that is off by p and turned by α moves its points by no more than p + α ρ, where ρ is how far they
+    are from its origin. What no device sees adds nothing: how wrong it is, nobody knows.
+
+    Args:
+        model: The compiled workstation.
+        bodies: Of any kind; only those of people can be off.
+    """
+
+    def __init__(self, model: Model, bodies: Sequence[int]) -> None:
+        self._bones: dict[str, list[tuple[int, str, float]]] = {}
+        self._n = len(bodies)
+        for row, index in enumerate(bodies):
+            body = model.bodies[index]
+            if body.role == "human":
+                reach = float(np.linalg.norm(body.corners, axis=1).max(initial=0.0)) + body.radius
+                bone = body.name.removeprefix(f"{body.owner}/")
+                self._bones.setdefault(body.owner, []).append((row, bone, reach))
+
+    def at(self, state: State) -> Array:
+        """Of each body [m], shape (b,)."""
+        found = np.zeros(self._n)
+        for person, bones in self._bones.items():
+            errors = state.hearings[person].bones
+            for row, bone, reach in bones if errors else ():
+                position, angle = errors.get(bone, (None, None))
+                found[row] = (position or 0.0) + (angle or 0.0) * reach
+        return found
+
+
+def tracking(error: float) -> Tolerance:
+    """As the input that may decide a verdict. Error [m]."""
+    return Tolerance("tracking of the person", error, "m")

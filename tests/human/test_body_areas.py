@@ -1,0 +1,88 @@
+"""Every body area of Table A.2 is somewhere on the skin, in its region, and on the mirrored side too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from seerob.human import anthropometry
+from seerob.human.body_area import area_in, words
+from seerob.human.body_areas import AREAS, body_area
+from seerob.human.skeleton import BONES
+from seerob.human.skin import body_region, edges, skin
+from seerob.norms.body_limits import shipped
+
+MIRROR = np.array([1.0, 1.0, -1.0])
+
+
+def surface(solid, count=400):
+    """Points on a capsule or dilated rectangle, spread at random; (count, 3)."""
+    random = np.random.default_rng(0)
+    first, second = edges(solid)
+    inside = (
+        solid.points[0] + random.uniform(size=(count, 1)) * first + random.uniform(size=(count, 1)) * second
+    )
+    out = random.standard_normal((count, 3))
+    return inside + solid.radius * out / np.linalg.norm(out, axis=1, keepdims=True)
+
+
+def on_skin(body):
+    return [(bone, p) for bone, solids in skin(body).items() for solid in solids for p in surface(solid)]
+
+
+@pytest.mark.parametrize("sex", ["male", "female"])
+@pytest.mark.parametrize("hand", ["right", "left"])
+def test_all_29_areas_are_on_the_skin_and_in_their_region(sex, hand):
+    body = anthropometry.body(name="p", stature=1.7, mass=70, sex=sex)
+    region_of = {area.number: region.name for region in shipped().regions.values() for area in region.areas}
+    found = set()
+    for bone, point in on_skin(body):
+        area = body_area(bone, point, body=body, hand=hand)
+        if area is not None:
+            assert body_region(bone, point, body=body) == region_of[area.number], (bone, point, area)
+            found.add(area.number)
+    assert found == set(region_of) == set(range(1, 30))
+
+
+def test_names_are_those_of_the_table():
+    for region in shipped().regions.values():
+        for area in region.areas:
+            assert AREAS[area.number - 1].name.partition(",")[0] == area.name.partition(",")[0].lower()
+
+
+def test_a_mirrored_point_of_a_left_handed_person_is_in_the_same_area():
+    body = anthropometry.body(name="p", stature=1.7, mass=70, sex="male")
+    for bone, point in on_skin(body):
+        other = bone.replace("right_", "x_").replace("left_", "right_").replace("x_", "left_")
+        one = body_area(bone, point, body=body, hand="right")
+        two = body_area(other, point * MIRROR, body=body, hand="left")
+        assert one == two
+    assert {b for b in BONES if "foot" in b or "toes" in b} <= {
+        bone for bone, p in on_skin(body) if body_area(bone, p, body=body, hand="right") is None
+    }
+
+
+def test_front_and_back_are_told_apart():
+    body = anthropometry.body(name="p", stature=1.7, mass=70, sex="male")
+
+    def at(bone, x, y, z=0.0):
+        area = body_area(bone, np.array([x, y, z]), body=body, hand="right")
+        return None if area is None else area.name
+
+    assert at("thorax", 0.1, 0.1) == "sternum"
+    assert at("thorax", 0.1, 0.1, 0.08) == "pectoral muscle"
+    assert at("thorax", -0.1, 0.1) is None
+    assert at("right_hand", 0.02, -0.05, -0.02) == "palm, dominant"
+    assert at("left_hand", 0.02, -0.05, 0.02) == "palm, non-dominant"
+    assert at("left_hand", 0.02, -0.05, -0.02) == "thenar eminence"
+    assert at("right_hand", -0.02, -0.17) == "forefinger end joint, dominant"
+    assert at("right_thigh", -0.1, -0.1) is None
+
+
+def test_words_carry_the_area_and_give_it_back():
+    said = words("op/right_hand", "Hands and fingers", front=True, dominant=True, area="palm, dominant")
+    assert said == "op/right_hand (Hands and fingers, front, palm, dominant side)"
+    assert area_in(f"arm/tool0 ↔ {said}", "op") == (
+        "right_hand",
+        "Hands and fingers, front, palm, dominant side",
+    )

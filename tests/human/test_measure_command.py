@@ -1,0 +1,64 @@
+"""``seerob measure`` prints a table that the workstation file understands."""
+
+from __future__ import annotations
+
+import tomllib
+
+import numpy as np
+import pytest
+from made_capture import PERSON, walking
+
+from seerob.cli import main
+from seerob.human.skeleton import BONES, bone_poses
+from seerob.reading import convert_workstation
+
+NAMES = {
+    "Hips": "pelvis", "Chest": "lumbar", "Chest2": "thorax", "Neck": "neck", "Head": "head",
+    **{
+        f"{side.title()}{joint}": f"{side}_{bone}"
+        for side in ("left", "right")
+        for joint, bone in {
+            "Collar": "clavicle", "Shoulder": "upper_arm", "Elbow": "forearm", "Wrist": "hand",
+            "Hip": "thigh", "Knee": "shank", "Ankle": "foot", "Toe": "toes",
+        }.items()
+    },
+}  # fmt: skip
+
+
+def written(file):
+    """Joint centres of a walk as OpenSim's TRC, y up."""
+    t, q = walking()
+    p = bone_poses(PERSON, q)[1][:, [BONES.index(bone) for bone in NAMES.values()]]
+    rows = np.stack([-p[..., 1], p[..., 2], -p[..., 0]], axis=-1).reshape(len(t), -1)
+    head = [
+        "PathFileType\t4\t(X/Y/Z)\twalk.trc",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"60\t60\t{len(t)}\t{len(NAMES)}\tm\t60\t1\t{len(t)}",
+        "Frame#\tTime\t" + "\t\t\t".join(NAMES),
+        "\t\t" + "\t".join(f"X{k}\tY{k}\tZ{k}" for k in range(1, len(NAMES) + 1)),
+        "",
+    ]
+    body = [
+        f"{k + 1}\t{s:.6f}\t" + "\t".join(f"{x:.7f}" for x in row)
+        for k, (s, row) in enumerate(zip(t, rows, strict=True))
+    ]
+    file.write_text("\n".join([*head, *body]) + "\n")
+
+
+def test_a_recording_becomes_a_person_of_that_size(tmp_path, capsys):
+    file = tmp_path / "walk.trc"
+    written(file)
+    assert main(["measure", "trc", str(file), "--mass", "75", "--sex", "male", "--stature", "1.75"]) == 0
+    out = capsys.readouterr().out
+    assert "measured: thigh" in out
+    table = tomllib.loads(out[out.index("[[humans]]") :])
+    thigh = float(np.linalg.norm(np.diff(bone_poses(PERSON, np.zeros(53))[1][[13, 14]], axis=0)))
+    assert BONES[13:15] == ("right_thigh", "right_shank")
+    assert table["humans"][0]["lengths"]["thigh"] == pytest.approx(thigh, abs=1e-3)
+    made, problems = convert_workstation(table, "measured.toml")
+    assert made is not None, problems
+
+
+def test_what_reads_no_person_is_refused(tmp_path, capsys):
+    assert main(["measure", "csv", str(tmp_path / "x.csv"), "--mass", "75", "--sex", "male"]) == 3
+    assert "reads no recording of a person" in capsys.readouterr().err

@@ -1,0 +1,194 @@
+"""One change at a time to a source file: comparisons, signs, limits, units and verdicts.
+
+A `Mutant` says which node of the syntax tree is replaced by what; `mutated` makes the changed tree.
+What only draws or describes (markers, bases, messages) is left alone: no verdict hangs on it.
+"""
+
+from __future__ import annotations
+
+import ast
+import copy
+from collections.abc import Iterator
+from typing import NamedTuple
+
+FLIPPED = {
+    ast.Lt: (ast.GtE, ast.LtE),
+    ast.LtE: (ast.Gt, ast.Lt),
+    ast.Gt: (ast.LtE, ast.GtE),
+    ast.GtE: (ast.Lt, ast.Gt),
+    ast.Eq: (ast.NotEq,),
+    ast.NotEq: (ast.Eq,),
+    ast.Is: (ast.IsNot,),
+    ast.IsNot: (ast.Is,),
+    ast.In: (ast.NotIn,),
+    ast.NotIn: (ast.In,),
+}
+TURNED = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult}
+OPPOSITE = {
+    one: other
+    for pair in (
+        ("min", "max"),
+        ("fmin", "fmax"),
+        ("minimum", "maximum"),
+        ("argmin", "argmax"),
+        ("any", "all"),
+        ("floor", "ceil"),
+        ("WITHIN", "EXCEEDED"),
+        ("transient", "static"),
+    )
+    for one, other in (pair, pair[::-1])
+} | {"UNDECIDED": "WITHIN"}
+"""Names of functions, methods and members that say the opposite."""
+UNIT = 1e3
+"""A figure in millimetres, grams, milliseconds or kilonewtons where another was meant."""
+SLIGHT = 1.1
+"""A figure that is wrong by a tenth."""
+ROUNDING = 1e-6
+"""Figures up to this absorb rounding: no limit."""
+
+DRAWN = ("Arrow", "Box", "Ellipsoid", "Highlight", "Hull", "Label", "Polyline", "Prism", "Rays", "Segment",
+         "Sphere", "Basis", "Input", "InputError", "at", "Undecided", "ValueError", "UnknownName", "Meta",
+         "given", "errstate")  # fmt: skip
+"""Calls whose arguments no verdict depends on."""
+SPOKEN = ("basis", "subjects", "_markers", "_arrow", "_vector", "_label")
+"""Functions whose result no verdict depends on."""
+
+
+class Mutant(NamedTuple):
+    """One change."""
+
+    file: str
+    """Relative to the package."""
+    function: str
+    """Qualified name of the outermost function, or ``<module>``, or a class whose attribute it is."""
+    line: int
+    node: int
+    """Number of the node in the order of `ast.walk`."""
+    choice: int
+    before: str
+    after: str
+    again: int
+    """How often the same change was met before in the same function."""
+
+    @property
+    def key(self) -> str:
+        """Names it as long as the code around it stays: no line number."""
+        times = f" #{self.again + 1}" if self.again else ""
+        return f"{self.file} {self.function}: {self.before} → {self.after}{times}"
+
+
+def _choices(node: ast.AST) -> Iterator[ast.AST]:
+    """Whatever a node could be mistaken for."""
+    new = copy.deepcopy(node)
+    if isinstance(node, ast.Compare) and len(node.ops) == 1:
+        for kind in FLIPPED[type(node.ops[0])]:
+            assert isinstance(new, ast.Compare)
+            new.ops = [kind()]
+            yield copy.deepcopy(new)
+    elif isinstance(node, ast.BinOp) and type(node.op) in TURNED:
+        assert isinstance(new, ast.BinOp)
+        new.op = TURNED[type(node.op)]()
+        yield new
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.Not)):
+        yield copy.deepcopy(node.operand)
+    elif isinstance(node, ast.BoolOp):
+        assert isinstance(new, ast.BoolOp)
+        new.op = ast.And() if isinstance(node.op, ast.Or) else ast.Or()
+        yield new
+    elif isinstance(node, ast.Constant):
+        value = node.value
+        if isinstance(value, bool):
+            yield ast.Constant(not value)
+        elif isinstance(value, float) and ROUNDING < abs(value) < float("inf"):
+            yield ast.Constant(value * SLIGHT)
+            yield ast.Constant(value * UNIT)
+        elif isinstance(value, (int, float)) and not 0 < abs(value) <= ROUNDING:
+            yield ast.Constant(value + 1)
+    elif isinstance(node, ast.Name) and node.id in OPPOSITE and isinstance(node.ctx, ast.Load):
+        yield ast.Name(OPPOSITE[node.id], ast.Load())
+    elif isinstance(node, ast.Attribute) and node.attr in OPPOSITE and isinstance(node.ctx, ast.Load):
+        assert isinstance(new, ast.Attribute)
+        new.attr = OPPOSITE[node.attr]
+        yield new
+
+
+def _left_alone(node: ast.AST) -> bool:
+    if isinstance(node, ast.Call):
+        called = node.func
+        name = called.attr if isinstance(called, ast.Attribute) else getattr(called, "id", "")
+        return name in DRAWN
+    if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+        return node.name in SPOKEN
+    return isinstance(node, (ast.JoinedStr, ast.Import, ast.ImportFrom, ast.Assert, ast.Raise))
+
+
+def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, str]]:
+    """Nodes that may be changed, and the outermost function they are in."""
+
+    def inside(node: ast.AST, function: str, depth: int) -> Iterator[tuple[ast.AST, str]]:
+        if _left_alone(node):
+            return
+        if depth:
+            yield node, function
+        for name, value in ast.iter_fields(node):
+            called = isinstance(node, (ast.Call, ast.Lambda))
+            if not called and name in ("annotation", "returns", "decorator_list", "args"):
+                continue
+            # Which element of what: a wrong one is no wrong limit.
+            if name == "slice" and isinstance(value, (ast.Constant, ast.Slice, ast.Tuple)):
+                continue
+            for child in value if isinstance(value, list) else [value]:
+                if isinstance(child, ast.AST):
+                    yield from inside(child, function, depth + 1)
+
+    for statement in tree.body:
+        if isinstance(statement, ast.FunctionDef):
+            yield from inside(statement, statement.name, 0)
+        elif isinstance(statement, ast.ClassDef):
+            for part in statement.body:
+                if isinstance(part, ast.FunctionDef):
+                    yield from inside(part, f"{statement.name}.{part.name}", 0)
+                elif (
+                    isinstance(part, ast.AnnAssign)
+                    and "ClassVar" in ast.unparse(part.annotation)
+                    and part.value
+                ):
+                    yield part.value, statement.name
+        elif isinstance(statement, (ast.Assign, ast.AnnAssign)) and statement.value is not None:
+            target = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
+            if isinstance(target, ast.Name) and "DRAWN" not in target.id:
+                yield from inside(statement.value, "<module>", 1)
+
+
+def mutants(source: str, file: str) -> list[Mutant]:
+    """Every change of a file, in a stable order."""
+    tree = ast.parse(source)
+    numbers = {id(node): k for k, node in enumerate(ast.walk(tree))}
+    found: list[Mutant] = []
+    met: dict[tuple[str, str, str], int] = {}
+    for node, function in _nodes(tree):
+        for choice, new in enumerate(_choices(node)):
+            before, after = _text(node), _text(ast.fix_missing_locations(new))
+            again = met.get((function, before, after), -1) + 1
+            met[function, before, after] = again
+            line = getattr(node, "lineno", 0)
+            found.append(Mutant(file, function, line, numbers[id(node)], choice, before, after, again))
+    return found
+
+
+def mutated(source: str, mutant: Mutant) -> ast.Module:
+    """The tree of a file with one change."""
+    tree = ast.parse(source)
+    old = next(node for k, node in enumerate(ast.walk(tree)) if k == mutant.node)
+    new = list(_choices(old))[mutant.choice]
+
+    class Swap(ast.NodeTransformer):
+        def visit(self, node: ast.AST) -> ast.AST:
+            return ast.copy_location(new, old) if node is old else self.generic_visit(node)
+
+    return ast.fix_missing_locations(Swap().visit(tree))
+
+
+def _text(node: ast.AST) -> str:
+    text = " ".join(ast.unparse(node).split())
+    return text if len(text) <= 120 else text[:117] + "..."

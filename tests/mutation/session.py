@@ -1,0 +1,227 @@
+"""A pytest session that runs its tests once, and then those that a mutant could fail, for each mutant.
+
+The changed code is put into the living functions of a forked process: nothing on disk changes, and what was
+imported and collected once is not imported again. Which tests call which functions is seen while they run
+unchanged.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import os
+import signal
+import sys
+import threading
+import time
+import types
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from _pytest.runner import runtestprotocol
+
+import seerob
+from mutation.operators import Mutant, mutated
+
+PACKAGE = Path(inspect.getfile(seerob)).parent
+LEAST = 20
+"""Seconds that a mutant may take at least before it counts as one that never ends."""
+
+
+Callers = dict[tuple[str, str], list[Any]]
+"""Tests that call a function, by file and qualified name."""
+
+
+class Outcome(NamedTuple):
+    """What became of a mutant."""
+
+    mutant: Mutant
+    killed: bool
+    tests: int
+    """That call what it changes; none of them, and it survives."""
+
+
+class Mutation:
+    """The plugin.
+
+    Args:
+        sources: Text of the files that are changed, as it was when the mutants were made.
+        mutants: To be tried.
+        jobs: Processes at a time.
+        tell: Called with each outcome.
+    """
+
+    def __init__(
+        self, sources: dict[str, str], mutants: Sequence[Mutant], jobs: int, tell: Callable[[Outcome], None]
+    ) -> None:
+        self.sources, self.mutants, self.jobs, self.tell = sources, mutants, jobs, tell
+        self.failed: list[str] = []
+        """Tests that fail without any change."""
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_collection(self) -> None:
+        """Examples of hypothesis are the same for every mutant, and a failing one is not made smaller."""
+        # Not before: what is imported before pytest starts, its plugins cannot rewrite.
+        from hypothesis import Phase, settings
+
+        settings.register_profile(
+            "mutation",
+            deadline=None,
+            derandomize=True,
+            database=None,
+            phases=[Phase.explicit, Phase.generate],
+        )
+        settings.load_profile("mutation")
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Instead of running the tests once."""
+        if session.testsfailed:
+            raise session.Interrupted(f"{session.testsfailed} errors while tests were collected")
+        callers, seconds = self._unchanged(session)
+        queue = [(mutant, self._tests(mutant, callers, seconds)) for mutant in self.mutants]
+        running: dict[int, tuple[Mutant, int]] = {}
+        while queue or running:
+            while queue and len(running) < self.jobs:
+                mutant, items = queue.pop(0)
+                if items:
+                    limit = LEAST + int(10 * sum(seconds[item.nodeid] for item in items))
+                    running[_forked(mutant, self.sources[mutant.file], items, limit)] = mutant, len(items)
+                else:
+                    self.tell(Outcome(mutant, False, 0))
+            if running:
+                pid, status = os.wait()
+                if pid in running:
+                    mutant, n = running.pop(pid)
+                    self.tell(Outcome(mutant, status != 0, n))
+        return True
+
+    def _unchanged(self, session: pytest.Session) -> tuple[Callers, dict[str, float]]:
+        """Tests that call each function, and how long each takes."""
+        files = {str(PACKAGE / mutant.file): mutant.file for mutant in self.mutants}
+        callers: Callers = defaultdict(list)
+        seconds = {}
+        for item in session.items:
+            seen: set[types.CodeType] = set()
+
+            def note(frame: types.FrameType, event: str, _: object, seen: set[Any] = seen) -> None:
+                if event == "call":
+                    seen.add(frame.f_code)
+
+            threading.setprofile(note)
+            sys.setprofile(note)
+            start = time.perf_counter()
+            try:
+                reports = runtestprotocol(item, log=False, nextitem=None)
+            finally:
+                sys.setprofile(None)
+                threading.setprofile(None)  # type: ignore[arg-type]
+            seconds[item.nodeid] = time.perf_counter() - start
+            if any(report.failed for report in reports):
+                self.failed.append(item.nodeid)
+                continue
+            called = {
+                (files[code.co_filename], code.co_qualname.split(".<")[0])
+                for code in seen
+                if code.co_filename in files
+            }
+            for where in called:
+                callers[where].append(item)
+        return callers, seconds
+
+    @staticmethod
+    def _tests(mutant: Mutant, callers: Callers, seconds: dict[str, float]) -> list[Any]:
+        whole = mutant.function == "<module>"
+        found = {
+            item.nodeid: item
+            for (file, function), items in callers.items()
+            if file == mutant.file
+            and (whole or function == mutant.function or function.startswith(f"{mutant.function}."))
+            for item in items
+        }
+        return sorted(found.values(), key=lambda item: seconds[item.nodeid])
+
+
+def _forked(mutant: Mutant, source: str, items: Sequence[Any], limit: int) -> int:
+    pid = os.fork()
+    if pid:
+        return pid
+    try:
+        signal.alarm(limit)
+        silence = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(silence, 1)
+        os.dup2(silence, 2)
+        put_in(mutant, source)
+        for item in items:
+            if any(report.failed for report in runtestprotocol(item, log=False, nextitem=None)):
+                os._exit(1)
+        os._exit(0)
+    except BaseException:
+        os._exit(2)
+
+
+def put_in(mutant: Mutant, source: str) -> None:
+    """Change the living code of this process."""
+    path, tree = PACKAGE / mutant.file, mutated(source, mutant)
+    name = ".".join(("seerob", *Path(mutant.file).with_suffix("").parts))
+    module = importlib.import_module(name)
+    owner, _, method = mutant.function.partition(".")
+    for cached in _cached():
+        cached.cache_clear()
+    if mutant.function == "<module>":
+        _rebind(module, tree, mutant)
+    elif not method and inspect.isclass(getattr(module, owner)):
+        _attribute(getattr(module, owner), tree, mutant)
+    else:
+        holder = getattr(module, owner) if method else module
+        code = next(c for c in _codes(compile(tree, str(path), "exec")) if c.co_qualname == mutant.function)
+        _plain(vars(holder)[method or owner]).__code__ = code
+
+
+def _cached() -> Iterator[Any]:
+    for name, module in list(sys.modules.items()):
+        if name.startswith("seerob"):
+            yield from (value for value in vars(module).values() if hasattr(value, "cache_clear"))
+
+
+def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
+    yield code
+    for part in code.co_consts:
+        if isinstance(part, types.CodeType):
+            yield from _codes(part)
+
+
+def _plain(function: Any) -> Any:
+    """The function below its decorators."""
+    if isinstance(function, property):
+        return _plain(function.fget)
+    function = getattr(function, "__func__", function)
+    return _plain(function.__wrapped__) if hasattr(function, "__wrapped__") else function
+
+
+def _rebind(module: types.ModuleType, tree: ast.Module, mutant: Mutant) -> None:
+    """A constant, wherever it was imported to."""
+    for statement in tree.body:
+        if isinstance(statement, (ast.Assign, ast.AnnAssign)) and statement.value is not None:
+            end = statement.end_lineno or statement.lineno
+            if not statement.lineno <= mutant.line <= end:
+                continue
+            targets = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
+            name = ast.unparse(targets)
+            new = eval(compile(ast.Expression(statement.value), mutant.file, "eval"), vars(module))
+            old = vars(module)[name]
+            for other in list(sys.modules.values()):
+                if vars(other).get(name) is old:
+                    setattr(other, name, new)
+
+
+def _attribute(cls: type, tree: ast.Module, mutant: Mutant) -> None:
+    for statement in tree.body:
+        for part in statement.body if isinstance(statement, ast.ClassDef) else ():
+            if isinstance(part, ast.AnnAssign) and part.lineno == mutant.line and part.value is not None:
+                value = eval(compile(ast.Expression(part.value), mutant.file, "eval"), {})
+                setattr(cls, ast.unparse(part.target), value)

@@ -1,0 +1,63 @@
+"""A few mutants at every run of the tests; `scripts/mutate` tries them all."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from mutation.operators import mutants, mutated
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = '''
+LIMIT = 0.5
+def judged(v: float, limits=(1, 2)) -> bool:
+    """Within 3 of it."""
+    return not v * 1000.0 <= max(LIMIT, -v)
+'''
+
+
+def test_each_mutant_is_one_change():
+    found = mutants(SOURCE, "made.py")
+    assert [(m.before, m.after) for m in found] == [
+        ("0.5", "0.55"),
+        ("0.5", "500.0"),
+        ("not v * 1000.0 <= max(LIMIT, -v)", "v * 1000.0 <= max(LIMIT, -v)"),
+        ("v * 1000.0 <= max(LIMIT, -v)", "v * 1000.0 > max(LIMIT, -v)"),
+        ("v * 1000.0 <= max(LIMIT, -v)", "v * 1000.0 < max(LIMIT, -v)"),
+        ("v * 1000.0", "v / 1000.0"),
+        ("1000.0", "1100.0"),
+        ("1000.0", "1000000.0"),
+        ("max", "min"),
+        ("-v", "v"),
+    ]
+    texts = {ast.unparse(mutated(SOURCE, mutant)) for mutant in found}
+    assert len(texts) == len(found)
+    assert ast.unparse(ast.parse(SOURCE)) not in texts
+
+
+def test_equivalent_mutants_have_a_reason_and_are_named_once():
+    known = tomllib.loads((ROOT / "tests/mutation/equivalent.toml").read_text("utf-8"))["equivalent"]
+    assert all(entry["why"] for entry in known)
+    assert len({entry["mutant"] for entry in known}) == len(known)
+
+
+@pytest.mark.parametrize(
+    ("only", "tests"),
+    [("collision.py", "tests/test_collision.py"), ("stopping.py", "tests/test_stopping.py")],
+)
+def test_a_sample_is_killed(only, tests):
+    """In a process of its own: it changes living code."""
+    command = [sys.executable, ROOT / "scripts/mutate", "--only", only, "--tests", ROOT / tests]
+    done = subprocess.run(
+        [*command, "--sample", "8", "--jobs", "1"], capture_output=True, text=True, check=False, timeout=300
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    told = re.search(r"(\d+) of (\d+) mutants killed", done.stdout)
+    assert told is not None
+    assert told[1] == told[2]

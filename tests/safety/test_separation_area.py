@@ -1,0 +1,108 @@
+"""The area of the present S_p around a robot: against the separation criterion, and drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, results_at, two_r
+from seerob.errors import InputError, UnknownName
+from seerob.offset_shell import offset_shell
+
+CELL = (
+    FLOATING
+    + TWO_R
+    + """
+[[humans]]
+name = "operator"
+stature = 1.75
+mass = 75
+sex = "male"
+at = { position = [3.2, 0, 0] }
+[[parts]]
+name = "post"
+shape = { box = [0.1, 0.1, 0.1] }
+at = { position = [0, 2.5, 0] }
+[[safety]]
+kind = "separation"
+name = "ssm"
+between = ["arm", "operator"]
+stop = { reaction = 0.1, stopping = 0.3 }
+human_speed = 1.6
+intrusion = 0.1
+human_uncertainty = 0.05
+robot_uncertainty = 0.01
+"""
+)
+AREA = '[[safety]]\nkind = "separation_area"\nname = "{of}"\nseparation = "ssm"\nof = "{of}"\n'
+
+
+def results(folder, text, speed=1.0):
+    return results_at(made(folder, text, {"arm.urdf": two_r()}), arm=((0.0, 0.0), (speed, 0.0)))
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.5, 2.0])
+def test_the_room_of_a_person_is_the_least_margin_of_the_separation_criterion(tmp_path, speed):
+    found = results(tmp_path, CELL + AREA.format(of="operator"), speed)
+    ssm, area = found["ssm"], found["operator"]
+    links = [p for p in ssm.parts if p.limit is not None]
+    assert area.value == pytest.approx(min(p.value - p.limit for p in links), abs=1e-12)
+    assert area.verdict == ssm.verdict
+
+
+def test_a_part_beside_the_arm_is_judged_by_closed_form(tmp_path):
+    """Link 1 turns at 1 rad/s: S_p = (v + 1.6) 0.4 + 0.16 with v of its fastest corner."""
+    found = results(tmp_path, CELL + AREA.format(of="post"))
+    v = np.hypot(1.0, 0.05)
+    S_p1 = (v + 1.6) * 0.4 + 0.16
+    gap1 = 2.5 - 0.05 - 0.05
+    v2 = np.hypot(2.0, 0.05)
+    S_p2 = (v2 + 1.6) * 0.4 + 0.16
+    gap2 = np.hypot(1.0 - 0.05, gap1)
+    assert found["post"].value == pytest.approx(min(gap1 - S_p1, gap2 - S_p2), abs=1e-9)
+
+
+def test_it_grows_with_the_speed_and_is_drawn_around_every_moving_part(tmp_path):
+    slow, fast = (
+        results(tmp_path / str(v), CELL + AREA.format(of="operator"), v)["operator"] for v in (0.1, 1.0)
+    )
+    sizes = []
+    for result in (slow, fast):
+        hulls = [m for m in result.markers if type(m).__name__ == "Hull"]
+        assert len(hulls) == 2
+        sizes.append(np.ptp(np.array(hulls[1].vertices), axis=0))
+    np.testing.assert_allclose(sizes[1] - sizes[0], 2 * 0.4 * 0.9 * np.hypot(2, 0.05), atol=5e-3)
+
+
+def test_what_separation_does_not_know_leaves_it_undecided(tmp_path):
+    text = CELL.replace("intrusion = 0.1\n", "") + AREA.format(of="post")
+    found = results(tmp_path, text)["post"]
+    assert found.verdict == "undecided"
+    assert "intrusion" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [(('separation = "ssm"', 'separation = "sms"'), "ssm"), (('of = "post"', 'of = "arm"'), "itself")],
+)
+def test_what_makes_no_sense_is_refused(tmp_path, change, words):
+    with pytest.raises((InputError, UnknownName), match=words):
+        made(tmp_path, CELL + AREA.format(of="post").replace(*change), {"arm.urdf": two_r()}).bound  # noqa: B018
+
+
+def test_the_shell_lies_on_the_border_and_is_closed():
+    rng = np.random.default_rng(3)
+    points = rng.normal(size=(30, 3))
+    vertices, faces = offset_shell(points, 0.4)
+    from scipy.optimize import minimize
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(points)
+    A, b = hull.equations[:, :3], hull.equations[:, 3]
+    for v in vertices[::7]:
+        limits = {"type": "ineq", "fun": lambda x: -(A @ x + b)}
+        near = minimize(lambda x, v=v: ((x - v) ** 2).sum(), points.mean(axis=0), constraints=limits)
+        assert np.sqrt(near.fun) == pytest.approx(0.4, abs=1e-4)
+    edges = sorted(tuple(sorted((f[i], f[(i + 1) % 3]))) for f in faces for i in range(3))
+    assert len(faces) == 80
+    assert all(edges.count(e) == 2 for e in set(edges))

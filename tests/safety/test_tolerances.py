@@ -1,0 +1,328 @@
+"""Intervals from tolerances: exact ends, the verdict between them, and the input that decides it by name."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob.errors import InputError
+from seerob.impact_mass import simplified_mass
+from seerob.mass_tolerances import MassTolerances
+from seerob.tolerances import Tolerance, deciding, spread
+
+POSE = ((0.0, np.pi / 2), (1.0, -2.0))
+GRIP = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ sphere = 0.02 }}\nmass = {mass}\n{more}\n'
+PART = (
+    '[[workpieces]]\nname = "part"\non = "grip"\nshape = {{ box = [0.1, 0.2, 0.3] }}\nmass = {mass}\n{more}\n'
+)
+PERSON = """[[humans]]
+name = "op"
+stature = 1.75
+mass = 75
+sex = "male"
+at = {{ position = [{x}, 0, -1] }}
+"""
+PLATE = '[[parts]]\nname = "wall"\nshape = { box = [0.1, 9, 9] }\nat = { position = [-3, 0, 0] }\n'
+
+
+def loaded(folder, *, links=(1.0, 1.0), tool=0.7, part=0.4, robot="", grip="", piece="", criteria=""):
+    text = FLOATING + TWO_R + robot + GRIP.format(mass=tool, more=grip) + PART.format(mass=part, more=piece)
+    return made(folder, text + criteria, {"arm.urdf": two_r(masses=links)})
+
+
+def criterion(kind, options):
+    return f'[[safety]]\nkind = "{kind}"\nname = "it"\n{options}\n'
+
+
+def test_ends_are_those_of_all_corners_and_the_widest_input_decides():
+    """x²y/z over a box: monotone in each, so the ends are among the eight corners."""
+    middle, half = np.array([2.0, 3.0, 4.0]), np.array([0.1, 0.5, 0.2])
+
+    def figure(shifts):
+        x, y, z = middle + half * np.array([shifts[0], shifts[1], -shifts[2]])
+        return np.array([x * x * y / z, x])
+
+    found = spread(figure, 3)
+    corners = np.array([figure(s) for s in itertools.product((-1, 1), repeat=3)])
+    assert (found.low == corners.min(axis=0)).all()
+    assert (found.high == corners.max(axis=0)).all()
+    assert found.widths[:, 1] == pytest.approx([0.2, 0, 0])
+    names = [Tolerance(name, 0.02, unit) for name, unit in (("x", "m"), ("stop.reaction", "s"), ("z", "%"))]
+    assert deciding(names, found.widths[:, 0]) == "decided by stop.reaction ± 20 ms"
+
+
+def test_a_mass_that_is_off_is_a_robot_of_another_mass(tmp_path):
+    """M of a twin whose masses really are 10, 20 and 50 % larger, inertia with them."""
+    off = loaded(
+        tmp_path / "a",
+        robot="mass_tolerance = 0.1\n",
+        grip="mass_tolerance = 0.2",
+        piece="mass_tolerance = 0.5",
+    )
+    robot = off.model.robot("arm")
+    tolerances = MassTolerances(off.model, robot)
+    assert [str(t) for t in tolerances.tolerances] == [
+        "mass_tolerance of arm ± 10 %",
+        "mass_tolerance of grip ± 20 %",
+        "mass_tolerance of part ± 50 %",
+    ]
+    state = state_at(off, arm=POSE)
+    nominal = simplified_mass(off.model, robot)
+    for k, (sides, masses) in enumerate(
+        [((1, 1, 1), (1.1, 0.84, 0.6)), ((-1, 1, -1), (0.9, 0.84, 0.2)), ((0, -1, 1), (1.0, 0.56, 0.6))]
+    ):
+        link, tool, part = masses
+        real = loaded(tmp_path / f"b{k}", links=(link, link), tool=tool, part=part)
+        other = real.model.robot("arm")
+        # The library's point masses have an inertia of 1e-12 that is not scaled in the other twin.
+        np.testing.assert_allclose(
+            tolerances.matrices(state).at(sides), state_at(real, arm=POSE).mass_matrix(other), atol=1e-9
+        )
+        found = tolerances.simplified(nominal, sides)
+        assert found == pytest.approx(simplified_mass(real.model, other), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        ("kinetic_energy", 'robot = "arm"'),
+        ("effective_mass", 'at = "arm"'),
+        ("effective_mass", 'at = "arm"\ntoward = "wall"'),
+    ],
+)
+def test_energy_and_mass_lie_between_those_of_the_lightest_and_the_heaviest(tmp_path, kind, options):
+    def value(name, limit="", **masses):
+        text = PLATE + criterion(kind, options + limit)
+        return results_at(loaded(tmp_path / name, criteria=text, **masses), arm=POSE)["it"]
+
+    light = value("light", links=(0.9, 0.9), tool=0.35).value
+    heavy = value("heavy", links=(1.1, 1.1), tool=1.05).value
+    off = {"robot": "mass_tolerance = 0.1\n", "grip": "mass_tolerance = 0.5"}
+    result = value("off", **off)
+    assert result.interval == pytest.approx((light, heavy), rel=1e-9)
+    assert light < result.value < heavy
+    for name, limit, verdict in (
+        ("under", light * 0.999, "exceeded"),
+        ("within", heavy * 1.001, "within"),
+        ("low", light * 1.001, "undecided"),
+        ("high", heavy * 0.999, "undecided"),
+    ):
+        found = value(name, f"\nlimit = {limit}", **off)
+        assert found.verdict == verdict
+        assert ("decided by mass_tolerance of" in found.reason) == (verdict == "undecided")
+    inputs = {i.name: i.value for i in result.basis.inputs}
+    assert (inputs["mass_tolerance of arm"], inputs["mass_tolerance of grip"]) == (0.1, 0.5)
+
+
+def test_heaviest_direction_is_bounded_whatever_direction_that_becomes(tmp_path):
+    """In the plane, by brute force over masses; the third direction is infinite and has no interval."""
+    text = criterion("effective_mass", 'at = "arm"\nalong = "worst"\nlimit = 9')
+    result = results_at(loaded(tmp_path, robot="mass_tolerance = 0.1\n", criteria=text), arm=POSE)["it"]
+    assert (result.value, result.interval, result.verdict) == (None, None, "exceeded")
+
+
+def separation(folder, stop, *, x=6.0, more="", qd=(1.0, 0.0)):
+    text = FLOATING + TWO_R + PERSON.format(x=x)
+    text += criterion("separation", f'between = ["arm", "op"]\nstop = {{ {stop} }}\n{KNOWN}{more}')
+    station = made(folder, text, {"arm.urdf": two_r()})
+    return results_at(station, arm=((0.0, 0.0), qd))["it"]
+
+
+TIMES = "reaction = {0}, stopping = {1}"
+KNOWN = "intrusion = 0.2\nhuman_uncertainty = 0.1\nrobot_uncertainty = 0.05\nhuman_speed = 1.6\n"
+
+
+@pytest.mark.parametrize(
+    ("stop", "halves", "low", "high", "decides"),
+    [
+        (
+            "reaction = {0}, stopping = {1}",
+            "reaction = 0.02, stopping = 0.1",
+            (0.08, 0.2),
+            (0.12, 0.4),
+            "stop.stopping ± 100 ms",
+        ),
+        (
+            'model = "constant_deceleration", reaction = {0}, deceleration = {1}',
+            "reaction = 0.02, deceleration = 2.0",
+            (0.08, 6.0),
+            (0.12, 2.0),
+            "stop.deceleration ± 2 m/s²",
+        ),
+        (
+            "reaction = {0}, stopping = {1}",
+            "reaction = 0.02",
+            (0.08, 0.3),
+            (0.12, 0.3),
+            "stop.reaction ± 20 ms",
+        ),
+    ],
+)
+@pytest.mark.parametrize("mode", ["dynamic", "fixed"])
+def test_separation_lies_between_those_of_the_ends(tmp_path, stop, halves, low, high, decides, mode):
+    """The shown interval is the distance, with what S_p may be off on its side."""
+    middle = (0.1, (low[1] + high[1]) / 2)
+    more = f'mode = "{mode}"\n'
+    ends = [separation(tmp_path / n, stop.format(*at), more=more) for n, at in (("l", low), ("h", high))]
+    off = stop.format(*middle) + f", tolerance = {{ {halves} }}"
+    result = separation(tmp_path / "off", off, more=more)
+    assert ends[0].limit < result.limit < ends[1].limit
+    least, largest = (
+        result.value - (ends[1].limit - result.limit),
+        result.value + (result.limit - ends[0].limit),
+    )
+    assert result.interval == pytest.approx((least, largest), abs=1e-12)
+    for k, (gap, verdict) in enumerate(
+        [
+            (ends[1].limit + 1e-3, "within"),
+            (ends[1].limit - 1e-3, "undecided"),
+            (ends[0].limit + 1e-3, "undecided"),
+            (ends[0].limit - 1e-3, "exceeded"),
+        ]
+    ):
+        found = separation(tmp_path / str(k), off, x=6.0 - result.value + gap, more=more)
+        assert found.value == pytest.approx(gap, abs=1e-9)
+        assert found.verdict == verdict
+        assert (f"decided by {decides}" in found.reason) == (verdict == "undecided")
+    assert any(i.name == "tolerance of stop.reaction" and i.value == 0.02 for i in result.basis.inputs)
+
+
+@pytest.mark.parametrize(
+    ("stop", "word"),
+    [
+        ("reaction = 0.1, stopping = 0.3, tolerance = { reaction = 0.1 }", "reaction = 0.1 is not more"),
+        ("reaction = 0.1, stopping = 0.3, tolerance = { deceleration = 1 }", "deceleration is not given"),
+        ("reaction = 0.1, stopping = 0.3, tolerance = { reaction = -0.1 }", ">= 0"),
+    ],
+)
+def test_a_tolerance_that_cannot_be_is_named_before_the_run(tmp_path, stop, word):
+    with pytest.raises(InputError, match=word):
+        separation(tmp_path, stop)
+
+
+@pytest.mark.parametrize(
+    ("limit", "verdict"),
+    [(2.9, "within"), (2.9301, "undecided"), (2.9699, "undecided"), (2.9701, "exceeded")],
+)
+def test_a_distance_is_known_to_its_uncertainty(tmp_path, limit, verdict):
+    """From the tip of the arm along x, 2 m, to the wall's face at 4.95 m: 2.95 m ± 20 mm."""
+    wall = PLATE.replace("-3", "5")
+    text = criterion("minimum_distance", f'between = ["arm", "wall"]\nlimit = {limit}\nuncertainty_mm = 20')
+    station = made(tmp_path, FLOATING + TWO_R + wall + text, {"arm.urdf": two_r()})
+    result = results_at(station, arm=((0.0, 0.0), (0.0, 0.0)))["it"]
+    assert result.interval == pytest.approx((2.93, 2.97))
+    assert result.verdict == verdict
+    assert ("decided by uncertainty ± 20 mm" in result.reason) == (verdict == "undecided")
+
+
+def test_what_a_person_is_off_by_is_in_every_distance(tmp_path):
+    """A hand 30 mm from where a device sees it, turned by 0.1 rad: its points are within 30 mm + 0.1 ρ."""
+    text = FLOATING + TWO_R + PERSON.format(x=3.0)
+    text += criterion("minimum_distance", 'between = ["arm", "op"]\nlimit = 0.3')
+    text += criterion(
+        "separation", f'between = ["arm", "op"]\nstop = {{ reaction = 0.1, stopping = 0.3 }}\n{KNOWN}'
+    ).replace('"it"', '"S"')
+    station = made(tmp_path, text, {"arm.urdf": two_r()})
+    state = state_at(station, arm=((0.0, 0.0), (1.0, 0.0)))
+    hand = next(b for b in station.model.bodies if b.name == "op/right_hand")
+    reach = float(np.linalg.norm(hand.corners, axis=1).max()) + hand.radius
+    from seerob.run import Judge
+
+    before = {r.name: r for r in Judge(station.bound)(state)}
+    assert before["S"].interval is None
+    state.hearings["op"].bones = {"right_hand": (0.03, 0.1), "left_hand": (None, None), "pelvis": (0.01, 0.0)}
+    after = {r.name: r for r in Judge(station.bound)(state)}
+    error = 0.03 + 0.1 * reach
+    for name in ("it", "S"):
+        low, high = after[name].interval
+        assert after[name].value - low >= error - 1e-12
+        assert (high - after[name].value) == pytest.approx(error)
+
+
+def contact(folder, options="", *, robot="", speed=1.0, links=(4.0, 4.0)):
+    text = FLOATING + TWO_R + robot
+    text += criterion(
+        "power_and_force",
+        f'robot = "arm"\nexcluded = [{EXCLUDED}]\ncontact_area = {{ arm = 1e-4 }}\n{options}',
+    )
+    station = made(folder, text, {"arm.urdf": two_r(masses=links)})
+    return results_at(station, arm=((0.0, 0.0), (speed, 0.0)))["it"]
+
+
+EXCLUDED = '"Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"'
+
+
+def region(result, name="Chest"):
+    return next(part for part in result.parts if part.name == name)
+
+
+def test_permissible_speed_lies_between_those_of_the_ends(tmp_path):
+    """Free chest: pressure governs, v = p A / √(μ k), so masses, k and A count; at the high end energy."""
+    off = contact(
+        tmp_path / "off",
+        "stiffness_tolerance = 0.2\narea_tolerance = 0.1",
+        robot="mass_tolerance = 0.25\n",
+        speed=0.1,
+    )
+    chest = region(off)
+    # With M/2 = 4 kg ± 1 kg the arm along its motion is lighter, so that M/2 counts.
+    mass = {m.name: m.value for m in off.parts}["M/2 + m_L"]
+    assert mass == pytest.approx(4.0)
+
+    def speed(m, k, A):
+        from seerob import collision
+
+        mu = collision.reduced_mass(40.0, m)
+        by_force = collision.speed_at_force(280.0, mu, k * 25e3)
+        by_energy = collision.speed_at_energy(collision.energy_limit(280.0, k * 25e3, 1.6), mu)
+        return float(min(collision.speed_at_pressure(2 * 120e4, A * 1e-4, mu, k * 25e3), by_force, by_energy))
+
+    m_u = {m.name: m.value for m in off.parts}["m_u along the motion, heaviest part"]
+    heavier = max(4.0, m_u)
+    assert chest.limit == pytest.approx(speed(heavier, 1.0, 1.0))
+    low, high = speed(heavier * 1.25, 1.2, 0.9), speed(heavier * 0.75, 0.8, 1.1)
+    assert chest.interval == pytest.approx(
+        (chest.value - (high - chest.limit), chest.value + chest.limit - low)
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "robot", "decides"),
+    [
+        ("", "mass_tolerance = 0.25\n", "mass_tolerance of arm ± 25 %"),
+        ("stiffness_tolerance = 0.3", "", "stiffness_tolerance ± 30 %"),
+        ("area_tolerance = 0.3\nstiffness_tolerance = 0.1", "", "area_tolerance ± 30 %"),
+    ],
+)
+def test_verdict_of_contact_is_open_between_the_ends(tmp_path, options, robot, decides):
+    slow = region(contact(tmp_path / "slow", options, robot=robot, speed=0.05))
+    per_speed = slow.value / 0.05
+    below, above = slow.interval
+    least, largest = slow.limit - (above - slow.value), slow.limit + (slow.value - below)
+    for k, (v, verdict) in enumerate(
+        [
+            (least * 0.999, "within"),
+            (least * 1.001, "undecided"),
+            (largest * 0.999, "undecided"),
+            (largest * 1.001, "exceeded"),
+        ]
+    ):
+        found = region(contact(tmp_path / str(k), options, robot=robot, speed=v / per_speed))
+        assert found.verdict == verdict
+        assert (f"decided by {decides}" in found.reason) == (verdict == "undecided")
+        if verdict == "undecided":
+            assert all(area.verdict == "undecided" for area in found.parts)
+        if verdict == "within":
+            assert all(area.verdict == "within" for area in found.parts)
+
+
+def test_without_tolerances_nothing_changes(tmp_path):
+    plain = contact(tmp_path / "a", speed=0.1)
+    zero = contact(tmp_path / "b", "stiffness_tolerance = 0.0\narea_tolerance = 0.0", speed=0.1)
+    assert plain.interval is None
+    assert [(p.value, p.limit, p.verdict) for p in plain.parts] == [
+        (p.value, p.limit, p.verdict) for p in zero.parts
+    ]

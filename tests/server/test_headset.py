@@ -1,0 +1,190 @@
+"""A page that offers what a headset sees, over the connection it has anyway."""
+
+import time
+
+import msgspec
+import numpy as np
+import pytest
+
+from seerob.headset_offers import LONGEST_NAME, MOST_NAMES, OFFERS, SHORTEST
+from seerob.human.estimated import estimated
+from seerob.human.mapping import conventions
+from seerob.live import Listener
+from seerob.server.live import Live
+from seerob.server.serving import Server
+from seerob.snapshot import Tracked, Tracking
+from seerob.sources.headset import Headset
+from server.frames import MESHES, Visitor, scene
+
+PATIENCE = 30.0
+POINTS = ("viewer", "left-grip", "right-grip")
+PLACES = np.array([[0.0, 1.7, 0.0], [-0.3, 1.0, -0.4], [0.3, 1.0, -0.4]])
+TOKEN = "a1b2c3d4e5f60718"
+
+
+class Page(Visitor):
+    """A page in a headset."""
+
+    _decoder = msgspec.msgpack.Decoder()
+
+    def see(self, k=0, *, human="anna", names=POINTS, places=PLACES, **more):
+        poses = np.column_stack([places, np.tile([1.0, 0, 0, 0], (len(places), 1))]).astype("<f4").tobytes()
+        said = {"human": human, "t": 1.0 + k / 72, "names": tuple(names), "poses": poses} | more
+        self.socket.send(msgspec.msgpack.encode(Tracking(**said)))
+
+    def answer(self, timeout=PATIENCE):
+        while True:
+            data = self.socket.recv(timeout=timeout)
+            if b"tracked" in data[:20]:
+                return msgspec.msgpack.decode(data, type=Tracked)
+
+
+@pytest.fixture(name="server")
+def a_server():
+    with Server(scene=scene(), meshes=MESHES, feed=Live(), port=0) as server:
+        yield server
+
+
+@pytest.fixture(name="samples")
+def a_source():
+    samples = []
+    listener = Listener(Headset(human="anna", name="headset", timeout=1.0), None, samples.append)
+    listener.start()
+    end = time.monotonic() + PATIENCE
+    while "anna" not in OFFERS._waiting and time.monotonic() < end:
+        time.sleep(0.005)
+    yield samples
+    listener.ask_to_stop()
+    assert listener.join(PATIENCE)
+    assert "anna" not in OFFERS._waiting
+
+
+def seen(page, samples, enough=1, **more):
+    """Offer until the source has said something."""
+    end, k = time.monotonic() + PATIENCE, 0
+    while len(samples) < enough and time.monotonic() < end:
+        page.see(k, **more)
+        k += 1
+        time.sleep(0.01)
+    assert len(samples) >= enough
+    return samples[-1]
+
+
+def test_three_points_arrive_as_pulls_on_head_and_hands(server, samples):
+    with Page(server) as page:
+        sample = seen(page, samples, 3)
+        assert page.answer() == Tracked(human="anna", accepted=True)
+    points = {p.name: p for p in sample.points}
+    assert {p.bone for p in sample.points} == {"head", "left_hand", "right_hand"}
+    # x forward, y left, z up of x right, y up, z backward
+    np.testing.assert_allclose(points["viewer"].position, [0, 0, 1.7], atol=1e-6)
+    np.testing.assert_allclose(points["left-grip"].position, [0.4, 0.3, 1.0], atol=1e-6)
+
+
+def test_what_is_not_tracked_or_only_estimated_is_said(server, samples):
+    places = PLACES.copy()
+    places[1] = np.nan
+    with Page(server) as page:
+        sample = seen(page, samples, places=places, guessed=b"\0\0\1")
+    points = {p.name: p for p in sample.points}
+    assert points["left-grip"].position is None
+    assert points["right-grip"].confidence < points["viewer"].confidence == 1.0
+
+
+def test_a_whole_body_fits_into_a_message(server, samples):
+    body = [f"joint-{k}-of-the-body" for k in range(MOST_NAMES - 4)]
+    names = ("viewer", "hips", "left-foot-ankle", "right-foot-ankle", *body)
+    with Page(server) as page:
+        sample = seen(page, samples, names=names, places=np.full((len(names), 3), 0.5))
+    assert {p.bone for p in sample.points} == {"head", "pelvis", "left_foot", "right_foot"}
+
+
+def test_nobody_waits_for_it(server):
+    with Page(server) as page:
+        page.see(human="berta")
+        answer = page.answer()
+    assert not answer.accepted
+    assert "nothing in this run waits for a headset of 'berta'" in answer.reason
+
+
+def test_one_page_per_person_until_it_leaves(server, samples):
+    with Page(server) as second:
+        with Page(server) as first:
+            seen(first, samples)
+            assert first.answer().accepted
+            second.see()
+            assert "another page is the headset" in second.answer().reason
+        end = time.monotonic() + PATIENCE
+        answer = Tracked(human="anna", accepted=False)
+        while not answer.accepted and time.monotonic() < end:
+            second.see(500)
+            try:
+                answer = second.answer(timeout=0.1)
+            except TimeoutError:
+                continue
+        assert answer.accepted
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"names": ("viewer", "viewer", "x")},
+        {"names": ()},
+        {"names": ("viewer", "left-grip", "x" * (LONGEST_NAME + 1))},
+        {"poses": b""},
+        {"poses": bytes(28 * 3 + 1)},
+        {"guessed": b"\0"},
+        {"t": float("nan")},
+        {"t": -1.0},
+        {"human": "a" * (LONGEST_NAME + 1)},
+    ],
+)
+def test_an_offer_that_contradicts_itself_is_turned_away(server, wrong):
+    with Page(server) as page:
+        page.see(**wrong)
+        assert page.end(PATIENCE)[0] == 1007
+
+
+def test_without_the_token_nobody_offers():
+    with Server(scene=scene(), meshes=MESHES, feed=Live(), port=0, token=TOKEN) as server:
+        with pytest.raises(Exception, match="401"):
+            Page(server)
+        with pytest.raises(Exception, match="403"):
+            Page(server, path=f"/ws?token={TOKEN}", origin="https://elsewhere.example")
+        with Page(server, path=f"/ws?token={TOKEN}") as page:
+            page.see(human="nobody")
+            assert not page.answer().accepted
+
+
+def test_of_limbs_that_nobody_sees_nothing_is_scored():
+    three = estimated({"head", "left_hand", "right_hand"})
+    assert {"pelvis", "lumbar", "thorax", "left_thigh", "right_shank", "left_foot"} <= set(three)
+    assert not {"head", "left_hand", "left_upper_arm"} & set(three)
+    assert estimated({"pelvis", "head", "left_foot", "right_foot", "left_hand", "right_hand"}) == ()
+    assert estimated(()) == ()  # moved by joints or keyframes
+    assert {"viewer", "leftgrip"} <= conventions()["webxr"].places.keys()
+
+
+def test_a_body_that_appears_later_is_taken_up(server, samples):
+    body = (*POINTS, "hips", "left-foot-ankle", "right-foot-ankle")
+    with Page(server) as page:
+        seen(page, samples, 2)
+        before, k, end = len(samples), 5000, time.monotonic() + PATIENCE
+        while not any(len(s.points) == 6 for s in samples[before:]) and time.monotonic() < end:
+            page.see(k, names=body, places=np.full((6, 3), 0.5))
+            k += 1
+            time.sleep(0.01)
+    assert {p.bone for p in samples[-1].points} >= {"pelvis", "left_foot", "head"}
+
+
+def test_ten_thousand_offers_a_second_are_not_ten_thousand_samples(server, samples):
+    with Page(server) as page:
+        seen(page, samples)
+        before, begun = len(samples), time.monotonic()
+        for k in range(9000, 9500):
+            page.see(k)
+        page.see(9999, human="nobody")
+        while page.answer().human != "nobody":
+            pass
+        passed = time.monotonic() - begun
+    assert len(samples) - before <= passed / SHORTEST + 1

@@ -1,0 +1,121 @@
+"""Any bytes may come from a capture device: they are understood, or refused; nothing else happens."""
+
+import random
+from functools import cache
+
+import msgspec
+import numpy as np
+import pytest
+from test_mutated_recordings import mutated
+
+from seerob import headset_offers
+from seerob.emulators import natnet_datagrams
+from seerob.emulators.mvn_person import animated
+from seerob.emulators.natnet import NatnetServer
+from seerob.emulators.rokoko import RokokoSender
+from seerob.emulators.vive import FIVE, WORN, recorded, worn
+from seerob.emulators.vrpn import VrpnServer
+from seerob.errors import InputError
+from seerob.motion_io import tracker_file
+from seerob.protocols import ProtocolError, natnet, natnet_models, rokoko, vive, vrpn
+from seerob.server.hub import read_message
+from seerob.snapshot import Tracking
+
+COUNTS = [pytest.param(1500, id="short"), pytest.param(100_000, id="long", marks=pytest.mark.soak)]
+
+
+@cache
+def person():
+    return animated("library:reach")
+
+
+def a_frame(version):
+    made = NatnetServer({"A": person()}, worn={"waist": (person(), "Pelvis")}, version=version)
+    return natnet_datagrams.frame(made.frame(3), version)
+
+
+def a_model(version):
+    made = NatnetServer({"A": person()}, worn={"waist": (person(), "Pelvis")}, version=version)
+    return natnet_datagrams.models(made.models(), version)
+
+
+def a_vrpn_stream():
+    made = VrpnServer(person(), {role: WORN[role] for role in FIVE})
+    return made.names() + made.instant(0.1)
+
+
+def read_vrpn(data):
+    reader = vrpn.Reader()
+    for message in vrpn.Splitter().feed(data):
+        pose = reader.take(message)
+        assert pose is None or pose.position.shape == (3,)
+
+
+def an_offer():
+    poses = np.zeros((3, 7), "<f4").tobytes()
+    said = Tracking(human="anna", t=1.0, names=("viewer", "left-grip", "right-grip"), poses=poses)
+    return msgspec.msgpack.encode(said)
+
+
+def read_offer(data):
+    message = read_message(data)
+    if isinstance(message, Tracking):
+        assert headset_offers.read(message, 0.0).positions.shape == (len(message.names), 3)
+
+
+DECODERS = {
+    **{
+        f"natnet {v[0]}.{v[1]}": (lambda v=v: a_frame(v), lambda data, v=v: natnet.frame(data, v))
+        for v in ((2, 6), (3, 1), (4, 1))
+    },
+    **{
+        f"models {v[0]}.{v[1]}": (lambda v=v: a_model(v), lambda data, v=v: natnet_models.models(data, v))
+        for v in ((3, 1), (4, 1))
+    },
+    "server info": (
+        lambda: natnet_datagrams.server_info("M", (4, 1), port=1511, group="239.0.0.1"),
+        natnet.server_info,
+    ),
+    "vrpn": (a_vrpn_stream, read_vrpn),
+    "rokoko": (lambda: RokokoSender({"A": person()}).message(0), rokoko.decode),
+    "rokoko lz4": (lambda: RokokoSender({"A": person()}, compressed=True).message(0), rokoko.decode),
+    "vive": (lambda: vive.encode(worn(person())(0.0)), vive.decode),
+    "headset": (an_offer, read_offer),
+}
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("kind", DECODERS)
+def test_mutated_datagrams_are_read_or_refused(kind, count):
+    make, read = DECODERS[kind]
+    whole = make()
+    read(whole)
+    rng = random.Random(11)
+    refused = 0
+    refusal: type[Exception] = ValueError if kind == "headset" else ProtocolError
+    for _ in range(count):
+        try:
+            read(mutated(whole, rng))
+        except refusal:
+            refused += 1
+    assert refused > 0
+
+
+@pytest.mark.parametrize(
+    "files", [pytest.param(100, id="short"), pytest.param(100_000, id="long", marks=pytest.mark.soak)]
+)
+@pytest.mark.parametrize("suffix", [".jsonl", ".csv"])
+def test_mutated_recordings_of_trackers_are_read_or_refused(tmp_path, suffix, files):
+    path = tmp_path / f"r{suffix}"
+    tracker_file.write(path, recorded(worn(person()), duration=0.2, rate=30))
+    whole = path.read_bytes()
+    rng = random.Random(5)
+    refused = 0
+    for _ in range(files):
+        path.write_bytes(mutated(whole, rng))
+        try:
+            for instant in tracker_file.read(path, file="r"):
+                assert all(d.position.shape == (3,) for d in instant.devices)
+        except InputError:
+            refused += 1
+    assert refused > 0

@@ -1,0 +1,32 @@
+"""A live source on a real socket, until enough is heard."""
+
+import socket
+import time
+
+from seerob.live import Listener
+
+PATIENCE = 30.0
+
+
+def free_port(kind=socket.SOCK_DGRAM):
+    with socket.socket(socket.AF_INET, kind) as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def heard(source, enough):
+    """Samples until there are enough of them."""
+    samples = []
+    listener = Listener(source, None, samples.append)
+    listener.start()
+    end = time.monotonic() + PATIENCE
+    while not enough(samples) and time.monotonic() < end:
+        time.sleep(0.01)
+    listener.ask_to_stop()
+    assert listener.join(PATIENCE)
+    assert enough(samples)
+    return samples
+
+
+def by_name(sample):
+    return {point.name: point for point in sample.points}

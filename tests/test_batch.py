@@ -1,0 +1,241 @@
+"""Criteria over many instants in arrays say what the road says of each, to rounding."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made_cell import TWO_R, UR10, heard, made, two_r, wave
+from seerob.engine import Engine
+from seerob.errors import InputError, UnknownName
+from seerob.run import Judge
+from seerob.series import CODES
+from seerob.snapshot import Verdict
+
+N = 70
+T = 0.01 * np.arange(N)
+MORE = """
+[[humans]]
+name = "worker"
+stature = 1.75
+mass = 75
+sex = "male"
+at = { position = [1.3, 0, -0.7] }
+posture = "standing"
+[[parts]]
+name = "wall"
+shape = { box = [0.1, 2, 2] }
+at = { position = [-1, 0, 1] }
+[[safety]]
+kind = "velocity"
+name = "point"
+at = "arm"
+offset = [0.1, 0, 0]
+limit = 1.3
+[[safety]]
+kind = "velocity"
+name = "fastest"
+of = "arm"
+limit = 2.0
+[[safety]]
+kind = "kinetic_energy"
+name = "energy"
+robot = "arm"
+limit = 14.0
+[[safety]]
+kind = "manipulability"
+name = "manipulability"
+at = "arm"
+limit = 0.4
+[[safety]]
+kind = "effective_mass"
+name = "mass along"
+at = "arm"
+limit = 1.0
+[[safety]]
+kind = "effective_mass"
+name = "worst mass"
+at = "arm"
+along = "worst"
+[[safety]]
+kind = "effective_mass"
+name = "mass toward"
+at = "arm"
+toward = "worker"
+limit = 1.3
+[[safety]]
+kind = "force_polytope"
+name = "force"
+at = "arm"
+limit = 600.0
+[[safety]]
+kind = "minimum_distance"
+name = "distance"
+between = ["arm", "worker"]
+limit = 0.3
+[[safety]]
+kind = "separation"
+name = "separation"
+between = ["arm", "worker"]
+stop = { reaction = 0.1, stopping = 0.2 }
+human_speed = 0.2
+intrusion = 0.0
+human_uncertainty = 0.0
+robot_uncertainty = 0.0
+[[safety]]
+kind = "separation"
+name = "open separation"
+between = ["arm", "worker"]
+stop = { reaction = 0.1, stopping = 0.2, model = "constant_deceleration" }
+"""
+SLOW = """
+[[safety]]
+kind = "separation"
+name = "fixed"
+between = ["arm", "worker"]
+stop = { reaction = 0.1, stopping = 0.2 }
+mode = "fixed"
+[[safety]]
+kind = "power_and_force"
+name = "contact"
+robot = "arm"
+human = "worker"
+every = 0.1
+"""
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("cell"), "engine = { physics = false }\n" + UR10 + MORE + SLOW)
+
+
+@pytest.fixture(scope="module")
+def motion():
+    q, qd = zip(*(wave(t) for t in T), strict=True)
+    return {"arm": np.array(q)}, {"arm": np.array(qd)}
+
+
+@pytest.fixture(scope="module")
+def batch(cell, motion):
+    return cell.batch(*motion, threads=2)
+
+
+@pytest.fixture(scope="module")
+def road(cell):
+    engine, judge = Engine(cell.model, driven={"arm": 1.0}), Judge(cell.bound)
+    engine.take([heard("arm", float(t), *wave(t)) for t in 0.01 * np.arange(N + 2)])
+    return [judge(engine.tick() if k else engine.start()) for k in range(N)]
+
+
+def test_values_limits_and_verdicts_are_those_of_the_road(batch, road):
+    for i, (name, column) in enumerate(batch.items()):
+        results = [row[i] for row in road]
+        if name == "contact":
+            continue
+        value, limit = (
+            np.array([np.nan if x is None else x for x in (getattr(r, key) for r in results)])
+            for key in ("value", "limit")
+        )
+        np.testing.assert_allclose(column.value, value, rtol=1e-12, atol=1e-15, err_msg=name)
+        np.testing.assert_allclose(column.answers.limit, limit, rtol=1e-12, err_msg=name)
+        np.testing.assert_array_equal(column.answers.verdict, [CODES[r.verdict] for r in results], name)
+        spans = [r.interval for r in results]
+        if column.answers.interval is None:
+            assert spans == [None] * N, name
+        else:
+            np.testing.assert_allclose(np.array(column.answers.interval).T, spans, rtol=1e-12, err_msg=name)
+
+
+def test_the_motion_crosses_limits(batch):
+    for name in ("point", "fastest", "energy", "manipulability", "mass along", "force", "distance"):
+        assert len(np.unique(batch[name].answers.verdict)) > 1, name
+
+
+def test_only_what_remembers_is_asked_instant_by_instant(batch):
+    assert {name for name, column in batch.items() if column.note} == {"fixed", "contact"}
+
+
+def test_number_of_threads_changes_no_bit(cell, motion, batch, monkeypatch):
+    monkeypatch.setattr("seerob.batch.STRETCH", 9)
+    for threads in (1, 3):
+        again = cell.batch(*motion, threads=threads)
+        for name, column in batch.items():
+            np.testing.assert_array_equal(again[name].value, column.value)
+            np.testing.assert_array_equal(again[name].answers.verdict, column.answers.verdict)
+
+
+def test_what_is_not_known_is_undecided(cell, motion):
+    q, qd = motion[0]["arm"].copy(), motion[1]["arm"].copy()
+    q[5, 2], qd[40, 0] = np.nan, np.inf
+    found = cell.batch({"arm": q}, {"arm": qd})
+    for column in found.values():
+        assert (column.answers.verdict[[5, 40]] == CODES[Verdict.UNDECIDED]).all()
+        assert np.isnan(column.value[[5, 40]]).all()
+        assert "not finite" in column.reasons[5]
+    assert np.flatnonzero(np.isnan(found["point"].value)).tolist() == [5, 40]
+    worker = cell.model.human("worker").home
+    alone = cell.batch({"worker": np.tile(worker, (3, 1))}, {"worker": np.zeros((3, len(worker)))})
+    assert alone["energy"].verdict is Verdict.UNDECIDED
+    assert "no motion is given" in alone["energy"].reasons[0]
+
+
+def test_a_planar_arm_in_closed_form(tmp_path):
+    text = TWO_R + '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\n'
+    text += '[[safety]]\nkind = "velocity"\nname = "speed"\nat = "arm/tip"\n'
+    station = made(tmp_path, text, {"arm.urdf": two_r()})
+    rng = np.random.default_rng(3)
+    q, qd = rng.uniform(-3, 3, (2, 500, 2))
+    found = station.batch({"arm": q}, {"arm": qd})
+    c, turn = np.cos(q[:, 1]), qd.sum(axis=1)
+    v2 = qd[:, 0] ** 2 + turn**2 + 2 * c * qd[:, 0] * turn
+    np.testing.assert_allclose(found["speed"].value, np.sqrt(v2), atol=1e-9)
+    np.testing.assert_allclose(found["energy"].value, 0.5 * (qd[:, 0] ** 2 + v2), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("q", "qd", "t", "told"),
+    [
+        ({}, {}, None, "give positions"),
+        ({"arm": np.zeros((4, 6))}, {}, None, "give both"),
+        ({"arm": np.zeros((4, 5))}, {"arm": np.zeros((4, 6))}, None, "6 joints of 4 instants"),
+        ({"arm": np.zeros((4, 6))}, {"arm": np.zeros((3, 6))}, None, "6 joints of 4 instants"),
+        ({"arm": np.zeros((4, 6))}, {"arm": np.zeros((4, 6))}, [0, 1, 1, 2], "numbers that increase"),
+        ({"arm": np.zeros((4, 6))}, {"arm": np.zeros((4, 6))}, [0, 1], "numbers that increase"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_told(cell, q, qd, t, told):
+    with pytest.raises(InputError, match=told):
+        cell.batch(q, qd, t=t)
+
+
+def test_sources_are_followed_tick_by_tick_with_what_is_not_heard(tmp_path):
+    text = "engine = { physics = false }\n" + TWO_R
+    text += '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "motion.csv"\ntimeout = 0.2\n'
+    text += (
+        'mapping = { time = "t", joints = ["a", "b"], time_unit = "s", joint_unit = "rad" }\n'
+        '[[safety]]\nkind = "velocity"\nname = "v"\nof = "arm"\nlimit = 2.5\n'
+        '[[safety]]\nkind = "kinetic_energy"\nname = "E"\nrobot = "arm"\nlimit = 4\n'
+    )
+    # Nothing is heard from 1 s to 2 s.
+    t = np.concatenate([np.arange(0, 1.001, 0.02), np.arange(2, 3.001, 0.02)])
+    rows = [f"{s:.3f},{np.sin(2 * s)},{np.cos(3 * s)}" for s in t]
+    station = made(tmp_path, text, {"arm.urdf": two_r(), "motion.csv": "\n".join(["t,a,b", *rows])})
+    found, log = station.batch(), station.run().results
+    assert len(found.t) == log.ticks
+    for name, column in found.items():
+        np.testing.assert_array_equal(column.answers.verdict, log[name].verdicts)
+        np.testing.assert_allclose(column.value, log[name].values, rtol=1e-12)
+        assert column.verdict is log[name].verdict
+        assert sum("not heard for" in reason for reason in column.reasons) > 50
+
+
+def test_names_that_do_not_exist_are_told(cell, batch):
+    with pytest.raises(UnknownName, match="arm"):
+        cell.batch({"arn": np.zeros((4, 6))}, {"arn": np.zeros((4, 6))})
+    with pytest.raises(UnknownName, match="energy"):
+        batch["enegry"]
+
+
+def test_no_instants_are_no_answers(cell):
+    found = cell.batch({"arm": np.zeros((0, 6))}, {"arm": np.zeros((0, 6))})
+    assert all(len(column.value) == 0 and column.verdict is None for column in found.values())

@@ -1,0 +1,104 @@
+"""The cell with a PLC that ships: real sockets, and the PLC is killed and comes back while it runs."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from argparse import Namespace
+from pathlib import Path
+
+from seerob import load
+from seerob.commands.emulating import opcua, rtde
+from seerob.recording import Recording
+from seerob.sinks.recorder import Recorder
+
+SHIPPED = Path(__file__).parents[1] / "workstations" / "plc_cell"
+PATIENCE = 60.0
+"""With one chapter [s]; on an idle machine all of them take 3 s."""
+
+
+def here(folder, robot, plc):
+    """The workstation that ships, at other ports."""
+    shutil.copytree(SHIPPED, folder)
+    file = folder / "workstation.toml"
+    text = file.read_text(encoding="utf-8")
+    text = text.replace('kind = "rtde"\n', f'kind = "rtde"\nport = {robot}\n')
+    text = text.replace("127.0.0.1:4840", f"127.0.0.1:{plc}")
+    # A loaded machine may be late by more than what a cell would allow.
+    file.write_text(text.replace("timeout = 0.3 ", "timeout = 3 "), encoding="utf-8")
+    return load(folder)
+
+
+class Chapters:
+    """Waits for what a chapter is to show, then does what begins the next."""
+
+    def __init__(self, *chapters):
+        self._chapters = list(chapters)
+        self._end = time.monotonic() + PATIENCE
+        self.results, self.reasons = {}, {}
+
+    def write(self, snapshot, samples):
+        self.results = {r.name: r for r in snapshot.results}
+        if self._chapters and self._chapters[0][0](self.results):
+            _, deed = self._chapters.pop(0)
+            self.reasons |= {n: r.reason for n, r in self.results.items() if r.verdict == "undecided"}
+            deed()
+            self._end = time.monotonic() + PATIENCE
+
+    def stop(self):
+        assert time.monotonic() < self._end, {n: (r.verdict, r.reason) for n, r in self.results.items()}
+        return not self._chapters
+
+    def close(self):
+        pass
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+
+def known(results):
+    names = ("robot – operator", "crate speed", "light curtain")
+    return all(results[name].verdict != "undecided" for name in names)
+
+
+def only_the_robot_is_known(results):
+    silent = ("crate – operator", "crate speed", "door – operator", "light curtain")
+    return results["robot – operator"].verdict == "within" and all(
+        results[n].verdict == "undecided" for n in silent
+    )
+
+
+def nothing():
+    pass
+
+
+def test_the_plc_dies_and_comes_back(tmp_path):
+    common = Namespace(host="127.0.0.1", port=0, robot="ur10", file=None)
+    robot, plc = rtde.emulated(common).server, opcua.emulated(common).server
+    with robot, plc:
+        station = here(tmp_path / "cell", robot.port, plc.port)
+        assert not [f for f in station.scene().findings if "not reached" in f.text]
+        story = Chapters(
+            (known, plc.stop),
+            (only_the_robot_is_known, plc.start),
+            (known, nothing),
+        )
+        summary = station.run(
+            live=True, writers=[story], sinks=[Recorder()], folder=tmp_path / "run", stop=story.stop
+        )
+    assert "crate: not heard" in story.reasons["crate speed"]
+    assert "curtain/clear: plc not heard" in story.reasons["light curtain"]
+    recording = Recording.open(tmp_path / "run" / "run.mcap")
+    again = load(tmp_path / "cell").run(feed=(tick.samples for tick in recording.ticks()))
+    for name, series in summary.results.items():
+        assert again.results[name].worst().reason == series.worst().reason
+        assert again.results[name].verdict == series.verdict
+
+
+def test_its_dictionary_is_used_to_the_last_variable():
+    station = load(SHIPPED)
+    assert not [f for f in station.model.findings if "used by nothing" in f.text or "same variable" in f.text]
+    assert {v.source for v in station.model.dictionary.values()} == {"plc"}

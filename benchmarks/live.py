@@ -1,46 +1,113 @@
-"""How late a live source is: from the controller's packet to the mailbox, and to the State that uses it.
+"""How late live sources are: from the packet to the mailbox, and to the State that uses it.
 
-The emulator is a process of its own. Its instants are on a grid and the least latency is not known, so
-figures are beyond the least latency of the run. ``--seconds`` and ``--frequency`` change the length and
-the rate.
+A UR10 over RTDE, a 7-axis arm over FRI and the variables of a cell over OPC UA at once, each emulated by a
+process of its own, beside a person with distances between all of them. A packet is as old as the kernel of
+this machine says. The peer is the same listeners with no twin beside them: what the machine itself makes late.
+
+``--seconds`` is the length of either part, ``--switch`` how long a thread keeps the interpreter
+[s] instead of what a live run sets, ``--smoke`` a short run without judgement.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import re
+import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
+from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
 
 import seerob as sr
-from seerob import live
-from seerob.samples import JointSample
+from seerob import live, run
+from seerob.samples import SignalSample, key
 
-FOLDER = Path(__file__).parents[1] / "workstations" / "ur10_rtde"
+FOLDER = Path(__file__).parents[1] / "workstations" / "plc_cell"
+KUKA = """
+[[robots]]
+name = "lbr"
+model = "library:iiwa14"
+base = {{ position = [0.6, -1.0, 0.75] }}
+
+[[sources]]
+kind = "fri"
+robot = "lbr"
+host = "127.0.0.1"
+port = {port}
+frequency = 200
+timeout = 0.3
+origin = "simulator"
+
+[[safety]]
+kind = "minimum_distance"
+name = "lbr – operator"
+between = ["lbr", "operator"]
+limit = 0.05
+
+"""
+MAILBOX, BEYOND_TICK = 2e-3, 3e-3
+"""Budgets of the 99th percentile [s]: packet to mailbox, and to the State beyond one tick."""
 
 
-class Late:
-    """A writer that notes when each tick was done and which samples it took."""
+class Post:
+    """Notes every sample between its arrival and the mailbox, and what each tick took."""
 
-    def __init__(self, seconds: float) -> None:
-        self.end = seconds
-        self.doubts: set[str] = set()
-        self.ticks: list[tuple[float, list[JointSample], float]] = []
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.arrived: dict[tuple[str, int], float] = {}
+        self.mailbox: dict[str, list[float]] = defaultdict(list)
+        self.posted: dict[tuple[str, ...], list[float]] = defaultdict(list)
+        self.taken: list[tuple[float, dict[tuple[str, ...], int]]] = []
+
+    @contextlib.contextmanager
+    def watching(self):
+        """Patch the road while it is driven on."""
+        hear, take = live.Listener._take, live.Listening.take
+
+        def heard(listener, sample):
+            before, posted = listener._seq, None
+            hear(listener, sample)
+            posted = time.monotonic()
+            if listener._seq == before:
+                return
+            with self.lock:
+                self.arrived[listener.name, before] = sample.t
+                self.mailbox[listener.name].append(posted - sample.t)
+
+        def taking(listening):
+            now, found = time.monotonic(), take(listening)
+            self.taken.append((now, found))
+            return found
+
+        live.Listener._take, live.Listening.take = heard, taking
+        try:
+            yield self
+        finally:
+            live.Listener._take, live.Listening.take = hear, take
+
+
+class States:
+    """A writer that notes how old samples are when the State that uses them is there."""
+
+    def __init__(self, post: Post, seconds: float) -> None:
+        self.post, self.end = post, seconds
+        self.ages: dict[str, list[float]] = defaultdict(list)
+        self.newest: list[tuple[float, dict[tuple[str, ...], float]]] = []
+        self.ticks, self.undecided = 0, 0
 
     def write(self, snapshot, samples) -> None:
-        heard = [s for s in samples if isinstance(s, JointSample) and s.source.startswith("rtde")]
-        self.doubts |= {
-            f"{snapshot.t:.2f} s {r.reason}" for r in snapshot.results if r.verdict == sr.Verdict.UNDECIDED
-        }
-        self.ticks.append((time.monotonic(), heard, snapshot.t))
+        self.ticks += 1
+        self.undecided += any(r.verdict == sr.Verdict.UNDECIDED for r in snapshot.results)
+        self.end_reached = snapshot.t >= self.end
 
     def stop(self) -> bool:
-        return bool(self.ticks) and self.ticks[-1][2] >= self.end
+        return self.end_reached
 
     def close(self) -> None: ...
 
@@ -50,50 +117,109 @@ class Late:
     def __exit__(self, *_) -> None: ...
 
 
+@contextlib.contextmanager
+def emulators(*commands: list[str]):
+    """Emulators, and the port of each."""
+    with contextlib.ExitStack() as stack:
+        ports = []
+        for command in commands:
+            whole = [sys.executable, "-m", "seerob.cli", "emulate", *command]
+            process = stack.enter_context(subprocess.Popen(whole, stdout=subprocess.PIPE, text=True))
+            stack.callback(process.terminate)
+            ports.append(int([re.search(r":(\d+)", process.stdout.readline()) for _ in range(2)][1][1]))
+        yield ports
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        link.bind(("127.0.0.1", 0))
+        return link.getsockname()[1]
+
+
+def cell(folder: str, rtde: int, fri: int, opcua: int) -> sr.Station:
+    text = (FOLDER / "workstation.toml").read_text()
+    text = text.replace("frequency = 125 ", "frequency = 500 ").replace(":4840", f":{opcua}")
+    text = text.replace('kind = "rtde"\n', f'kind = "rtde"\nport = {rtde}\n')
+    Path(folder, "workstation.toml").write_text(text + KUKA.format(port=fri))
+    Path(folder, "variables.toml").write_text((FOLDER / "variables.toml").read_text())
+    return sr.load(folder)
+
+
+def line(what: str, late: list[float]) -> float:
+    p50, p99, worst = 1e3 * np.percentile(late, (50, 99, 100))
+    print(f"{what:<34} {len(late):6d}   p50 {p50:6.2f} ms   p99 {p99:6.2f} ms   worst {worst:6.2f} ms")
+    return p99 * 1e-3
+
+
+def used_late(post: Post, period: float) -> int:
+    """Ticks that used a sample older than one tick while a newer one had been in the mailbox."""
+    count, newest = 0, {}
+    for now, samples in post.taken:
+        for sample in samples:
+            if not isinstance(sample, SignalSample):
+                newest[key(sample), sample.source] = sample.seq
+        for (_, source), seq in newest.items():
+            following = post.arrived.get((source, seq + 1))
+            count += following is not None and following < now - period
+    return count
+
+
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=10.0)
-    parser.add_argument("--frequency", type=float, default=500.0)
+    parser.add_argument("--switch", type=float)
+    parser.add_argument("--smoke", action="store_true")
     options = parser.parse_args()
-    posted: list[tuple[float, float]] = []
-    post = live.Mailbox.post
+    seconds = 0.5 if options.smoke else options.seconds
+    if options.switch is not None:
+        live.PROMPT = options.switch
+    fri = free_port()
+    commands = [["rtde", "--port", "0"], ["opcua", "--port", "0"], ["fri", "--port", str(fri)]]
+    with emulators(*commands) as (rtde, opcua, _), tempfile.TemporaryDirectory() as folder:
+        station = cell(folder, rtde, fri, opcua)
+        sources = [s for s in station.workstation.sources if isinstance(s, live.LiveSource)]
+        _ = station.sources
+        with Post().watching() as alone:
+            pairs = [(source, run.source_target(station.model, source)) for source in sources]
+            with live.Listening(pairs) as listening:
+                listening.first(5.0)
+                time.sleep(seconds)
+        with Post().watching() as post:
+            states = States(post, seconds)
+            begun = len(post.taken)
+            done: list[float] = []
+            write = states.write
 
-    def note(box, sample) -> None:
-        post(box, sample)
-        if isinstance(sample, JointSample):
-            posted.append((time.monotonic(), sample.t_device))
+            def written(snapshot, samples):
+                done.append(time.monotonic())
+                write(snapshot, samples)
+                used.append(samples)
 
-    live.Mailbox.post = note
-    command = [sys.executable, "-m", "seerob.cli", "emulate", "rtde", "--port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as emulator:
-        try:
-            port = [re.search(r":(\d+)", emulator.stdout.readline()) for _ in range(2)][1][1]
-            with tempfile.TemporaryDirectory() as folder:
-                text = (FOLDER / "workstation.toml").read_text()
-                text = text.replace("frequency = 125 ", f"frequency = {options.frequency} ")
-                text = text.replace('kind = "rtde"\n', f'kind = "rtde"\nport = {port}\n')
-                Path(folder, "workstation.toml").write_text(text)
-                station = sr.load(folder)
-                writer = Late(options.seconds)
-                summary = station.run(live=True, writers=[writer], stop=writer.stop)
-        finally:
-            emulator.terminate()
-    mailbox = np.array([host - device for host, device in posted])
-    least = mailbox.min()
-    state = np.array([done - s.t_device for done, heard, _ in writer.ticks[1:] for s in heard]) - least
-    starved, newest = 0, -np.inf
-    for _, heard, t in writer.ticks:
-        newest = max([newest, *(s.t for s in heard)])
-        starved += newest < t
+            used: list = []
+            states.write = written
+            summary = station.run(live=True, writers=[states], stop=states.stop)
     period = station.workstation.engine.tick
-    for name, late in (("packet to mailbox", mailbox - least), ("packet to State and results", state)):
-        p50, p99, worst = 1e3 * np.percentile(late, (50, 99, 100))
-        print(f"{name:<28} p50 {p50:6.2f} ms   p99 {p99:6.2f} ms   worst {worst:6.2f} ms")
-    print(f"tick {1e3 * period:g} ms, {len(posted)} packets, {len(writer.ticks)} ticks")
-    print(f"slipped {summary.slipped:.3f} s")
-    print(f"ticks beyond the newest sample: {starved}; verdict {summary.verdict}")
-    for reason in sorted(writer.doubts)[:10]:
-        print(f"  undecided: {reason}")
+    _ = begun
+    print("packet to mailbox, listeners alone")
+    base = {name: line(f"  {name}", late) for name, late in sorted(alone.mailbox.items())}
+    print("packet to mailbox, beside the twin")
+    own = {name: line(f"  {name}", late) for name, late in sorted(post.mailbox.items())}
+    print("packet to State and results")
+    ages = defaultdict(list)
+    for instant, samples in zip(done[1:], used[1:], strict=True):
+        for sample in samples:
+            if (arrived := post.arrived.get((sample.source, sample.seq))) is not None:
+                ages[sample.source].append(instant - arrived)
+    state = {name: line(f"  {name}", late) for name, late in sorted(ages.items())}
+    for name in own:
+        print(f"{name}: p99 {own[name] / base[name]:.2f} x that of the listener alone")
+    print(f"tick {1e3 * period:g} ms, {states.ticks} ticks, {states.undecided} with something undecided")
+    print(f"slipped {summary.slipped:.3f} s; used late: {used_late(post, period)}")
+    for what, found, budget in (
+        ("packet to mailbox", max(own.values()), MAILBOX),
+        ("packet to State", max(state.values()), period + BEYOND_TICK),
+    ):
+        print(f"{what} p99 {1e3 * found:.2f} ms, budget {1e3 * budget:g} ms: {found / budget:.2f} of it")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from seerob.clamping import Memory, clamps, pinch_pairs
+from seerob.clamping import clamps, pinch_pairs
 from seerob.distance import Shapes
 from seerob.geometry import Mesh, Solid, capsule
 
@@ -44,26 +44,6 @@ def test_parts_of_one_robot_clamp_only_what_once_had_room() -> None:
     assert not found[:3].any()
     assert found[4:, 0].all()
     assert not found[:, 1].any()
-
-
-def test_live_says_what_the_batch_says() -> None:
-    rng = np.random.default_rng(5)
-    gaps = np.abs(np.cumsum(rng.normal(0, 0.03, (400, 6)), axis=0))
-    t = np.cumsum(rng.uniform(0.005, 0.02, 400))
-    opened = np.array([True, False] * 3)
-    memory = Memory()
-    live = [memory.step(float(s), g, THICKNESS, opened) for s, g in zip(t, gaps, strict=True)]
-    np.testing.assert_array_equal(live, clamps(gaps, t, THICKNESS, opened=opened))
-
-
-def test_memory_says_the_same_twice_and_forgets_when_set_back() -> None:
-    memory, opened = Memory(), np.array([True])
-    memory.step(0.0, np.array([0.3]), THICKNESS, opened)
-    first = memory.step(0.1, np.array([0.09]), THICKNESS, opened)
-    np.testing.assert_array_equal(memory.step(0.1, np.array([0.09]), THICKNESS, opened), first)
-    assert first.all()
-    assert not memory.step(0.2, np.array([0.09]), THICKNESS, opened).any()
-    assert memory.step(0.0, np.array([0.09]), THICKNESS, opened).all()
 
 
 def slotted() -> Mesh:

@@ -12,4 +12,5 @@ def test_every_criterion_for_one_robot_and_one_person():
     )
     assert done.returncode == 0, done.stderr
     assert "power and force" in done.stdout
-    assert "x real time" in done.stdout
+    assert "Pinocchio" in done.stdout
+    assert done.stdout.count("x real time") == 2

@@ -13,19 +13,18 @@ between links that are always near.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.distance import Closests, Per, Query
+from seerob.distance import Per, Query
 from seerob.kernels.shapes import Shapes
 from seerob.model import Mechanism, Model
 from seerob.transforms import Array
 
 Flags = NDArray[np.bool_]
-Before = tuple[float, Array, Array]
 
 STILL = 1e-3
 """A gap that closes more slowly than this stays as it is [m/s]."""
@@ -67,30 +66,6 @@ def clamps(
     return np.asarray(closing[..., None] & (ahead[..., None] <= thickness) & wide)
 
 
-@dataclass
-class Memory:
-    """The last gaps of a live run."""
-
-    last: Before | None = None
-    before: Before | None = None
-    """What it was when ``last`` was judged."""
-
-    def step(self, t: float, gaps: Array, thickness: Array, opened: Flags) -> Flags:
-        """Which gaps clamp which body parts now; see `clamps`. Shape (g, r).
-
-        Asked again for the last instant it says the same; asked for an earlier one (a replay was set back),
-        it forgets.
-        """
-        if self.last is not None and t < self.last[0]:
-            self.last = None
-        if self.last is None or t > self.last[0]:
-            self.before = self.last
-        found = clamps(gaps[None], np.array([t]), thickness, before=self.before, opened=opened)
-        widest = gaps if self.before is None else np.maximum(gaps, self.before[2])
-        self.last = t, gaps.copy(), widest
-        return np.asarray(found[0])
-
-
 @dataclass(frozen=True, eq=False)
 class PinchPairs:
     """The gaps in which the moving parts of a robot could clamp somebody, bound once."""
@@ -112,13 +87,9 @@ class PinchPairs:
             rotations: world_from_body of every body, shape (n, 3, 3).
             positions: Likewise [m], shape (n, 3).
         """
-        return self.asked(lambda query, per: query.ask(rotations, positions, per))
-
-    def asked(self, ask: Callable[[Query, Per], Closests]) -> tuple[Array, NDArray[np.int64]]:
-        """The same of what each query says now, such as `State.distances` tells."""
         distances, others = [np.zeros(0)], [np.zeros(0, np.int64)]
         for query, per in self.queries:
-            found = ask(query, per)
+            found = query.ask(rotations, positions, per)
             distances.append(found.distance)
             others.append(found.body_a)
         return np.concatenate(distances), np.concatenate(others)

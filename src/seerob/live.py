@@ -15,6 +15,7 @@ import asyncio
 import contextlib
 import logging
 import os
+import sys
 import time
 from collections.abc import AsyncGenerator, Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -45,6 +46,10 @@ ASK_WITHIN = 1.5
 """At start [s]."""
 PATIENCE = 1.0
 """How long a run waits for the first samples before it begins without them [s]."""
+
+PROMPT = 5e-4
+"""How long a thread keeps the interpreter while others wait for it [s], during a live run. Python's own 5 ms
+is as long as samples then wait for the twin's computations."""
 
 
 class LiveSource(Source, frozen=True, kw_only=True):
@@ -250,6 +255,8 @@ class Listening:
         self.listeners = tuple(Listener(source, target, self._box.post) for source, target in sources)
 
     def __enter__(self) -> Self:
+        self._interval = sys.getswitchinterval()
+        sys.setswitchinterval(min(self._interval, PROMPT))
         for listener in self.listeners:
             listener.start()
         return self
@@ -264,6 +271,7 @@ class Listening:
             if not listener.join(max(0.0, end - time.monotonic())):
                 _log.warning("%s: did not stop within %g s", listener.name, STOP_WITHIN)
             _log.info("%s: %s", listener.name, listener.statistics())
+        sys.setswitchinterval(self._interval)
 
     def first(self, patience: float = PATIENCE) -> tuple[Sample, ...]:
         """What is heard from now on, once all that drive something were, or when that takes too long."""

@@ -30,6 +30,14 @@ Corners = Annotated[tuple[Corner, ...], unit("m", min_length=3, max_length=200)]
 Share = Annotated[float, Meta(ge=0, le=1)]
 Tolerance = Annotated[float, Meta(ge=0, lt=1)]
 """Either way, as a share of the figure itself."""
+Percentile = Annotated[
+    str,
+    Meta(
+        pattern=r"^[a-z0-9_]+ P[0-9]{1,2}$",
+        max_length=80,
+        description='metres, or a population and percentile such as "germany P50"',
+    ),
+]
 Name = Annotated[
     str,
     Meta(pattern=r"^[A-Za-z0-9_.\-]+$", max_length=80, description="letters, digits, '_', '.' and '-' only"),

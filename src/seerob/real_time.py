@@ -12,7 +12,6 @@ from seerob.live import Listening, LiveSource
 from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample, key
 from seerob.workstation import Workstation
 
-
 AFTER = 1e-6
 """Between a sample and its repetition [s]: two of one instant there are not."""
 

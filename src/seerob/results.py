@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from seerob.bone_errors import BoneErrors
+from seerob.column import Spill
 from seerob.errors import UnknownName
 from seerob.series import Series, Spread, Worst, WorstTracker, worst_verdict
 from seerob.snapshot import CriterionInfo, History, Result, Snapshot, Verdict
@@ -41,6 +42,9 @@ class ResultLog(Mapping[str, Series]):
         self._worst: dict[str, WorstTracker] = {}
         self._tracking: dict[str, JointLog] = {}
         self._bones: dict[str, BoneErrors] = {}
+        self._spill = Spill()
+        self._last: Snapshot | None = None
+        self._worse: tuple[str, ...] = ()
         self.ticks = 0
         """Snapshots that were added."""
         self.start: float | None = None
@@ -54,11 +58,15 @@ class ResultLog(Mapping[str, Series]):
         """Take the results of one tick.
 
         A criterion with a period repeats its last result between two evaluations; the repetition
-        (the same `Result.t` again) is not counted twice.
+        (the same `Result.t` again) is not counted twice. Nor is a snapshot that was added last: the
+        writers of a run share its log, and whoever comes first adds.
 
         Returns:
             Names of the criteria whose worst instant so far is in this snapshot.
         """
+        if snapshot is self._last:
+            return self._worse
+        self._last = snapshot
         self.ticks += 1
         if self.start is None:
             self.start = snapshot.t
@@ -80,11 +88,12 @@ class ResultLog(Mapping[str, Series]):
                 self._tracking[name] = JointLog(name, error, snapshot.t)
         for name, bones in snapshot.bones.items():
             self._bones.setdefault(name, BoneErrors()).add(bones, snapshot.t)
-        return tuple(worse)
+        self._worse = tuple(worse)
+        return self._worse
 
     def _begin(self, name: str, unit: str, at_most: bool) -> Series:
         tracker = WorstTracker()
-        series = Series(name=name, unit=unit, at_most=at_most, tracker=tracker)
+        series = Series(name=name, unit=unit, at_most=at_most, tracker=tracker, spill=self._spill)
         self._series[name], self._worst[name] = series, tracker
         return series
 

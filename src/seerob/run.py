@@ -25,7 +25,7 @@ from seerob.model import Model
 from seerob.real_time import Clock
 from seerob.results import ResultLog
 from seerob.samples import Sample
-from seerob.sink import Writer
+from seerob.sink import KeepsResults, Writer
 from seerob.snapshot import (
     CriterionInfo,
     Finding,
@@ -350,6 +350,8 @@ def run(
     with ExitStack() as open_writers, settled():
         for writer in writers:
             open_writers.enter_context(writer)
+            if isinstance(writer, KeepsResults):
+                writer.share(log)
         engine = engine_of(model)
         for out, samples in ticks(engine, Judge(bound), feed):
             count, t = count + 1, out.t

@@ -1,9 +1,8 @@
-"""One criterion over time, in arrays that grow without being copied at each tick."""
+"""One criterion over time, in columns that grow without being copied at each tick."""
 
 from __future__ import annotations
 
 import math
-from array import array
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
@@ -11,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.column import Column, Spill
 from seerob.errors import Undecided
 from seerob.snapshot import Result, Snapshot, Trace, Verdict
 from seerob.transforms import Array
@@ -110,19 +110,28 @@ class WorstTracker:
 class Series:
     """One criterion, or one part of it, over a run. Arrays are read-only copies of what is there now."""
 
-    def __init__(self, *, name: str, unit: str, at_most: bool, tracker: WorstTracker | None = None) -> None:
+    def __init__(
+        self,
+        *,
+        name: str,
+        unit: str,
+        at_most: bool,
+        tracker: WorstTracker | None = None,
+        spill: Spill | None = None,
+    ) -> None:
         self.name = name
         self.unit = unit
         self.at_most = at_most
         """Whether limits bound from above."""
         self._tracker = tracker
-        self._t, self._values, self._limits = array("d"), array("d"), array("d")
-        self._reasons = array("i")
+        self._spill = spill = Spill() if spill is None else spill
+        self._t, self._values, self._limits = Column("d", spill), Column("d", spill), Column("d", spill)
+        self._reasons = Column("i", spill)
         self._reason_of: dict[str, int] = {"": 0}
         self._parts: dict[str, Series] = {}
         self._last_t: float | None = None
         # Appended last at each tick: its length is how many ticks are whole.
-        self._verdicts = array("B")
+        self._verdicts = Column("B", spill)
 
     @property
     def known(self) -> bool:
@@ -146,7 +155,7 @@ class Series:
         for part in result.parts:
             series = self._parts.get(part.name)
             if series is None:
-                series = Series(name=part.name, unit=part.unit, at_most=part.at_most)
+                series = Series(name=part.name, unit=part.unit, at_most=part.at_most, spill=self._spill)
                 self._parts[part.name] = series
             series.append(part, t)
         self._verdicts.append(CODES[result.verdict])
@@ -154,9 +163,7 @@ class Series:
     def __len__(self) -> int:
         return len(self._verdicts)
 
-    def _floats(self, data: array[float]) -> Array:
-        # tobytes is one step under the interpreter's lock, so a reader in another thread never
-        # sees an array that is being grown.
+    def _floats(self, data: Column) -> Array:
         n = len(self._verdicts)
         return np.frombuffer(data.tobytes(), np.float64)[:n]
 
@@ -184,7 +191,8 @@ class Series:
     def reasons(self) -> tuple[str, ...]:
         """Why UNDECIDED or what governs, per tick; ``…`` beyond the `MAX_REASONS` distinct ones kept."""
         texts = (*self._reason_of, "…")
-        return tuple(texts[code] for code in self._reasons[: len(self)])
+        codes = np.frombuffer(self._reasons.tobytes(), np.intc)[: len(self)]
+        return tuple(texts[code] for code in codes.tolist())
 
     @property
     def parts(self) -> Mapping[str, Series]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Protocol, Self, runtime_checkable
 
 from msgspec import Struct
 
+from seerob.results import ResultLog
 from seerob.samples import Sample
 from seerob.snapshot import Scene, Snapshot
 
@@ -26,6 +27,14 @@ class Writer(Protocol):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
+
+
+@runtime_checkable
+class KeepsResults(Protocol):
+    """A writer that needs every result of the run: hours of them are kept once, not once per writer."""
+
+    def share(self, log: ResultLog) -> None:
+        """Use the log of the run; adding a snapshot that is in it changes nothing."""
 
 
 class Sink(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

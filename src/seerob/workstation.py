@@ -23,6 +23,7 @@ from seerob.quantities import (
     Mass,
     Name,
     PathName,
+    Percentile,
     Radian,
     Radians,
     Share,
@@ -251,7 +252,7 @@ class Human(_Table, frozen=True, kw_only=True):
     """A person."""
 
     name: Name
-    stature: Annotated[float, unit("m", ge=1.2, le=2.3)] | str
+    stature: Annotated[float, unit("m", ge=1.2, le=2.3)] | Percentile
     """[m], or a percentile of a published population: ``"germany P50"``."""
     mass: Annotated[float, unit("kg", ge=30, le=250)]
     """[kg]"""

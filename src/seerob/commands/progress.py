@@ -9,8 +9,9 @@ from types import TracebackType
 from typing import Self
 
 from seerob.commands import STATUS
+from seerob.results import ResultLog
 from seerob.samples import Sample
-from seerob.sink import Writer
+from seerob.sink import KeepsResults, Writer
 from seerob.snapshot import Snapshot
 
 
@@ -71,6 +72,11 @@ class Announced:
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """See `Writer.write`."""
         self._writer.write(snapshot, samples)
+
+    def share(self, log: ResultLog) -> None:
+        """See `KeepsResults.share`."""
+        if isinstance(self._writer, KeepsResults):
+            self._writer.share(log)
 
     def close(self) -> None:
         """See `Writer.close`."""

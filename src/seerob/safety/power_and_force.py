@@ -192,9 +192,8 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         found = [links, *carried]
         if self.human is not None:
             found.append(provenance.given("horizon", self.horizon, "m"))
-        for key in ("stiffness_tolerance", "area_tolerance"):
-            if getattr(self, key):
-                found.append(provenance.given(key, getattr(self, key), ""))
+        tolerances = {key: getattr(self, key) for key in ("stiffness_tolerance", "area_tolerance")}
+        found += [provenance.given(key, share, "") for key, share in tolerances.items() if share]
         if self.person_speed is not None:
             found.append(provenance.given("person_speed", self.person_speed, "m/s"))
         radii, areas = self._by_body(model, self.contact_radius), self._by_body(model, self.contact_area)

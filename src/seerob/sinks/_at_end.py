@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Self
+
+from seerob.results import ResultLog
+from seerob.snapshot import CriterionInfo
 
 Progress = Callable[[int, int], None]
 """Called with how many of how many steps of writing are done."""
@@ -38,3 +41,18 @@ class AtEnd:
     def _tell(self, done: int, total: int) -> None:
         if self.progress is not None:
             self.progress(done, total)
+
+
+class AtEndWithResults(AtEnd):
+    """One that needs every result of the run.
+
+    Attributes:
+        log: Of the run, once it has one; its own until then.
+    """
+
+    def __init__(self, criteria: Iterable[CriterionInfo]) -> None:
+        self.log = ResultLog(criteria)
+
+    def share(self, log: ResultLog) -> None:
+        """Use the log of the run, which holds the same: see `seerob.sink.KeepsResults`."""
+        self.log = log

@@ -12,10 +12,10 @@ from msgspec import Meta
 
 from seerob.errors import InputError
 from seerob.report_section import ReportSection
-from seerob.results import ResultLog, result_named
+from seerob.results import result_named
 from seerob.samples import Sample
 from seerob.sink import Sink
-from seerob.sinks._at_end import AtEnd
+from seerob.sinks._at_end import AtEndWithResults
 from seerob.snapshot import Basis, Finding, Scene, Snapshot
 
 
@@ -46,7 +46,7 @@ class Dossier(Sink, frozen=True, kw_only=True):
         return DossierWriter(scene, meshes, files, folder / self.file, pictures=self.pictures)
 
 
-class DossierWriter(AtEnd):
+class DossierWriter(AtEndWithResults):
     """Collects results; keeps one snapshot per criterion, that of its worst instant.
 
     Of its progress every picture is a step, and so is the page.
@@ -56,13 +56,13 @@ class DossierWriter(AtEnd):
         self, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes], path: Path, *, pictures: int
     ) -> None:
         """Use `Dossier.open`."""
+        super().__init__(scene.criteria)
         self.path = path
         self.findings: list[Finding] = list(scene.findings)
         """What the report lists as found; the run may add to it."""
         self.sections: list[ReportSection] = []
         """What a command adds to the report, after the criteria."""
         self._scene, self._meshes, self._files, self._pictures = scene, meshes, files, pictures
-        self.log = ResultLog(scene.criteria)
         self._worst: dict[str, Snapshot] = {}
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:

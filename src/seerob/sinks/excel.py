@@ -11,12 +11,12 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from seerob.errors import InputError
-from seerob.results import ResultLog, result_named
+from seerob.results import result_named
 from seerob.samples import Sample
 from seerob.series import CODES, Series
 from seerob.sink import Sink
 from seerob.sinks import _posture_safety
-from seerob.sinks._at_end import AtEnd
+from seerob.sinks._at_end import AtEndWithResults
 from seerob.sinks._bone_errors import HEAD as ERRORS
 from seerob.sinks._bone_errors import bone_rows
 from seerob.sinks._motion_sheets import MotionSheets
@@ -69,15 +69,15 @@ class Excel(Sink, frozen=True, kw_only=True):
         return ExcelWriter(scene, folder / self.file, motion, rows=self.rows, motion_rows=self.motion_rows)
 
 
-class ExcelWriter(AtEnd):
+class ExcelWriter(AtEndWithResults):
     """Collects results and motion."""
 
     def __init__(
         self, scene: Scene, path: Path, motion: MotionSheets, *, rows: int, motion_rows: int
     ) -> None:
         """Use `Excel.open`."""
+        super().__init__(scene.criteria)
         self.path = path
-        self.log = ResultLog(scene.criteria)
         self._scene, self._motion, self._rows, self._motion_rows = scene, motion, rows, motion_rows
         self._bases: dict[str, Basis] = {i.name: i.basis for i in scene.criteria if i.basis is not None}
 

@@ -113,14 +113,25 @@ class DeviceTime:
 
 
 class _Answering:
-    """Answers every so many messages, as the controller asks."""
+    """Answers every so many messages, as the controller asks; reads each but once."""
 
     def __init__(self) -> None:
         self._sent, self._since = 0, 0
+        self._read: tuple[bytes, Monitoring] | None = None
+
+    def monitoring(self, datagram: bytes) -> Monitoring:
+        """What a datagram says.
+
+        Raises:
+            ProtocolError: It is no monitoring message.
+        """
+        if self._read is None or self._read[0] is not datagram:
+            self._read = datagram, fri.decode_monitoring(datagram)
+        return self._read[1]
 
     def __call__(self, datagram: bytes) -> bytes | None:
         try:
-            m = fri.decode_monitoring(datagram)
+            m = self.monitoring(datagram)
         except ProtocolError:
             return None  # whoever reads it will say so
         self._since += 1
@@ -207,12 +218,13 @@ class Fri(LiveSource, frozen=True, kw_only=True):
         device, slope = DeviceTime(), Differentiator(GAP * self.period())
         said: dict[str, float | bool | str] = {}
         due = 0.0
+        answering = _Answering()
         async with (
-            listening(self.bind, self.port, sender=self.host, answer=_Answering()) as port,
+            listening(self.bind, self.port, sender=self.host, answer=answering) as port,
             aclosing(port.receive(SILENCE)) as heard,
         ):
             async for datagram in heard:
-                m = fri.decode_monitoring(datagram.data)
+                m = answering.monitoring(datagram.data)
                 if len(m.q) != JOINTS:
                     raise ProtocolError(f"sends {len(m.q)} joints where an LBR has {JOINTS}")
                 now = states(m)

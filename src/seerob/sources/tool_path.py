@@ -129,7 +129,7 @@ class ToolPath(Source, frozen=True, kw_only=True):
             what = f"nobody says where {target.name} stands"
             raise InputError.at(self.file, "frame", what, 'use frame = "world"')
         world_from_base = np.array(target.world_from_base)
-        fixed = _fixed(target)
+        fixed = fixed_links(target)
         if not fixed:
             return world_from_base, f"the base of {target.name}"
         root = next(iter(fixed))
@@ -148,7 +148,7 @@ class ToolPath(Source, frozen=True, kw_only=True):
         return world_from_base @ fixed[root], f"the frame of {root}"
 
 
-def _fixed(target: Target) -> dict[str, Array]:
+def fixed_links(target: Target) -> dict[str, Array]:
     """Links that the robot's joints do not move, root first: base from link, (4, 4), by full name."""
     found: dict[str, Array] = {}
     if target.description is None:

@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from seerob.source import Target
 
 
-def target_of(robot: str, *, joints: int, whose: str) -> Target:
+def target_of(robot: str, *, joints: int | None = None, whose: str = "") -> Target:
     """A robot of the library, as a source sees it.
 
     Args:
         robot: Its name in the library.
-        joints: How many it must have.
+        joints: How many it must have; None for any number.
         whose: What has that many: ``a Universal Robots arm``.
 
     Raises:
@@ -31,7 +31,7 @@ def target_of(robot: str, *, joints: int, whose: str) -> Target:
 
     description = library.load(robot)
     own = description.joints()
-    if len(own) != joints:
+    if joints is not None and len(own) != joints:
         what = f"{robot} has {len(own)} joints, {whose} has {joints}"
         raise InputError.at("seerob emulate", "--robot", what, "name another robot")
     return Target(
@@ -42,6 +42,20 @@ def target_of(robot: str, *, joints: int, whose: str) -> Target:
         upper=tuple(inf if j.upper is None else j.upper for j in own),
         velocity=tuple(None if j.velocity is None else j.velocity.value for j in own),
         description=description,
+    )
+
+
+def home_of(target: Target, amplitude: float) -> tuple[float, ...]:
+    """Joint positions nearest to zero about which every joint has room to swing.
+
+    Args:
+        target: The robot.
+        amplitude: Of the swing [rad or m].
+    """
+    limits = zip(target.lower, target.upper, strict=True)
+    return tuple(
+        (low + high) / 2 if high - low < 2 * amplitude else min(max(0.0, low + amplitude), high - amplitude)
+        for low, high in limits
     )
 
 

@@ -1,0 +1,134 @@
+"""A WebSocket to a server that sends more than anybody asked for: what waits is bounded, the oldest goes."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import AsyncGenerator, Sequence
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING
+
+from seerob.protocols import ProtocolError
+
+if TYPE_CHECKING:
+    from websockets.asyncio.client import ClientConnection
+
+CONNECT_WITHIN = 2.0
+"""[s]"""
+WAITING = 64
+"""Messages that wait to be read; of more, the oldest are lost."""
+ALIVE = 10.0
+"""A server that answers no ping within this time is gone [s]."""
+
+
+class Link:
+    """A connection that is made; see `linked`."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self._socket = socket
+        self._waiting = deque[tuple[float, bytes | str]](maxlen=WAITING)
+        self._arrived = asyncio.Event()
+        self._task = asyncio.create_task(self._listen())
+
+    async def send(self, message: str | bytes) -> None:
+        """Send; text in a text frame, bytes in a binary one.
+
+        Raises:
+            ProtocolError: The connection is closed.
+        """
+        from websockets.exceptions import ConnectionClosed
+
+        try:
+            await self._socket.send(message)
+        except ConnectionClosed as error:
+            raise ProtocolError(f"the server closed the connection: {error}") from error
+
+    async def receive(self, patience: float | None) -> tuple[float, bytes | str] | None:
+        """The next message and when it arrived (host's monotonic time [s]); None when the server closed.
+
+        Args:
+            patience: Longest pause [s]; None for any.
+
+        Raises:
+            TimeoutError: Nothing for so long.
+            ProtocolError: The connection broke.
+        """
+        async with asyncio.timeout(patience):
+            while not self._waiting:
+                if self._task.done():
+                    self._ended()
+                    return None
+                self._arrived.clear()
+                await self._arrived.wait()
+        return self._waiting.popleft()
+
+    async def close(self) -> None:
+        """End it."""
+        self._task.cancel()
+        await asyncio.gather(self._task, return_exceptions=True)
+
+    def _ended(self) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        try:
+            self._task.result()
+        except ConnectionClosed as error:
+            raise ProtocolError(f"the connection broke: {error}") from error
+
+    async def _listen(self) -> None:
+        try:
+            async for message in self._socket:
+                self._waiting.append((time.monotonic(), message))
+                self._arrived.set()
+        finally:
+            self._arrived.set()
+
+
+@asynccontextmanager
+async def linked(
+    host: str, port: int, *, largest: int, what: str, protocols: Sequence[str] = (), tls: bool = False
+) -> AsyncGenerator[Link, None]:
+    """Connect.
+
+    Args:
+        host: Name or address.
+        port: Of the server.
+        largest: Message that is read [byte].
+        what: The server, for messages.
+        protocols: Subprotocols that are spoken.
+        tls: Encrypted, and the server's certificate is checked.
+
+    Raises:
+        OSError: There is no connection.
+        TimeoutError: It does not answer.
+        ProtocolError: No such server is there.
+    """
+    from websockets.asyncio.client import connect
+    from websockets.exceptions import InvalidHandshake, InvalidURI
+    from websockets.typing import Subprotocol
+
+    shown = f"[{host}]" if ":" in host else host
+    opening = connect(
+        f"ws{'s' if tls else ''}://{shown}:{port}/",
+        max_size=largest,
+        open_timeout=CONNECT_WITHIN,
+        close_timeout=0.2,
+        ping_interval=ALIVE,
+        ping_timeout=ALIVE,
+        compression=None,
+        proxy=None,
+        subprotocols=[Subprotocol(name) for name in protocols] or None,
+    )
+    try:
+        socket = await opening
+    except (InvalidHandshake, InvalidURI) as error:
+        raise ProtocolError(f"no {what} answers at {host}:{port}: {error}") from error
+    async with socket:
+        if protocols and socket.subprotocol is None:
+            raise ProtocolError(f"{host}:{port} speaks none of {', '.join(protocols)}")
+        link = Link(socket)
+        try:
+            yield link
+        finally:
+            await link.close()

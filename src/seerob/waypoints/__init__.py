@@ -1,0 +1,1 @@
+"""Programmed waypoints: read from files, made into continuous motion; knows no physics engine."""

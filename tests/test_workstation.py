@@ -18,7 +18,9 @@ LIVE = {"ur10_rtde", "plc_cell"}
 EVERY = sorted(
     path.parent for path in (Path(__file__).parents[1] / "workstations").glob("*/workstation.toml")
 )
-FOLDERS = [folder for folder in EVERY if folder.name not in LIVE]
+RECORDED = {"captured_operator"}
+"""Of a recorded person, who is lost for a moment; see test_captured_operator.py."""
+FOLDERS = [folder for folder in EVERY if folder.name not in LIVE | RECORDED]
 CLEARANCES = {
     "ur10_assembly": ("gripper", "table"),
     "iiwa_bench": ("fingers", "bench"),
@@ -29,7 +31,7 @@ CLEARANCES = {
 
 
 def test_every_workstation_is_looked_at():
-    assert {folder.name for folder in EVERY} == set(CLEARANCES) | LIVE
+    assert {folder.name for folder in EVERY} == set(CLEARANCES) | LIVE | RECORDED
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
@@ -73,6 +75,7 @@ def test_the_type_of_the_file_names_every_table_once():
         "edition",
         "description",
         "variables",
+        "zones",
         "allow_writing",
         "engine",
         "folder",

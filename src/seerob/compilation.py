@@ -23,6 +23,7 @@ from seerob.errors import InputError, Problem, UnknownName
 from seerob.filing import filed
 from seerob.human import posture
 from seerob.model import Body, Frame, Mechanism, Model
+from seerob.model_io.calibration import calibrated_by
 from seerob.model_io.description import Description, Link, Quantity
 from seerob.model_io.loader import load_robot
 from seerob.mounting import Mounting
@@ -145,13 +146,15 @@ class _Compiler:
             name=robot.name,
         )
         description = by_hand(description, robot, self.file)
+        if robot.calibration is not None:
+            description = calibrated_by(description, robot.calibration, self.folder)
         q = home(description, robot, self.file)
         self._chain(robot.name, description, "robot", pose_matrix(robot.base), q, robot.q is not None)
         self.mounting.files |= filed(
             robot.name,
             description.files,
             folder=self.folder,
-            references=(robot.model, robot.meshes),
+            references=(robot.model, robot.meshes, robot.calibration),
             packages=robot.packages,
         )
         if robot.tool is not None:

@@ -8,7 +8,7 @@ excess away from the margin, a limit toward it. Noise of floating-point sums, su
 from __future__ import annotations
 
 import math
-from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal, localcontext
+from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Context, Decimal
 from typing import NamedTuple
 
 DECIMALS = {
@@ -34,6 +34,11 @@ _EXACT = 12
 """Significant digits that a float is trusted for: 0.1 + 0.2 is 0.3."""
 _MOST = 17
 _HUGE = 1e15
+_ARITHMETIC = Context(prec=60)
+_UNITS = [Decimal(1).scaleb(-places) for places in range(_SMALLEST + _MOST + 1)]
+"""Of the last place, by places after the point."""
+_NOISE = [unit / 1000 for unit in _UNITS]
+"""That directed rounding must not lift to a whole unit."""
 
 
 class Pair(NamedTuple):
@@ -105,15 +110,10 @@ def _text(value: float, places: int, rounding: str) -> str:
         return "∞" if value > 0 else "−∞"
     if abs(value) >= _HUGE:
         return _signed(repr(float(value)))
-    with localcontext() as context:
-        context.prec = 60
-        exact = Decimal(f"{value:.{_EXACT - 1}e}")
-        unit = Decimal(1).scaleb(-places)
-        # Noise must not be lifted to a whole unit by directed rounding.
-        if abs(exact) < unit / 1000:
-            exact = Decimal(0)
-        rounded = exact.quantize(unit, rounding=rounding)
-        text = f"{rounded:f}"
+    exact = Decimal(f"{value:.{_EXACT - 1}e}")
+    if abs(exact) < _NOISE[places]:
+        exact = Decimal(0)
+    text = f"{exact.quantize(_UNITS[places], rounding, _ARITHMETIC):f}"
     if "." in text:
         text = text.rstrip("0").rstrip(".")
     if text in ("-0", ""):

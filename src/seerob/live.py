@@ -17,12 +17,12 @@ import logging
 import os
 import sys
 import time
-from collections.abc import AsyncGenerator, Callable, Iterable, Sequence
+from collections.abc import AsyncGenerator, Callable, Coroutine, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Lock, Thread
 from types import TracebackType
-from typing import Annotated, Self
+from typing import Annotated, Any, Self, TypeVar
 
 from msgspec import Meta
 from msgspec.structs import replace
@@ -35,6 +35,7 @@ from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
 
 _log = logging.getLogger(__name__)
+T = TypeVar("T")
 
 MARGIN = 0.005
 """Of the delay behind the world, for what is late on the way [s]."""
@@ -97,9 +98,7 @@ class LiveSource(Source, frozen=True, kw_only=True):
         )
         behind = Finding(level="note", subject=about, text=text)
         try:
-            # In a thread: whoever opens it may be in an event loop, a notebook for one.
-            with ThreadPoolExecutor(1) as thread:
-                said = thread.submit(asyncio.run, asyncio.wait_for(self.ask(), ASK_WITHIN)).result()
+            said = at_start(self.ask())
         except InputError:
             raise
         except (OSError, EOFError, SeerobError) as error:
@@ -118,6 +117,17 @@ class LiveSource(Source, frozen=True, kw_only=True):
             SeerobError: What the other end says cannot be understood.
         """
         raise NotImplementedError
+
+
+def at_start(question: Coroutine[Any, Any, T]) -> T:
+    """The answer to what is asked when a source is opened.
+
+    Raises:
+        TimeoutError: There was none within `ASK_WITHIN`.
+    """
+    # In a thread: whoever opens it may be in an event loop, a notebook for one.
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(asyncio.run, asyncio.wait_for(question, ASK_WITHIN)).result()
 
 
 def because(error: BaseException) -> str:

@@ -63,6 +63,7 @@ class State:
         }
         self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
         self._cache: dict[Any, Any] = {}
+        self._relied_on: set[tuple[str, ...]] = set()
         self._jacobian = np.zeros((6, model.mj.nv))
         self.columns = {m.name: Columns.of(m, model.mj) for m in model.mechanisms.values()}
         """Where the joints of each robot and human are among all."""
@@ -94,6 +95,7 @@ class State:
             self.quaternions,
         )
         self._cache.clear()
+        self._relied_on.clear()
         self._surveyor.forget()
 
     def poses(self) -> bytes:
@@ -105,6 +107,8 @@ class State:
     def require(self, *names: str) -> None:
         """Raise `Undecided` unless each robot or human is where the twin shows it."""
         self.asked.update(names)
+        if names in self._relied_on:
+            return
         for name in names:
             key = ("doubt", name)
             reason = self._cache.get(key)
@@ -112,6 +116,7 @@ class State:
                 reason = self._cache[key] = self.doubt(name)
             if reason:
                 raise Undecided(reason)
+        self._relied_on.add(names)
 
     def doubt(self, name: str) -> str:
         """Why a twin may not be where the real one is; empty when it may be relied on.

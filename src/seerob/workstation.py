@@ -61,8 +61,7 @@ class Engine(_Table, frozen=True, kw_only=True):
     gravity: Annotated[tuple[Coordinate, Coordinate, Coordinate], unit("m/s²")] = (0.0, 0.0, -9.81)
     """[m/s²]"""
     tracking_limit: Annotated[float, unit("rad", gt=0)] = 0.01
-    """Joint error [rad or m] beyond which the twin does not follow what was heard: verdicts that
-    depend on it turn UNDECIDED."""
+    """Joint error [rad or m] beyond which the twin does not follow: what depends on it is UNDECIDED."""
     human_tracking_limit: Annotated[float, unit("rad", gt=0)] = 0.05
     """The same for people [rad or m]: about what devices that see people are good to."""
     physics: bool = True
@@ -85,6 +84,8 @@ class Robot(_Table, frozen=True, kw_only=True):
     """Pose of its root link in the world."""
     meshes: str | None = None
     """The maker's description (as ``model``) whose shapes replace the library's envelope."""
+    calibration: str | None = None
+    """File with the kinematics of this very robot, as ``seerob probe rtde --calibration`` writes it."""
     packages: dict[str, str] = {}
     """Folders of ROS packages that ``package://`` may name."""
     arguments: dict[str, str] = {}

@@ -69,6 +69,8 @@ class Mutant(NamedTuple):
     after: str
     again: int
     """How often the same change was met before in the same function."""
+    assigned: str = ""
+    """Constant or attribute of a class whose value it is."""
 
     @property
     def key(self) -> str:
@@ -122,8 +124,8 @@ def _left_alone(node: ast.AST) -> bool:
     return isinstance(node, (ast.JoinedStr, ast.Import, ast.ImportFrom, ast.Assert, ast.Raise))
 
 
-def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, str]]:
-    """Nodes that may be changed, and the outermost function they are in."""
+def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, str, str]]:
+    """Nodes that may be changed, the outermost function they are in, and the name that they are bound to."""
 
     def inside(node: ast.AST, function: str, depth: int) -> Iterator[tuple[ast.AST, str]]:
         if _left_alone(node):
@@ -141,23 +143,26 @@ def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, str]]:
                 if isinstance(child, ast.AST):
                     yield from inside(child, function, depth + 1)
 
+    def named(node: ast.AST, function: str, depth: int, name: str = "") -> Iterator[tuple[ast.AST, str, str]]:
+        yield from ((inner, where, name) for inner, where in inside(node, function, depth))
+
     for statement in tree.body:
         if isinstance(statement, ast.FunctionDef):
-            yield from inside(statement, statement.name, 0)
+            yield from named(statement, statement.name, 0)
         elif isinstance(statement, ast.ClassDef):
             for part in statement.body:
                 if isinstance(part, ast.FunctionDef):
-                    yield from inside(part, f"{statement.name}.{part.name}", 0)
+                    yield from named(part, f"{statement.name}.{part.name}", 0)
                 elif (
                     isinstance(part, ast.AnnAssign)
                     and "ClassVar" in ast.unparse(part.annotation)
                     and part.value
                 ):
-                    yield part.value, statement.name
+                    yield part.value, statement.name, ast.unparse(part.target)
         elif isinstance(statement, (ast.Assign, ast.AnnAssign)) and statement.value is not None:
             target = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
             if isinstance(target, ast.Name) and "DRAWN" not in target.id:
-                yield from inside(statement.value, "<module>", 1)
+                yield from named(statement.value, "<module>", 1, target.id)
 
 
 def mutants(source: str, file: str) -> list[Mutant]:
@@ -166,13 +171,14 @@ def mutants(source: str, file: str) -> list[Mutant]:
     numbers = {id(node): k for k, node in enumerate(ast.walk(tree))}
     found: list[Mutant] = []
     met: dict[tuple[str, str, str], int] = {}
-    for node, function in _nodes(tree):
+    for node, function, assigned in _nodes(tree):
         for choice, new in enumerate(_choices(node)):
             before, after = _text(node), _text(ast.fix_missing_locations(new))
             again = met.get((function, before, after), -1) + 1
             met[function, before, after] = again
             line = getattr(node, "lineno", 0)
-            found.append(Mutant(file, function, line, numbers[id(node)], choice, before, after, again))
+            number = numbers[id(node)]
+            found.append(Mutant(file, function, line, number, choice, before, after, again, assigned))
     return found
 
 

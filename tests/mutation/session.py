@@ -83,7 +83,7 @@ class Mutation:
         if session.testsfailed:
             raise session.Interrupted(f"{session.testsfailed} errors while tests were collected")
         callers, seconds = self._unchanged(session)
-        queue = [(mutant, self._tests(mutant, callers, seconds)) for mutant in self.mutants]
+        queue = [(mutant, self._tests(mutant, session, callers, seconds)) for mutant in self.mutants]
         running: dict[int, tuple[Mutant, int]] = {}
         while queue or running:
             while queue and len(running) < self.jobs:
@@ -134,7 +134,9 @@ class Mutation:
         return callers, seconds
 
     @staticmethod
-    def _tests(mutant: Mutant, callers: Callers, seconds: dict[str, float]) -> list[Any]:
+    def _tests(
+        mutant: Mutant, session: pytest.Session, callers: Callers, seconds: dict[str, float]
+    ) -> list[Any]:
         whole = mutant.function == "<module>"
         found = {
             item.nodeid: item
@@ -143,7 +145,18 @@ class Mutation:
             and (whole or function == mutant.function or function.startswith(f"{mutant.function}."))
             for item in items
         }
+        # What is bound at import, such as the bound of an option, is asked for by name and calls nothing.
+        for item in session.items:
+            if mutant.assigned and mutant.assigned in _names(item) and item.nodeid in seconds:
+                found[item.nodeid] = item
         return sorted(found.values(), key=lambda item: seconds[item.nodeid])
+
+
+def _names(item: pytest.Item) -> set[str]:
+    """Global names and attributes that a test itself speaks of."""
+    function = getattr(item, "function", None)
+    codes = _codes(function.__code__) if isinstance(function, types.FunctionType) else ()
+    return {name for code in codes for name in code.co_names}
 
 
 def _forked(mutant: Mutant, source: str, items: Sequence[Any], limit: int) -> int:
@@ -210,8 +223,7 @@ def _rebind(module: types.ModuleType, tree: ast.Module, mutant: Mutant) -> None:
             end = statement.end_lineno or statement.lineno
             if not statement.lineno <= mutant.line <= end:
                 continue
-            targets = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
-            name = ast.unparse(targets)
+            name = mutant.assigned
             new = eval(compile(ast.Expression(statement.value), mutant.file, "eval"), vars(module))
             old = vars(module)[name]
             for other in list(sys.modules.values()):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections import Counter
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from seerob.commands import OUT, Exit, line, port, seconds
@@ -36,6 +37,12 @@ def add(sub: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="any other option of the source, value as in the workstation file; may be repeated",
     )
+    sub.add_argument(
+        "--calibration",
+        type=Path,
+        metavar="FILE",
+        help="write the kinematics of that very robot to a new file",
+    )
     sub.add_argument("--seconds", type=seconds, default=3.0, help="how long to listen (default: 3)")
 
 
@@ -61,6 +68,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError.at(where, "", because(error), remedy) from error
     for finding in findings:
         line(finding.level, finding.text, "" if finding.level == "note" else "yellow")
+    if options.calibration is not None:
+        _save_calibration(source, options.calibration, where)
     newest: dict[str, Sample] = {}
     qualities: Counter[str] = Counter()
 
@@ -89,6 +98,37 @@ def run(options: argparse.Namespace) -> int:
         _tell(sample)
     OUT.print(_snippet(options.kind, given), markup=False)
     return Exit.WITHIN
+
+
+def _save_calibration(source: LiveSource, path: Path, where: str) -> None:
+    """Read the kinematics of the very robot, and write them."""
+    import asyncio
+    from datetime import datetime
+
+    from seerob.live import because
+    from seerob.model_io.calibration import written
+    from seerob.sources.rtde import Rtde
+
+    if not isinstance(source, Rtde):
+        what = "its protocol does not tell the kinematics of the very robot"
+        raise InputError.at(where, "--calibration", what, "leave it out")
+    try:
+        found = asyncio.run(source.calibration())
+    except (OSError, EOFError, SeerobError) as error:
+        remedy = (
+            "is the primary interface on? it is a service of its own in the controller's security settings"
+        )
+        raise InputError.at(where, "--calibration", because(error), remedy) from error
+    date = datetime.now().astimezone().strftime("%Y-%m-%d")
+    try:
+        with path.open("x") as file:
+            file.write(
+                written(found, f"Kinematics of the robot at {source.host}, read {date} by seerob probe")
+            )
+    except OSError as error:
+        what = f"cannot be written: {error.strerror}"
+        raise InputError.at(path, "--calibration", what, "give the name of a new file") from error
+    line("wrote", f'{path}; in the robot\'s table: calibration = "{path.name}"', "bold")
 
 
 def _source(options: argparse.Namespace) -> tuple[LiveSource, dict[str, Any]]:

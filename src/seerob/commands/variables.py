@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from seerob.station import Station
 
 HELP = "what the variable dictionary covers, what is heard of it, and a skeleton by browsing a device"
-EXAMPLE = "seerob variables my_cell --browse plc > variables.toml"
+EXAMPLE = "seerob variables my_cell --browse plc   > variables.toml"
 WITHIN = 60.0
 """For browsing [s]."""
 

@@ -41,6 +41,7 @@ from seerob.protocols.rtde import (
     pack,
 )
 from seerob.protocols.rtde_states import RobotMode, SafetyStatus
+from seerob.protocols.ur_primary import Kinematics, encode_state
 
 _log = logging.getLogger(__name__)
 
@@ -67,6 +68,8 @@ MAX_CLIENTS = 8
 MAX_RECIPES = 16
 FULL = 1 << 16
 """Bytes that wait for a client who does not read; then the connection is closed."""
+PRIMARY_SENDS = 100
+"""Packages of the primary interface to one client."""
 LATE = 0.5
 """Time that is not made up for when this machine was too slow [s]."""
 
@@ -83,6 +86,8 @@ class RtdeServer(LoopEmulator):
         without: Fields that it does not have.
         values: Fields with another value than that of a robot at work.
         messages: Said to every client that connects, before anything else.
+        kinematics: What the primary interface says of how it was built; there is none when not given.
+        primary_port: Of that interface; 0 is any free one.
     """
 
     def __init__(
@@ -96,10 +101,13 @@ class RtdeServer(LoopEmulator):
         without: frozenset[str] = frozenset(),
         values: Mapping[str, Value] | None = None,
         messages: tuple[str, ...] = (),
+        kinematics: Kinematics | None = None,
+        primary_port: int = 0,
     ) -> None:
         super().__init__()
         self.host, self.port = host, port
         self.motion, self.controller, self.version, self.messages = motion, controller, version, messages
+        self.kinematics, self.primary_port = kinematics, primary_port
         self.types = {name: kind for name, kind in TYPES.items() if name not in without}
         self.values = dict(values or {})
         """May be changed while it runs."""
@@ -140,10 +148,29 @@ class RtdeServer(LoopEmulator):
         server = await asyncio.start_server(self._welcome, self.host, self.port)
         self.port = server.sockets[0].getsockname()[1]
         self._begun = time.monotonic()
+        primary = None
+        if self.kinematics is not None:
+            primary = await asyncio.start_server(self._say_kinematics, self.host, self.primary_port)
+            self.primary_port = primary.sockets[0].getsockname()[1]
         ready()
         await over.wait()
         server.close()
+        if primary is not None:
+            primary.close()
         # What is left, the clients' tasks, asyncio.run cancels.
+
+    async def _say_kinematics(self, _: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """The primary interface, as far as it goes: the same state ten times a second."""
+        try:
+            for _k in range(PRIMARY_SENDS):
+                if self.kinematics is not None:
+                    writer.write(encode_state(self.kinematics))
+                await writer.drain()
+                await asyncio.sleep(0.1)
+        except (OSError, asyncio.CancelledError):
+            pass
+        finally:
+            writer.transport.abort()
 
     async def _welcome(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.connections += 1

@@ -81,6 +81,7 @@ BONES: tuple[str, ...] = tuple(PARENTS)
 """The 21 bones in the order of the description's links, each after its parent."""
 
 
+@cache
 def without_side(bone: str) -> str:
     """``upper_arm`` of ``left_upper_arm``."""
     return bone.removeprefix("right_").removeprefix("left_")

@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta
+from msgspec.structs import replace
 
 from seerob.errors import InputError
-from seerob.live import LiveSource
-from seerob.protocols import ProtocolError, rtde, rtde_client
+from seerob.live import LiveSource, at_start, because
+from seerob.model_io.calibration import Calibration, off_by
+from seerob.protocols import ProtocolError, rtde, rtde_client, ur_primary
 from seerob.protocols.rtde import ControllerVersion, Level, TextMessage, Value
 from seerob.protocols.rtde_states import RobotMode, SafetyStatus, name, quality
 from seerob.samples import JointSample, Sample, SignalSample
@@ -45,6 +47,10 @@ SIGNAL_PERIOD = 0.1
 """Signals are repeated after this time, or when a state changes [s]."""
 CB3_RATE = 125.0
 """The most that a CB3 controller sends [Hz]."""
+SAME_TOOL = 2e-4
+"""A tool that is nearer to where it should be is there [m]: a fraction of what such arms repeat to."""
+PRIMARY_WITHIN = 1.4
+"""The primary interface says everything at least once a second [s]."""
 LEVELS = {Level.EXCEPTION: logging.ERROR, Level.ERROR: logging.ERROR, Level.WARNING: logging.WARNING}
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -131,6 +137,8 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
     port: Annotated[int, Meta(ge=1, le=65535)] = rtde.PORT
     frequency: Annotated[float, Meta(ge=1, le=500, extra={"unit": "Hz"})] = 125.0
     """Samples per second [Hz]; e-Series and later can do 500."""
+    primary_port: Annotated[int, Meta(ge=0, le=65535)] = ur_primary.PORT
+    """Of the primary interface, which is read once for the kinematics of this very robot; 0 leaves it out."""
     origin: MotionOrigin = MotionOrigin.CONTROLLER
     """``vendor_emulator`` when it is URSim."""
 
@@ -153,7 +161,46 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
         if len(target.joints) != 6:
             what = f"{target.name} has {len(target.joints)} joints, a Universal Robots arm has 6"
             raise InputError.at(f"rtde {self.host}", "robot", what, "name another robot")
-        return super().open(folder, target)
+        opened = super().open(folder, target)
+        if self.primary_port and not any("not reached" in f.text for f in opened.findings):
+            opened = replace(opened, findings=(*opened.findings, self._kinematics(target)))
+        return opened
+
+    def _kinematics(self, target: Target) -> Finding:
+        """Whether the model has the kinematics of this very robot."""
+        try:
+            found = at_start(self.calibration())
+            if target.description is None:
+                raise ProtocolError("there is no model to compare it with")
+            off = off_by(target.description, found, f"rtde {self.host}")
+        except InputError as error:
+            level, text = "warning", f"its kinematics are {error.problems[0].what}"
+        except (OSError, EOFError, ProtocolError) as error:
+            level = "assumed"
+            text = (
+                "kinematics as the model has them: those of this very robot could not be read "
+                f"(port {self.primary_port}: {because(error)})"
+            )
+        else:
+            level, text = "note", f"the model's tool is where this very robot's is, to {1e3 * off:.2f} mm"
+            if off > SAME_TOOL:
+                level = "warning"
+                text = (
+                    f"the model's tool is up to {1e3 * off:.1f} mm from where this very robot's is: "
+                    f"seerob probe rtde {self.host} --calibration FILE, and name it in the robot's table: "
+                    'calibration = "FILE"'
+                )
+        return Finding(level=level, subject=self.robot, text=text)
+
+    async def calibration(self) -> Calibration:
+        """The kinematics of this very robot, from the primary interface.
+
+        Raises:
+            OSError: There is no connection.
+            ProtocolError: It says something else.
+        """
+        k = await ur_primary.read_kinematics(self.host, self.primary_port, PRIMARY_WITHIN)
+        return Calibration(theta=k.theta, a=k.a, d=k.d, alpha=k.alpha, checksum=k.checksum)
 
     async def ask(self) -> tuple[Finding, ...]:
         """Software, protocol, and what the controller does not have."""

@@ -73,12 +73,14 @@ class Arm:
                     raise InputError.at(description.name, "waypoints", what, "give joint positions")
             self._steps.append((part.parent_from_link, [(index[j.name], j) for j in part.joints]))
         self._tcp = np.eye(4) if link_from_tcp is None else np.asarray(link_from_tcp, float)
-        self.base_from_root = np.eye(4)
+        self.base_from_root: Array = np.eye(4)
         if base is not None:
-            root_from_base = np.eye(4)
+            root_from_base: Array = np.eye(4)
             for part in _way(description, base):
                 if part.joints:
-                    raise InputError.at(description.name, "base", f"{base!r} moves", "name a link that does not")
+                    raise InputError.at(
+                        description.name, "base", f"{base!r} moves", "name a link that does not"
+                    )
                 root_from_base = root_from_base @ part.parent_from_link
             self.base_from_root = np.linalg.inv(root_from_base)
 
@@ -90,7 +92,7 @@ class Arm:
         """
         q = np.asarray(q, float)
         lead = q.shape[:-1]
-        T = np.broadcast_to(self.base_from_root, (*lead, 4, 4))
+        T: Array = np.broadcast_to(self.base_from_root, (*lead, 4, 4))
         anchors, axes = np.zeros((*lead, self.n, 3)), np.zeros((*lead, self.n, 3))
         for parent_from_link, joints in self._steps:
             T = T @ parent_from_link

@@ -10,7 +10,8 @@ to another only through a singularity, where a factor is 0.
     f_{elbow} = \big((p_3 - p_2) \times (p_4 - p_3)\big) \cdot z_2, \quad
     f_{wrist} = (z_4 \times z_6) \cdot z_5
 
-with :math:`p_w` where axes 5 and 6 meet and :math:`p_4` a point of axis 4 that lies in the wrist.
+with :math:`p_w` where axes 5 and 6 meet and :math:`p_4` a point of axis 4 (of a spherical wrist the one
+where the axes meet).
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seerob.transforms import Array, rotation_from_wxyz
+from seerob.transforms import Array
 from seerob.waypoints.arm import Arm, Posture
 from seerob.waypoints.branches import Branch, branch, is_classic
 
@@ -80,7 +80,9 @@ def solutions(arm: Arm, rotation: Array, position: Array, near: Array) -> tuple[
     low = np.maximum(np.where(np.isfinite(arm.lower), arm.lower, -np.pi), near - np.pi)
     high = np.minimum(np.where(np.isfinite(arm.upper), arm.upper, np.pi), near + np.pi)
     low, high = np.minimum(low, high), np.maximum(low, high)
-    starts = np.vstack([near, random.uniform(low, high, (SEEDS, arm.n))])
+    # With more than six joints there are infinitely many: only the nearest means something.
+    more = SEEDS if arm.n <= 6 else 0
+    starts = np.vstack([near, random.uniform(low, high, (more, arm.n))])
     q, error = reach(arm, rotation, position, starts)
     classic = is_classic(arm)
     found: list[Solution] = []
@@ -96,17 +98,6 @@ def follow(arm: Arm, rotation: Array, position: Array, near: Array) -> tuple[Arr
     """The solution that a posture close by leads to, shape (n,), and its error [m, rad]."""
     q, error = reach(arm, rotation, position, near[None])
     return q[0], float(error[0])
-
-
-def pose_of(arm: Arm, q: Array) -> tuple[Array, Array]:
-    """Base from tool (3, 3) and position of the tool point [m] at joint positions (n,)."""
-    at = arm.posture(q)
-    return at.rotation, at.position
-
-
-def rotation_of(wxyz: tuple[float, float, float, float]) -> Array:
-    """Rotation matrix of a unit quaternion."""
-    return rotation_from_wxyz(wxyz)
 
 
 def rotation_vectors(rotation: Array) -> Array:

@@ -22,7 +22,7 @@ FUNCTIONS: dict[str, Callable[[float], float]] = {
 }
 
 
-class NotConstant(Exception):  # noqa: N818
+class NotConstant(Exception):
     """What stands there is not a constant; the message says what."""
 
 

@@ -35,7 +35,20 @@ MOVES_OTHERWISE = re.compile(
     r"teachmode|screw_driving|tool_contact|set_conveyor)"
 )
 """Calls that move the robot in ways that are not modelled."""
-BLOCKS = ("if", "elif", "else", "while", "for", "thread", "return", "break", "continue", "run", "kill", "join")
+BLOCKS = (
+    "if",
+    "elif",
+    "else",
+    "while",
+    "for",
+    "thread",
+    "return",
+    "break",
+    "continue",
+    "run",
+    "kill",
+    "join",
+)
 DEFINITION = re.compile(r"^(def|sec)\s+[A-Za-z_]\w*\s*\(\s*\)\s*:$")
 ASSIGNMENT = re.compile(r"^(?:(?:global|local)\s+)?([A-Za-z_]\w*)\s*=(?!=)\s*(.*)$")
 REMEDY = "export a program without it, or record the motion on the controller"
@@ -157,9 +170,10 @@ class _Script:
         else:
             raise NotConstant("needs constant joint positions or a constant pose")
         if move is Move.CIRCULAR:
-            if not isinstance(given.get("pose_via"), PoseValue) or pose is None:
+            middle = given.get("pose_via")
+            if not isinstance(middle, PoseValue) or pose is None:
                 raise NotConstant("via and goal must be constant poses (joint positions are not read here)")
-            via = _pose(given["pose_via"])
+            via = _pose(middle)
             if given.get("mode", 0.0) not in (0.0, 1.0):
                 raise NotConstant("mode is 0 or 1")
             if given.get("mode") == 1.0:
@@ -188,7 +202,9 @@ class _Script:
 
     def program(self) -> Program:
         if not self.problems and not self._waypoints:
-            self.problems.append(Problem(self.file, "", "no move with constants", "give a program that moves"))
+            self.problems.append(
+                Problem(self.file, "", "no move with constants", "give a program that moves")
+            )
         if self.problems:
             raise InputError(self.problems)
         remarks = [
@@ -246,4 +262,3 @@ def _pose(value: PoseValue) -> ToolPose:
     except ValueError as error:
         raise NotConstant(str(error)) from error
     return ToolPose((x, y, z), (w, i, j, k))
-

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +12,7 @@ from seerob.errors import InputError
 
 if TYPE_CHECKING:
     from seerob.emulators.motions import Motion
-    from seerob.source import Target
+    from seerob.source import Opened, Target
 
 
 def target_of(robot: str, *, joints: int | None = None, whose: str = "") -> Target:
@@ -65,14 +67,69 @@ def read(path: Path, target: Target) -> Motion:
     Raises:
         InputError: The file is missing or wrong, or the robot cannot do what it says.
     """
-    from seerob.emulators.motions import played
-    from seerob.samples import JointSample
     from seerob.sources.csv import Csv
     from seerob.sources.excel import Excel
     from seerob.tables.candidates import WORKBOOKS
 
     kind = Excel if path.suffix.lower() in WORKBOOKS else Csv
-    opened = kind(robot=target.name, file=path.name).open(path.parent, target)
+    return _played(kind(robot=target.name, file=path.name).open(path.parent, target))
+
+
+def _played(opened: Opened) -> Motion:
+    from seerob.emulators.motions import played
+    from seerob.samples import JointSample
+
     samples = [s for s in opened.samples if isinstance(s, JointSample)]
     speeds = [s.qd or (0.0,) * len(s.q) for s in samples]
     return played([s.t for s in samples], [s.q for s in samples], speeds)
+
+
+CALM = {
+    "joint_speed": 0.5,
+    "joint_acceleration": 1.0,
+    "joint_jerk": 10.0,
+    "tool_speed": 0.1,
+    "tool_acceleration": 0.5,
+    "tool_jerk": 5.0,
+}
+"""What an emulated controller does where its waypoints do not say [rad/s, m/s and their derivatives]."""
+
+
+def add_motion(sub: argparse.ArgumentParser) -> None:
+    """Arguments that say what it plays."""
+    what = sub.add_mutually_exclusive_group()
+    what.add_argument("--file", type=Path, help="motion to play: a table with joint columns (.csv, .xlsx)")
+    text = "waypoints to go through, timed here: .script, .urp, .toml, .yaml, .csv, .xlsx"
+    what.add_argument("--waypoints", type=Path, help=text)
+
+
+def motion_of(options: argparse.Namespace, target: Target, home: Sequence[float]) -> tuple[Motion, str]:
+    """What it plays, and that in words.
+
+    Args:
+        options: With those of `add_motion`.
+        target: The robot.
+        home: What it swings about when nothing is given, and where it stands before waypoints that
+            begin with a pose [rad].
+
+    Raises:
+        InputError: The file is missing or wrong, or the robot cannot do what it says.
+    """
+    from seerob.emulators.motions import swing
+
+    if options.waypoints is not None:
+        return _through(options.waypoints, target, home), f"through the waypoints of {options.waypoints}"
+    if options.file is not None:
+        return read(options.file, target), str(options.file)
+    return swing(home), "a calm swing"
+
+
+def _through(path: Path, target: Target, home: Sequence[float]) -> Motion:
+    from seerob.sources.waypoints import Waypoints
+    from seerob.waypoints.reading import read_program
+
+    program = read_program(path, path.name)
+    first = program.waypoints[0] if program.waypoints else None
+    start = tuple(home) if first is not None and first.q is None else None
+    source = Waypoints(robot=target.name, file=path.name, start=start, **CALM)
+    return _played(source.open(path.parent, target))

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from seerob.commands import port
 from seerob.commands.emulating import Emulated
-from seerob.commands.emulating._motions import read, target_of
+from seerob.commands.emulating._motions import add_motion, motion_of, target_of
 
 HELP = "a KUKA LBR controller (FRI), which sends to a client"
 HOME = (0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0)
@@ -18,7 +17,7 @@ JOINTS = 7
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     sub.add_argument("--robot", default="iiwa14", help="robot of the library (default: iiwa14)")
-    sub.add_argument("--file", type=Path, help="motion to play: a table with joint columns (.csv, .xlsx)")
+    add_motion(sub)
     sub.add_argument("--to", default="127.0.0.1", help="address of the client (default: this machine)")
     sub.add_argument("--port", type=port, default=30200, help="port of the client (default: 30200)")
     sub.add_argument("--edition", choices=("1", "2.5", "2.7"), default="2.7", help="FRI (default: 2.7)")
@@ -32,11 +31,10 @@ def emulated(options: argparse.Namespace) -> Emulated:
         InputError: No such robot, or a motion that it cannot do.
     """
     from seerob.emulators.fri import FriServer
-    from seerob.emulators.motions import swing
     from seerob.protocols.fri import Edition
 
     target = target_of(options.robot, joints=JOINTS, whose="an LBR")
-    motion = swing(HOME) if options.file is None else read(options.file, target)
+    motion, what = motion_of(options, target, HOME)
     server = FriServer(
         motion,
         to=(options.to, options.port),
@@ -44,5 +42,4 @@ def emulated(options: argparse.Namespace) -> Emulated:
         edition=Edition(options.edition),
         period=1e-3 * options.period,
     )
-    what = "a calm swing" if options.file is None else str(options.file)
     return Emulated(server, f"{target.name}, {what}", f"{options.host}, to {options.to}:{options.port}")

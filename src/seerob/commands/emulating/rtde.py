@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from seerob.commands import port
 from seerob.commands.emulating import Emulated
-from seerob.commands.emulating._motions import read, target_of
+from seerob.commands.emulating._motions import add_motion, motion_of, target_of
+from seerob.errors import InputError
 
 if TYPE_CHECKING:
     from seerob.emulators.rtde import RtdeServer
+    from seerob.protocols.ur_primary import Kinematics
 
 HELP = "a Universal Robots controller (RTDE)"
 HOME = (0.0, -1.2, 1.4, -1.5, -1.5, 0.0)
@@ -22,8 +23,12 @@ JOINTS = 6
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     sub.add_argument("--robot", default="ur10", help="robot of the library whose limits hold (default: ur10)")
-    sub.add_argument("--file", type=Path, help="motion to play: a table with joint columns (.csv, .xlsx)")
+    add_motion(sub)
     sub.add_argument("--port", type=port, default=30004, help="port; 0 is any free one (default: 30004)")
+    sub.add_argument("--calibration", type=Path, help="kinematics it says it has: a file of seerob probe")
+    sub.add_argument(
+        "--primary-port", type=port, default=30011, help="port where it says them (default: 30011); 0 is any"
+    )
 
 
 def emulated(options: argparse.Namespace) -> Emulated:
@@ -32,11 +37,26 @@ def emulated(options: argparse.Namespace) -> Emulated:
     Raises:
         InputError: No such robot, or a motion that it cannot do.
     """
-    from seerob.emulators.motions import swing
     from seerob.emulators.rtde import RtdeServer
 
     target = target_of(options.robot, joints=JOINTS, whose="a Universal Robots arm")
-    motion = swing(HOME) if options.file is None else read(options.file, target)
-    server: RtdeServer = RtdeServer(motion, host=options.host, port=options.port)
-    what = "a calm swing" if options.file is None else str(options.file)
+    motion, what = motion_of(options, target, HOME)
+    server: RtdeServer = RtdeServer(
+        motion,
+        host=options.host,
+        port=options.port,
+        kinematics=None if options.calibration is None else _kinematics(options.calibration),
+        primary_port=options.primary_port,
+    )
     return Emulated(server, f"{target.name}, {what}", f"{options.host}:{options.port}")
+
+
+def _kinematics(path: Path) -> Kinematics:
+    from seerob.model_io.calibration import read_calibration
+    from seerob.protocols.ur_primary import Kinematics
+
+    try:
+        found = read_calibration(path.read_bytes(), str(path))
+    except OSError as error:
+        raise InputError.at(path, "", f"cannot be read: {error.strerror}", "give another file") from error
+    return Kinematics(found.theta, found.a, found.d, found.alpha, found.checksum or (0,) * 6)

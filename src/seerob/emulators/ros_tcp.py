@@ -1,0 +1,151 @@
+"""Both sides of Unity's ROS-TCP wire: an endpoint with a robot, and a Unity project that plays one."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable, Mapping
+
+from seerob.emulators.background import LoopEmulator
+from seerob.emulators.motions import Motion
+from seerob.emulators.rosbridge import JOINT_STATES, Says, states_of
+from seerob.protocols import ProtocolError, ros_tcp
+from seerob.protocols.ros_messages import Content, ros1_name, same_type
+from seerob.protocols.ros_serialised import Edition, encode, store
+from seerob.protocols.ros_tcp import Splitter
+
+EPOCH = 1_700_000_000.0
+"""What the robot's clock begins at [s]."""
+PAUSE = 0.02
+"""Before Unity tries again to connect [s]."""
+LATE = 0.5
+"""Time that is not made up for when this machine was too slow [s]."""
+
+
+class _Playing(LoopEmulator):
+    """A robot's messages on a grid of time.
+
+    Args:
+        motion: What the robot does.
+        names: Of its joints, as ROS calls them.
+        host: Address to listen on, or to connect to.
+        port: Of the endpoint.
+        edition: Of ROS.
+        rate: Messages per second [Hz].
+        more: What is published beside the joint states, by topic.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        names: tuple[str, ...],
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        edition: Edition = Edition.ROS1,
+        rate: float = 100.0,
+        more: Mapping[str, tuple[Content, Says]] | None = None,
+    ) -> None:
+        super().__init__()
+        self.host, self.port, self.edition, self.rate, self.epoch = host, port, edition, rate, EPOCH
+        states = (Content.JOINT_STATE, states_of(motion, names, EPOCH))
+        self.topics: dict[str, tuple[Content, Says]] = {JOINT_STATES: states, **(more or {})}
+        self._begun = 0.0
+
+    async def play(self, writer: asyncio.StreamWriter, wanted: set[str]) -> None:
+        """Send what is wanted until the other side has gone; the set may change meanwhile."""
+        k = int((time.monotonic() - self._begun) * self.rate) + 1
+        while not writer.is_closing():
+            late = time.monotonic() - self._begun - k / self.rate
+            if late < 0:
+                await asyncio.sleep(-late)
+            elif late > LATE:
+                k += int(late * self.rate)
+            for topic in sorted(wanted):
+                content, says = self.topics[topic]
+                writer.write(ros_tcp.pack(topic, encode(content, says(k / self.rate), self.edition)))
+            await writer.drain()
+            k += 1
+
+
+class RosTcpEndpoint(_Playing):
+    """An endpoint beside a robot's ROS: sends what is subscribed."""
+
+    async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
+        """Listen, and serve whoever connects."""
+        store(self.edition)
+        server = await asyncio.start_server(self._welcome, self.host, self.port)
+        self.port = server.sockets[0].getsockname()[1]
+        self._begun = time.monotonic()
+        ready()
+        await over.wait()
+        server.close()
+
+    async def _welcome(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        splitter, wanted = Splitter(), set[str]()
+        sending = asyncio.create_task(self._send(writer, wanted))
+        try:
+            writer.write(ros_tcp.handshake(self.edition))
+            while data := await reader.read(1 << 16):
+                for frame in splitter.feed(data):
+                    if frame.destination == "__subscribe":
+                        self._subscribe(writer, frame.fields(), wanted)
+                    elif frame.destination == "__topic_list":
+                        types = [ros1_name(content.message_type) for content, _ in self.topics.values()]
+                        said = {"topics": list(self.topics), "types": types}
+                        writer.write(ros_tcp.command("topic_list", said))
+        except (OSError, ProtocolError, asyncio.CancelledError):
+            pass  # the client left, or the server stops: asyncio would log what is no mistake
+        finally:
+            sending.cancel()
+            writer.transport.abort()
+
+    async def _send(self, writer: asyncio.StreamWriter, wanted: set[str]) -> None:
+        with contextlib.suppress(OSError):
+            await self.play(writer, wanted)
+
+    def _subscribe(self, writer: asyncio.StreamWriter, said: dict[str, object], wanted: set[str]) -> None:
+        topic, name = str(said.get("topic", "")), str(said.get("message_name", ""))
+        if topic in self.topics and same_type(name, self.topics[topic][0].message_type):
+            wanted.add(topic)
+        else:
+            text = f"Failed to resolve message name: {name[:100]} on {topic[:100]}"
+            writer.write(ros_tcp.command("error", {"text": text}))
+
+
+class UnityProject(_Playing):
+    """A Unity project that publishes a robot's joints: connects to an endpoint, again and again."""
+
+    async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
+        """Connect and publish."""
+        store(self.edition)
+        self._begun = time.monotonic()
+        ready()
+        ended = asyncio.ensure_future(over.wait())
+        while not over.is_set():
+            task = asyncio.ensure_future(self._session())
+            await asyncio.wait({task, ended}, return_when=asyncio.FIRST_COMPLETED)
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+            if not over.is_set():
+                await asyncio.sleep(PAUSE)
+
+    async def _session(self) -> None:
+        writer: asyncio.StreamWriter | None = None
+        try:
+            reader, writer = await asyncio.open_connection(self.host, self.port)
+            splitter = Splitter()
+            while not (frames := splitter.feed(await reader.read(1 << 16))):
+                if reader.at_eof():
+                    return
+            self.edition = ros_tcp.edition_of(frames[0])
+            for topic, (content, _) in self.topics.items():
+                said = {"topic": topic, "message_name": ros1_name(content.message_type), "queue_size": 10}
+                writer.write(ros_tcp.command("publish", {**said, "latch": False}))
+            await self.play(writer, set(self.topics))
+        except (OSError, ProtocolError):
+            pass  # nobody listens yet
+        finally:
+            if writer is not None:
+                writer.transport.abort()

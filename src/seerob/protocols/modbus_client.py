@@ -1,0 +1,148 @@
+"""A Modbus TCP client that only reads: a connection, and answers to blocks of registers."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import AsyncGenerator, Iterable, Sequence
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING, Any
+
+from seerob.protocols import ProtocolError
+from seerob.protocols.modbus import Block, Place, Table, blocks, decode
+
+if TYPE_CHECKING:
+    from pymodbus.client import AsyncModbusTcpClient
+
+PATIENCE = 1.0
+"""With each answer [s]."""
+EXCEPTIONS = {
+    1: "the device does not know the function",
+    2: "the device has no such register",
+    3: "the device refuses the number of registers",
+    4: "the device failed to read it",
+    5: "the device needs longer to answer",
+    6: "the device is busy",
+    10: "the gateway has no way to the device",
+    11: "the device behind the gateway does not answer",
+}
+"""Exception codes of the protocol, in words."""
+
+
+class Refused(ProtocolError):
+    """The device answers that it has not what is asked for."""
+
+
+class Device:
+    """A device that answers.
+
+    Args:
+        client: Connected.
+        number: Of the device behind the address (unit identifier).
+    """
+
+    def __init__(self, client: AsyncModbusTcpClient, number: int) -> None:
+        self._client, self._number = client, number
+        self._split: set[Block] = set()
+
+    async def block(self, block: Block) -> Sequence[int | bool]:
+        """Registers or bits of one block.
+
+        Raises:
+            Refused: The device has them not.
+            TimeoutError: No answer in time.
+            OSError: The connection is gone.
+            ProtocolError: It answers with something else.
+        """
+        from pymodbus.exceptions import ConnectionException, ModbusException
+
+        ask: Any = {
+            Table.HOLDING: self._client.read_holding_registers,
+            Table.INPUT: self._client.read_input_registers,
+            Table.COIL: self._client.read_coils,
+            Table.DISCRETE: self._client.read_discrete_inputs,
+        }[block.table]
+        try:
+            answer = await ask(block.first, count=block.count, device_id=self._number)
+        except ConnectionException as error:
+            raise ConnectionError("the device closed the connection") from error
+        except ModbusException as error:
+            if not self._client.connected:
+                raise ConnectionError("the device closed the connection") from error
+            raise TimeoutError(f"no answer in {PATIENCE:g} s") from error
+        if answer.isError():
+            code = int(getattr(answer, "exception_code", 0))
+            raise Refused(EXCEPTIONS.get(code, f"exception {code}"))
+        found: Sequence[int | bool] = answer.bits if block.table.bits else answer.registers
+        if len(found) < block.count:
+            raise ProtocolError(f"{len(found)} values where {block.count} were asked for")
+        return found
+
+    async def read(self, wanted: dict[str, Place]) -> dict[str, int | float | bool | Refused]:
+        """Values by name; where the device refuses one, why.
+
+        A block that is refused is asked for value by value from then on: one wrong address must not
+        take its neighbours with it.
+
+        Raises:
+            OSError: The connection is gone, or no answer in time.
+            ProtocolError: It answers with something else.
+        """
+        found: dict[str, int | float | bool | Refused] = {}
+        for block in blocks(wanted.values()):
+            inside = {name: place for name, place in wanted.items() if block.covers(place)}
+            if block not in self._split:
+                try:
+                    found |= take(block, await self.block(block), inside)
+                except Refused as error:
+                    if len(inside) == 1:
+                        found |= dict.fromkeys(inside, error)
+                        continue
+                    self._split.add(block)
+            if block in self._split:
+                for name, place in inside.items():
+                    single = Block(place.table, place.at, place.type.count)
+                    try:
+                        found |= take(single, await self.block(single), {name: place})
+                    except Refused as error:
+                        found[name] = error
+        return found
+
+
+def take(
+    block: Block, words: Sequence[int | bool], wanted: dict[str, Place]
+) -> dict[str, int | float | bool]:
+    """Values of places that lie in a block."""
+    starts = {name: place.at - block.first for name, place in wanted.items()}
+    return {
+        name: decode(place, words[starts[name] : starts[name] + place.type.count])
+        for name, place in wanted.items()
+    }
+
+
+@asynccontextmanager
+async def connect(host: str, port: int, number: int) -> AsyncGenerator[Device, None]:
+    """A connection, until the block ends.
+
+    Args:
+        host: Name or address.
+        port: 502 of most devices.
+        number: Of the device (unit identifier).
+
+    Raises:
+        OSError: There is no connection.
+    """
+    from pymodbus.client import AsyncModbusTcpClient
+
+    logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)
+    client = AsyncModbusTcpClient(host, port=port, timeout=PATIENCE, retries=0, reconnect_delay=0)
+    try:
+        if not await client.connect():
+            raise ConnectionError("no connection")
+        yield Device(client, number)
+    finally:
+        client.close()
+
+
+def covered(found: Iterable[Block], place: Place) -> bool:
+    """Whether one of the blocks has a place."""
+    return any(block.covers(place) for block in found)

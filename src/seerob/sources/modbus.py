@@ -1,0 +1,80 @@
+"""Variables of PLCs and machines through Modbus TCP: asked again and again."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncGenerator
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+import msgspec
+from msgspec import Meta
+
+from seerob.dictionary import Variable
+from seerob.errors import InputError, Problem
+from seerob.protocols import modbus
+from seerob.protocols.modbus import Place
+from seerob.protocols.modbus_client import Refused, connect
+from seerob.quantities import Seconds
+from seerob.snapshot import Finding
+from seerob.source import Opened, Target
+from seerob.sources._variables import Change, VariablesSource
+
+
+class Modbus(VariablesSource, frozen=True, kw_only=True):
+    """Variables of a PLC or machine through Modbus TCP."""
+
+    by_exception: ClassVar[bool] = False
+
+    host: str
+    """Name or address of the device."""
+    port: Annotated[int, Meta(ge=1, le=65535)] = modbus.PORT
+    device: Annotated[int, Meta(ge=0, le=255)] = 1
+    """Number of the device behind that address (unit identifier); often 1 or 255."""
+    every: Seconds = 0.1
+    """Interval between questions [s]."""
+
+    def period(self) -> float:
+        """Interval between samples that is expected [s]."""
+        return self.every
+
+    def open(self, folder: Path, target: Target | None) -> Opened:
+        """Understand every address, and look whether the device is there.
+
+        Raises:
+            InputError: With every address that cannot be understood.
+        """
+        problems = []
+        for variable in () if target is None else target.variables:
+            try:
+                msgspec.convert(variable.address, Place)
+            except msgspec.ValidationError as error:
+                remedy = 'write { table = "holding", at = 128, type = "i16" }'
+                problems.append(Problem(f"modbus {self.host}", f"{variable.name}.address", str(error), remedy))
+        if problems:
+            raise InputError(problems)
+        return VariablesSource.open(self, folder, target)
+
+    async def ask(self) -> tuple[Finding, ...]:
+        """Connect once: the protocol has no question for what a device is."""
+        async with connect(self.host, self.port, self.device):
+            text = f"variables asked from {self.host}:{self.port} every {self.every:g} s"
+            return (Finding(level="note", subject=self.name or "modbus", text=text),)
+
+    async def changes(
+        self, variables: tuple[Variable, ...], folder: Path
+    ) -> AsyncGenerator[tuple[Change, ...], None]:
+        """Every variable, asked again and again."""
+        wanted = {v.name: msgspec.convert(v.address, Place) for v in variables}
+        clock = asyncio.get_running_loop()
+        async with connect(self.host, self.port, self.device) as device:
+            due = clock.time()
+            while True:
+                found = await device.read(wanted)
+                yield tuple(
+                    Change(name, None, doubt=str(value)) if isinstance(value, Refused) else Change(name, value)
+                    for name, value in found.items()
+                )
+                # What was asked late is not made up for.
+                due = max(due + self.every, clock.time())
+                await asyncio.sleep(due - clock.time())

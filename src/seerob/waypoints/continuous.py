@@ -1,0 +1,194 @@
+"""Waypoints into one continuous motion: which joint positions they are, pieces between them, their timing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from seerob.errors import InputError, Problem
+from seerob.trajectory import MAX_SAMPLES, Trajectory
+from seerob.transforms import Array, rotation_from_wxyz
+from seerob.waypoints.arm import Arm
+from seerob.waypoints.blending import Leg, meet, rounded
+from seerob.waypoints.branches import Branch
+from seerob.waypoints.goals import Goals
+from seerob.waypoints.pieces import SINGULAR, Piece, joint_line, tool_way
+from seerob.waypoints.timing import Limits, Profile, profile
+from seerob.waypoints.waypoint import Program, Waypoint
+
+NO_BLEND = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wish:
+    """What the program does not say itself; None where nobody said it."""
+
+    joint_speed: float | None = None
+    """Of the leading joint [rad/s or m/s]."""
+    joint_acceleration: float | None = None
+    joint_jerk: float | None = None
+    tool_speed: float | None = None
+    """[m/s]"""
+    tool_acceleration: float | None = None
+    tool_jerk: float | None = None
+    period: float = 0.008
+    """Of the samples [s]."""
+    start: tuple[float, ...] | None = None
+    """Where the robot stands before the first waypoint [rad or m]."""
+    branch: Branch | None = None
+    """Of poses that a joint move goes to; the one nearest to where the robot is when not given."""
+
+
+@dataclass(frozen=True, eq=False)
+class Continuous:
+    """A motion through waypoints."""
+
+    trajectory: Trajectory
+    at: tuple[Array, ...]
+    """Joint positions of each waypoint [rad or m]."""
+    remarks: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = field(default=())
+    """What may differ on a controller, or was changed."""
+
+
+def continuous(
+    program: Program, arm: Arm, wish: Wish, *, speed_limits: tuple[float | None, ...]
+) -> Continuous:
+    """A continuous motion through all waypoints.
+
+    Args:
+        program: Waypoints, poses in the arm's base.
+        arm: The robot.
+        wish: Speeds and the like that the program does not give.
+        speed_limits: Of the joints [rad/s or m/s]; None where unknown. Linear moves that need more are
+            slowed as a whole, and said.
+
+    Raises:
+        InputError: With every limit that nobody gave, or the first waypoint that cannot be reached.
+    """
+    _complete(program, wish)
+    goals = Goals(program, arm, start=wish.start, branch=wish.branch)
+    legs: list[Leg] = []
+    doubts: list[str] = []
+    remarks: list[str] = []
+    rests = 0.0
+    limits = np.array([np.inf if v is None else v for v in speed_limits])
+    for k, (before, waypoint, q) in enumerate(goals.steps()):
+        piece = _piece(program, arm, before, waypoint, q)
+        if piece is None:
+            if legs:
+                legs[-1].pause += waypoint.pause
+            else:
+                rests += waypoint.pause
+            continue
+        goals.reached(piece.q[-1])
+        leg = Leg(piece, _limits(waypoint, wish, piece), waypoint.shown, waypoint.duration, waypoint.pause)
+        _slowed(leg, limits, doubts)
+        if piece.least < SINGULAR:
+            doubts.append(
+                f"{waypoint.shown}: near a singularity at {100 * piece.least_at:.0f} % of the way (least "
+                f"singular value {piece.least:.2g}): joints turn fast there, and controllers differ"
+            )
+        if piece.turning:
+            remarks.append(f"{waypoint.shown}: the tool only turns; its speed is taken as rad/s")
+        legs.append(leg)
+        leg.blend = waypoint.blend > NO_BLEND and k + 1 < len(program.waypoints)
+    legs = rounded(legs, program, arm, doubts)
+    meet(legs)
+    trajectory = _sampled(legs, program.file, wish.period, goals.first, rests)
+    remarks += goals.remarks
+    return Continuous(trajectory, tuple(goals.found), tuple(remarks), (*goals.doubts, *doubts))
+
+
+def _complete(program: Program, wish: Wish) -> None:
+    """InputError with everything that nobody gave."""
+    wanted: dict[str, str] = {}
+    for w in program.waypoints:
+        kind = "tool" if w.move.of_tool else "joint"
+        unit = "m" if w.move.of_tool else "rad"
+        wanted.setdefault(f"{kind}_jerk", f"{unit}/s³")
+        if w.speed is None:
+            wanted.setdefault(f"{kind}_speed", f"{unit}/s")
+        if w.acceleration is None:
+            wanted.setdefault(f"{kind}_acceleration", f"{unit}/s²")
+    missing = [
+        Problem(program.file, key, "nobody gave it", f"give {key} [{unit}] in the source (none is assumed)")
+        for key, unit in wanted.items()
+        if getattr(wish, key) is None
+    ]
+    if not program.waypoints:
+        missing.append(Problem(program.file, "", "no waypoints", "give at least one"))
+    if missing:
+        raise InputError(missing)
+
+
+def _limits(waypoint: Waypoint, wish: Wish, piece: Piece) -> Limits:
+    kind = "tool" if waypoint.move.of_tool else "joint"
+    given = {"speed": waypoint.speed, "acceleration": waypoint.acceleration, "jerk": None}
+    figures = [
+        own if own is not None else float(getattr(wish, f"{kind}_{key}")) for key, own in given.items()
+    ]
+    scale = 1.0 if piece.tool else piece.leading
+    return Limits(*(figure / scale for figure in figures))
+
+
+def _piece(program: Program, arm: Arm, before: Array, waypoint: Waypoint, q: Array) -> Piece | None:
+    if not waypoint.move.of_tool:
+        return joint_line(before, q)
+    if waypoint.pose is not None:
+        rotation, position = rotation_from_wxyz(waypoint.pose.wxyz), np.array(waypoint.pose.position)
+    else:
+        at = arm.posture(q)
+        rotation, position = at.rotation, at.position
+    via = None if waypoint.via is None else np.array(waypoint.via.position)
+    return tool_way(arm, before, rotation, position, via=via, file=program.file, place=waypoint.shown)
+
+
+def _slowed(leg: Leg, limits: Array, doubts: list[str]) -> None:
+    """A move whose joints would be faster than they can is slowed as a whole."""
+    fastest = np.abs(leg.piece.dq).max(axis=0)
+    possible = float(np.min(limits / np.maximum(fastest, 1e-12)))
+    if possible < leg.limits.speed:
+        unit = "m/s" if leg.piece.tool else "rad/s of the leading joint"
+        scale = 1.0 if leg.piece.tool else leg.piece.leading
+        doubts.append(
+            f"{leg.place}: slowed from {leg.limits.speed * scale:.3g} to {possible * scale:.3g} {unit}, which "
+            "the joints' speed limits allow; a controller may stop instead"
+        )
+        leg.limits = Limits(possible, leg.limits.acceleration, leg.limits.jerk)
+
+
+def _timing(leg: Leg, file: str) -> Profile:
+    if not leg.steady:
+        return profile(
+            leg.piece.length, leg.v0, leg.v1, leg.limits, duration=leg.duration, file=file, place=leg.place
+        )
+    v = leg.v0
+    return Profile(leg.piece.length / v, lambda t: (v * t, v))
+
+
+def _sampled(legs: list[Leg], file: str, period: float, first: Array, rests: float) -> Trajectory:
+    timed: list[tuple[float, Profile, Leg]] = []
+    t = rests
+    for leg in legs:
+        timing = _timing(leg, file)
+        timed.append((t, timing, leg))
+        t += timing.duration + leg.pause
+    if t / period > MAX_SAMPLES:
+        raise InputError.at(file, "", f"{t:.0f} s at {period:g} s: too many samples", "give a longer period")
+    if t < 1e-6:
+        raise InputError.at(file, "", "nothing moves", "give waypoints that differ from the start")
+    # Whole periods, and the end.
+    times = np.append(np.arange(np.ceil(t / period - 1e-6)) * period, t)
+    q = np.tile(first, (len(times), 1))
+    qd = np.zeros_like(q)
+    for begin, timing, leg in timed:
+        inside = np.flatnonzero((times >= begin) & (times <= begin + timing.duration))
+        if inside.size:
+            states = np.array([timing.at(x) for x in (times[inside] - begin).tolist()])
+            q[inside], tangent = leg.piece.at(states[:, 0])
+            qd[inside] = tangent * states[:, 1:]
+        later = times > begin + timing.duration
+        q[later], qd[later] = leg.piece.q[-1], 0.0
+    return Trajectory(file=file, t=times, q=q, qd=qd)

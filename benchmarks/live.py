@@ -2,7 +2,7 @@
 
 A UR10 over RTDE, a 7-axis arm over FRI and the variables of a cell over OPC UA at once, each emulated by a
 process of its own, beside a person with distances between all of them. A packet is as old as the kernel of
-this machine says. The peer is the same listeners with no twin beside them: what the machine itself makes late.
+this machine says. The peer is the same listeners with no twin beside them: what this machine makes late.
 
 ``--seconds`` is the length of either part, ``--switch`` how long a thread keeps the interpreter
 [s] instead of what a live run sets, ``--smoke`` a short run without judgement.
@@ -62,8 +62,8 @@ class Post:
         self.lock = threading.Lock()
         self.arrived: dict[tuple[str, int], float] = {}
         self.mailbox: dict[str, list[float]] = defaultdict(list)
-        self.posted: dict[tuple[str, ...], list[float]] = defaultdict(list)
-        self.taken: list[tuple[float, dict[tuple[str, ...], int]]] = []
+        self.posted: dict[tuple[str, int], float] = {}
+        self.taken: list[tuple[float, tuple]] = []
 
     @contextlib.contextmanager
     def watching(self):
@@ -71,13 +71,14 @@ class Post:
         hear, take = live.Listener._take, live.Listening.take
 
         def heard(listener, sample):
-            before, posted = listener._seq, None
+            before = listener._seq
             hear(listener, sample)
             posted = time.monotonic()
             if listener._seq == before:
                 return
             with self.lock:
                 self.arrived[listener.name, before] = sample.t
+                self.posted[listener.name, before] = posted
                 self.mailbox[listener.name].append(posted - sample.t)
 
         def taking(listening):
@@ -93,21 +94,27 @@ class Post:
 
 
 class States:
-    """A writer that notes how old samples are when the State that uses them is there."""
+    """A writer that notes what each State was made from, and when it was there."""
 
-    def __init__(self, post: Post, seconds: float) -> None:
-        self.post, self.end = post, seconds
-        self.ages: dict[str, list[float]] = defaultdict(list)
-        self.newest: list[tuple[float, dict[tuple[str, ...], float]]] = []
-        self.ticks, self.undecided = 0, 0
+    def __init__(self, seconds: float) -> None:
+        self.end = seconds
+        self.ticks: list[tuple[float, tuple]] = []
+        self.undecided, self.over = 0, False
 
     def write(self, snapshot, samples) -> None:
-        self.ticks += 1
+        self.ticks.append((time.monotonic(), samples))
         self.undecided += any(r.verdict == sr.Verdict.UNDECIDED for r in snapshot.results)
-        self.end_reached = snapshot.t >= self.end
+        self.over = snapshot.t >= self.end
 
-    def stop(self) -> bool:
-        return self.end_reached
+    def ages(self, post: Post) -> dict[str, list[float]]:
+        """Between the arrival of samples and the State with its results, by source [s]."""
+        found = defaultdict(list)
+        for instant, samples in self.ticks[1:]:  # the first waits for the beginning
+            for sample in samples:
+                arrived = post.arrived.get((sample.source, sample.seq))
+                if arrived is not None:
+                    found[sample.source].append(instant - arrived)
+        return found
 
     def close(self) -> None: ...
 
@@ -145,6 +152,12 @@ def cell(folder: str, rtde: int, fri: int, opcua: int) -> sr.Station:
     return sr.load(folder)
 
 
+def table(title: str, late: dict[str, list[float]]) -> dict[str, float]:
+    """Print a line per source; the 99th percentile of each [s]."""
+    print(title)
+    return {name: line(f"  {name}", values) for name, values in sorted(late.items())}
+
+
 def line(what: str, late: list[float]) -> float:
     p50, p99, worst = 1e3 * np.percentile(late, (50, 99, 100))
     print(f"{what:<34} {len(late):6d}   p50 {p50:6.2f} ms   p99 {p99:6.2f} ms   worst {worst:6.2f} ms")
@@ -159,7 +172,7 @@ def used_late(post: Post, period: float) -> int:
             if not isinstance(sample, SignalSample):
                 newest[key(sample), sample.source] = sample.seq
         for (_, source), seq in newest.items():
-            following = post.arrived.get((source, seq + 1))
+            following = post.posted.get((source, seq + 1))
             count += following is not None and following < now - period
     return count
 
@@ -185,36 +198,19 @@ def main() -> None:
                 listening.first(5.0)
                 time.sleep(seconds)
         with Post().watching() as post:
-            states = States(post, seconds)
-            begun = len(post.taken)
-            done: list[float] = []
-            write = states.write
-
-            def written(snapshot, samples):
-                done.append(time.monotonic())
-                write(snapshot, samples)
-                used.append(samples)
-
-            used: list = []
-            states.write = written
-            summary = station.run(live=True, writers=[states], stop=states.stop)
+            states = States(seconds)
+            summary = station.run(live=True, writers=[states], stop=lambda: states.over)
     period = station.workstation.engine.tick
-    _ = begun
-    print("packet to mailbox, listeners alone")
-    base = {name: line(f"  {name}", late) for name, late in sorted(alone.mailbox.items())}
-    print("packet to mailbox, beside the twin")
-    own = {name: line(f"  {name}", late) for name, late in sorted(post.mailbox.items())}
-    print("packet to State and results")
-    ages = defaultdict(list)
-    for instant, samples in zip(done[1:], used[1:], strict=True):
-        for sample in samples:
-            if (arrived := post.arrived.get((sample.source, sample.seq))) is not None:
-                ages[sample.source].append(instant - arrived)
-    state = {name: line(f"  {name}", late) for name, late in sorted(ages.items())}
-    for name in own:
-        print(f"{name}: p99 {own[name] / base[name]:.2f} x that of the listener alone")
-    print(f"tick {1e3 * period:g} ms, {states.ticks} ticks, {states.undecided} with something undecided")
-    print(f"slipped {summary.slipped:.3f} s; used late: {used_late(post, period)}")
+    base = table("packet to mailbox, listeners alone", alone.mailbox)
+    own = table("packet to mailbox, beside the twin", post.mailbox)
+    state = table("packet to State and results", states.ages(post))
+    for name, late in own.items():
+        print(f"{name}: p99 {late / base[name]:.2f} x that of the listener alone")
+    print(
+        f"tick {1e3 * period:g} ms, {len(states.ticks)} ticks, {states.undecided} with something undecided, "
+        f"slipped {summary.slipped:.3f} s"
+    )
+    print(f"older than a tick and used while a newer one was there: {used_late(post, period)}")
     for what, found, budget in (
         ("packet to mailbox", max(own.values()), MAILBOX),
         ("packet to State", max(state.values()), period + BEYOND_TICK),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import logging
+import sys
 import threading
 import time
 
@@ -12,7 +13,7 @@ import msgspec
 import pytest
 
 from seerob.errors import InputError, SeerobError
-from seerob.live import FIRST_PAUSE, LONGEST_PAUSE, MARGIN, Listener, Listening, LiveSource, delay_of
+from seerob.live import FIRST_PAUSE, LONGEST_PAUSE, MARGIN, PROMPT, Listener, Listening, LiveSource, delay_of
 from seerob.real_time import Clock, hear, require_recorded
 from seerob.samples import JointSample, SignalSample
 from seerob.source import Source
@@ -230,6 +231,13 @@ def test_a_run_begins_without_a_source_that_is_not_there():
     with Listening([(Made(script=script), None)]) as listening:
         until(lambda: listening.listeners[0].statistics().count)
         assert listening.first(patience=0.05) == ()
+
+
+def test_a_live_run_waits_for_no_thread_for_long_and_leaves_that_as_it_was():
+    before = sys.getswitchinterval()
+    with Listening([]):
+        assert sys.getswitchinterval() <= PROMPT < before
+    assert sys.getswitchinterval() == before
 
 
 def test_a_live_source_cannot_loop_and_its_time_out_is_longer_than_its_delay():

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from seerob.human.body_area import words
 from seerob.human.body_areas import body_area, in_front
 from seerob.human.skeleton import BONES
 from seerob.human.skin import body_region
-from seerob.model import Frame, Model
+from seerob.model import Model
 from seerob.people import size
 from seerob.state import State
 from seerob.transforms import Array
@@ -20,12 +18,12 @@ class BodyPlaces:
     def __init__(self, model: Model) -> None:
         people = {human.name: human for human in model.workstation.humans}
         self._names = [each.name for each in model.bodies]
-        self._bones: dict[int, tuple[str, str, Frame]] = {}
-        """Body → person, bone, frame."""
+        self._bones: dict[int, tuple[str, str]] = {}
+        """Body → person, bone."""
         for index, each in enumerate(model.bodies):
             person, _, bone = each.name.rpartition("/")
             if each.role == "human" and person in people and bone in BONES:
-                self._bones[index] = person, bone, Frame(each.name, each.mj, np.eye(4))
+                self._bones[index] = person, bone
         self._sizes = {name: size(human) for name, human in people.items()}
         self._hands = {name: human.hand for name, human in people.items()}
 
@@ -39,9 +37,12 @@ class BodyPlaces:
         """
         if index not in self._bones:
             return self._names[index]
-        person, bone, frame = self._bones[index]
-        rotation, position = state.pose(frame)
-        local = rotation.T @ (point - position)
+        named: str = state.once(("place", index, point.tobytes()), lambda: self._named(state, index, point))
+        return named
+
+    def _named(self, state: State, index: int, point: Array) -> str:
+        person, bone = self._bones[index]
+        local = (point - state.positions[index]) @ state.rotations[index]
         area = body_area(bone, local, body=self._sizes[person], hand=self._hands[person])
         return words(
             self._names[index],

@@ -3,7 +3,7 @@ r"""Where a part of a person could be clamped: a gap that closes below the body 
 A gap :math:`g` between a moving part of a robot and another surface clamps a body part of the
 thickness :math:`D` while it closes and is, or by the next instant may be, no wider than it:
 
-.. math:: \dot g < 0, \qquad g_n + \min(0, g_n - g_{n-1}) \le D
+.. math:: \dot g < 0, \qquad g_n + (g_n - g_{n-1}) \le D
 
 Causal, so that a live run and a recording say the same. What was before the first instant is not
 known: a gap that is narrow there counts as closing, unless nothing is left of it. Gaps of
@@ -55,12 +55,12 @@ def clamps(
     gaps = np.asarray(gaps, float)
     earlier, when, widest = np.full_like(gaps[:1], np.inf), -np.inf, gaps[:1]
     if before is not None:
-        when, earlier, widest = before[0], before[1][None], np.maximum(before[2], gaps[0])[None]
+        when, earlier, widest = before[0], before[1][None], before[2][None]
     previous = np.concatenate([earlier, gaps[:-1]])
     elapsed = np.diff(np.concatenate([[when], t]))[:, None]
     change = gaps - previous
     closing = np.where(np.isinf(previous), gaps > 0, change < -STILL * elapsed)
-    ahead = gaps + np.where(np.isfinite(change), np.minimum(change, 0.0), 0.0)
+    ahead = gaps + np.where(np.isfinite(change), change, 0.0)
     seen = np.maximum.accumulate(np.concatenate([widest, gaps]), axis=0)[1:]
     wide = opened[None, :, None] | (seen[..., None] >= thickness)
     return np.asarray(closing[..., None] & (ahead[..., None] <= thickness) & wide)

@@ -22,6 +22,7 @@ COMMANDS = (
     "report",
     "swept",
     "permissible",
+    "plan",
     "kinds",
     "schema",
     "emulate",

@@ -22,7 +22,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seerob.kernels.axes import mobility
+from seerob.kernels.axes import mobility, reciprocals
 from seerob.transforms import Array
 
 
@@ -74,8 +74,7 @@ def mass_of_rows(w: Array, M: Array) -> Array:
     found = np.empty((1, len(w), len(w)))
     if not mobility(np.ascontiguousarray(w)[None], np.ascontiguousarray(M)[None], found):
         raise np.linalg.LinAlgError("a mass matrix is not positive definite")
-    with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / np.maximum(found[0].diagonal(), 0.0))
+    return reciprocals(found[0].diagonal().copy())
 
 
 def impact_energy(mu: ArrayLike, v: ArrayLike) -> Array:

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob import collision
 from seerob.contact_shape import ContactShape, force_at_pressure
+from seerob.kernels.contact_speeds import permissible_speeds
 from seerob.norms.body_limits import BodyLimits, BodyRegion
 from seerob.snapshot import Input, Origin
 from seerob.tolerances import Spread
@@ -103,18 +103,12 @@ class RegionArrays:
                 shape (b, 2, r).
             clamped: Whether the body part cannot recoil, shape (b, r).
         """
-        k = self.stiffness
-        factor = np.where(clamped, 1.0, self.multiplier)
-        m = np.broadcast_to(np.asarray(m_R, float)[:, None], clamped.shape)
-        mu = np.where(clamped, m, collision.reduced_mass(self.mass, m))
-        F_P = np.where(clamped, forces[:, 1], forces[:, 0])
-        printed = np.where(clamped, np.nan, self.energy)
-        F = factor * self.force
-        v_F = collision.speed_at_force(F, mu, k)
-        v_P = collision.speed_at_force(F_P, mu, k)
-        v_E = collision.speed_at_energy(collision.energy_limit(F, k, printed), mu)
-        v, which = collision.permissible_speed(v_F, v_P, v_E)
-        return Speeds(v, which, v_F, v_P, v_E, mu)
+        return Speeds(
+            *permissible_speeds(
+                np.ascontiguousarray(m_R, float), forces, clamped, self.force, self.multiplier,
+                self.stiffness, self.mass, self.energy,
+            )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ SENSITIVE = "Larynx, eyes and ears"
 FEET = "Feet"
 """In no row of the table; no limit is available."""
 REGIONS = (*body_limits.REGIONS, SENSITIVE, FEET)
+_WITHIN_CAP = int(Reach.WITHIN_CAP)
 FORBIDDEN = frozenset({*body_limits.FORBIDDEN, SENSITIVE})
 
 
@@ -94,7 +95,7 @@ class Person:
         """
         state.require(*self._gap.carriers)
         found = state.distances(self._query, Per.WHETHER)
-        close: NDArray[np.bool_] = np.asarray(found.reach == Reach.WITHIN_CAP).reshape(self._shape)
+        close: NDArray[np.bool_] = np.asarray(found.reach == _WITHIN_CAP).reshape(self._shape)
         self._close = np.asarray(close.any(axis=0))
         near: NDArray[np.bool_] = close @ self._member
         if speed is not None:

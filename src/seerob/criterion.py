@@ -22,6 +22,9 @@ EvaluateMany = Callable[["States"], "Answers"]
 """The same of many instants; may raise `Undecided`, of all of them."""
 
 
+# To ask an enumeration for a member takes longer than all the rest of a judgement.
+_WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+
 _seconds = Meta(gt=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})
 
 
@@ -80,24 +83,25 @@ def judge(value: float, limit: float | None, *, at_most: bool = True) -> Verdict
     A value that is not a number is UNDECIDED, whatever the limit.
     """
     if math.isnan(value):
-        return Verdict.UNDECIDED
+        return _UNDECIDED
     if limit is None:
         return None
     within = value <= limit if at_most else value >= limit
-    return Verdict.WITHIN if within else Verdict.EXCEEDED
+    return _WITHIN if within else _EXCEEDED
 
 
 def judge_interval(
     interval: tuple[float, float], limit: float | None, *, at_most: bool = True
 ) -> Verdict | None:
     """Verdict when the true value lies in ``interval``: UNDECIDED when the limit lies inside it."""
-    low, high = (judge(end, limit, at_most=at_most) for end in interval)
-    return low if low == high else Verdict.UNDECIDED
+    low, high = interval
+    verdict = judge(low, limit, at_most=at_most)
+    return verdict if verdict is judge(high, limit, at_most=at_most) else _UNDECIDED
 
 
 def worst(verdicts: list[Verdict | None]) -> Verdict | None:
     """The verdict of a whole: EXCEEDED before UNDECIDED before WITHIN before none."""
-    for verdict in (Verdict.EXCEEDED, Verdict.UNDECIDED, Verdict.WITHIN):
+    for verdict in (_EXCEEDED, _UNDECIDED, _WITHIN):
         if verdict in verdicts:
             return verdict
     return None

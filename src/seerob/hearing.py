@@ -39,6 +39,8 @@ class Hearing:
     """When the physics last lost it, so that it was put back [s]."""
     saturated: bool = False
     """A joint's torque limit was reached: the twin cannot do what was heard."""
+    coarse: str = ""
+    """Why what is heard is too coarse for energies and forces; empty when it is not."""
 
     def forget(self, t: float) -> None:
         """Drop what is older than the last sample at or before ``t`` [s]."""

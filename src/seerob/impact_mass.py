@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from seerob import collision
+from seerob.kernels.speed import directions
 from seerob.model import Mechanism, Model
 from seerob.state import State
 from seerob.transforms import Array
@@ -50,12 +51,9 @@ def masses_along_motion(
         Undecided: Not heard, or a mass that nobody gave.
     """
     M = state.mass_matrix(robot) if M is None else M
-    masses = np.full(len(bodies), np.nan)
     _, points, velocities = state.fastest_points(tuple(bodies))
-    speeds = np.sqrt(np.einsum("ij,ij->i", velocities, velocities))
-    moving = speeds > standstill
-    if moving.any():
-        u = velocities / np.where(moving, speeds, 1.0)[:, None]
-        rows = state.along(tuple(bodies), robot, points, u)
-        masses[moving] = collision.mass_of_rows(rows[moving], M)
-    return masses
+    some, u = directions(velocities, standstill)
+    if not some:
+        return np.full(len(bodies), np.nan)
+    rows = state.along(tuple(bodies), robot, points, u)
+    return np.where(np.isnan(u[:, 0]), np.nan, collision.mass_of_rows(rows, M))

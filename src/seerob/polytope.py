@@ -21,7 +21,7 @@ from itertools import combinations
 import numpy as np
 
 from seerob.kernels import polytope as kernel
-from seerob.kernels.axes import principal_axes
+from seerob.kernels.contact_forces import zero_moment_set
 from seerob.transforms import Array
 
 SINGULAR = 1e-9
@@ -74,33 +74,12 @@ def zero_moment(J_v: Array, low: Array, high: Array) -> Polytope:
     Raises:
         ValueError: Bounds that are not finite or are inverted.
     """
-    J_v, low, high = _checked(J_v, low, high)
-    possible, N, below, above = kernel.unit_slabs(np.ascontiguousarray(J_v), low, high)
-    free = _undriven(N)
-    if not possible:
-        return _nothing()
-    # Across the free directions it is a polygon, a stretch or a point: one plane more for each.
-    planes = free.shape[1]
-    N = np.vstack([N, free.T])
-    below, above = np.append(below, np.zeros(planes)), np.append(above, np.zeros(planes))
-    n = len(N)
-    if planes == 3:
-        V = np.zeros((1, 3))
-    else:
-        room = 4 * n * (n - 1)
-        V = np.empty((room, 3))
-        V = V[: max(kernel.corners(N, below, above, V), 0)]
-    if not len(V):
-        return _nothing()
-    size = float(np.abs(V).max())
-    V = kernel.merged(V, SAME * size)
-    driven = n - planes
-    return Polytope(
-        corners=V,
-        triangles=kernel.faces(N, below, above, V, 10 * SAME * size),
-        free=free,
-        inscribed=float(kernel.inscribed(below[:driven], above[:driven])),
-    )
+    J_v = np.ascontiguousarray(J_v, float)
+    bounds = np.asarray(low, float), np.asarray(high, float)
+    proper, V, triangles, free, inscribed = zero_moment_set(J_v, *bounds, SINGULAR, SAME)
+    if not proper:
+        _checked(J_v, *bounds)
+    return Polytope(V, triangles, free, inscribed) if len(V) else _nothing()
 
 
 def free_moment(J: Array, low: Array, high: Array) -> Polytope:
@@ -165,16 +144,6 @@ def _checked(J: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
 
 def _nothing() -> Polytope:
     return Polytope(np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros((3, 0)), float("nan"))
-
-
-def _undriven(N: Array) -> Array:
-    """Orthonormal columns perpendicular to every normal, shape (3, d)."""
-    if not len(N):
-        return np.eye(3)
-    sigma, axes = np.empty((1, 3)), np.empty((1, 3, 3))
-    principal_axes(N.T[None].copy(), sigma, axes)
-    driven = int((sigma[0] > SINGULAR * sigma[0, 0]).sum())
-    return np.asarray(axes[0][:, driven:])
 
 
 def _corners_of_section(N: Array, low: Array, high: Array) -> Array:

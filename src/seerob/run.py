@@ -276,7 +276,11 @@ def engine_of(model: Model) -> Engine:
             driven[source.target()] = max(timeout, driven.get(source.target(), timeout))
     live = {s.target() for s in model.workstation.sources if isinstance(s, LiveSource)}
     signals, following = signal_timeouts(model)
-    return Engine(model, driven={**following, **driven}, live={*live, *following}, signals=signals)
+    engine = Engine(model, driven={**following, **driven}, live={*live, *following}, signals=signals)
+    for source in model.workstation.sources:
+        if why := source.coarse():
+            engine.state.hearings[source.target()].coarse = why
+    return engine
 
 
 def ticks(

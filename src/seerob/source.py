@@ -87,6 +87,10 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """Name of the robot or human it drives; empty for signals."""
         return ""
 
+    def coarse(self) -> str:
+        """Why what it says is too coarse for energies and forces; empty when it is not."""
+        return ""
+
     def open(self, folder: Path, target: Target | None) -> Opened:
         """Read or connect, and check against the target's limits.
 

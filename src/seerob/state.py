@@ -7,6 +7,7 @@ heard, or has a mass that nobody gave: a stale or guessed number can never be gr
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from typing import Any
 
 import mujoco
@@ -20,7 +21,7 @@ from seerob.hearing import SLACK
 from seerob.hearing import Hearing as Hearing  # noqa: PLC0414
 from seerob.joint_columns import Columns, moving_dofs
 from seerob.kernels.chain import along
-from seerob.kernels.speed import fastest, placed, stacked, velocities
+from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
 from seerob.model import Frame, Gap, Mechanism, Model
 from seerob.signals import Signals
 from seerob.surveying import Surveyor
@@ -162,6 +163,17 @@ class State:
         self.asked.add(VARIABLE + name)
         return self.signals.value(name, self.t)
 
+    def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """What several criteria work out from this state: made by whoever asks first at this tick.
+
+        Args:
+            key: A tuple that begins with what it is, and names all that it depends on but the state.
+            make: How to.
+        """
+        if key not in self._cache:
+            self._cache[key] = make()
+        return self._cache[key]
+
     # -- joints -----------------------------------------------------------------------------
 
     def q(self, mechanism: Mechanism) -> Array:
@@ -186,6 +198,8 @@ class State:
         """
         self.require(mechanism.name)
         hearing = self.hearings[mechanism.name]
+        if hearing.coarse:
+            raise Undecided(f"{mechanism.name}: {hearing.coarse}")
         k = sum(1 for instant, _ in hearing.heard if instant <= self.t + SLACK)
         times = [instant for instant, _ in hearing.heard[max(k - 1, 0) : k + 1]]
         around = [torques for torques in hearing.torques[max(k - 1, 0) : k + 1] if torques is not None]
@@ -200,11 +214,13 @@ class State:
         """Joint-space mass matrix M(q) with tools and workpieces [kg·m², kg·m or kg], shape (n, n).
 
         Raises:
-            Undecided: A mass that nobody gave.
+            Undecided: A mass that nobody gave, or what drives it is too coarse for what a mass is asked for.
         """
         self.require(mechanism.name)
         if mechanism.unknown_masses:
             raise Undecided("; ".join(mechanism.unknown_masses))
+        if why := self.hearings[mechanism.name].coarse:
+            raise Undecided(f"{mechanism.name}: {why}")
         key = ("M", mechanism.name)
         if key not in self._cache:
             if "M" not in self._cache:
@@ -220,9 +236,7 @@ class State:
         """World rotation (3, 3) and position (3,) [m] of a frame."""
         key = ("pose", id(frame))
         if key not in self._cache:
-            rotation = self._xmat[frame.mj].reshape(3, 3)
-            position = self._xpos[frame.mj] + rotation @ frame.body_from_frame[:3, 3]
-            self._cache[key] = rotation @ frame.body_from_frame[:3, :3], position
+            self._cache[key] = carried(self._xmat, self._xpos, frame.mj, frame.body_from_frame)
         rotation, position = self._cache[key]
         return rotation, position
 

@@ -79,5 +79,5 @@ def intervals(distance: Array, S_p: Array, seen: float, span: Spread | None) -> 
         span: Ends of S_p; None when nothing of the stop may be off.
     """
     low, high = (S_p, S_p) if span is None else (span.low, span.high)
-    ends = np.column_stack([distance - seen - (high - S_p), distance + seen + (S_p - low)])
-    return [(float(a), float(b)) for a, b in ends]
+    ends = distance - seen - (high - S_p), distance + seen + (S_p - low)
+    return list(zip(*(end.tolist() for end in ends), strict=True))

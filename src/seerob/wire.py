@@ -22,7 +22,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 import msgspec
 from msgspec import Struct
 
-from seerob import markers, snapshot, verdict
+from seerob import markers, page_messages, snapshot, verdict
 from seerob.errors import InputError
 
 FROM_SERVER = (
@@ -37,7 +37,7 @@ FROM_SERVER = (
 FROM_PAGE = (snapshot.Command, snapshot.Tracking)
 """Messages that a page sends; what has a default may be left out."""
 
-SOURCES = (verdict, markers, snapshot)
+SOURCES = (verdict, markers, snapshot, page_messages)
 """Modules whose types go over the wire; `seerob.snapshot` has the names of all of them."""
 
 FILE = Path(__file__).resolve().parents[2] / "web" / "src" / "wire.ts"
@@ -64,7 +64,10 @@ def schema() -> str:
 
 def _declarations(*, docs: bool) -> Iterator[str]:
     aliases = _aliases()
-    for name, thing in vars(snapshot).items():
+    # In the order of the files: what is said beside the snapshots comes last.
+    beside = vars(page_messages)
+    own = {name: thing for name, thing in vars(snapshot).items() if beside.get(name) is not thing}
+    for name, thing in (own | beside).items():
         if name.startswith("_"):
             continue
         if isinstance(thing, (GenericAlias, UnionType)):

@@ -34,6 +34,7 @@ from seerob.quantities import Metres3 as Metres3  # noqa: PLC0414
 from seerob.quantities import Pose as Pose  # noqa: PLC0414
 from seerob.sensor_tables import Sensor
 from seerob.simple_shape import Shape as Shape  # noqa: PLC0414
+from seerob.target_table import CartesianTarget
 from seerob.task_phase import TaskPhase
 from seerob.trigger_table import Trigger
 
@@ -85,7 +86,7 @@ class Robot(_Table, frozen=True, kw_only=True):
     meshes: str | None = None
     """The maker's description (as ``model``) whose shapes replace the library's envelope."""
     calibration: str | None = None
-    """File with the kinematics of this very robot, as ``seerob probe rtde --calibration`` writes it."""
+    """File with the kinematics of this very robot, as ``seerob probe`` writes it."""
     packages: dict[str, str] = {}
     """Folders of ROS packages that ``package://`` may name."""
     arguments: dict[str, str] = {}
@@ -294,7 +295,7 @@ class Workstation(_Table, frozen=True, kw_only=True):
     zones: str | None = None
     """Zones of a robot controller as more ``[[areas]]``, a TOML or JSON file beside this one."""
     allow_writing: bool = False
-    """Whether ``[[triggers]]`` may write to machines; the command line must allow it too."""
+    """Whether ``[[triggers]]`` and ``[[targets]]`` may write; the command line must allow it too."""
     engine: Engine = Engine()
     robots: tuple[Robot, ...] = ()
     tools: tuple[Tool, ...] = ()
@@ -307,6 +308,7 @@ class Workstation(_Table, frozen=True, kw_only=True):
     phases: tuple[TaskPhase, ...] = ()
     displays: tuple[Display, ...] = ()
     triggers: tuple[Trigger, ...] = ()
+    targets: tuple[CartesianTarget, ...] = ()
     contacts: tuple[Contact, ...] = ()
     sources: tuple[Any, ...] = ()
     """`Source`s, each of the type that its ``kind`` names."""
@@ -335,6 +337,7 @@ TABLES: dict[str, type[Struct]] = {
     "phases": TaskPhase,
     "displays": Display,
     "triggers": Trigger,
+    "targets": CartesianTarget,
     "contacts": Contact,
 }
 """Lists of tables and the type of their entries."""

@@ -50,7 +50,8 @@ DRAWN = ("Arrow", "Box", "Ellipsoid", "Highlight", "Hull", "Label", "Polyline", 
          "Sphere", "Basis", "Input", "InputError", "at", "Undecided", "ValueError", "UnknownName", "Meta",
          "given", "errstate")  # fmt: skip
 """Calls whose arguments no verdict depends on."""
-SPOKEN = ("basis", "subjects", "_markers", "_arrow", "_vector", "_label")
+SPOKEN = ("basis", "subjects", "_markers", "_arrow", "_vector", "_label", "_picture", "_beams", "_line",
+          "hull", "_hidden", "_told", "_limits_given", "_rounded")  # fmt: skip
 """Functions whose result no verdict depends on."""
 
 
@@ -116,12 +117,16 @@ def _choices(node: ast.AST) -> Iterator[ast.AST]:
 
 def _left_alone(node: ast.AST) -> bool:
     if isinstance(node, ast.Call):
-        called = node.func
-        name = called.attr if isinstance(called, ast.Attribute) else getattr(called, "id", "")
-        return name in DRAWN
+        return _called(node) in DRAWN
     if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
         return node.name in SPOKEN
     return isinstance(node, (ast.JoinedStr, ast.Import, ast.ImportFrom, ast.Assert, ast.Raise))
+
+
+def _called(node: ast.Call) -> str:
+    """Name of what is called."""
+    called = node.func
+    return called.attr if isinstance(called, ast.Attribute) else getattr(called, "id", "")
 
 
 def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, str, str]]:
@@ -136,8 +141,13 @@ def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, str, str]]:
             called = isinstance(node, (ast.Call, ast.Lambda))
             if not called and name in ("annotation", "returns", "decorator_list", "args"):
                 continue
-            # Which element of what: a wrong one is no wrong limit.
-            if name == "slice" and isinstance(value, (ast.Constant, ast.Slice, ast.Tuple)):
+            # Which element of what: a wrong one is no wrong limit. A strict zip only guards its author.
+            if name == "slice" and isinstance(value, (ast.Constant, ast.Slice, ast.Tuple, ast.UnaryOp)):
+                continue
+            if isinstance(node, ast.keyword) and node.arg == "strict":
+                continue
+            # Of a new shape: whatever is left.
+            if name == "args" and isinstance(node, ast.Call) and _called(node) == "reshape":
                 continue
             for child in value if isinstance(value, list) else [value]:
                 if isinstance(child, ast.AST):

@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 import types
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,6 +30,8 @@ from mutation.operators import Mutant, mutated
 PACKAGE = Path(inspect.getfile(seerob)).parent
 LEAST = 20
 """Seconds that a mutant may take at least before it counts as one that never ends."""
+FIRST = 3
+"""Exit code of a process whose first test failed; one more for each that did not."""
 
 
 Callers = dict[tuple[str, str], list[Any]]
@@ -84,20 +86,26 @@ class Mutation:
             raise session.Interrupted(f"{session.testsfailed} errors while tests were collected")
         callers, seconds = self._unchanged(session)
         queue = [(mutant, self._tests(mutant, session, callers, seconds)) for mutant in self.mutants]
-        running: dict[int, tuple[Mutant, int]] = {}
+        running: dict[int, tuple[Mutant, list[Any]]] = {}
+        kills: Counter[tuple[str, str, str]] = Counter()
         while queue or running:
             while queue and len(running) < self.jobs:
                 mutant, items = queue.pop(0)
                 if items:
+                    # What killed others of the same function kills this one, mostly.
+                    items.sort(key=lambda item: -kills[mutant.file, mutant.function, item.nodeid])
                     limit = LEAST + int(10 * sum(seconds[item.nodeid] for item in items))
-                    running[_forked(mutant, self.sources[mutant.file], items, limit)] = mutant, len(items)
+                    running[_forked(mutant, self.sources[mutant.file], items, limit)] = mutant, items
                 else:
                     self.tell(Outcome(mutant, False, 0))
             if running:
                 pid, status = os.wait()
                 if pid in running:
-                    mutant, n = running.pop(pid)
-                    self.tell(Outcome(mutant, status != 0, n))
+                    mutant, items = running.pop(pid)
+                    self.tell(Outcome(mutant, status != 0, len(items)))
+                    first = os.WEXITSTATUS(status) - FIRST if os.WIFEXITED(status) else -1
+                    if 0 <= first < len(items):
+                        kills[mutant.file, mutant.function, items[first].nodeid] += 1
         return True
 
     def _unchanged(self, session: pytest.Session) -> tuple[Callers, dict[str, float]]:
@@ -169,9 +177,9 @@ def _forked(mutant: Mutant, source: str, items: Sequence[Any], limit: int) -> in
         os.dup2(silence, 1)
         os.dup2(silence, 2)
         put_in(mutant, source)
-        for item in items:
+        for k, item in enumerate(items):
             if any(report.failed for report in runtestprotocol(item, log=False, nextitem=None)):
-                os._exit(1)
+                os._exit(min(FIRST + k, 255))
         os._exit(0)
     except BaseException:
         os._exit(2)

@@ -14,7 +14,7 @@ from seerob.differentiation import Differentiator, end_slope
 from seerob.emulators.fri import FriServer
 from seerob.errors import InputError
 from seerob.live import Listener
-from seerob.protocols.fri import Edition, Monitoring
+from seerob.protocols.fri import Edition, Monitoring, encode_monitoring
 from seerob.samples import JointSample, SignalSample
 from seerob.sources.fri import DeviceTime, Fri
 
@@ -137,6 +137,34 @@ def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch, port):
     wait_for(lambda: open_files() <= files and threading.active_count() <= threads)
 
 
+def test_doubled_and_overtaken_datagrams_are_no_news_and_cost_no_speed(port):
+    heard = []
+    listener = Listener(Fri(robot="arm", host="127.0.0.1", port=port), None, heard.append)
+    listener.start()
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as controller:
+
+            def send(k):
+                m = Monitoring(edition=Edition.V2_7, sequence=k, send_period=5, q=(0.01 * k,) * 7)
+                controller.sendto(encode_monitoring(m), ("127.0.0.1", port))
+
+            def known():
+                return [s for s in heard if isinstance(s, JointSample)]
+
+            # Until somebody listens, what is sent is lost.
+            wait_for(lambda: (send(0), len(known()))[1] > 0)
+            for k in (1, 2, 3, 3, 4, 6, 5, 7, 7, 8, 0, 9):
+                send(k)
+            wait_for(lambda: known()[-1].t_device == pytest.approx(0.045))
+    finally:
+        listener.ask_to_stop()
+        assert listener.join(10.0)
+    times = [s.t_device for s in known()]
+    assert times == pytest.approx([0.005 * k for k in (0, 1, 2, 3, 4, 6, 7, 8, 9)])
+    assert [s.qd for s in known()][:2] == [None, None]
+    assert np.array([s.qd for s in known()][2:]) == pytest.approx(np.full((7, 7), 2.0))
+
+
 # -- time and speed -----------------------------------------------------------------------------
 
 
@@ -171,3 +199,5 @@ def test_messages_are_the_clock_where_there_is_none_and_the_count_comes_round():
     assert clock(message(2**32 - 1)) == pytest.approx(0.005 * (2**32 - 1))
     assert clock(message(0)) == pytest.approx(0.005 * 2**32)
     assert clock(message(2)) == pytest.approx(0.005 * (2**32 + 2))
+    assert clock(message(2**32 - 2)) == pytest.approx(0.005 * (2**32 - 2))
+    assert clock(message(3)) == pytest.approx(0.005 * (2**32 + 3))

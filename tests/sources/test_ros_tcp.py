@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -75,7 +76,7 @@ def test_transforms_come_too():
 
     more = {"/tf": (Content.TF, edges), "/tf_static": (Content.TF, lambda t: ())}
     with RosTcpEndpoint(motion, NAMES, more=more) as server:
-        sample = heard(RosTcp(robot="arm", host="127.0.0.1", port=server.port, content="tf"), len)[0]
+        sample = heard(RosTcp(robot="arm", host="127.0.0.1", port=server.port, content=Content.TF), len)[0]
     assert isinstance(sample, PoseSample)
     assert sample.position[0] == pytest.approx(sample.t_device - 1000.0, abs=1e-6)
 
@@ -118,14 +119,18 @@ def test_joints_of_ros_1_are_serialised_as_its_wiki_says():
 
 @settings(max_examples=100, deadline=None)
 @given(
-    st.lists(st.tuples(st.text(st.characters(codec="ascii", min_codepoint=33), max_size=20), st.binary(max_size=60))),
+    st.lists(
+        st.tuples(
+            st.text(st.characters(codec="ascii", min_codepoint=33), max_size=20), st.binary(max_size=60)
+        )
+    ),
     st.lists(st.integers(0, 3000), max_size=8),
 )
 def test_frames_come_out_however_the_stream_is_cut(frames, cuts):
     stream = b"".join(ros_tcp.pack(name, body) for name, body in frames)
     edges = [0, *sorted(min(c, len(stream)) for c in cuts), len(stream)]
     splitter = Splitter()
-    found = [f for a, b in zip(edges, edges[1:], strict=False) for f in splitter.feed(stream[a:b])]
+    found = [f for a, b in pairwise(edges) for f in splitter.feed(stream[a:b])]
     # An empty frame says only that somebody is there.
     assert found == [Frame(n, b) for n, b in frames if n or b]
 

@@ -63,7 +63,7 @@ def joint_samples(samples):
     [(Edition.ROS2, way) for way in Compression]
     + [(Edition.ROS1, Compression.NONE), (Edition.ROS1, Compression.CBOR_RAW)],
 )
-def test_joints_come_by_name_in_every_form(edition, compression):
+def test_joints_come_by_name_in_every_form(edition, compression, caplog):
     with RosbridgeServer(sorted_motion, SORTED, edition=edition) as server:
         said = source(server, edition=edition, compression=compression, joints=NAMES)
         samples = heard(said, lambda s: len(s) > 5)
@@ -72,6 +72,7 @@ def test_joints_come_by_name_in_every_form(edition, compression):
             np.testing.assert_allclose(sample.q, q, atol=1e-6)
             np.testing.assert_allclose(sample.qd, qd, atol=1e-6)
             assert sample.tau is None
+    assert "asked for as JSON" not in caplog.text
 
 
 def test_a_server_of_ros_1_that_fails_at_cbor_is_asked_for_json(monkeypatch, caplog):
@@ -186,7 +187,9 @@ def test_the_tool_is_where_the_chain_of_transforms_says():
 def test_transforms_move_the_robot(tmp_path):
     with RosbridgeServer(motion, NAMES, more=FRAMES) as server:
         station = cell(tmp_path, server, 'content = "tf"\n')
-        story = lived(station, Story(40, lambda s: any(isinstance(x, PoseSample) for h in s.heard for x in h)))
+        story = lived(
+            station, Story(40, lambda s: any(isinstance(x, PoseSample) for h in s.heard for x in h))
+        )
         poses = [s for samples in story.heard for s in samples if isinstance(s, PoseSample)]
         assert {s.target for s in poses} == {"arm/tool0"}
         assert "joints are solved" in " ".join(f.text for f in station.scene().findings)
@@ -200,7 +203,9 @@ def test_a_trajectory_is_played_and_then_stands():
         server.topics["/joint_trajectory"] = (Content.TRAJECTORY, lambda t: Plan(None, NAMES, points))
         server.rate = 0.5
         said = source(server, content=Content.TRAJECTORY, joints=NAMES)
-        samples = heard(said, lambda s: bool(s) and np.allclose(s[-1].q, HOME + 0.1) and s[-1].qd == (0.0,) * 6)
+        samples = heard(
+            said, lambda s: bool(s) and np.allclose(s[-1].q, HOME + 0.1) and s[-1].qd == (0.0,) * 6
+        )
     moved = np.array([s.q for s in samples]) - HOME
     assert np.all((moved > -1e-9) & (moved < 0.1 + 1e-9))
 

@@ -24,6 +24,7 @@ from seerob.commands.sinks import file_of, refuse_existing, sinks_of, tell_files
 from seerob.errors import InputError
 
 if TYPE_CHECKING:
+    from seerob.cartesian_targets import CartesianTargets
     from seerob.snapshot import Scene
     from seerob.station import Station
     from seerob.triggers import Triggers
@@ -121,6 +122,7 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
             writers = announced(station.open_sinks(sinks, folder, scene), list(map(file_of, sinks)), say)
             line("page", f"{view.url}  (Ctrl-C ends the run)", "bold")
             writers += _triggers(station, allow=options.allow_writing)
+            writers += _targets(station, allow=options.allow_writing)
             summary = station.run(writers=[view, *writers], live=True, scene=scene, stop=over, progress=note)
     line("ran", f"{summary.duration:.1f} s" + _slipped(summary.slipped))
     tell_results(summary)
@@ -137,13 +139,27 @@ def _triggers(station: Station, *, allow: bool) -> list[Triggers]:
         line("writes", f"{names}: workstation file and command line both allow it", "yellow")
         return [Triggers(station.model, on_command_line=allow)]
     if names:
-        missing = (
-            "--allow-writing" if station.workstation.allow_writing else "allow_writing = true in the file"
-        )
-        line("note", f"writes nothing: {names} would need {missing}")
-    elif allow:
+        line("note", f"writes nothing: {names} would need {_missing(station)}")
+    elif allow and not station.workstation.targets:
         line("note", "writes nothing: the workstation has no triggers")
     return []
+
+
+def _targets(station: Station, *, allow: bool) -> list[CartesianTargets]:
+    """What publishes Cartesian targets; nothing unless file and command line both allow it, which is said."""
+    from seerob.cartesian_targets import CartesianTargets, targets_allowed
+
+    topics = ", ".join(f"{target.topic} ({target.host})" for target in station.workstation.targets)
+    if targets_allowed(station.model, on_command_line=allow):
+        line("targets", f"{topics}: workstation file and command line both allow it", "yellow")
+        return [CartesianTargets(station.model, on_command_line=allow)]
+    if topics:
+        line("note", f"publishes no targets: {topics} would need {_missing(station)}")
+    return []
+
+
+def _missing(station: Station) -> str:
+    return "--allow-writing" if station.workstation.allow_writing else "allow_writing = true in the file"
 
 
 def _slipped(lost: float) -> str:

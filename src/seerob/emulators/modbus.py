@@ -11,8 +11,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 
 from seerob.emulators.background import LoopEmulator
-from seerob.protocols.modbus import Table, blocks, encode
-from seerob.protocols.modbus import Place as Place  # noqa: PLC0414
+from seerob.protocols.modbus import Place, Table, blocks, encode
 
 Program = Mapping[Place, Callable[[float], float | bool]]
 """Place → the raw value in it at a time since it was made [s]."""
@@ -90,7 +89,7 @@ class ModbusServer(LoopEmulator):
         try:
             await over.wait()
         finally:
-            await server.shutdown()
+            await server.shutdown()  # type: ignore[no-untyped-call]
 
     def _play(self, table: Table, start: int, registers: list[int]) -> None:
         """Bring the registers of a table, from an address on, up to date."""

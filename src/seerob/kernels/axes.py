@@ -115,3 +115,12 @@ def mobility(J: Array, M: Array, found: Array) -> bool:
                     total += W[p, i] * W[q, i] / D[i]
                 found[k, p, q] = found[k, q, p] = total
     return definite
+
+
+@njit("f8[::1](f8[::1])", cache=True, nogil=True, error_model="numpy")
+def reciprocals(values: Array) -> Array:
+    """1/x, infinite where x is not above 0; what is not a number stays so."""
+    found = np.empty_like(values)
+    for i in range(len(values)):
+        found[i] = np.inf if values[i] <= 0.0 else 1.0 / values[i]
+    return found

@@ -50,6 +50,27 @@ def placed(
             quaternions[i, c] = xquat[ids[i], c]
 
 
+@njit(cache=True, nogil=True)
+def carried(xmat: Array, xpos: Array, body: int, body_from_frame: Array) -> tuple[Array, Array]:
+    """World rotation (3, 3) and position (3,) [m] of a frame on one of MuJoCo's bodies.
+
+    Args:
+        xmat: World from body, row by row, shape (m, 9).
+        xpos: [m], shape (m, 3).
+        body: Which.
+        body_from_frame: Shape (4, 4).
+    """
+    rotation, position = np.empty((3, 3)), np.empty(3)
+    for r in range(3):
+        x, y, z = xmat[body, 3 * r], xmat[body, 3 * r + 1], xmat[body, 3 * r + 2]
+        for c in range(3):
+            rotation[r, c] = x * body_from_frame[0, c] + y * body_from_frame[1, c] + z * body_from_frame[2, c]
+        position[r] = xpos[body, r] + (
+            x * body_from_frame[0, 3] + y * body_from_frame[1, 3] + z * body_from_frame[2, 3]
+        )
+    return rotation, position
+
+
 @njit(f"void({_ROWS}, {_ROWS}, {_ROWS}, i8[::1], i8[::1], {_ROWS}, {_ROWS})", cache=True, nogil=True)
 def velocities(
     cvel: Array,
@@ -170,3 +191,22 @@ def fastest_many(
             rotations[k], positions[k], linear[k], angular[k], corners, start, reach,
             speed[k], point[k], velocity[k],
         )  # fmt: skip
+
+
+@njit("Tuple((b1, f8[:,::1]))(f8[:,::1], f8)", cache=True, nogil=True, error_model="numpy")
+def directions(v: Array, still: float) -> tuple[bool, Array]:
+    """Whether any of many velocities has a direction, and which, NaN where none, shape (n, 3).
+
+    Args:
+        v: [m/s], shape (n, 3).
+        still: Speed up to which there is none [m/s].
+    """
+    found = np.full(v.shape, np.nan)
+    some = False
+    for i in range(len(v)):
+        speed = math.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2])
+        if speed > still:
+            some = True
+            for c in range(3):
+                found[i, c] = v[i, c] / speed
+    return some, found

@@ -86,7 +86,7 @@ def pictures(path: Path, topic: str, reading: Reading) -> tuple[list[Picture], s
 
 
 def _topic(path: Path, file: str, topic: str) -> str:
-    with _opened(path, file) as bag:
+    with opened(path, file) as bag:
         topics = sorted({c.topic for c in bag.connections if c.msgtype == TYPE})
         others = sorted({f"{c.topic} ({c.msgtype})" for c in bag.connections})[:12]
     if topic and topic not in topics:
@@ -120,7 +120,7 @@ def _is_ros2(path: Path) -> bool:
 
 
 @contextmanager
-def _opened(path: Path, file: str) -> Iterator[Any]:
+def opened(path: Path, file: str) -> Iterator[Any]:
     """A bag that is opened and closed, with what is wrong with it as an `InputError`."""
     size = path.stat().st_size if path.is_file() else sum(p.stat().st_size for p in path.glob("*"))
     if size > MAX_BYTES:
@@ -147,7 +147,7 @@ def wrong_bag(file: str, error: Exception) -> InputError:
 
 def _messages(path: Path, topic: str, file: str) -> Iterator[tuple[float, Any]]:
     """Instant of recording [s] and content of each message."""
-    with _opened(path, file) as bag:
+    with opened(path, file) as bag:
         wanted = [c for c in bag.connections if c.topic == topic and c.msgtype == TYPE]
         messages = bag.messages(connections=wanted)
         while True:

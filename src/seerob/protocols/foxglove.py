@@ -116,7 +116,9 @@ def channels(said: Operation) -> list[ServerChannel]:
         number = item.get("id") if isinstance(item, dict) else None
         if type(number) is not int or not 0 <= number < 1 << 53:
             raise ProtocolError("a channel without a number")
-        topic, encoding, schema = (str(item.get(k, ""))[:LONGEST_NAME] for k in ("topic", "encoding", "schemaName"))
+        topic, encoding, schema = (
+            str(item.get(k, ""))[:LONGEST_NAME] for k in ("topic", "encoding", "schemaName")
+        )
         found.append(ServerChannel(number, topic, encoding, schema))
     return found
 
@@ -148,7 +150,9 @@ def decode(content: Content, channel: ServerChannel, payload: bytes) -> Said:
         said = document(payload)
         return _own_json(content, said) if channel.schema in OWN[content] else read(content, said)
     if channel.encoding == "protobuf":
-        return _joint_states(payload) if content is Content.JOINT_STATE else _transforms(payload, channel.schema)
+        return (
+            _joint_states(payload) if content is Content.JOINT_STATE else _transforms(payload, channel.schema)
+        )
     raise ProtocolError(f"messages in the unknown encoding {channel.encoding[:40]!r}")
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 
 from seerob.protocols import ProtocolError
-from seerob.protocols.protobuf_wire import Field, double, doubles, fields, message, whole
+from seerob.protocols.protobuf_wire import Field, Wire, double, doubles, fields, message, whole
 
 PORT = 30200
 """Of the client: the controller sends there."""
@@ -22,6 +22,8 @@ LARGEST = 1500
 """Datagram [bytes]."""
 MONITORING, COMMAND = 0x245142, 0x34001
 """Identifiers of the two messages."""
+_DOUBLE = bytes([1 << 3 | Wire.FIXED64])
+"""Tag of field 1 with a number of eight bytes."""
 MOST_JOINTS = 16
 
 
@@ -240,6 +242,11 @@ def _interpolated(field: Field | None, found: dict[str, object]) -> None:
 
 
 def _joint_values(field: Field) -> tuple[float, ...]:
+    data = field.bytes()
+    count, rest = divmod(len(data), 9)
+    if not rest and count <= MOST_JOINTS and data[::9] == _DOUBLE * count:
+        # One by one, as controllers send them: most of the time of a message goes into these.
+        return struct.unpack("<" + count * "xd", data)
     return tuple(x for f in fields(field.bytes()) if f.number == 1 for x in f.doubles())
 
 

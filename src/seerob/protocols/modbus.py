@@ -50,7 +50,7 @@ class Type(StrEnum):
     """One bit of a register, or a coil or discrete input."""
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """Registers that one value takes."""
         return 1 if self is Type.BIT else int(self[1:]) // 16
 
@@ -91,13 +91,13 @@ class Place(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             raise ValueError(f'table = "{self.table}" has single bits: type = "bit" and no bit')
         if not self.table.bits and (self.type is Type.BIT) != (self.bit is not None):
             raise ValueError('type = "bit" in a register and bit = 0 … 15 belong together')
-        if (self.type.count > 1) != (self.words is not None):
+        if (self.type.size > 1) != (self.words is not None):
             raise ValueError(
-                f'{self.type} takes {self.type.count} registers: words = "high_first" or "low_first" '
-                + ("must be given" if self.type.count > 1 else "belongs to values of several")
+                f'{self.type} takes {self.type.size} registers: words = "high_first" or "low_first" '
+                + ("must be given" if self.type.size > 1 else "belongs to values of several")
             )
-        if self.at + self.type.count > 1 << 16:
-            raise ValueError(f"{self.at} and {self.type.count - 1} more: the last register is 65535")
+        if self.at + self.type.size > 1 << 16:
+            raise ValueError(f"{self.at} and {self.type.size - 1} more: the last register is 65535")
 
 
 class Block(msgspec.Struct, frozen=True):
@@ -109,7 +109,7 @@ class Block(msgspec.Struct, frozen=True):
 
     def covers(self, place: Place) -> bool:
         """Whether a place lies in it."""
-        inside = self.first <= place.at and place.at + place.type.count <= self.first + self.count
+        inside = self.first <= place.at and place.at + place.type.size <= self.first + self.count
         return place.table is self.table and inside
 
 
@@ -138,7 +138,7 @@ def encode(place: Place, value: float) -> list[int]:
         struct.error: It does not fit.
     """
     data = struct.pack(FORMATS[place.type], value if place.type in (Type.F32, Type.F64) else round(value))
-    registers = list(struct.unpack(f">{place.type.count}H", data))
+    registers = list(struct.unpack(f">{place.type.size}H", data))
     return registers[::-1] if place.words is Words.LOW_FIRST else registers
 
 
@@ -146,8 +146,8 @@ def blocks(places: Iterable[Place]) -> tuple[Block, ...]:
     """The fewest questions that ask for nothing else: a device refuses a block with a hole in it."""
     found: list[Block] = []
     order = {table: k for k, table in enumerate(Table)}
-    for place in sorted(set(places), key=lambda p: (order[p.table], p.at, p.type.count)):
-        end = place.at + place.type.count
+    for place in sorted(set(places), key=lambda p: (order[p.table], p.at, p.type.size)):
+        end = place.at + place.type.size
         most = MOST_BITS if place.table.bits else MOST
         last = found[-1] if found else None
         if last is not None and last.table is place.table and place.at <= last.first + last.count:
@@ -155,7 +155,5 @@ def blocks(places: Iterable[Place]) -> tuple[Block, ...]:
             if longer <= most:
                 found[-1] = Block(last.table, last.first, longer)
                 continue
-        found.append(Block(place.table, place.at, place.type.count))
+        found.append(Block(place.table, place.at, place.type.size))
     return tuple(found)
-
-

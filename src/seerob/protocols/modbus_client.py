@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import AsyncGenerator, Iterable, Sequence
+from collections.abc import AsyncGenerator, Sequence
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -100,7 +100,7 @@ class Device:
                     self._split.add(block)
             if block in self._split:
                 for name, place in inside.items():
-                    single = Block(place.table, place.at, place.type.count)
+                    single = Block(place.table, place.at, place.type.size)
                     try:
                         found |= take(single, await self.block(single), {name: place})
                     except Refused as error:
@@ -114,7 +114,7 @@ def take(
     """Values of places that lie in a block."""
     starts = {name: place.at - block.first for name, place in wanted.items()}
     return {
-        name: decode(place, words[starts[name] : starts[name] + place.type.count])
+        name: decode(place, words[starts[name] : starts[name] + place.type.size])
         for name, place in wanted.items()
     }
 
@@ -141,8 +141,3 @@ async def connect(host: str, port: int, number: int) -> AsyncGenerator[Device, N
         yield Device(client, number)
     finally:
         client.close()
-
-
-def covered(found: Iterable[Block], place: Place) -> bool:
-    """Whether one of the blocks has a place."""
-    return any(block.covers(place) for block in found)

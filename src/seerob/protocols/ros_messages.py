@@ -159,7 +159,7 @@ def _transform(item: Any) -> Transform:
 
 def _plan(message: Any) -> Plan:
     names = _names(_field(message, "joint_names"))
-    points = []
+    points: list[Point] = []
     for item in _list(_field(message, "points"), MOST_POINTS, "points"):
         position = _numbers(_field(item, "positions"), "positions")
         velocity = _numbers(_field(item, "velocities"), "velocities")

@@ -26,9 +26,13 @@ class Edition(StrEnum):
 @cache
 def store(edition: Edition) -> Any:
     """The definitions of the standard messages (a `rosbags` type store)."""
-    from rosbags.typesys import Stores, get_typestore
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-    return get_typestore(Stores.ROS1_NOETIC if edition is Edition.ROS1 else Stores.ROS2_HUMBLE)
+    found = get_typestore(Stores.ROS1_NOETIC if edition is Edition.ROS1 else Stores.ROS2_HUMBLE)
+    # It lacks this one; the definition is that of geometry2.
+    frames = Content.TF.message_type
+    found.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", frames))
+    return found
 
 
 def decode(content: Content, raw: bytes, edition: Edition) -> Said:
@@ -72,7 +76,7 @@ def _made(content: Content, said: Said, edition: Edition) -> Any:
 
     from seerob.protocols.ros_messages import NANO, Joints, Plan
 
-    def made(name: str, **fields: Any) -> Any:
+    def made(name: str, /, **fields: Any) -> Any:
         return store(edition).types[name](**fields)
 
     def span(name: str, t: float | None) -> Any:

@@ -145,8 +145,9 @@ class Reader:
 
     def _put(self, frame: dict[Any, Any]) -> str | None:
         name, number, total, data = (frame.get(key) for key in ("id", "num", "total", "data"))
-        fits = type(number) is int and type(total) is int and isinstance(data, str)
-        if not (fits and 0 <= number < total <= MOST_FRAGMENTS) or not isinstance(name, str | int):
+        if not isinstance(number, int) or not isinstance(total, int) or not isinstance(data, str):
+            raise ProtocolError("a fragment without its place or its data")
+        if not 0 <= number < total <= MOST_FRAGMENTS or not isinstance(name, str | int):
             raise ProtocolError("a fragment without its place")
         parts = self._parts.setdefault(str(name)[:200], {})
         if len(self._parts) > MOST_UNFINISHED:

@@ -12,7 +12,7 @@ from seerob import provenance
 from seerob.answers import Answers
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
 from seerob.impact_mass import simplified_mass
-from seerob.kernels.axes import mobility, principal_axes
+from seerob.kernels.axes import mobility, principal_axes, reciprocals
 from seerob.mass_tolerances import MassTolerances, Matrices
 from seerob.model import Mechanism, Model
 from seerob.quantities import Metres3
@@ -42,9 +42,12 @@ def inverse_effective_mass(J_v: Array, M: Array) -> Array:
         Symmetric matrix, shape (..., 3, 3) [1/kg]; singular where the point cannot be pushed.
     """
     J_v, M = np.asarray(J_v, float), np.asarray(M, float)
-    batch, (rows, n) = np.broadcast_shapes(J_v.shape[:-2], M.shape[:-2]), J_v.shape[-2:]
-    points = np.array(np.broadcast_to(J_v, (*batch, rows, n))).reshape(-1, rows, n)
-    masses = np.array(np.broadcast_to(M, (*batch, n, n))).reshape(-1, n, n)
+    batch, (rows, n) = (), J_v.shape[-2:]
+    if J_v.ndim > 2 or M.ndim > 2:
+        batch = np.broadcast_shapes(J_v.shape[:-2], M.shape[:-2])
+    if batch:
+        J_v, M = np.broadcast_to(J_v, (*batch, rows, n)), np.broadcast_to(M, (*batch, n, n))
+    points, masses = np.array(J_v).reshape(-1, rows, n), np.array(M).reshape(-1, n, n)
     found = np.empty((len(points), rows, rows))
     if not mobility(points, masses, found):
         raise np.linalg.LinAlgError("a mass matrix is not positive definite")
@@ -61,8 +64,8 @@ def projected_mass(inverse: Array, u: Array) -> Array:
     Returns:
         Mass [kg], shape (...); inf where the point cannot be pushed that way.
     """
-    along = (u[..., None, :] @ inverse @ u[..., :, None])[..., 0, 0]
-    return np.asarray(np.divide(1.0, along, out=np.full(np.shape(along), np.inf), where=~(along <= 0)))
+    along = np.asarray((u[..., None, :] @ inverse @ u[..., :, None])[..., 0, 0])
+    return reciprocals(along.reshape(-1)).reshape(along.shape)
 
 
 def principal_masses(inverse: Array) -> tuple[Array, Array]:
@@ -75,8 +78,7 @@ def principal_masses(inverse: Array) -> tuple[Array, Array]:
     values, axes = np.empty((len(used_up), 3)), np.empty_like(used_up)
     # Of a symmetric matrix without negative eigenvalues they are its singular values.
     principal_axes(used_up, values, axes)
-    masses = np.divide(1.0, values, out=np.full_like(values, np.inf), where=~(values <= 0))
-    return masses.reshape(*batch, 3), axes.reshape(*batch, 3, 3)
+    return reciprocals(values.reshape(-1)).reshape(*batch, 3), axes.reshape(*batch, 3, 3)
 
 
 class EffectiveMass(Criterion, frozen=True, kw_only=True):

@@ -5,6 +5,7 @@ The sets themselves are in `seerob.polytope`.
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from seerob import joint_torques, provenance
 from seerob.answers import Answers
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge
 from seerob.errors import InputError, Undecided
+from seerob.kernels.contact_forces import drawn_corners
 from seerob.kernels.polytope import largest
 from seerob.model import Mechanism, Model
 from seerob.polytope import Polytope, free_moment, torque_box, zero_moment
@@ -118,7 +120,8 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
 
     def _result(self, polytope: Polytope, at: Array) -> Result:
         unbounded = polytope.free.shape[1] > 0
-        across = float(np.linalg.norm(polytope.farthest))
+        farthest = polytope.farthest
+        across = math.sqrt(float(farthest @ farthest))
         if unbounded:
             # No force is too large for the structure here, so every limit is exceeded.
             value, verdict = None, None if self.limit is None else Verdict.EXCEEDED
@@ -128,7 +131,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             )
         else:
             value, verdict = across, judge(across, self.limit)
-            direction = polytope.farthest / across if across > 0 else np.zeros(3)
+            direction = farthest / across if across > 0 else np.zeros(3)
             reason = f"largest along {_vector(direction)}"
             if polytope.inscribed < 0:
                 reason += "; without any force the torque limits cannot hold the robot"
@@ -144,8 +147,8 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
                 Result(name="in every direction", value=inscribed, unit="N"),
                 *((Result(name="across that direction", value=across, unit="N"),) if unbounded else ()),
                 *(
-                    Result(name=f"direction {axis}", value=float(u), unit="")
-                    for axis, u in zip("xyz", direction, strict=True)
+                    Result(name=f"direction {axis}", value=u, unit="")
+                    for axis, u in zip("xyz", direction.tolist(), strict=True)
                 ),
             ),
             markers=self._markers(polytope, at, direction, value, verdict),
@@ -157,14 +160,12 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
         center = tuple(at.tolist())
         markers: list[Marker] = []
         if len(polytope.triangles):
-            lengths = DRAWN * np.linalg.norm(polytope.corners, axis=1)
-            shorter = np.minimum(1.0, LARGEST_DRAWN / np.maximum(lengths, 1e-12))
-            drawn = at + DRAWN * polytope.corners * shorter[:, None]
+            drawn, cut = drawn_corners(polytope.corners, at, DRAWN, LARGEST_DRAWN)
             markers.append(
                 Hull(
                     vertices=tuple(map(tuple, drawn.tolist())),
                     faces=tuple(map(tuple, polytope.triangles.tolist())),
-                    label="" if (lengths <= LARGEST_DRAWN).all() else "cut off where it is drawn too large",
+                    label="cut off where it is drawn too large" if cut else "",
                     verdict=verdict,
                 )
             )
@@ -247,4 +248,4 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
 
 
 def _vector(u: Array) -> str:
-    return "(" + ", ".join(f"{0.0 if abs(x) < 5e-3 else x:.2f}" for x in u) + ")"
+    return "(" + ", ".join(f"{0.0 if abs(x) < 5e-3 else x:.2f}" for x in u.tolist()) + ")"

@@ -21,6 +21,7 @@ from seerob.contact_tolerances import ContactEnds, ranks, robot_masses
 from seerob.criterion import Criterion, Evaluate, worst
 from seerob.errors import Undecided, UnknownName
 from seerob.impact_mass import masses_along_motion, moving_masses, simplified_mass
+from seerob.kernels.contact_speeds import governing
 from seerob.model import Frame, Model
 from seerob.norms import body_limits
 from seerob.norms.crushing_gaps import NOT_VERIFIED, crushing_gaps, gap_inputs
@@ -339,13 +340,8 @@ class Contacts:
 
         Without a limit it is the fastest.
         """
-        badness, rank = np.where(near, v, -np.inf), np.zeros(v.shape, int)
-        rows = self.in_regions
-        margin = speeds.permissible - v[:, rows]
-        rank[:, rows] = ranks(v[:, rows], speeds, ends)
-        badness[:, rows] = np.where(near[:, rows], rank[:, rows] * FAR - margin, -np.inf)
-        worst_rows = badness.argmax(axis=0)
-        return worst_rows, rank[worst_rows, np.arange(len(worst_rows))]
+        known = ranks(v[:, self.in_regions], speeds, ends)
+        return governing(v, near, self.in_regions, speeds.permissible, known, FAR)
 
     def _region(self, k: int, judged: Judged) -> tuple[Result, int]:
         """The result of one of `REGIONS`, and the row of the moving body that governs it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -62,8 +63,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
                 room = float(found.distance[nearest])
                 if room < outside[0]:
                     outside = room, _where(model, each, nearest, several), each.gap.deviation
-                if room <= 0:
-                    entered += [(each, found, i) for i in np.flatnonzero(found.distance <= 0).tolist()]
+                entered += [(each, found, i) for i in np.flatnonzero(found.distance <= 0).tolist()]
             pairs = [(int(found.body_a[i]), each.gap.b[i]) for each, found, i in entered]
             deeps = depths.ask(state.rotations, state.positions, pairs) if pairs else []
             for (each, found, i), deep in zip(entered, deeps, strict=True):
@@ -80,20 +80,22 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
                 )
                 lit.append(Highlight(body=model.bodies[each.gap.b[i]].name, verdict=Verdict.EXCEEDED))
                 lit += _line(deep, found.point_a[i])
-            return self._result(outside, parts, lit)
+            return self._result(outside, parts, deeps, lit)
 
         return evaluate
 
-    def _result(self, outside: tuple[float, str, float], parts: list[Result], lit: list[Marker]) -> Result:
+    def _result(
+        self,
+        outside: tuple[float, str, float],
+        parts: list[Result],
+        deeps: Sequence[Depth],
+        lit: list[Marker],
+    ) -> Result:
         room, who, deviation = outside
         if parts:
-            deepest = min(parts, key=lambda part: part.value or 0.0)
-            verdict, reason, room = (
-                Verdict.EXCEEDED,
-                ", ".join(part.name for part in parts),
-                deepest.value or 0.0,
-            )
-            interval = deepest.interval
+            deepest = max(deeps, key=lambda deep: deep.at_least)
+            verdict, reason = Verdict.EXCEEDED, ", ".join(part.name for part in parts)
+            room, interval = -deepest.at_least, (-deepest.at_most, -deepest.at_least)
         else:
             # The real surface may stick out of the shape: nearly inside is not outside.
             close = room - deviation <= 0

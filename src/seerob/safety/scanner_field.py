@@ -107,7 +107,7 @@ class _Scan:
         self.fixed = not model.bodies[self.plane].carrier
         self.background: tuple[Array, NDArray[np.int64]] | None = None
         self.drawn: tuple[float, markers.Rays] | None = None
-        self.blind = 0.0
+        self.blind: float
         farthest = max(float(np.hypot(x, y)) for x, y in chosen.corners)
         self.spacing = farthest * self.scanner.resolution
         capability = sensor.capability
@@ -129,21 +129,19 @@ class _Scan:
             before: The same against what stands still, where that is known.
         """
         distance, met = self._against(self.still, state, beams) if before is None else before
-        return self._against(self.moving, state, beams, distance.copy(), met.copy())
+        return self._against(self.moving, state, beams, (distance.copy(), met.copy()))
 
     def _against(
         self,
         rays: Rays,
         state: State,
         beams: Array,
-        distance: Array | None = None,
-        met: NDArray[np.int64] | None = None,
+        before: tuple[Array, NDArray[np.int64]] | None = None,
     ) -> tuple[Array, NDArray[np.int64]]:
         u = beams @ state.rotations[self.plane].T
         origins = np.empty_like(u)
         origins[:] = state.positions[self.plane]
-        if distance is None or met is None:
-            distance, met = np.full(len(u), self.scanner.range), np.full(len(u), -1, np.int64)
+        distance, met = before or (np.full(len(u), self.scanner.range), np.full(len(u), -1, np.int64))
         rays.cast(state.rotations, state.positions, origins, u, distance, met)
         return distance, met
 
@@ -153,8 +151,7 @@ class _Scan:
         distance, met = self.cast(state, self.beams, self.background)
         # The last one is for beams that meet nothing, -1.
         hit = self.watched[met]
-        if hit.any():
-            hit[hit] = contains(self.chosen.corners, self.beams[hit, :2] * distance[hit, None])
+        hit[hit] = contains(self.chosen.corners, self.beams[hit, :2] * distance[hit, None])
         seen = set(met[hit].tolist())
         _, inside = self.presence.inside(state)
         sights = {

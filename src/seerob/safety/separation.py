@@ -157,6 +157,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         K = C + Z_d + Z_r + gap.deviation
         unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
         largest, places = LargestSeparation(), BodyPlaces(model)
+        names = [body.name for body in model.bodies]
         ends = SeparationEnds(self.stop, lambda changed: replace(self, stop=changed).required(model))
         off = TrackingError(model, gap.a)
 
@@ -170,22 +171,25 @@ class Separation(Criterion, frozen=True, kw_only=True):
             seen = float(off.at(state).max(initial=0.0))
             span = ends.at(state) if ends.tolerances else None
             spans = intervals(found.distance, S_p, seen, span)
+            off_at_all, bodies = span is not None or seen > 0, found.body_a.tolist()
             parts = tuple(
                 Result(
-                    name=model.bodies[body].name,
-                    value=float(found.distance[i]),
+                    name=names[body],
+                    value=distance,
                     unit="m",
-                    limit=float(S_p[i]),
+                    limit=least,
                     at_most=False,
-                    verdict=self._verdict(spans[i], float(S_p[i]), bool(unknown)),
-                    interval=spans[i] if span is not None or seen else None,
-                    reason=model.bodies[int(found.body_a[i])].name,
+                    verdict=self._verdict(ends_of_part, least, bool(unknown)),
+                    interval=ends_of_part if off_at_all else None,
+                    reason=names[nearest],
                 )
-                for i, body in enumerate(gap.b)
+                for body, distance, least, ends_of_part, nearest in zip(
+                    gap.b, found.distance.tolist(), S_p.tolist(), spans, bodies, strict=True
+                )
             )
             verdict = worst([part.verdict for part in parts])
-            worst_ones = [i for i, part in enumerate(parts) if part.verdict is verdict]
-            k = min(worst_ones, key=lambda i: float(found.distance[i] - S_p[i]))
+            margins = (found.distance - S_p).tolist()
+            k = min((i for i, part in enumerate(parts) if part.verdict is verdict), key=margins.__getitem__)
             open_ = unknown
             if verdict is Verdict.UNDECIDED and not unknown:
                 widths = np.zeros(0) if span is None else span.widths[:, k]

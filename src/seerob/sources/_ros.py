@@ -100,7 +100,9 @@ class RosSource(LiveSource, frozen=True, kw_only=True):
             raise InputError.at("sources", "robot", f"no robot {self.robot!r}", "name a robot")
         if self.joints and len(self.joints) != len(target.joints):
             what = f"{len(self.joints)} joints for the {len(target.joints)} of {target.name}"
-            raise InputError.at(self.where(), "joints", what, f"name one for each of {', '.join(target.joints)}")
+            raise InputError.at(
+                self.where(), "joints", what, f"name one for each of {', '.join(target.joints)}"
+            )
         if self.content is Content.TF:
             self._world_from_parent(target)
             self._driven(target)
@@ -129,8 +131,8 @@ class RosSource(LiveSource, frozen=True, kw_only=True):
             said += [Finding(level=k, subject=self.robot, text=text) for k, text in _remarks(first)]
         if self.content is Content.TF:
             text = (
-                f"joints are solved from the pose of {self.child!r} in {self.parent!r}: the branch, and what a "
-                "redundant robot does beside its tool, may differ from the controller's; what depends on "
+                f"joints are solved from the pose of {self.child!r} in {self.parent!r}: the branch, and what "
+                "a redundant robot does beside its tool, may differ from the controller's; what depends on "
                 "them is preliminary"
             )
             said.append(Finding(level="assumed", subject=self.robot, text=text))
@@ -140,7 +142,9 @@ class RosSource(LiveSource, frozen=True, kw_only=True):
         """Another publisher may have the rest; but of none of the joints is another robot."""
         if self.joints and not set(self.joints) & set(first.names):
             what = f"messages of {', '.join(first.names[:12])}; {self.robot} has {', '.join(self.joints)}"
-            raise InputError.at(self.where(), "joints", what, "give joints = [names in ROS, in the robot's order]")
+            raise InputError.at(
+                self.where(), "joints", what, "give joints = [names in ROS, in the robot's order]"
+            )
 
     async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Samples of the robot."""

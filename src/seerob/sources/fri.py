@@ -7,6 +7,7 @@ command nothing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
 from enum import IntEnum
@@ -15,6 +16,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from seerob.device_clock import RESTART
 from seerob.differentiation import SAMPLES, Differentiator
 from seerob.errors import InputError
 from seerob.live import LiveSource
@@ -97,7 +99,7 @@ class DeviceTime:
     """The controller's time: its time stamps, or where it sends none, its count of messages."""
 
     def __init__(self) -> None:
-        self._counted, self._turns = 0, 0
+        self._counted: int | None = None
 
     def __call__(self, m: Monitoring) -> float | None:
         """[s]; None when it says neither."""
@@ -105,11 +107,11 @@ class DeviceTime:
             return m.time
         if not m.send_period:
             return None
-        # The counter has 32 bits and comes round.
-        if m.sequence < self._counted - (1 << 31):
-            self._turns += 1
-        self._counted = m.sequence
-        return (m.sequence + (self._turns << 32)) * m.send_period * 1e-3
+        if self._counted is None:
+            self._counted = m.sequence
+        # The counter has 32 bits and comes round, and datagrams may overtake one another there too.
+        self._counted += (m.sequence - self._counted + (1 << 31)) % (1 << 32) - (1 << 31)
+        return self._counted * m.send_period * 1e-3
 
 
 class _Answering:
@@ -217,7 +219,7 @@ class Fri(LiveSource, frozen=True, kw_only=True):
         """Joint samples, and signals ten times a second and whenever a state changes."""
         device, slope = DeviceTime(), Differentiator(GAP * self.period())
         said: dict[str, float | bool | str] = {}
-        due = 0.0
+        due, newest = 0.0, -math.inf
         answering = _Answering()
         async with (
             listening(self.bind, self.port, sender=self.host, answer=answering) as port,
@@ -232,5 +234,9 @@ class Fri(LiveSource, frozen=True, kw_only=True):
                     said, due = now, datagram.arrived + SIGNAL_PERIOD
                     yield SignalSample(source="", seq=0, t=datagram.arrived, values=now | figures(m))
                 t = device(m)
-                qd = slope.add(datagram.arrived if t is None else t, m.q)
+                instant = datagram.arrived if t is None else t
+                qd = None
+                if not newest - RESTART < instant <= newest:  # neither doubled nor overtaken
+                    newest = instant
+                    qd = slope.add(instant, m.q)
                 yield joint_sample(m, target=self.robot, arrived=datagram.arrived, device=t, qd=qd)

@@ -18,7 +18,7 @@ from seerob.protocols.modbus_client import Refused, connect
 from seerob.quantities import Seconds
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
-from seerob.sources._variables import Change, VariablesSource
+from seerob.sources._variables import Change, Node, VariablesSource
 
 
 class Modbus(VariablesSource, frozen=True, kw_only=True):
@@ -50,7 +50,9 @@ class Modbus(VariablesSource, frozen=True, kw_only=True):
                 msgspec.convert(variable.address, Place)
             except msgspec.ValidationError as error:
                 remedy = 'write { table = "holding", at = 128, type = "i16" }'
-                problems.append(Problem(f"modbus {self.host}", f"{variable.name}.address", str(error), remedy))
+                problems.append(
+                    Problem(f"modbus {self.host}", f"{variable.name}.address", str(error), remedy)
+                )
         if problems:
             raise InputError(problems)
         return VariablesSource.open(self, folder, target)
@@ -72,9 +74,21 @@ class Modbus(VariablesSource, frozen=True, kw_only=True):
             while True:
                 found = await device.read(wanted)
                 yield tuple(
-                    Change(name, None, doubt=str(value)) if isinstance(value, Refused) else Change(name, value)
+                    Change(name, None, doubt=str(value))
+                    if isinstance(value, Refused)
+                    else Change(name, value)
                     for name, value in found.items()
                 )
                 # What was asked late is not made up for.
                 due = max(due + self.every, clock.time())
                 await asyncio.sleep(due - clock.time())
+
+    async def browse(self) -> AsyncGenerator[Node, None]:
+        """Nothing: the protocol has no names.
+
+        Raises:
+            InputError: Always.
+        """
+        what = "a Modbus device cannot be asked what it has"
+        raise InputError.at(f"modbus {self.host}", "", what, "its manual lists its registers")
+        yield

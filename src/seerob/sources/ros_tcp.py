@@ -191,8 +191,14 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
                     async with asyncio.timeout(self.silence()):
                         item = await waiting.get()
                 except TimeoutError:
-                    what = "connected, but silent" if newest and not newest[0].is_closing() else "nobody connects"
-                    raise TimeoutError(f"{what} at {self.bind}:{self.port} for {self.silence() or 0:g} s") from None
+                    what = (
+                        "connected, but silent"
+                        if newest and not newest[0].is_closing()
+                        else "nobody connects"
+                    )
+                    raise TimeoutError(
+                        f"{what} at {self.bind}:{self.port} for {self.silence() or 0:g} s"
+                    ) from None
                 if isinstance(item, ProtocolError):
                     raise item
                 yield item
@@ -205,5 +211,3 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
             server.close()
             for writer in newest:
                 writer.transport.abort()
-
-

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from seerob.errors import InputError, UnknownName
 from seerob.model_io.description import Description, Joint, JointKind, Link
-from seerob.transforms import Array
+from seerob.transforms import Array, inverse
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ class Arm:
                         description.name, "base", f"{base!r} moves", "name a link that does not"
                     )
                 root_from_base = root_from_base @ part.parent_from_link
-            self.base_from_root = np.linalg.inv(root_from_base)
+            self.base_from_root = inverse(root_from_base)
 
     def posture(self, q: ArrayLike) -> Posture:
         """Where the arm is.

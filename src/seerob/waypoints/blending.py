@@ -92,7 +92,7 @@ def _distance_cut(arm: Arm, piece: Piece, corner: Array, r: float, *, from_end: 
 
 
 def _blend_speed(arm: Arm, curve: Piece, before: Leg, after: Leg) -> float:
-    """Speed in joint space at which a rounding is passed within the speeds and accelerations of both sides."""
+    """Speed in joint space of a rounding, within the speeds and accelerations of both sides."""
     h = np.diff(curve.s)
     bend = np.abs(np.diff(curve.dq, axis=0)) / h[:, None]
     posture = arm.posture(curve.q)

@@ -153,8 +153,8 @@ def _slowed(leg: Leg, limits: Array, doubts: list[str]) -> None:
         unit = "m/s" if leg.piece.tool else "rad/s of the leading joint"
         scale = 1.0 if leg.piece.tool else leg.piece.leading
         doubts.append(
-            f"{leg.place}: slowed from {leg.limits.speed * scale:.3g} to {possible * scale:.3g} {unit}, which "
-            "the joints' speed limits allow; a controller may stop instead"
+            f"{leg.place}: slowed from {leg.limits.speed * scale:.3g} to {possible * scale:.3g} {unit}, "
+            "which the joints' speed limits allow; a controller may stop instead"
         )
         leg.limits = Limits(possible, leg.limits.acceleration, leg.limits.jerk)
 

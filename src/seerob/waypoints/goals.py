@@ -74,8 +74,8 @@ class Goals:
         waypoint = self._program.waypoints[len(self.found)]
         if waypoint.move.of_tool and waypoint.q is not None and np.abs(q - self._here).max() > 1e-3:
             self.doubts.append(
-                f"{waypoint.shown}: the straight way ends in other joint positions than the waypoint has "
-                f"(off by {np.abs(q - self._here).max():.3g} rad or m): the tool is there, the branch is another"
+                f"{waypoint.shown}: the straight way ends in other joint positions than it has "
+                f"(off by {np.abs(q - self._here).max():.3g} rad or m): the tool is there, on another branch"
             )
         if waypoint.move.of_tool and waypoint.pose is not None:
             self._name(waypoint, q)

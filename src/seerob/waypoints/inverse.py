@@ -88,7 +88,7 @@ def solutions(arm: Arm, rotation: Array, position: Array, near: Array) -> tuple[
     found: list[Solution] = []
     for row in q[error < 1e3 * EXACT]:
         turned = _nearest_turn(arm, row, near)
-        if turned is None or any(np.abs(turned - other.q).max() < SAME for other in found):
+        if turned is None or any(_apart(arm, turned, other.q) < SAME for other in found):
             continue
         found.append(Solution(turned, branch(arm.posture(turned)) if classic else None))
     return tuple(sorted(found, key=lambda s: float(np.linalg.norm(s.q - near))))
@@ -125,6 +125,12 @@ def rotation_vectors(rotation: Array) -> Array:
 def _twist(at: Posture, rotation: Array, position: Array) -> Array:
     turn = rotation_vectors(rotation @ np.swapaxes(at.rotation, -1, -2))
     return np.concatenate([position - at.position, turn], axis=-1)
+
+
+def _apart(arm: Arm, a: Array, b: Array) -> float:
+    """Largest difference of a joint, whole turns aside."""
+    d = a - b
+    return float(np.abs(np.where(arm.slides, d, (d + np.pi) % (2 * np.pi) - np.pi)).max())
 
 
 def _nearest_turn(arm: Arm, q: Array, near: Array) -> Array | None:

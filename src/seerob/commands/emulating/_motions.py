@@ -125,11 +125,14 @@ def motion_of(options: argparse.Namespace, target: Target, home: Sequence[float]
 
 
 def _through(path: Path, target: Target, home: Sequence[float]) -> Motion:
+    import msgspec
+
     from seerob.sources.waypoints import Waypoints
     from seerob.waypoints.reading import read_program
 
     program = read_program(path, path.name)
     first = program.waypoints[0] if program.waypoints else None
     start = tuple(home) if first is not None and first.q is None else None
-    source = Waypoints(robot=target.name, file=path.name, start=start, **CALM)
+    given = {"robot": target.name, "file": path.name, "start": start, **CALM}
+    source = msgspec.convert({k: v for k, v in given.items() if v is not None}, Waypoints)
     return _played(source.open(path.parent, target))

@@ -1,0 +1,116 @@
+r"""Permissible speeds of many surfaces against many body regions: `seerob.collision` in one loop."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from seerob.transforms import Array
+
+ROUNDING = 1 - 1e-12
+"""Where the energy limit is that of the force, rounding must not say that energy governs."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def permissible_speeds(
+    m_R: Array,
+    forces: Array,
+    clamped: NDArray[np.bool_],
+    force: Array,
+    multiplier: Array,
+    stiffness: Array,
+    mass: Array,
+    energy: Array,
+) -> tuple[Array, NDArray[np.int64], Array, Array, Array, Array]:
+    """Speeds by force, pressure and energy, and the least of them that are known.
+
+    Args:
+        m_R: Effective mass of the robot at each surface [kg], shape (b,).
+        forces: That the pressure limits allow, free and clamped, NaN when unknown [N], shape (b, 2, r).
+        clamped: Whether the body part cannot recoil, shape (b, r).
+        force: Quasi-static limit of each region [N], shape (r,).
+        multiplier: Transient over quasi-static, shape (r,).
+        stiffness: [N/m], shape (r,).
+        mass: Of the body part [kg], shape (r,).
+        energy: Printed transient energy [J], NaN when there is none, shape (r,).
+
+    Returns:
+        The least [m/s]; which it is (`seerob.collision.Governing`); by force, pressure, energy [m/s]; reduced
+        mass [kg]; shape (b, r) each.
+    """
+    b, r = clamped.shape
+    least, by_force, by_pressure, by_energy, reduced = (
+        np.empty((b, r)),
+        np.empty((b, r)),
+        np.empty((b, r)),
+        np.empty((b, r)),
+        np.empty((b, r)),
+    )
+    which = np.empty((b, r), np.int64)
+    for i in range(b):
+        for j in range(r):
+            k, F, F_P, mu, E = stiffness[j], multiplier[j] * force[j], forces[i, 0, j], m_R[i], energy[j]
+            if clamped[i, j]:
+                # Printed energies are transient.
+                F, F_P, E = force[j], forces[i, 1, j], np.nan
+            else:
+                mu = 1.0 / (1.0 / mass[j] + 1.0 / m_R[i])
+            stored = F * F / (2.0 * k)
+            if not math.isnan(E):
+                stored = E if math.isnan(stored) else min(stored, E)
+            root = math.sqrt(mu * k)
+            v_F, v_P, v_E = F / root, F_P / root, math.sqrt(2.0 * stored / mu)
+            by_force[i, j], by_pressure[i, j], by_energy[i, j], reduced[i, j] = v_F, v_P, v_E, mu
+            v = v_F
+            if v_E < v_F * ROUNDING:
+                v = v_E
+            if v_P < v or math.isnan(v):
+                v = v_P
+            least[i, j] = v
+            which[i, j] = 0 if v == v_F else 1 if v == v_P else 2
+    return least, which, by_force, by_pressure, by_energy, reduced
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def governing(
+    v: Array,
+    near: NDArray[np.bool_],
+    columns: NDArray[np.int64],
+    permissible: Array,
+    known: NDArray[np.int64],
+    far: float,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which surface is the worst for each region: by rank, then by margin; without a limit the fastest.
+
+    Args:
+        v: Relative speeds [m/s], shape (b, k).
+        near: What could be hit by what, shape (b, k).
+        columns: Of ``v``: the regions with limits, shape (r,).
+        permissible: As given [m/s], shape (b, r).
+        known: Ranks against the limits: 2 exceeded, 1 open, 0 within, shape (b, r).
+        far: Larger than any margin of speed [m/s].
+
+    Returns:
+        Rows of surfaces, and their ranks, 0 without a limit; shape (k,) each.
+    """
+    b, k = v.shape
+    column = np.full(k, -1)
+    column[columns] = np.arange(len(columns))
+    rows, ranks = np.zeros(k, np.int64), np.zeros(k, np.int64)
+    for j in range(k):
+        worst = -np.inf
+        c = column[j]
+        for i in range(b):
+            rank = known[i, c] if c >= 0 else 0
+            if i == 0:
+                ranks[j] = rank
+            if not near[i, j]:
+                continue
+            badness = v[i, j] if c < 0 else rank * far - (permissible[i, c] - v[i, j])
+            # What is not a number is the worst.
+            if badness > worst or (math.isnan(badness) and not math.isnan(worst)):
+                worst, rows[j], ranks[j] = badness, i, rank
+    return rows, ranks

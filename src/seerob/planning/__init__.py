@@ -1,0 +1,1 @@
+"""Paths of a robot that keep a distance from everything, and the proof that they do."""

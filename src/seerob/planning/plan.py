@@ -1,0 +1,135 @@
+"""A plan: postures to go through, and what is known of the way between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from seerob.errors import InputError, Problem
+from seerob.model import Model
+from seerob.planning.clearance import Clearance
+from seerob.planning.search import search
+from seerob.transforms import Array
+
+MOST = 20_000
+"""Postures tried per way."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A path of one robot, straight in joint space from posture to posture."""
+
+    robot: str
+    joints: tuple[str, ...]
+    q: Array
+    """Postures [rad or m], shape (k, n)."""
+    margin: float
+    """Kept everywhere on it [m]; proven for the shapes of the twin."""
+    least: float
+    """Bound from below on the distance to anything, on all of it [m]."""
+    nearest: str
+    """What is nearest to what at the posture of the path that is nearest to anything."""
+    seed: int
+    asked: int
+    """Postures whose distances were computed."""
+    left_out: tuple[str, ...]
+    """Pairs of the robot's own bodies that are not watched."""
+
+    def toml(self) -> str:
+        """A file of waypoints, for the source ``waypoints``."""
+        head = [
+            f"# Planned for {self.robot} with seed {self.seed}: straight joint moves between these postures",
+            f"# keep at least {self.margin:g} m from everything, by the twin's shapes, while nothing else",
+            "# moves. A blend would leave the proven way. Preliminary: not executed by any controller.",
+            f"# joints: {', '.join(self.joints)}",
+        ]
+        rows = [f"[[waypoints]]\nq = [{', '.join(f'{x:.9f}' for x in q)}]" for q in self.q.tolist()]
+        return "\n".join([*head, "", "\n\n".join(rows), ""])
+
+
+def plan(
+    model: Model,
+    robot: str,
+    goals: Sequence[Sequence[float]],
+    *,
+    start: Sequence[float] | None = None,
+    margin: float = 0.02,
+    seed: int = 1,
+    seconds: float = 60.0,
+    say: Callable[[int], bool] = lambda tried: False,
+) -> Plan:
+    """A path from a start through goals that keeps a margin from everything, proven between postures too.
+
+    Everybody else stands where the workstation file puts them; areas and the motion of sources are not
+    looked at.
+
+    Args:
+        model: The compiled workstation.
+        robot: Who moves.
+        goals: Joint positions to go through, (n,) each [rad or m].
+        start: Where it begins [rad or m]; its ``q`` in the file when not given.
+        margin: Least distance from anything, itself included [m].
+        seed: Same model, same seed, same path.
+        seconds: Longest time per goal [s].
+        say: Told how many postures were tried; True stops the work.
+
+    Raises:
+        UnknownName: No such robot.
+        InputError: No start, a posture of another length, beyond a limit, or nearer than the margin.
+        NoPath: None was found; that there is none is not known.
+        Stopped: ``say`` said so.
+    """
+    mechanism = model.robot(robot)
+    if start is None and not mechanism.home_given:
+        raise InputError.at(
+            "plan", "start", f"nobody says where {robot} is", "give its q in the file, or start"
+        )
+    if not goals:
+        raise InputError.at("plan", "goal", "missing", "give joint positions to go to")
+    if not (margin >= 0 and np.isfinite(margin)):
+        raise InputError.at("plan", "margin", f"{margin} m", "give 0 or more")
+    ways = [
+        np.asarray(mechanism.home if start is None else start, float),
+        *(np.asarray(g, float) for g in goals),
+    ]
+    names = ["start", *(f"goal {i + 1}" for i in range(len(goals)))]
+    problems: list[Problem] = []
+    for name, q in zip(names, ways, strict=True):
+        if q.shape != (len(mechanism.joints),) or not np.isfinite(q).all():
+            what = f"{q.size} joint positions" if q.shape != (len(mechanism.joints),) else "is not finite"
+            problems.append(Problem("plan", name, what, f"give {len(mechanism.joints)} numbers [rad or m]"))
+            continue
+        for joint, low, value, high in zip(
+            mechanism.joints, mechanism.lower, q, mechanism.upper, strict=True
+        ):
+            if not low <= value <= high:
+                what = f"{joint.name} at {value:.4g} is beyond its limits {low:.4g} and {high:.4g}"
+                problems.append(Problem("plan", name, what, "choose another posture"))
+    if problems:
+        raise InputError(problems)
+    clearance = Clearance(model, mechanism, ways[0])
+    for name, q in zip(names, ways, strict=True):
+        what = clearance.fault(q, margin)
+        if what:
+            problems.append(Problem("plan", name, what, "choose another posture or a smaller margin"))
+    if problems:
+        raise InputError(problems)
+    path = [ways[0]]
+    for a, b in pairwise(ways):
+        path += search(clearance, a, b, margin=margin, seed=seed, most=MOST, seconds=seconds, say=say)[1:]
+    least = min((clearance.least(a, b) for a, b in pairwise(path)), default=np.inf)
+    near = [found for q in path if (found := clearance.nearest(q)) is not None]
+    return Plan(
+        robot=robot,
+        joints=tuple(j.name for j in mechanism.joints),
+        q=np.array(path),
+        margin=margin,
+        least=float(max(least, margin)),
+        nearest=min(near, key=lambda n: n.distance).what if near else "",
+        seed=seed,
+        asked=clearance.asked,
+        left_out=clearance.left_out,
+    )

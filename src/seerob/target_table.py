@@ -1,0 +1,43 @@
+"""Cartesian targets that the twin may publish to ROS, in the workstation file."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+from msgspec import Meta
+
+from seerob.quantities import PathName, Table, unit
+
+Topic = Annotated[str, Meta(pattern=r"^/?[A-Za-z~][A-Za-z0-9_/]*$", max_length=200)]
+
+
+class TargetMessage(StrEnum):
+    """How a pose is published."""
+
+    POSE_STAMPED = "geometry_msgs/PoseStamped"
+    POSE = "geometry_msgs/Pose"
+    TRANSFORM_STAMPED = "geometry_msgs/TransformStamped"
+
+
+class CartesianTarget(Table, frozen=True, kw_only=True):
+    """Where a tool of the twin is to go, published over rosbridge for a controller that listens to that."""
+
+    at: PathName
+    """Full name of the link or tool that a source moves by poses (``ur10/tool0``), or the robot's."""
+    host: str
+    """Name or address of the computer with the rosbridge server."""
+    port: Annotated[int, Meta(ge=1, le=65535)] = 9090
+    tls: bool = False
+    """Encrypted, and the server's certificate is checked."""
+    topic: Topic
+    """Such as ``/target_pose``; there is no usual one."""
+    message: TargetMessage = TargetMessage.POSE_STAMPED
+    ros: Annotated[int, Meta(ge=1, le=2)] = 2
+    """1 for a server of ROS 1."""
+    frame_id: str = "base_link"
+    """Frame of ROS that poses are in."""
+    link: PathName | None = None
+    """Full name of the link of the twin that stands where ``frame_id`` is; the world when not given."""
+    every: Annotated[float, unit("s", ge=0.01, le=60)] = 0.1
+    """Least time between two targets [s]; of what comes faster, the newest is published."""

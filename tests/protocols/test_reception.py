@@ -1,0 +1,136 @@
+"""Packets are as old as the kernel says, whoever reads them late; and on loops that cannot say when."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import socket
+import sys
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seerob.protocols.connection import connected
+from seerob.protocols.datagrams import listening
+from seerob.protocols.reception import Reception, instant
+
+CLOCKS = 5e-3
+"""Between the wall clock and the monotonic one, while one is set to the time of a server [s]."""
+
+
+class Windows(asyncio.SelectorEventLoop):
+    """A loop that does not say when a socket can be read, as that of Windows."""
+
+    def add_reader(self, *_):
+        raise NotImplementedError
+
+
+LOOPS = [asyncio.SelectorEventLoop, Windows]
+
+
+def run(loop, coroutine):
+    with asyncio.Runner(loop_factory=loop) as runner:
+        return runner.run(asyncio.wait_for(coroutine, 30))
+
+
+def pair(kind):
+    """Two sockets, of which what the first sends the second gets."""
+    if kind == socket.SOCK_STREAM:
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            one = socket.create_connection(server.getsockname())
+            return one, server.accept()[0]
+    one, other = socket.socket(type=kind), socket.socket(type=kind)
+    other.bind(("127.0.0.1", 0))
+    one.connect(other.getsockname())
+    return one, other
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel's time stamps of Linux")
+@pytest.mark.parametrize("kind", [socket.SOCK_DGRAM, socket.SOCK_STREAM])
+def test_a_late_reader_does_not_make_it_late(kind):
+    one, other = pair(kind)
+    with one, other:
+        other.setblocking(False)
+        reception = Reception(other)
+        with pytest.raises(BlockingIOError):
+            reception.read(100)
+        for text in (b"first", b"second"):
+            before = time.monotonic()
+            one.send(text)
+            after = time.monotonic()
+            time.sleep(0.1)
+            arrived, data, _ = reception.read(100)
+            assert data == text
+            assert before - CLOCKS <= arrived <= after + CLOCKS
+
+
+@given(
+    st.none() | st.integers(-(10**12), 10**12),
+    st.floats(0, 1e6),
+    st.floats(0, 1e3),
+)
+def test_a_stamp_is_believed_between_the_last_look_and_now(age, empty, waited):
+    now, wall = empty + waited, 10**18
+    found = instant(None if age is None else wall - age, now=now, wall=wall, empty=empty)
+    assert empty <= found <= now
+    if age is None:
+        assert found == now
+    elif 0 <= 1e-9 * age <= waited:
+        assert found == pytest.approx(now - 1e-9 * age, abs=1e-6)
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_datagrams_are_answered_and_heard_in_order(loop):
+    async def talk():
+        loop = asyncio.get_running_loop()
+        with socket.socket(type=socket.SOCK_DGRAM) as other:
+            other.bind(("127.0.0.1", 0))
+            other.setblocking(False)
+            async with listening("127.0.0.1", 0, answer=lambda data: data + b"!") as port:
+                heard = []
+                for k in range(5):
+                    other.sendto(b"%d" % k, ("127.0.0.1", port.port))
+                async for datagram in port.receive(10):
+                    heard.append(datagram)
+                    if len(heard) == 5:
+                        break
+                answers = []
+                while len(answers) < 5:
+                    try:
+                        answers.append(other.recv(10))
+                    except BlockingIOError:
+                        await asyncio.sleep(0.001)
+                assert [d.data for d in heard] == [b"%d" % k for k in range(5)]
+                assert answers == [b"%d!" % k for k in range(5)]
+                assert all(a.arrived <= b.arrived <= loop.time() for a, b in itertools.pairwise(heard))
+                with pytest.raises(TimeoutError, match="nothing sent"):
+                    await anext(port.receive(0.01))
+            # The port is free again.
+            async with listening("127.0.0.1", port.port):
+                pass
+
+    run(loop, talk())
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_a_connection_is_read_waited_for_and_ends(loop):
+    async def talk():
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            gone = server.getsockname()[1]
+            async with connected("localhost", gone, 10) as connection:
+                other, _ = server.accept()
+                with other:
+                    await connection.write(b"question")
+                    assert other.recv(100) == b"question"
+                    with pytest.raises(TimeoutError, match="silent for 0"):
+                        await connection.read(100, 0.01)
+                    asyncio.get_running_loop().call_later(0.01, other.send, b"answer")
+                    assert (await connection.read(100, 10)).data == b"answer"
+                assert (await connection.read(100, 10)).data == b""
+        with pytest.raises(ConnectionRefusedError):
+            async with connected("127.0.0.1", gone, 10):
+                pass
+
+    run(loop, talk())

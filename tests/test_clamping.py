@@ -70,6 +70,7 @@ def test_gap_in_a_slot_is_found_where_a_hull_has_none() -> None:
     np.testing.assert_allclose(gaps[:, 0], 0.1 - 0.02 - x, atol=1e-12)
     live = [pairs.gaps(r, p)[0] for r, p in zip(rotations, positions, strict=True)]
     np.testing.assert_array_equal(live, gaps)
+    assert pairs.gaps(rotations[0], positions[0])[1].tolist() == [0]
     found = clamps(gaps, np.arange(7) * 0.1, np.array([0.05]), opened=pairs.opened)
     np.testing.assert_array_equal(found[1:, 0, 0], gaps[1:, 0] - 0.01 <= 0.05 + 1e-12)
 

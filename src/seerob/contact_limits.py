@@ -143,9 +143,9 @@ class Judged:
     speeds: Speeds
     clamped: NDArray[np.bool_]
     """Shape (b, r)."""
-    rows: Array
+    rows: NDArray[np.int64]
     """Surface that governs, shape (k,)."""
-    ranks: Array
+    ranks: NDArray[np.int64]
     """2 exceeded, 1 open, 0 within, shape (k,)."""
     ends: Spread | None = None
     """Of the permissible speeds, shape (b, r), where something that they are made from may be off."""

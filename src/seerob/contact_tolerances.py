@@ -122,7 +122,7 @@ class ContactEnds:
         return spread(speeds, len(self.tolerances))
 
 
-def ranks(v: Array, speeds: Speeds, ends: Spread | None) -> Array:
+def ranks(v: Array, speeds: Speeds, ends: Spread | None) -> NDArray[np.int64]:
     """2 exceeded, 1 open, 0 within, of relative speeds [m/s] (b, r)."""
     low, high = (speeds.permissible,) * 2 if ends is None else (ends.low, ends.high)
     return np.where(v > high, 2, np.where(np.isnan(speeds.pressure) | (v > low), 1, 0))

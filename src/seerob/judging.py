@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from msgspec.structs import replace
 
 from seerob.criterion import Criterion, Evaluate
@@ -46,7 +46,7 @@ class Judge:
         state.asked.clear()
         try:
             result = self._muted(criterion, state) or bound.evaluate(state)
-            if result.value is not None and not np.isfinite(result.value):
+            if result.value is not None and not math.isfinite(result.value):
                 raise Undecided(f"the value is {result.value}, not a finite number")
         except Undecided as reason:
             result = Result(

@@ -11,6 +11,8 @@ from seerob.snapshot import Input, Origin
 from seerob.workstation import Mounted, Robot
 
 FILE = "workstation file"
+PRELIMINARY = ("vendor_emulator", "simulator", "planned")
+"""Origins of a motion that no real controller has executed, [Weistroffer2022]_ 2.1.3.1."""
 WORST_FIRST = list(reversed(Origin))
 
 
@@ -22,9 +24,12 @@ def motion(model: Model, *names: str) -> tuple[Input, ...]:
         source = next((s for s in model.workstation.sources if s.target() == name), None)
         if source is not None:
             # A twin follows what was heard; whether that was measured, the source's own findings say.
-            measured = getattr(source, "origin", None) == "controller"
-            kind = Origin.MEASURED if measured else Origin.GIVEN
-            found.append(Input(name=f"motion of {name}", origin=kind, source=source.name))
+            origin = getattr(source, "origin", None)
+            kind = Origin.MEASURED if origin == "controller" else Origin.GIVEN
+            said = (
+                None if origin is None else f"{origin}, preliminary" * (origin in PRELIMINARY) or str(origin)
+            )
+            found.append(Input(name=f"motion of {name}", value=said, origin=kind, source=source.name))
         elif mechanism.home_given:
             where = "posture" if mechanism.role == "human" else "q"
             found.append(

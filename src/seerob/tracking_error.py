@@ -36,6 +36,8 @@ class TrackingError:
     def at(self, state: State) -> Array:
         """Of each body [m], shape (b,)."""
         found = np.zeros(self._n)
+        if not any(state.hearings[person].bones for person in self._bones):
+            return found
         for person, bones in self._bones.items():
             errors = state.hearings[person].bones
             for row, bone, reach in bones if errors else ():

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob.contact_limits import RegionArrays
+from seerob.contact_areas import area_results, margin
+from seerob.contact_limits import Judged, RegionArrays
 from seerob.contact_shape import ContactShape, force_at_pressure
 from seerob.contact_tolerances import area_verdict, ranks
 from seerob.criterion import judge, judge_interval, worst
@@ -20,11 +21,12 @@ from seerob.errors import InputError
 from seerob.judging import Judge
 from seerob.norms.body_limits import SHIPPED, parse, shipped
 from seerob.norms.iso_13855 import Approach, Edition, intrusion, minimum_distance, speed_at
+from seerob.safety import tool_force
 from seerob.safety.effective_mass import inverse_effective_mass, principal_masses
 from seerob.safety.manipulability import Manipulability, least_value_by_joint, singular_values
 from seerob.safety.minimum_distance import MinimumDistance
 from seerob.safety.separation import Separation
-from seerob.snapshot import Verdict
+from seerob.snapshot import Result, Verdict
 from seerob.tolerances import Spread
 
 TEXT = files("seerob.norms").joinpath(SHIPPED).read_text("utf-8")
@@ -152,6 +154,28 @@ def test_a_flat_contact_is_credited_with_its_cap_and_many_patches_with_the_least
     np.testing.assert_allclose(arrays.pressure_force(shape(*patches), cap), least, rtol=1e-12)
 
 
+def test_a_sharp_patch_is_not_hidden_by_one_that_is_longer_and_narrower():
+    arrays, cap = RegionArrays.of(shipped()), 1e-4
+    long, round_ = (arrays.pressure_force(shape(radii), cap) for radii in ((0.01, 0.9), (0.02, 0.03)))
+    assert (round_ < long).any()
+    both = arrays.pressure_force(shape((0.01, 0.9), (0.02, 0.03)), cap)
+    np.testing.assert_array_equal(both, np.minimum(long, round_))
+
+
+def test_what_is_least_permitted_and_how_far_it_is():
+    part = Result(name="Chest", value=1.0, limit=3.0)
+    assert margin((part, 0)) == 2.0
+    assert margin((Result(name="Chest", value=1.0), 0)) == margin((Result(name="C", limit=1.0), 0)) == -np.inf
+    arrays = RegionArrays.of(shipped())
+    n = len(arrays.regions)
+    speeds = arrays.speeds(np.array([4.0]), np.full((1, 2, n), 1e9), np.zeros((1, n), bool))
+    ends = Spread(speeds.permissible * 0.9, speeds.permissible, np.zeros((0, 1, n)))
+    none = np.zeros((1, n), bool)
+    judged = Judged(np.ones(1), np.zeros(n), none, np.ones(1), speeds, none, np.zeros(n), np.zeros(n))
+    assert judged.least is speeds.permissible
+    assert replace(judged, ends=ends).least is ends.low
+
+
 def test_ranks_on_and_beside_the_permissible_speed():
     arrays = RegionArrays.of(shipped())
     n = len(arrays.regions)
@@ -168,6 +192,39 @@ def test_ranks_on_and_beside_the_permissible_speed():
     assert area_verdict(WITHIN, EXCEEDED, None) is WITHIN
     assert area_verdict(WITHIN, EXCEEDED, ends) is area_verdict(EXCEEDED, UNDECIDED, ends) is UNDECIDED
     assert area_verdict(WITHIN, WITHIN, ends) is WITHIN
+
+
+def test_areas_on_and_beside_the_speed_that_each_allows():
+    arrays = RegionArrays.of(shipped())
+    n, column = (
+        len(arrays.regions),
+        next(k for k, region in enumerate(arrays.regions) if region.name == "Hands and fingers"),
+    )
+    speeds = arrays.speeds(np.array([4.0]), np.full((1, 2, n), 1e9), np.zeros((1, n), bool))
+    judged = Judged(
+        v_r=np.ones(1), v_h=np.zeros(n), near=np.ones((1, n), bool), projected=np.ones(1), speeds=speeds,
+        clamped=np.zeros((1, n), bool), rows=np.zeros(n, int), ranks=np.zeros(n),
+    )  # fmt: skip
+
+    def areas(v, force=1e9, unknown="", ends=None, whole=WITHIN):
+        forces = np.full(len(arrays.owner), force)
+        return area_results(
+            arrays, forces, (0, column), replace(judged, ends=ends), whole=whole, unknown=unknown, v=v
+        )
+
+    limit = float(min(speeds.force[0, column], speeds.energy[0, column]))
+    pressed = 50.0 / np.sqrt(speeds.mu[0, column] * 75e3)
+    for force, allowed in ((1e9, limit), (50.0, pressed), (np.nan, limit)):
+        np.testing.assert_allclose([found.limit for found in areas(limit, force)], allowed, rtol=1e-12)
+    (allowed,) = {found.limit for found in areas(1.0, 50.0)}
+    for v, verdict in ((allowed, WITHIN), (np.nextafter(allowed, 9), EXCEEDED)):
+        assert {(found.verdict, found.reason) for found in areas(v, 50.0)} == {(verdict, "")}
+    for v, verdict, reason in ((limit, UNDECIDED, "a mesh"), (np.nextafter(limit, 9), EXCEEDED, "")):
+        assert {(f.verdict, f.reason) for f in areas(v, np.nan, "a mesh")} == {(verdict, reason)}
+    ends = Spread(speeds.permissible, speeds.permissible, np.zeros((0, 1, n)))
+    for unknown, reason in (("", "decided as its region is"), ("a mesh", "a mesh")):
+        found = areas(limit, 1e9, unknown, ends, UNDECIDED)
+        assert {(f.verdict, f.reason) for f in found} == {(UNDECIDED, reason)}
 
 
 def contact(
@@ -334,3 +391,7 @@ def test_the_joint_that_leads_out_of_a_singularity_is_named(tmp_path):
     h = 1e-6
     slopes = [abs(least(away + h * e) - least(away - h * e)) / (2 * h) for e in np.eye(6)]
     np.testing.assert_allclose(least_value_by_joint(J(away)), slopes, atol=1e-7)
+
+
+def test_an_acceleration_needs_two_evaluations_within_50_ms():
+    assert tool_force.LONGEST == 0.05

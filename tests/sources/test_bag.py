@@ -9,10 +9,11 @@ import pytest
 
 from seerob.errors import InputError
 from seerob.motion_io.ros_bag import TimeBase
-from seerob.protocols.ros_messages import Content, Joints, Plan, Point
+from seerob.protocols.ros_messages import Content, Joints, Plan, Point, Transform
 from seerob.protocols.ros_serialised import Edition, encode, store
 from seerob.source import Target
 from seerob.sources.bag import Bag
+from seerob.sources.tool_path import PoseFrame
 
 NAMES = ("j1", "j2")
 INF = (math.inf, math.inf)
@@ -118,6 +119,26 @@ def test_a_commanded_trajectory_is_played(tmp_path):
     said = [(Content.TRAJECTORY, "/plan", 0.0, Plan(None, ("j2", "j1"), points))]
     found = opened(write(tmp_path, "mcap", said), content=Content.TRAJECTORY)
     np.testing.assert_allclose([s.q for s in found.samples], np.column_stack([-T, T]), atol=1e-12)
+
+
+def test_the_tool_is_where_the_chain_of_transforms_says(tmp_path):
+    one = (1.0, 0.0, 0.0, 0.0)
+    said = [
+        (Content.TF, "/tf", t, (Transform(100.0 + t, "base_link", "wrist", (0.1 * t, 0.0, 0.4), one),))
+        for t in T.tolist()
+    ]
+    # Recorded after all others, it holds from the beginning.
+    said.append((Content.TF, "/tf_static", 2.0, (Transform(None, "wrist", "tool0", (0.0, 0.2, 0.0), one),)))
+    path = write(tmp_path, "mcap", said)
+    found = opened(path, content=Content.TF, frame=PoseFrame.WORLD)
+    samples = list(found.samples)
+    assert {s.target for s in samples} == {"arm/tool0"}
+    expected = np.column_stack([0.1 * T, np.full(50, 0.2), np.full(50, 0.4)])
+    np.testing.assert_allclose([s.position for s in samples], expected, atol=1e-12)
+    np.testing.assert_allclose([s.t for s in samples], T, atol=1e-6)
+    assert "joints are solved" in " ".join(f.text for f in found.findings)
+    with pytest.raises(InputError, match="frames that are heard: base_link, tool0, wrist"):
+        opened(path, content=Content.TF, frame=PoseFrame.WORLD, child="gripper")
 
 
 def test_mistakes_are_named(tmp_path):

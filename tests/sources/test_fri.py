@@ -69,7 +69,7 @@ def test_the_session_becomes_ready_because_it_is_answered(tmp_path, port):
             wait_for(lambda: server.answers > count + 20)
         finally:
             listener.ask_to_stop()
-            assert listener.join(2.0)
+            assert listener.join(10.0)
         assert server.wrong == []
         assert server.moved_by_answer < 1e-12
     assert all(s.tau == pytest.approx((s.t_device,) * 7) for s in heard if isinstance(s, JointSample))
@@ -114,7 +114,7 @@ def test_strangers_are_not_listened_to(port):
                 other.append(own.answers)
         finally:
             listener.ask_to_stop()
-            assert listener.join(2.0)
+            assert listener.join(10.0)
         assert server.answers == 0
     assert other[0] > 0
 
@@ -133,7 +133,7 @@ def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch, port):
                 wait_for(lambda: len(heard) > 3)
     finally:
         listener.ask_to_stop()
-        assert listener.join(2.0)
+        assert listener.join(10.0)
     wait_for(lambda: open_files() <= files and threading.active_count() <= threads)
 
 

@@ -225,16 +225,20 @@ def cell(folder, port, *, timeout=1.0, model="ur10"):
         '[[sources]]\nkind = "modbus_robot"\nrobot = "arm"\nhost = "127.0.0.1"\n'
         f"port = {port}\nevery = 0.05\ntimeout = {timeout}\n"
         '[[safety]]\nkind = "velocity"\nname = "speed"\nat = "arm"\nlimit = 1.5\n'
-        '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = 500\n',
+        '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = 500\n'
+        '[[safety]]\nkind = "power_and_force"\nname = "contact"\nrobot = "arm"\nperson_speed = 0\n',
     )
 
 
 def test_the_twin_follows_and_energies_are_undecided(tmp_path):
     with robot() as server:
         story = lived(cell(tmp_path, server.port), Story(60, lambda story: story.decided() > 5))
-    energies = [s.results[1] for s in story.snapshots]
-    assert {e.verdict for e in energies} == {"undecided"}
-    assert "too coarse" in energies[-1].reason
+    late = [result for s in story.snapshots for result in s.results[1:]]
+    assert {result.name for result in late} == {"energy", "contact"}
+    assert {result.verdict for result in late} == {"undecided"}
+    reasons = [r.reason for s in story.snapshots for r in s.results[1:] if s.results[0].verdict == "within"]
+    assert all("too coarse" in reason for reason in reasons)
+    assert reasons
     joints = story.joints()
     steps = np.array([s.q for s in joints]) / np.radians(0.1)
     assert np.abs(steps - np.round(steps)).max() < 1e-9

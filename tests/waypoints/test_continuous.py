@@ -8,6 +8,7 @@ from seerob.model_io import library
 from seerob.waypoints.arm import Arm
 from seerob.waypoints.branches import parse
 from seerob.waypoints.continuous import Wish, continuous
+from seerob.waypoints.inverse import rotation_vectors
 from seerob.waypoints.timing import Limits, needed, profile, reachable
 from seerob.waypoints.waypoint import Move, Program, ToolPose, Waypoint
 
@@ -129,6 +130,19 @@ def test_joint_speed_limits_slow_a_linear_move_down_and_say_so(arm):
     found = made(arm, joints(HOME), to(-0.7, -0.2, 0.5), limits=slow)
     assert np.abs(found.trajectory.qd).max() <= 0.05 * (1 + 1e-6)
     assert any("slowed from 0.25" in d for d in found.doubts)
+
+
+def test_a_tool_that_turns_fast_on_a_short_way_is_pointed_out_or_slowed(arm):
+    turn = ToolPose((-0.7, 0.0, 0.5), (0.0, np.cos(0.6), np.sin(0.6), 0.0))
+    way = joints(HOME), to(-0.72, 0.0, 0.5, move=Move.JOINT), Waypoint(place="t", move=Move.LINEAR, pose=turn)
+    free = made(arm, *way, wish=Wish(**{**vars_of(WISH), "tool_acceleration": 5.0, "tool_jerk": 500.0}))
+    assert any("the tool turns at up to" in d for d in free.doubts)
+    slow = made(arm, *way, wish=Wish(**{**vars_of(WISH), "tool_turn": 0.5}))
+    at = arm.posture(slow.trajectory.q[:-1])
+    near = np.linalg.norm(at.position - [-0.71, 0.0, 0.5], axis=1) < 0.009
+    r = at.rotation[near]
+    rate = np.linalg.norm(rotation_vectors(r[1:] @ np.swapaxes(r[:-1], 1, 2)), axis=1) / 0.004
+    assert rate.max() == pytest.approx(0.5, rel=0.01)
 
 
 def test_a_given_duration_is_kept_or_refused(arm):

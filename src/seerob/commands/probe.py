@@ -172,7 +172,7 @@ def options_of(pairs: list[str]) -> dict[str, Any]:
 
 
 def _tell(sample: Sample) -> None:
-    from seerob.samples import BodySample, JointSample, SignalSample
+    from seerob.samples import BodySample, JointSample, PoseSample, SignalSample
 
     if isinstance(sample, BodySample):
         seen = [point for point in sample.points if point.position is not None or point.wxyz is not None]
@@ -190,6 +190,10 @@ def _tell(sample: Sample) -> None:
         ):
             text = "not heard" if values is None else f"{' '.join(f'{x:+.4f}' for x in values)} {unit}"
             line(name, text)
+    elif isinstance(sample, PoseSample):
+        place = " ".join(f"{x:+.4f}" for x in sample.position)
+        turn = " ".join(f"{x:+.4f}" for x in sample.wxyz)
+        line("pose", f"{sample.target}: {place} m, w x y z {turn}")
     elif isinstance(sample, SignalSample):
         for name, value in sample.values.items():
             line("signal", f"{name} = {value:.4f}" if isinstance(value, float) else f"{name} = {value}")

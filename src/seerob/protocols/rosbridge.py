@@ -23,7 +23,6 @@ MAX_MESSAGE = 1 << 20
 MOST_FRAGMENTS = 256
 MOST_UNFINISHED = 8
 """Messages of which fragments are kept at once."""
-DEEPEST = 32
 TYPED = {64: "<u1", 69: "<u2", 70: "<u4", 71: "<u8", 72: "<i1", 77: "<i2", 78: "<i4", 79: "<i8"} | {
     85: "<f4",
     86: "<f8",

@@ -335,7 +335,7 @@ class Contacts:
 
     def _governing(
         self, v: Array, near: NDArray[np.bool_], speeds: contact_limits.Speeds, ends: Spread | None
-    ) -> tuple[Array, Array]:
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Row of the moving body that governs each of `REGIONS`, and its rank: 2 exceeded, 1 open, 0 within.
 
         Without a limit it is the fastest.

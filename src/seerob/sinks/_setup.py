@@ -24,9 +24,9 @@ from seerob.workstation import Engine
 UNKNOWN = "unknown: the workstation file is not at hand or cannot be read"
 ORIGINS = {
     "controller": "measured: the real robot's controller",
-    "vendor_emulator": "the maker's own controller software, without the robot",
+    "vendor_emulator": "the maker's own controller software, without the robot: preliminary",
     "simulator": "a generic simulator: preliminary until it is confirmed on the controller",
-    "planned": "a planned path that nobody has executed",
+    "planned": "a planned path that nobody has executed: preliminary until it is confirmed on the controller",
     "recording": "one of our recordings; what fed it is written there",
 }
 _ADDRESSES = ("file", "host", "url", "port", "address", "stream")

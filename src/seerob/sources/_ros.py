@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import Meta
 from msgspec.structs import replace
 
-from seerob.errors import InputError, suggestion
+from seerob.errors import InputError
 from seerob.live import LiveSource
 from seerob.protocols import ProtocolError
 from seerob.protocols.ros_messages import Content, Joints, Plan, Said
@@ -21,16 +21,14 @@ from seerob.protocols.rosbridge_client import SILENCE, Heard
 from seerob.samples import JointSample, PoseSample, Quality, Sample
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
-from seerob.sources._ros_frames import FrameTree
+from seerob.sources._ros_frames import STATIC, FrameTree, driven, world_from_parent
 from seerob.sources._ros_joints import JointGather, PlayedPlan
-from seerob.sources.tool_path import PoseFrame, fixed_links
+from seerob.sources.tool_path import PoseFrame
 from seerob.trajectory import MotionOrigin, origin_finding
 from seerob.transforms import Array, wxyz_from_rotation
 
 ASKED = 1.2
 """How long the first message is waited for at start [s]."""
-STATIC = "/tf_static"
-"""Where frames are said that never change."""
 
 
 class RosSource(LiveSource, frozen=True, kw_only=True):
@@ -223,22 +221,10 @@ class RosSource(LiveSource, frozen=True, kw_only=True):
                 await asyncio.gather(waiting, return_exceptions=True)
 
     def _world_from_parent(self, target: Target) -> Array:
-        if self.frame is PoseFrame.WORLD:
-            return np.eye(4)
-        fixed = fixed_links(target)
-        name = f"{target.name}/{self.parent}"
-        if name not in fixed or target.world_from_base is None:
-            what = f"no link {name!r} that stands still with {target.name}"
-            remedy = f'{suggestion(name, fixed)}; or frame = "world" when {self.parent!r} is its origin'
-            raise InputError.at(self.where(), "parent", what, remedy)
-        return np.array(target.world_from_base) @ fixed[name]
+        return world_from_parent(target, self.parent, self.frame, self.where())
 
     def _driven(self, target: Target) -> str:
-        at = self.at or f"{target.name}/{self.child}"
-        if target.frames and at not in (*target.frames, target.name):
-            what = f"no link or tool {at!r} that {target.name} moves"
-            raise InputError.at(self.where(), "at", what, suggestion(at, target.frames))
-        return at
+        return driven(target, self.at or f"{target.name}/{self.child}", self.where())
 
 
 def _pose_sample(pose: Array, stamp: float | None, arrived: float, driven: str) -> PoseSample:

@@ -6,9 +6,14 @@ import math
 
 import numpy as np
 
+from seerob.errors import InputError, suggestion
 from seerob.protocols.ros_messages import Transform
+from seerob.source import Target
+from seerob.sources.tool_path import PoseFrame, fixed_links
 from seerob.transforms import Array, rotation_from_wxyz, transform
 
+STATIC = "/tf_static"
+"""Where frames are said that never change."""
 LONGEST = 64
 """Edges of a chain."""
 MOST_FRAMES = 4096
@@ -80,3 +85,43 @@ def _matrix(said: Transform) -> Array:
     if not (math.isfinite(length) and abs(length - 1) < UNIT):
         return np.full((4, 4), np.nan)
     return transform(rotation_from_wxyz(np.array(said.wxyz) / length), said.position)
+
+
+def world_from_parent(target: Target, parent: str, frame: PoseFrame, where: str) -> Array:
+    """Where the parent stands in the workstation, (4, 4).
+
+    Args:
+        target: The robot.
+        parent: Frame of ROS, which is a link of the robot of the same name or the workstation's origin.
+        frame: Which of both.
+        where: The other end or the file, for messages.
+
+    Raises:
+        InputError: The robot has no such link that stands still.
+    """
+    if frame is PoseFrame.WORLD:
+        return np.eye(4)
+    fixed = fixed_links(target)
+    name = f"{target.name}/{parent}"
+    if name not in fixed or target.world_from_base is None:
+        what = f"no link {name!r} that stands still with {target.name}"
+        remedy = f'{suggestion(name, fixed)}; or frame = "world" when {parent!r} is its origin'
+        raise InputError.at(where, "parent", what, remedy)
+    return np.array(target.world_from_base) @ fixed[name]
+
+
+def driven(target: Target, at: str, where: str) -> str:
+    """Full name of what a pose drives.
+
+    Args:
+        target: The robot.
+        at: What it should be.
+        where: The other end or the file, for messages.
+
+    Raises:
+        InputError: The robot does not move it.
+    """
+    if target.frames and at not in (*target.frames, target.name):
+        what = f"no link or tool {at!r} that {target.name} moves"
+        raise InputError.at(where, "at", what, suggestion(at, target.frames))
+    return at

@@ -16,10 +16,15 @@ from seerob.motion_io.ros_bag import Recorded, TimeBase
 from seerob.protocols.ros_messages import Content, Joints, Plan
 from seerob.samples import JointSample, Quality
 from seerob.snapshot import Finding
-from seerob.source import Target
+from seerob.source import Opened, Target
+from seerob.sources._ros_frames import STATIC, FrameTree, driven, world_from_parent
 from seerob.sources._ros_joints import JointGather
 from seerob.sources._trajectory_file import TrajectoryFile
-from seerob.trajectory import MAX_SAMPLES, Trajectory
+from seerob.sources.tool_path import PoseFrame
+from seerob.tool_trajectory import PoseSamples, ToolTrajectory, plausible
+from seerob.trajectory import MAX_SAMPLES, Trajectory, origin_finding
+from seerob.trajectory_checks import sampling_findings
+from seerob.transforms import Array, wxyz_from_rotation
 
 SAME_INSTANT = 1e-6
 """Samples that are not later by more are dropped: a message that was recorded twice [s]."""
@@ -29,13 +34,96 @@ class Bag(TrajectoryFile, frozen=True, kw_only=True):
     """A robot's motion out of a ROS bag (ROS 1, ROS 2 in SQLite or MCAP)."""
 
     content: Content = Content.JOINT_STATE
-    """``joint_state``, or ``trajectory``: what somebody commanded."""
+    """``joint_state``, ``tf`` (the pose of its tool; the joints are solved) or ``trajectory``: what somebody
+    commanded."""
     topic: str = ""
     """The usual one, or the only one of its type, when not given."""
     joints: tuple[str, ...] = ()
     """Names of its joints in ROS, in the robot's order; the robot's own names when not given."""
     time_base: TimeBase = TimeBase.HEADER
     """``header``: the stamps of the messages; ``received``: when they were recorded."""
+    parent: str = "base_link"
+    """With ``tf``: frame that the pose is taken in."""
+    child: str = "tool0"
+    """With ``tf``: frame whose pose is taken."""
+    frame: PoseFrame = PoseFrame.BASE
+    """With ``tf``: ``base`` when ``parent`` is a link of the robot, ``world`` when it is the workstation's
+    origin."""
+    at: str | None = None
+    """With ``tf``: full name of the link or tool that ``child`` is (``ur10/tool0``); the robot's link of that
+    name when not given."""
+
+    def open(self, folder: Path, target: Target | None) -> Opened:
+        """Read the bag, and check the motion against the robot.
+
+        Raises:
+            InputError: The bag is missing or wrong, or of another robot than this could be.
+        """
+        if self.content is not Content.TF or target is None:
+            return TrajectoryFile.open(self, folder, target)
+        world = world_from_parent(target, self.parent, self.frame, self.file)
+        at = driven(target, self.at or f"{target.name}/{self.child}", self.file)
+        path, said = self._frames(folder / self.file)
+        plausible(path)
+        path = path.seen_from(world)
+        text = (
+            f"joints are solved from the pose of {self.child!r} in {self.parent!r}: the branch, and what "
+            "a redundant robot does beside its tool, may differ from the controller's; what depends on "
+            "them is preliminary"
+        )
+        return Opened(
+            samples=PoseSamples(path, self.name or f"bag {target.name}", at),
+            duration=path.duration,
+            findings=(
+                origin_finding(self.origin, target.name, self.file),
+                Finding(level="assumed", subject=target.name, text=text),
+                *(Finding(level=k, subject=target.name, text=t) for k, t in said),
+                *sampling_findings(path, target.name, self.timeout),
+            ),
+        )
+
+    def _frames(self, path: Path) -> tuple[ToolTrajectory, list[tuple[str, str]]]:
+        """The path of ``child`` in ``parent``."""
+        topic = ros_bag.chosen(ros_bag.topics_of(path, self.file), self.content, self.topic, self.file)
+        tree = FrameTree(self.parent, self.child)
+        # What never changes may have been recorded late: it holds from the beginning.
+        for item in ros_bag.messages(path, self.content, (STATIC,), self.file):
+            if isinstance(item.said, tuple):
+                tree.take(item.said, fixed=True)
+        times: list[float] = []
+        poses: list[Array] = []
+        dropped = 0
+        for item in ros_bag.messages(path, self.content, (topic,), self.file):
+            if not isinstance(item.said, tuple) or not tree.take(item.said, fixed=False):
+                continue
+            found = tree.pose()
+            if found is None:
+                continue
+            t = item.received if self.time_base is TimeBase.RECEIVED else found[1]
+            if t is None:
+                what = f"{topic}: a transform without a stamp"
+                raise InputError.at(self.file, "time_base", what, 'write time_base = "received"')
+            if times and t <= times[-1] + SAME_INSTANT:
+                dropped += 1
+                continue
+            times.append(t)
+            poses.append(found[0])
+            if len(times) > MAX_SAMPLES:
+                raise InputError.at(self.file, "", f"more than {MAX_SAMPLES} samples", "split the bag")
+        if not poses:
+            raise InputError.at(self.file, "child", tree.lacking(), "name parent and child")
+        said = [("note", f"{self.file}: {self.child!r} in {self.parent!r} out of {topic}")]
+        if dropped:
+            said.append(("note", f"{dropped} transforms joined to an instant that others of the chain had"))
+        return (
+            ToolTrajectory(
+                file=self.file,
+                t=np.array(times),
+                position=np.array([p[:3, 3] for p in poses]),
+                wxyz=np.array([_turn(p) for p in poses]),
+            ),
+            said,
+        )
 
     def read(self, path: Path, target: Target) -> tuple[Trajectory, tuple[Finding, ...]]:
         """The motion by the robot's joints.
@@ -46,9 +134,6 @@ class Bag(TrajectoryFile, frozen=True, kw_only=True):
         if self.joints and len(self.joints) != len(target.joints):
             what = f"{len(self.joints)} joints for the {len(target.joints)} of {target.name}"
             raise InputError.at(self.file, "joints", what, f"name one for each of {', '.join(target.joints)}")
-        if self.content is Content.TF:
-            what = "transforms are read live only"
-            raise InputError.at(self.file, "content", what, "take joint_state, or play the bag to rosbridge")
         topic = ros_bag.chosen(ros_bag.topics_of(path, self.file), self.content, self.topic, self.file)
         names = self.joints or target.joints
         recorded = ros_bag.messages(path, self.content, (topic,), self.file)
@@ -135,3 +220,8 @@ class Bag(TrajectoryFile, frozen=True, kw_only=True):
             ),
             said,
         )
+
+
+def _turn(pose: Array) -> Array:
+    """Unit quaternion; NaN where the pose is none, which the path refuses with its place."""
+    return wxyz_from_rotation(pose[:3, :3]) if np.isfinite(pose).all() else np.full(4, np.nan)

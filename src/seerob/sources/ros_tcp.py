@@ -98,14 +98,13 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
                     return
                 await asyncio.to_thread(store, edition)
                 for topic in self.topics():
-                    await connection.write(self._subscription(topic, edition))
+                    await connection.write(self._subscription(topic))
                 async with aclosing(self._decoded(frames, edition)) as messages:
                     async for heard in messages:
                         yield heard
 
-    def _subscription(self, topic: str, edition: Edition) -> bytes:
+    def _subscription(self, topic: str) -> bytes:
         # Endpoints of both editions know the short names.
-        del edition
         name = ros1_name(self.content.message_type)
         return ros_tcp.command("subscribe", {"topic": topic, "message_name": name})
 

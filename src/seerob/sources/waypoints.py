@@ -17,7 +17,7 @@ from seerob.trajectory import MotionOrigin, Trajectory
 from seerob.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
 from seerob.waypoints.arm import Arm
 from seerob.waypoints.branches import parse
-from seerob.waypoints.continuous import Wish, continuous
+from seerob.waypoints.continuous import Continuous, Wish, continuous
 from seerob.waypoints.point import Point
 from seerob.waypoints.reading import read_program
 from seerob.waypoints.waypoint import Program
@@ -47,6 +47,9 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
     """Likewise [m/s²]."""
     tool_jerk: Annotated[Above | None, unit("m/s³")] = None
     """Of linear and circular moves [m/s³]."""
+    tool_turn: Annotated[Above | None, unit("rad/s")] = None
+    """Largest turning speed of the tool on linear and circular moves [rad/s]; when not given only the
+    joints' speed limits hold, and what it reaches is said."""
     start: Radians | None = None
     """Joint positions before the first waypoint [rad or m]; when not given, that waypoint, if it has any."""
     branch: str | None = None
@@ -71,18 +74,7 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
         """Read the waypoints, solve the poses, time the way."""
         program = self.program(path)
         arm, said = self.arm(program, target)
-        wish = Wish(
-            joint_speed=self.joint_speed,
-            joint_acceleration=self.joint_acceleration,
-            joint_jerk=self.joint_jerk,
-            tool_speed=self.tool_speed,
-            tool_acceleration=self.tool_acceleration,
-            tool_jerk=self.tool_jerk,
-            period=self.period,
-            start=self.start,
-            branch=None if self.branch is None else parse(self.branch),
-        )
-        found = continuous(program, arm, wish, speed_limits=target.velocity)
+        found = self.motion(program, arm, target.velocity)
         where = program.file
         text = (
             f"the motion between the {len(program.waypoints)} waypoints of {where} is timed by seerob with "
@@ -94,6 +86,31 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
             *notes(tuple(f"{where}: {r}" for r in (*program.remarks, *found.remarks)), target.name),
             *notes(tuple(f"{where}: {d}" for d in found.doubts), target.name, level="warning"),
         )
+
+    def motion(self, program: Program, arm: Arm, speed_limits: tuple[float | None, ...]) -> Continuous:
+        """The continuous motion.
+
+        Args:
+            program: Of `program`.
+            arm: Of `arm`.
+            speed_limits: Of the joints [rad/s or m/s]; None where unknown.
+
+        Raises:
+            InputError: What nobody gave, or a waypoint that cannot be reached.
+        """
+        wish = Wish(
+            joint_speed=self.joint_speed,
+            joint_acceleration=self.joint_acceleration,
+            joint_jerk=self.joint_jerk,
+            tool_speed=self.tool_speed,
+            tool_acceleration=self.tool_acceleration,
+            tool_jerk=self.tool_jerk,
+            tool_turn=self.tool_turn,
+            period=self.period,
+            start=self.start,
+            branch=None if self.branch is None else parse(self.branch),
+        )
+        return continuous(program, arm, wish, speed_limits=speed_limits)
 
     def program(self, path: Path) -> Program:
         """The waypoints of the file, or those by hand.

@@ -18,6 +18,8 @@ from seerob.waypoints.timing import Limits, Profile, profile
 from seerob.waypoints.waypoint import Program, Waypoint
 
 NO_BLEND = 1e-6
+FAST_TURN = 1.0
+"""A tool that turns faster on a way of its own is pointed out [rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +34,8 @@ class Wish:
     """[m/s]"""
     tool_acceleration: float | None = None
     tool_jerk: float | None = None
+    tool_turn: float | None = None
+    """Largest turning speed of the tool on its own ways [rad/s]; not limited when not given."""
     period: float = 0.008
     """Of the samples [s]."""
     start: tuple[float, ...] | None = None
@@ -84,7 +88,7 @@ def continuous(
             continue
         goals.reached(piece.q[-1])
         leg = Leg(piece, _limits(waypoint, wish, piece), waypoint.shown, waypoint.duration, waypoint.pause)
-        _slowed(leg, limits, doubts)
+        _slowed(leg, limits, wish.tool_turn, doubts)
         if piece.least < SINGULAR:
             doubts.append(
                 f"{waypoint.shown}: near a singularity at {100 * piece.least_at:.0f} % of the way (least "
@@ -92,6 +96,11 @@ def continuous(
             )
         if piece.turning:
             remarks.append(f"{waypoint.shown}: the tool only turns; its speed is taken as rad/s")
+        elif wish.tool_turn is None and (rate := piece.turn * leg.limits.speed) > FAST_TURN:
+            doubts.append(
+                f"{waypoint.shown}: the tool turns at up to {rate:.2g} rad/s on this way (give tool_turn): how "
+                "fast a controller lets it turn is not modelled"
+            )
         legs.append(leg)
         leg.blend = waypoint.blend > NO_BLEND and k + 1 < len(program.waypoints)
     legs = rounded(legs, program, arm, doubts)
@@ -145,16 +154,18 @@ def _piece(program: Program, arm: Arm, before: Array, waypoint: Waypoint, q: Arr
     return tool_way(arm, before, rotation, position, via=via, file=program.file, place=waypoint.shown)
 
 
-def _slowed(leg: Leg, limits: Array, doubts: list[str]) -> None:
-    """A move whose joints would be faster than they can is slowed as a whole."""
+def _slowed(leg: Leg, limits: Array, tool_turn: float | None, doubts: list[str]) -> None:
+    """A move whose joints or tool would be faster than they may is slowed as a whole."""
     fastest = np.abs(leg.piece.dq).max(axis=0)
     possible = float(np.min(limits / np.maximum(fastest, 1e-12)))
+    if tool_turn is not None and leg.piece.turn > 0:
+        possible = min(possible, tool_turn / leg.piece.turn)
     if possible < leg.limits.speed:
         unit = "m/s" if leg.piece.tool else "rad/s of the leading joint"
         scale = 1.0 if leg.piece.tool else leg.piece.leading
         doubts.append(
             f"{leg.place}: slowed from {leg.limits.speed * scale:.3g} to {possible * scale:.3g} {unit}, "
-            "which the joints' speed limits allow; a controller may stop instead"
+            "which the speed limits of the joints or tool_turn allow; a controller may do otherwise"
         )
         leg.limits = Limits(possible, leg.limits.acceleration, leg.limits.jerk)
 

@@ -49,6 +49,8 @@ class Piece:
     """Least singular value of the Jacobian on it; infinite where it does not matter."""
     least_at: float = 0.0
     """Where, as a share of the way."""
+    turn: float = 0.0
+    """Angle that the tool turns per way [rad/m, or 1 where it only turns]."""
     turning: bool = False
     """Whether the tool only turns, and the way is an angle [rad]."""
 
@@ -153,7 +155,14 @@ def tool_way(
     dq = (np.linalg.pinv(J, rcond=1e-9) @ twist[..., None])[..., 0] / length
     worst = int(np.argmin(sigma))
     return Piece(
-        u * length, q, dq, True, least=float(sigma[worst]), least_at=float(u[worst]), turning=turning
+        u * length,
+        q,
+        dq,
+        True,
+        least=float(sigma[worst]),
+        least_at=float(u[worst]),
+        turn=angle / length,
+        turning=turning,
     )
 
 

@@ -1,0 +1,100 @@
+"""`seerob plan` and emulated controllers on waypoints, as a user calls them."""
+
+import argparse
+
+import numpy as np
+import pytest
+
+import seerob
+from seerob import cli
+from seerob.commands import Exit
+from seerob.commands.emulating import fri, rtde
+
+CELL = """
+[[robots]]
+name = "ur5"
+model = "library:ur5"
+q_deg = [-60, -70, 80, -100, -90, 0]
+
+[[parts]]
+name = "post"
+shape = { box = [0.1, 0.1, 0.1] }
+at = { position = [2, 0, 0.6] }
+"""
+SOURCE = """
+[[sources]]
+kind = "waypoints"
+robot = "ur5"
+file = "planned.toml"
+joint_speed = 1.0
+joint_acceleration = 2.0
+joint_jerk = 20.0
+
+[[safety]]
+kind = "waypoints"
+name = "waypoints"
+robot = "ur5"
+"""
+
+
+@pytest.fixture
+def cell(tmp_path):
+    (tmp_path / "workstation.toml").write_text(CELL, encoding="utf-8")
+    return tmp_path
+
+
+def test_a_plan_is_written_run_and_drawn(cell, capsys):
+    file = cell / "planned.toml"
+    call = ["plan", str(cell), "--to-deg=-40,-70,80,-100,-90,0", "-o", str(file)]
+    assert cli.main(call) == Exit.WITHIN
+    assert "preliminary" in capsys.readouterr().out
+    # What is there is not written over.
+    assert cli.main(call) == Exit.ERROR
+    (cell / "workstation.toml").write_text(CELL + SOURCE, encoding="utf-8")
+    station = seerob.load(cell)
+    summary = station.run()
+    assert summary.results["waypoints"].min() < 1e-3
+    texts = " ".join(f.text for f in station.scene().findings)
+    assert "a plan that was not executed" in texts
+    (criterion,) = station.scene().criteria
+    assert criterion.basis.inputs[0].value == "planned, preliminary"
+
+
+def test_a_path_that_is_not_found_is_undecided(cell):
+    (cell / "workstation.toml").write_text(CELL.replace("[2, 0, 0.6]", "[0.5, -0.1, 0.35]"), encoding="utf-8")
+    call = ["plan", str(cell), "--to-deg=60,-70,80,-100,-90,0", "--seconds", "0.001"]
+    assert cli.main([*call, "-o", str(cell / "p.toml")]) == Exit.UNDECIDED
+    assert not (cell / "p.toml").exists()
+
+
+@pytest.mark.parametrize("text", ["1,a", "", "1,,2", "nan"])
+def test_a_posture_is_numbers(cell, text):
+    with pytest.raises(SystemExit):
+        cli.main(["plan", str(cell), f"--to={text}"])
+
+
+@pytest.mark.parametrize(("kind", "n"), [(rtde, 6), (fri, 7)])
+def test_an_emulated_controller_goes_through_waypoints(tmp_path, kind, n):
+    parser = argparse.ArgumentParser()
+    kind.add(parser)
+    goals = np.zeros((3, n)) + kind.HOME
+    goals[1, 0] += 0.4
+    goals[2, 1] -= 0.3
+    rows = "\n".join(f"[[waypoints]]\nq = {row.tolist()}" for row in goals)
+    (tmp_path / "w.toml").write_text(rows, encoding="utf-8")
+    options = parser.parse_args(["--waypoints", str(tmp_path / "w.toml")])
+    options.host = "127.0.0.1"
+    server = kind.emulated(options).server
+    q = np.array([server.motion(t)[0] for t in np.arange(0.0, 12.0, 0.02)])
+    assert [np.abs(q - goal).max(axis=1).min() < 0.01 for goal in goals] == [True] * 3
+    np.testing.assert_allclose(q[-1], goals[-1], atol=1e-9)
+
+
+def test_a_pose_as_the_first_waypoint_starts_where_the_emulator_stands(tmp_path):
+    parser = argparse.ArgumentParser()
+    rtde.add(parser)
+    (tmp_path / "w.script").write_text("movej(p[-0.7, -0.2, 0.5, 3.14, 0, 0])", encoding="utf-8")
+    options = parser.parse_args(["--waypoints", str(tmp_path / "w.script")])
+    options.host = "127.0.0.1"
+    q, _ = rtde.emulated(options).server.motion(0.0)
+    assert q == pytest.approx(rtde.HOME)

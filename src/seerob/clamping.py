@@ -1,14 +1,17 @@
-r"""Where a part of a person could be clamped: a gap that closes below the body part's thickness.
+r"""Where a part of a person could be clamped: in a gap no wider than the body part, of parts that move.
 
 A gap :math:`g` between a moving part of a robot and another surface clamps a body part of the
-thickness :math:`D` while it closes and is, or by the next instant may be, no wider than it:
+thickness :math:`D` where it is no wider than it, or may be by the next instant, while its sides move:
 
-.. math:: \dot g < 0, \qquad g_n + (g_n - g_{n-1}) \le D
+.. math:: |v| > 0, \qquad g - \delta \le D
 
-Causal, so that a live run and a recording say the same. What was before the first instant is not
-known: a gap that is narrow there counts as closing, unless nothing is left of it. Gaps of
-one robot's own parts are counted only after they were once as wide as the body part: nothing gets
-between links that are always near.
+with :math:`\delta` how far the sides have moved since the instant before. Whether the *least* distance
+closes does not count: a nearer surface at a constant distance, or a part that tilts, hides another place
+where the gap closes. A part that moves past a surface or away from it counts as well: the rule errs on the
+side of clamping, and one more surface never permits more.
+
+Gaps of one robot's own parts are counted only after they were once as wide as the body part, since nothing
+gets between links that are always near, and only while these two move against each other.
 """
 
 from __future__ import annotations
@@ -27,43 +30,39 @@ from seerob.transforms import Array
 Flags = NDArray[np.bool_]
 
 STILL = 1e-3
-"""A gap that closes more slowly than this stays as it is [m/s]."""
+"""Parts of a robot that move more slowly against each other stay as they are [m/s]."""
+AHEAD = 0.09
+"""Largest way that is looked ahead to the next instant [m]."""
 
 
 def clamps(
     gaps: Array,
-    t: Array,
+    moved: Array,
+    speed: Array,
     thickness: Array,
     *,
     opened: Flags,
-    before: tuple[float, Array, Array] | None = None,
 ) -> Flags:
     """Which gaps clamp which body parts, and when.
 
     Args:
-        gaps: Distances of pairs of surfaces [m], shape (N, g); not above a cap that exceeds every thickness.
-        t: Instants, increasing [s], shape (N,).
+        gaps: Distances of pairs of surfaces [m], shape (N, g); not above a cap that exceeds every thickness
+            by more than `AHEAD`.
+        moved: How far their sides have moved since the instant before [m], 0 at the first, shape (N, g).
+        speed: Of one side seen from the other [m/s], infinity where it counts in any case, shape (N, g).
         thickness: Of body parts [m], shape (r,).
-        before: Instant [s], gaps and widest gaps so far [m] just before the first instant, shape (g,) each;
-            None when nothing is known of it.
         opened: Whether a pair counts from the start on (True) or only after it was as wide as the body
-            part (False), shape (g,).
+            part (False), shape (g,) or, of each body part, (g, r).
 
     Returns:
         Shape (N, g, r).
     """
     gaps = np.asarray(gaps, float)
-    earlier, when, widest = np.full_like(gaps[:1], np.inf), -np.inf, gaps[:1]
-    if before is not None:
-        when, earlier, widest = before[0], before[1][None], before[2][None]
-    previous = np.concatenate([earlier, gaps[:-1]])
-    elapsed = np.diff(np.concatenate([[when], t]))[:, None]
-    change = gaps - previous
-    closing = np.where(np.isinf(previous), gaps > 0, change < -STILL * elapsed)
-    ahead = gaps + np.where(np.isfinite(change), change, 0.0)
-    seen = np.maximum.accumulate(np.concatenate([widest, gaps]), axis=0)[1:]
-    wide = opened[None, :, None] | (seen[..., None] >= thickness)
-    return np.asarray(closing[..., None] & (ahead[..., None] <= thickness) & wide)
+    seen = np.maximum.accumulate(gaps, axis=0)
+    opened = opened[:, None] if opened.ndim == 1 else opened
+    wide = opened | (seen[..., None] >= thickness)
+    ahead = gaps - np.minimum(moved, AHEAD)
+    return np.asarray((speed > STILL)[..., None] & (ahead[..., None] <= thickness) & wide)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,12 +1,12 @@
-r"""Which gaps close on somebody, asked of the shapes only where the answer can depend on it.
+r"""Which gaps clamp somebody, asked of the shapes only where the answer can depend on it.
 
 The rule is that of `seerob.clamping.clamps`. A gap changes by no more than its two sides move, so most
 gaps need not be measured to know that they clamp nobody:
 
 - of a body part that nothing moving could hit it does not matter whether it would be clamped;
-- a gap whose sides have hardly moved does not close;
+- parts of a robot that stand still against each other clamp nobody between them;
 - a gap above :math:`D + \delta`, with :math:`\delta` how far its sides have moved since the instant
-  before, clamps nobody of the thickness D;
+  before, clamps nobody of the thickness D: it is measured no farther than that;
 - whether the robot's own parts were once as far apart as D is settled when they were, and cannot
   change before they have moved by what is lacking.
 
@@ -21,10 +21,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.clamping import STILL, Flags, PinchPairs, clamps
-from seerob.distance import Per, Reach, Survey
+from seerob.clamping import AHEAD, STILL, Flags, PinchPairs, clamps
+from seerob.distance import Reach, Survey
+from seerob.kernels.approach import relative_speeds
 from seerob.kernels.displacement import displacements
-from seerob.kernels.pairs import CLOSED, CORNERS, VOLUME
+from seerob.kernels.pairs import CORNERS
 from seerob.kernels.shapes import Shapes
 from seerob.kernels.speed import stacked
 from seerob.transforms import Array
@@ -50,6 +51,10 @@ class _Instant:
     """Whether each gap counts for each body part; see `clamps`, shape (g, r)."""
     lacking: Array
     """How wide each must yet have been to count for one more of them [m], NaN where for all, shape (g,)."""
+
+    def at(self, rotations: Array, positions: Array) -> bool:
+        """Whether it is of these poses."""
+        return np.array_equal(self.positions, positions) and np.array_equal(self.rotations, rotations)
 
 
 class ClosingGaps:
@@ -85,24 +90,20 @@ class ClosingGaps:
                 [np.column_stack([across, first]), [[-1, i] for i in others] or np.empty((0, 2))]
             ).astype(np.int64)
         )
-        sides = [np.array([*query.a, *query.b]) for query, _ in pairs.queries]
-        tame = [all(_closed(shapes, int(i)) for i in side) for side in sides]
-        sizes = [
-            len(query.a) * len(query.b) if per is Per.PAIR else len(query.b) for query, per in pairs.queries
-        ]
-        # What counts as inside an open mesh can change without any motion to speak of.
-        self._tame = np.repeat(np.array(tame, bool), sizes)
+        self._own = np.ascontiguousarray(np.column_stack([across, first])[~pairs.opened])
         self._last: _Instant | None = None
-        self._before: _Instant | None = None
 
-    def clamped(self, t: float, rotations: Array, positions: Array, wanted: Flags) -> Flags:
+    def clamped(
+        self, t: float, rotations: Array, positions: Array, twists: tuple[Array, Array], wanted: Flags
+    ) -> Flags:
         """Which moving bodies clamp which body parts now.
 
         Args:
             t: Instant [s].
             rotations: world_from_body of every body, shape (n, 3, 3).
             positions: Likewise [m], shape (n, 3).
-            wanted: Of which moving bodies and body parts that matters, shape (b, r).
+            twists: Velocities of their origins [m/s] and angular ones [rad/s], world axes, shape (n, 3) each.
+            wanted: Of which bodies, that move now, and which body parts that matters, shape (b, r).
 
         Returns:
             Shape (b, r); False where it does not matter.
@@ -112,22 +113,26 @@ class ClosingGaps:
         last = self._last
         if last is not None and t < last.t:
             last = None
-        if last is None or t > last.t:
-            self._before, last = last, self._begun(t, rotations, positions, last)
-            self._last = last
+        if last is None or t > last.t or not last.at(rotations, positions):
+            last = self._last = self._begun(t, rotations, positions, last)
         pairs = self._pairs
         # A row of False at the end is what -1 means.
         rows = np.concatenate([wanted, np.zeros((1, wanted.shape[1]), bool)])
         of_gaps = (rows[pairs.first] | rows[pairs.second]) & last.had_room
         if not of_gaps.any():
             return np.zeros_like(wanted)
+        speed = np.full(len(pairs.first), np.inf)
+        own = np.empty(len(self._own))
+        relative_speeds(rotations, positions, *twists, self._own, *self._hulls, own)
+        speed[~pairs.opened] = own
+        of_gaps &= (speed > STILL)[:, None]
         found = np.zeros(of_gaps.shape, bool)
-        if self._before is not None:
-            still = STILL * (last.t - self._before.t)
-            of_gaps &= ~(self._tame & (last.moved < still))[:, None]
         some = self._narrow(last, of_gaps)
         if len(some):
-            found[some] = self._judged(last, some)
+            # Whether there was room is known already.
+            room = np.ones(len(some), bool)
+            gaps, moved = last.gaps[None, some], last.moved[None, some]
+            found[some] = clamps(gaps, moved, speed[None, some], self._thickness, opened=room)[0]
         return np.asarray(pairs.per_body(found & of_gaps) & wanted)
 
     def _begun(self, t: float, rotations: Array, positions: Array, before: _Instant | None) -> _Instant:
@@ -138,7 +143,7 @@ class ClosingGaps:
             had_room = np.repeat(self._pairs.opened[:, None], len(self._thickness), axis=1)
             lacking = self._lacking(had_room)
             now = _Instant(
-                t, rotations.copy(), positions.copy(), unknown, endless, endless, had_room, lacking
+                t, rotations.copy(), positions.copy(), unknown, np.zeros(g), endless, had_room, lacking
             )
         else:
             moved = np.empty(len(self._seen))
@@ -166,20 +171,13 @@ class ClosingGaps:
         return np.where(np.isfinite(least), least, np.nan)
 
     def _narrow(self, now: _Instant, wanted: Flags) -> NDArray[np.int64]:
-        """Gaps that may clamp a body part that matters; measured now and, where it matters, before."""
+        """Gaps that may clamp a body part that matters, measured."""
         widest = np.where(wanted, self._thickness, -np.inf).max(axis=1)
-        before = self._before
-        reach = widest + ROUNDING if before is None else widest + now.moved
-        reach = np.minimum(reach + ROUNDING, self._cap)
+        reach = np.minimum(widest + np.minimum(now.moved, AHEAD) + ROUNDING, self._cap)
         lacking = np.isnan(now.gaps) & (widest > -np.inf)
         if lacking.any():
             self._measure(now, np.where(lacking, reach, -np.inf))
-        some = np.flatnonzero(now.gaps <= reach)
-        if before is not None and np.isnan(before.gaps[some]).any():
-            caps = np.full(len(now.gaps), -np.inf)
-            caps[some[np.isnan(before.gaps[some])]] = self._cap
-            self._measure(before, caps)
-        return some
+        return np.flatnonzero(now.gaps <= reach)
 
     def _measure(self, instant: _Instant, caps: Array) -> None:
         """Measure gaps up to caps; those beyond stay unknown, unless it is the cap."""
@@ -187,15 +185,6 @@ class ClosingGaps:
         found = self._survey.within(instant.rotations, instant.positions, caps)
         known = (caps > -np.inf) & ((found.reach != Reach.BEYOND_CAP) | (caps >= self._cap))
         instant.gaps = np.where(known, found.distance, instant.gaps)
-
-    def _judged(self, now: _Instant, some: NDArray[np.int64]) -> Flags:
-        """`clamps` of measured gaps, shape (len(some), r)."""
-        before = self._before
-        earlier = None if before is None else (before.t, before.gaps[some], np.full(len(some), -np.inf))
-        # Whether there was room is known already.
-        opened = np.ones(len(some), bool)
-        gaps = now.gaps[None, some]
-        return np.asarray(clamps(gaps, np.array([now.t]), self._thickness, opened=opened, before=earlier)[0])
 
 
 def _corners(shapes: Shapes, body: int) -> Array:
@@ -206,8 +195,3 @@ def _corners(shapes: Shapes, body: int) -> Array:
         count = int(shapes.which[i, CORNERS])
         found.append(shapes.corners[i, :count] @ rotation.T + position)
     return np.concatenate(found)
-
-
-def _closed(shapes: Shapes, body: int) -> bool:
-    """Whether every mesh of a body has an inside that is one, or none."""
-    return all(shapes.which[i, CLOSED] or not shapes.which[i, VOLUME] for i in shapes.solids[body])

@@ -186,6 +186,8 @@ class Engine:
                 self._references[name].take(found.t, found.q, None, anew=found.anew and self._tick > 0)
                 hearing.heard.append((found.t, found.reason))
                 hearing.parts.append((found.t, found.parts))
+                if found.observed:
+                    hearing.observed.append((found.t, found.observed))
                 hearing.torques.append(None)
 
     def _silent(self, name: str) -> bool:
@@ -260,6 +262,7 @@ class Engine:
     def start(self) -> State:
         """The twin at t = 0, placed on the first samples without being pulled there."""
         self._place(0.0)
+        self._note_bones()
         return self.state
 
     def tick(self) -> State:
@@ -290,6 +293,7 @@ class Engine:
         t = self._tick * self._period
         self._show(t)
         self._note_errors()
+        self._note_bones()
         return self.state
 
     def _follow(self) -> None:
@@ -377,7 +381,9 @@ class Engine:
             hearing = self._hearings[mechanism.name]
             hearing.error = float(off[mechanism.q_address].max(initial=0.0))
             hearing.saturated = bool(reached[mechanism.v_address].any())
-        for name, following in self._followings.items():
+
+    def _note_bones(self) -> None:
+        for name, following in self._followings.items() if self.controllers else ():
             q = self.state.joint_positions(self.model.mechanisms[name])
             self._hearings[name].bones = following.errors(self.state.t, q)
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from seerob.errors import UnknownName
 from seerob.human.angles import Angles, angles
-from seerob.human.estimated import estimated
 from seerob.human.skeleton import BONES
 from seerob.model import Mechanism, Model
 from seerob.state import State
@@ -52,8 +51,7 @@ def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> C
         doubted = state.bones_in_doubt(human.name)
         found = angles(state.rotations[rows], state.positions[rows])
         # What devices see changes with time: of a leg that nobody sees no score is made.
-        guessed = (*estimated(state.hearings[human.name].bones), *doubted)
-        lost = (*unmeasured, *guessed) if guessed else unmeasured
+        lost = (*unmeasured, *doubted) if doubted else unmeasured
         return found.without(lost) if lost else found
 
     return read

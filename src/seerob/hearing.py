@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from seerob.human.estimated import estimated
 from seerob.human.following import PartDoubt
 from seerob.transforms import Array
 
@@ -35,6 +36,8 @@ class Hearing:
     [rad]; None where none was seen."""
     parts: list[tuple[float, tuple[PartDoubt, ...]]] = field(default_factory=list)
     """The same of single bones of a person, when the rest may be relied on."""
+    observed: list[tuple[float, frozenset[str]]] = field(default_factory=list)
+    """Of a person that devices see: instant [s] and bones that some device sees then, oldest first."""
     lost: float = -np.inf
     """When the physics last lost it, so that it was put back [s]."""
     saturated: bool = False
@@ -47,8 +50,9 @@ class Hearing:
         while len(self.heard) > 1 and self.heard[1][0] <= t:
             del self.heard[0]
             del self.torques[:1]
-        while len(self.parts) > 1 and self.parts[1][0] <= t:
-            del self.parts[0]
+        for told in (self.parts, self.observed):
+            while len(told) > 1 and told[1][0] <= t:
+                del told[0]
 
     def doubt(self, t: float) -> str:
         """Why what was heard does not tell where it is at ``t`` [s]; empty when it does.
@@ -70,3 +74,12 @@ class Hearing:
         """Bones that may not be relied on at ``t`` [s], with the reasons."""
         k = sum(1 for instant, _ in self.parts if instant <= t + SLACK)
         return tuple(part for _, told in self.parts[max(k - 1, 0) : k + 1] for part in told)
+
+    def unseen(self, t: float) -> tuple[str, ...]:
+        """Bones that no device sees at ``t`` [s] and that the bones beside them do not tell.
+
+        Empty for a person whom no device sees, whom joints or keyframes move.
+        """
+        k = sum(1 for instant, _ in self.observed if instant <= t + SLACK)
+        around = [seen for _, seen in self.observed[max(k - 1, 0) : k + 1]]
+        return estimated(frozenset.intersection(*around)) if around else ()

@@ -41,7 +41,11 @@ class Judge:
         last = self._last[i]
         criterion = bound.criterion
         # A result between two evaluations lasts only as long as what it rests on is heard.
-        if last is not None and state.t < self._due[i] - 1e-9 and not any(map(state.doubt, self._asked[i])):
+        if (
+            last is not None
+            and state.t < self._due[i] - 1e-9
+            and not any(map(state.interrupted, self._asked[i]))
+        ):
             return last
         state.asked.clear()
         try:

@@ -165,6 +165,12 @@ class Model:
     _gaps: dict[tuple[tuple[int, ...], tuple[int, ...]], Gap] = field(default_factory=dict)
 
     @property
+    def estimates(self) -> dict[str, float]:
+        """How far bones that nobody sees may be off [m], of the people whose estimate the file accepts."""
+        people = self.workstation.humans
+        return {h.name: h.unseen_uncertainty for h in people if h.unseen_uncertainty is not None}
+
+    @property
     def folder(self) -> Path:
         """Folder of the workstation file."""
         return Path(self.workstation.folder)

@@ -24,6 +24,7 @@ from seerob.kernels.chain import along
 from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
 from seerob.model import Frame, Gap, Mechanism, Model
 from seerob.signals import Signals
+from seerob.seen_bones import bones_of, unseen_reason
 from seerob.surveying import Surveyor
 from seerob.transforms import Array
 
@@ -74,7 +75,8 @@ class State:
         self._surveyor = Surveyor(model.shapes)
         self._cdof, self._com = data.cdof, data.subtree_com
         self._moves: dict[tuple[int, ...], NDArray[np.bool_]] = {}
-        self._carriers: dict[tuple[int, ...], tuple[Indices, tuple[str, ...]]] = {}
+        self._rows: dict[tuple[int, ...], Indices] = {}
+        self._bones_of: dict[tuple[int, ...], tuple[tuple[str, ...], dict[str, frozenset[str]]]] = {}
         self._corners = stacked([body.corners for body in model.bodies])
         self._reach = np.array([body.radius + body.deviation for body in model.bodies])
 
@@ -120,10 +122,16 @@ class State:
         self._relied_on.add(names)
 
     def doubt(self, name: str) -> str:
-        """Why a twin may not be where the real one is; empty when it may be relied on.
+        """Why a twin may not be where the real one is, all of it; empty when it may be relied on.
 
         After `VARIABLE`, the name of a variable: why it may not be relied on.
         """
+        if reason := self.interrupted(name):
+            return reason
+        return "" if name.startswith(VARIABLE) else unseen_reason(name, self.hearings[name].unseen(self.t))
+
+    def interrupted(self, name: str) -> str:
+        """The same without what no device ever saw: why an answer of a moment ago may not hold any more."""
         if name.startswith(VARIABLE):
             return self.signals.at(name.removeprefix(VARIABLE), self.t).doubt
         parts = self.hearings[name].doubted(self.t)
@@ -132,14 +140,40 @@ class State:
     def bones_in_doubt(self, name: str) -> tuple[str, ...]:
         """Bones of a person that may not be where the twin shows them, when the others are.
 
+        What is in doubt, and what no device sees and its neighbours do not tell.
+
         Raises:
             Undecided: Nothing of the person may be relied on.
         """
         self.asked.add(name)
         if reason := self._doubt(name):
             raise Undecided(reason)
-        told = self.hearings[name].doubted(self.t)
-        return tuple(dict.fromkeys(bone for _, bones in told for bone in bones))
+        hearing = self.hearings[name]
+        doubted = (bone for _, bones in hearing.doubted(self.t) for bone in bones)
+        return tuple(dict.fromkeys((*doubted, *hearing.unseen(self.t))))
+
+    def require_bodies(self, bodies: tuple[int, ...], *, estimates: bool = False) -> None:
+        """Raise `Undecided` unless these bodies are where the twin shows them: of a person, these bones only.
+
+        Args:
+            bodies: By index.
+            estimates: Whether bones that nobody sees will do where the file accepts them
+                (``unseen_uncertainty``): whoever asks adds `seerob.tracking_error.TrackingError`.
+        """
+        key = ("relied on", bodies, estimates)
+        if bodies not in self._bones_of:
+            self._bones_of[bodies] = bones_of(self.model, bodies)
+        others, people = self._bones_of[bodies]
+        self.asked.update(others, people)
+        if key in self._cache:
+            return
+        self.require(*others)
+        for name, bones in people.items():
+            if bones.isdisjoint(self.bones_in_doubt(name)):
+                continue
+            if not estimates or self.model.estimates.get(name) is None or self.interrupted(name):
+                raise Undecided(self.doubt(name))
+        self._cache[key] = True
 
     def _doubt(self, name: str) -> str:
         hearing = self.hearings[name]
@@ -153,6 +187,17 @@ class State:
             why = " (a torque limit is reached)" if hearing.saturated else ""
             return f"{name}: the twin is off by {hearing.error:.3g} rad or m, more than {limit:g}{why}"
         return ""
+
+    def lost_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
+        """Those of some bodies that are bones in doubt of people of whom the others may be relied on."""
+        lost = []
+        for index in bodies:
+            body = self.model.bodies[index]
+            if body.role == "human" and body.carrier == body.owner and not self._doubt(body.owner):
+                names = (f"{body.owner}/{bone}" for bone in self.bones_in_doubt(body.owner))
+                if body.name in names:
+                    lost.append(index)
+        return tuple(lost)
 
     def signal(self, name: str) -> Value:
         """The value of a variable of the dictionary now, in SI.
@@ -280,14 +325,9 @@ class State:
 
     def body_velocity(self, index: int) -> tuple[Array, Array]:
         """Linear velocity at its origin [m/s] and angular velocity [rad/s] of a body, world axes."""
-        self._require_carrier(index)
+        self.require_bodies((index,))
         linear, angular = self._velocities()
         return linear[index], angular[index]
-
-    def _require_carrier(self, index: int) -> None:
-        carrier = self.model.bodies[index].carrier
-        if carrier:
-            self.require(carrier)
 
     def _velocities(self) -> tuple[Array, Array]:
         """Linear and angular velocities of all bodies at their origins, shape (n, 3) each."""
@@ -309,17 +349,16 @@ class State:
         Returns:
             Speed [m/s], the corner in the world [m] (3,), its velocity [m/s] (3,).
         """
-        self._require_carrier(index)
+        self.require_bodies((index,))
         speed, point, velocity = self._fastest()
         return float(speed[index]), point[index], velocity[index]
 
     def fastest_points(self, bodies: tuple[int, ...]) -> tuple[Array, Array, Array]:
         """The same of several bodies: speeds (b,), corners (b, 3) and their velocities (b, 3)."""
-        if bodies not in self._carriers:
-            names = dict.fromkeys(self.model.bodies[i].carrier for i in bodies)
-            self._carriers[bodies] = np.array(bodies, np.int64), tuple(filter(None, names))
-        rows, carriers = self._carriers[bodies]
-        self.require(*carriers)
+        self.require_bodies(bodies)
+        if bodies not in self._rows:
+            self._rows[bodies] = np.array(bodies, np.int64)
+        rows = self._rows[bodies]
         speed, point, velocity = self._fastest()
         return speed[rows], point[rows], velocity[rows]
 
@@ -338,14 +377,14 @@ class State:
 
     # -- distances --------------------------------------------------------------------------
 
-    def closest(self, gap: Gap) -> Closest:
-        """Where two sets are nearest."""
-        self.require(*gap.carriers)
+    def closest(self, gap: Gap, *, estimates: bool = False) -> Closest:
+        """Where two sets are nearest; ``estimates`` as in `require_bodies`."""
+        self.require_bodies((*gap.a, *gap.b), estimates=estimates)
         return self.distances(gap.query, Per.SETS).at(0)
 
-    def closest_per_body(self, gap: Gap) -> Closests:
+    def closest_per_body(self, gap: Gap, *, estimates: bool = False) -> Closests:
         """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``."""
-        self.require(*gap.carriers)
+        self.require_bodies((*gap.a, *gap.b), estimates=estimates)
         return self.distances(gap.query, Per.BODY)
 
     def distances(self, query: Query, per: Per) -> Closests:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
 from msgspec.structs import replace
 
 from seerob.state import State
@@ -48,11 +47,14 @@ class SeparationEnds:
     Args:
         stop: With its tolerances.
         required: S_p of every part at a state, for a stop without any.
+        remembers: Whether S_p depends on what was before, so that every end is to be asked at every tick.
     """
 
-    def __init__(self, stop: Stop, required: Callable[[Stop], Callable[[State], Array]]) -> None:
+    def __init__(
+        self, stop: Stop, required: Callable[[Stop], Callable[[State], Array]], *, remembers: bool
+    ) -> None:
         self.tolerances = tolerances(stop)
-        self._stop, self._required = stop, required
+        self._stop, self._required, self._remembers = stop, required, remembers
         self._bound: dict[Shifts, Callable[[State], Array]] = {}
 
     def at(self, state: State) -> Spread:
@@ -63,7 +65,10 @@ class SeparationEnds:
                 self._bound[shifts] = self._required(shifted(self._stop, shifts))
             return self._bound[shifts](state)
 
-        return spread(figure, len(self.tolerances))
+        found = spread(figure, len(self.tolerances))
+        if self._remembers:
+            _ = found.widths
+        return found
 
 
 def intervals(distance: Array, S_p: Array, seen: float, span: Spread | None) -> list[tuple[float, float]]:

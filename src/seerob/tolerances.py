@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -42,15 +43,23 @@ class Spread:
 
     low: Array
     high: Array
-    widths: Array
-    """What each input makes of the width by itself, shape (inputs, ...)."""
+    by_input: Array | Callable[[], Array]
+    """See `widths`, or how to work them out."""
+
+    @cached_property
+    def widths(self) -> Array:
+        """What each input makes of the width by itself, shape (inputs, ...).
+
+        Only a verdict that is open asks for it: worked out when it is asked for first.
+        """
+        return self.by_input() if callable(self.by_input) else self.by_input
 
 
 def spread(figure: Callable[[Shifts], Array], inputs: int) -> Spread:
     """Ends of a figure that is monotone in every input.
 
     Args:
-        figure: At shifted inputs, shape (...).
+        figure: At shifted inputs, shape (...); also asked later, when widths are, as long as its state is.
         inputs: How many there are.
     """
 
@@ -58,8 +67,12 @@ def spread(figure: Callable[[Shifts], Array], inputs: int) -> Spread:
         return tuple(side if i == k else 0 for i in range(inputs))
 
     low, high = np.asarray(figure((-1,) * inputs)), np.asarray(figure((1,) * inputs))
-    widths = [np.asarray(figure(alone(k, 1))) - np.asarray(figure(alone(k, -1))) for k in range(inputs)]
-    return Spread(low, high, np.array(widths).reshape(inputs, *low.shape))
+
+    def widths() -> Array:
+        found = [np.asarray(figure(alone(k, 1))) - np.asarray(figure(alone(k, -1))) for k in range(inputs)]
+        return np.array(found).reshape(inputs, *low.shape)
+
+    return Spread(low, high, widths)
 
 
 def deciding(tolerances: Sequence[Tolerance], widths: Array) -> str:

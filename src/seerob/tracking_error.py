@@ -16,7 +16,8 @@ class TrackingError:
     """Bound on the distance of every point of bones of the twin from the same point as devices see it.
 
     A bone that is off by p and turned by α moves its points by no more than p + α ρ, where ρ is how far they
-    are from its origin. What no device sees adds nothing: how wrong it is, nobody knows.
+    are from its origin. What no device sees adds what the file accepts (``unseen_uncertainty``), else nothing:
+    how wrong it is nobody knows, and `State.require_bodies` leaves it undecided.
 
     Args:
         model: The compiled workstation.
@@ -26,6 +27,7 @@ class TrackingError:
     def __init__(self, model: Model, bodies: Sequence[int]) -> None:
         self._bones: dict[str, list[tuple[int, str, float]]] = {}
         self._n = len(bodies)
+        self._accepted = model.estimates
         for row, index in enumerate(bodies):
             body = model.bodies[index]
             if body.role == "human":
@@ -43,6 +45,10 @@ class TrackingError:
             for row, bone, reach in bones if errors else ():
                 position, angle = errors.get(bone, (None, None))
                 found[row] = (position or 0.0) + (angle or 0.0) * reach
+            if person in self._accepted:
+                unseen = state.hearings[person].unseen(state.t)
+                for row, bone, _ in bones if unseen else ():
+                    found[row] = max(found[row], self._accepted[person] * (bone in unseen))
         return found
 
 

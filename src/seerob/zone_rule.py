@@ -90,6 +90,8 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
             reasons.append(f"not assessed: {', '.join(missing)}")
         if low != high:
             reasons.append(f"the score lies between {low:g} and {high:g}")
+        elif missing:
+            reasons.append(f"the score is {low:g} whatever is missing")
         reasons += [self._said(rows, key, angles, scores[key]) for key in drivers[:4]]
         best = max((row.score for row in rows), default=0.0)
         top = best if self.combination() == "max" else sum(_tops(rows, scores).values())

@@ -130,6 +130,7 @@ def test_external_torques_need_no_dynamics(tmp_path):
     tau = held(force=FORCE) - held(force=np.zeros(3))
     first = run(tmp_path, 'torques = "external"\n', tau, ticks=1)[0]
     assert first.value == pytest.approx(130, rel=1e-6)
+    assert "moment" not in parts(first)
 
 
 def test_moment_is_residual_for_a_point_contact_and_found_by_a_grip(tmp_path):
@@ -144,6 +145,12 @@ def test_moment_is_residual_for_a_point_contact_and_found_by_a_grip(tmp_path):
     assert parts(grip)["moment"] == pytest.approx(np.linalg.norm(MOMENT), rel=1e-6)
     assert elsewhere.verdict is Verdict.UNDECIDED
     assert "elsewhere" in elsewhere.reason
+    residual = parts(point)["residual"]
+    on_it = run(tmp_path / "d", f"{external}largest_residual = {residual!r}\n", tau, ticks=1)[0]
+    assert on_it.verdict is Verdict.WITHIN
+    for k, factor in enumerate((1.0, 1e-3, 0.0)):
+        share = parts(run(tmp_path / f"e{k}", external, factor * tau, ticks=1)[0])["residual share"]
+        assert share == pytest.approx(residual / np.linalg.norm(tau) if factor else 0.0)
 
 
 @pytest.mark.parametrize(("limit", "verdict"), [(129.999, Verdict.EXCEEDED), (130.001, Verdict.WITHIN)])
@@ -163,6 +170,7 @@ def test_uncertain_torques_give_an_interval(tmp_path, limit, verdict):
     low, high = result.interval
     assert low < 130 < high
     assert high - low < 100
+    assert ("across the limit" in result.reason) is (verdict is Verdict.UNDECIDED)
 
 
 def test_no_torques_are_undecided(tmp_path):
@@ -192,7 +200,7 @@ def test_force_that_the_joints_cannot_feel_is_never_within(tmp_path, limit, verd
     # F = J⁻ᵀ τ: F_x = −τ2, F_y = τ1 − τ2.
     assert [parts(result)[f"F{a}"] for a in "xyz"] == pytest.approx([5, 15, 0])
     assert result.verdict is verdict
-    assert "(0.00, 0.00, 1.00)" in result.reason
+    assert "100% of a force along ±(0.00, 0.00, 1.00)" in result.reason
 
 
 def test_moving_arm_in_the_air_exerts_no_force(tmp_path):

@@ -131,7 +131,8 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         value = float(span.high) if span.known else None
         reasons = []
         if missing:
-            reasons.append(f"not assessed: {', '.join(missing)}; the category lies between {low} and {high}")
+            span_said = f"lies between {low} and {high}" if low != high else f"is {low} whatever is missing"
+            reasons.append(f"not assessed: {', '.join(missing)}; the category {span_said}")
         elif verdict is Verdict.UNDECIDED:
             reasons.append(f"the accuracy leaves it open: the category lies between {low} and {high}")
         if drivers:

@@ -1,35 +1,45 @@
-"""Which bones nobody measures although the twin has them somewhere: limbs of which nothing is seen.
+"""Which bones nobody measures although the twin has them somewhere, and which the bones beside them tell.
 
-Between a hand and a shoulder an elbow follows from the bones' lengths, to a degree; of a leg of which no
-device sees anything nothing follows. A headset with two controllers sees head and hands: its legs, pelvis
-and spine are a guess, and no score may be made of them.
+Between a hand and an upper arm an elbow follows from the bones' lengths; of a leg of which only the foot is
+seen the knee may be anywhere on a circle. A headset with two controllers sees head and hands: arms, legs,
+pelvis and spine are a guess, and neither a distance nor a score may be made of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import lru_cache
 
-from seerob.human.skeleton import PARENTS, SIDES, without_side
+from seerob.human.skeleton import BONES, PARENTS, SIDES, without_side
 
-PARTS: tuple[tuple[str, ...], ...] = (
-    ("pelvis", "lumbar", "thorax"),
-    ("head", "neck"),
-    *((f"{s}_upper_arm", f"{s}_forearm", f"{s}_hand") for s in SIDES),
-    *((f"{s}_thigh", f"{s}_shank", f"{s}_foot", f"{s}_toes") for s in SIDES),
-)
-"""Parts of the body of which one bone at least must be seen."""
+HIPS = frozenset(f"{side}_thigh" for side in SIDES)
+SHOULDERS = frozenset(f"{side}_upper_arm" for side in SIDES)
 
 
 def estimated(seen: Collection[str]) -> tuple[str, ...]:
-    """Bones of the parts of which nothing is seen.
+    """Bones that are neither seen nor told by the bones beside them, in the order of `BONES`.
+
+    Told are: a bone between a bone that is seen (or a trunk that is told) and one that is seen; toes of a
+    foot that is known; pelvis and thorax by both hips and both shoulders together. Which is a choice.
 
     Args:
         seen: Bones that a device sees now; empty when no device sees the person at all, as when joints or
             keyframes move it: then nothing is estimated.
     """
-    if not seen:
-        return ()
-    return tuple(bone for part in PARTS if not any(b in seen for b in part) for bone in part)
+    return _estimated(frozenset(seen)) if seen else ()
+
+
+@lru_cache(maxsize=256)
+def _estimated(seen: frozenset[str]) -> tuple[str, ...]:
+    known = set(seen)
+    if seen >= HIPS and (seen >= SHOULDERS or seen & {"lumbar", "thorax"}):
+        known.add("pelvis")
+    if seen >= SHOULDERS and (seen >= HIPS or seen & {"lumbar", "pelvis"}):
+        known.add("thorax")
+    ends = {PARENTS[bone] for bone in known}
+    known |= {bone for bone in ends if PARENTS.get(bone) in known}
+    known |= {f"{side}_toes" for side in SIDES if f"{side}_foot" in known}
+    return tuple(bone for bone in BONES if bone not in known)
 
 
 LIMBS = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot", "toes", "head")

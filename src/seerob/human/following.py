@@ -46,6 +46,8 @@ SLACK = 1e-9
 """Instants that differ by less are the same [s]."""
 MANY = 0.3
 """Share of a device's points that jump at once, beyond which none of them is believed."""
+BETTER = 1.25
+"""By how much another device must count more for a bone before it takes it over: devices are offset."""
 ELSEWHERE = 0.1
 """Whoever was not seen for a while and is farther from before [rad or m] is put there, not pulled."""
 
@@ -70,6 +72,8 @@ class Followed:
     """Nobody knows how the person came here: it is to be put there."""
     seen: Pulls
     """What it was made of, in the root's frame."""
+    observed: frozenset[str] = frozenset()
+    """Bones that some device sees, each within its hold time."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,9 @@ class _Device:
     believed: dict[str, tuple[float, Vec3]] = field(default_factory=dict)
     """Point → when and where it was last believed."""
     seen: dict[str, float] = field(default_factory=dict)
-    """Bone → when it was last seen."""
+    """Bone → when it was last seen, or first told of without being seen."""
+    observed: dict[str, float] = field(default_factory=dict)
+    """Bone → when it was last seen indeed."""
 
     def forget(self, t: float) -> None:
         """Drop what is older than the last sample at or before ``t``."""
@@ -119,6 +125,8 @@ class Following:
         self._instants: list[float] = []
         self._last: Followed | None = None
         self._history: list[Followed] = []
+        self._chosen: dict[tuple[str, bool], int] = {}
+        """Bone and whether its orientation is meant → which device it was last taken from."""
         self._waits = False
         """Nothing was believed of late: where the person is now is not known."""
 
@@ -160,7 +168,7 @@ class Following:
         points = [each.points for each in told]
         reasons = [each.reason for each in told if each.reason]
         parts = [each.part for each in told if each.part is not None]
-        chosen, last = _best(points), self._last
+        chosen, last = _best(points, self._chosen), self._last
         if not chosen:
             if last is None or not any(each.jumped for each in told):
                 return None
@@ -186,7 +194,7 @@ class Following:
         reasons += _residual(found, error)
         if anew:
             reasons.append("appeared elsewhere")
-        return Followed(t, q, "; ".join(reasons[:4]), tuple(parts), anew, found)
+        return Followed(t, q, "; ".join(reasons[:4]), tuple(parts), anew, found, self._observed(t))
 
     def _device_at(self, device: _Device, name: str, t: float) -> _Told:
         """What a device sees at ``t``: between two samples, or the newest while it counts."""
@@ -213,6 +221,8 @@ class Following:
         out: list[BodyPoint] = []
         jumped: dict[str, str] = {}
         for point in points:
+            if not (point.position_weight or point.orientation_weight or point.confidence == 0.0):
+                continue  # a weight of 0 is as good as not mapped; a confidence of 0 is not seen just now
             device.seen.setdefault(point.bone, t)
             if not _finite(point):
                 continue
@@ -226,6 +236,8 @@ class Following:
                 device.believed[point.name] = t, point.position
             if point.position is not None or point.wxyz is not None:
                 device.seen[point.bone] = t
+                if _counts(point):
+                    device.observed[point.bone] = t
                 out.append(point)
         if not jumped:
             return _Told(out, reason)
@@ -234,6 +246,16 @@ class Following:
             # What a device loses so much of, it has lost altogether.
             return _Told([], "; ".join(filter(None, (reason, why))), jumped=True)
         return _Told(out, reason, (why, tuple(dict.fromkeys(jumped.values()))), jumped=True)
+
+    def _observed(self, t: float) -> frozenset[str]:
+        """Bones that some device sees, each within its hold time."""
+        return frozenset(
+            bone
+            for device in self._devices.values()
+            if device.samples
+            for bone, seen in device.observed.items()
+            if t - seen <= device.samples[-1].hold
+        )
 
     def _lost(self, t: float) -> list[PartDoubt]:
         """Bones that a device has and that nobody has seen for too long."""
@@ -280,8 +302,21 @@ def _with_others(bones: Sequence[str], seen: Collection[str]) -> tuple[str, ...]
     return tuple(dict.fromkeys(other for bone in bones for other in in_doubt_with(bone, seen)))
 
 
-def _best(devices: Sequence[Sequence[BodyPoint]]) -> list[BodyPoint]:
-    """Per bone the positions, and the orientations, of the device that counts most for it."""
+def _counts(point: BodyPoint) -> bool:
+    """Whether it pulls at all."""
+    return (point.position is not None and point.position_weight > 0) or (
+        point.wxyz is not None and point.orientation_weight > 0
+    )
+
+
+def _best(devices: Sequence[Sequence[BodyPoint]], chosen: dict[tuple[str, bool], int]) -> list[BodyPoint]:
+    """Per bone the positions, and the orientations, of the device that counts most for it.
+
+    Args:
+        devices: What each of them sees.
+        chosen: The choice of the instant before, which holds until another device counts clearly more;
+            brought up to date.
+    """
     if len(devices) == 1:
         return list(devices[0])
     best: dict[tuple[str, bool], tuple[float, int]] = {}
@@ -291,8 +326,11 @@ def _best(devices: Sequence[Sequence[BodyPoint]]) -> list[BodyPoint]:
                 (False, p.position, p.position_weight),
                 (True, p.wxyz, p.orientation_weight),
             ):
+                if chosen.get((p.bone, turned)) == k:
+                    weight *= BETTER
                 if value is not None and weight > best.get((p.bone, turned), (0.0, 0))[0]:
                     best[p.bone, turned] = weight, k
+    chosen |= {key: k for key, (_, k) in best.items()}
     out = []
     for k, points in enumerate(devices):
         for p in points:

@@ -115,6 +115,9 @@ def bind(
         if place is None:
             continue
         factor = (bones or {}).get(place.bone, 1.0)
+        weights = place.position * position * factor, place.orientation * orientation * factor
+        if not any(weights):
+            continue  # as good as not mapped
         rows.append(
             Row(
                 index=index,
@@ -124,8 +127,8 @@ def bind(
                 segment_from_bone=None
                 if rested is None or convention is None
                 else convention.axes.T @ rested[BONES.index(place.bone)],
-                position=place.position * position * factor,
-                orientation=place.orientation * orientation * factor,
+                position=weights[0],
+                orientation=weights[1],
             )
         )
     world = np.eye(4) if world_from_capture is None else world_from_capture

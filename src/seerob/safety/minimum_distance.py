@@ -14,6 +14,7 @@ from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge_interval
 from seerob.distance import Reach
 from seerob.errors import InputError
 from seerob.model import Gap, Model
+from seerob.partly_seen import partly_seen
 from seerob.snapshot import Basis, Result, Segment, Verdict
 from seerob.state import State
 from seerob.states import States
@@ -49,11 +50,14 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
 
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
-        gap, places = self._gap(model), BodyPlaces(model)
+        return partly_seen(model, self._gap(model), lambda gap: self._bound(model, gap))
+
+    def _bound(self, model: Model, gap: Gap) -> Evaluate:
+        places = BodyPlaces(model)
         off = TrackingError(model, (*gap.a, *gap.b))
 
         def evaluate(state: State) -> Result:
-            closest = state.closest(gap)
+            closest = state.closest(gap, estimates=True)
             distance = closest.distance
             seen = float(off.at(state).max(initial=0.0))
             either = self.uncertainty + seen

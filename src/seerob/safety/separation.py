@@ -149,24 +149,28 @@ class Separation(Criterion, frozen=True, kw_only=True):
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         own, _, _ = self._by_device(model)
-        return own._bound(model, self.unknown(model))
+        unknown = self.unknown(model)
+        return partly_seen(model, own._gap(model), lambda gap: own._bound(model, gap, unknown))
 
-    def _bound(self, model: Model, unknown: str) -> Evaluate:
-        gap, stop = self._gap(model), self._stop(model)
+    def _bound(self, model: Model, gap: Gap, unknown: str) -> Evaluate:
+        stop = self._stop(model)
         C, Z_d, Z_r = self._terms()[0]
         K = C + Z_d + Z_r + gap.deviation
         unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
         largest, places = LargestSeparation(), BodyPlaces(model)
         names = [body.name for body in model.bodies]
-        ends = SeparationEnds(self.stop, lambda changed: replace(self, stop=changed).required(model))
+        fixed = self.mode == "fixed"
+        ends = SeparationEnds(
+            self.stop, lambda changed: replace(self, stop=changed).required(model), remembers=fixed
+        )
         off = TrackingError(model, gap.a)
 
         def evaluate(state: State) -> Result:
-            found = state.closest_per_body(gap)
+            found = state.closest_per_body(gap, estimates=True)
             course = stop.courses(state)
             now = course(1.0)
             S_p = self._distance(now, K)
-            if self.mode == "fixed":
+            if fixed:
                 S_p = largest.including(state, S_p)
             seen = float(off.at(state).max(initial=0.0))
             span = ends.at(state) if ends.tolerances else None

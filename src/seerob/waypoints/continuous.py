@@ -98,8 +98,8 @@ def continuous(
             remarks.append(f"{waypoint.shown}: the tool only turns; its speed is taken as rad/s")
         elif wish.tool_turn is None and (rate := piece.turn * leg.limits.speed) > FAST_TURN:
             doubts.append(
-                f"{waypoint.shown}: the tool turns at up to {rate:.2g} rad/s on this way (give tool_turn): how "
-                "fast a controller lets it turn is not modelled"
+                f"{waypoint.shown}: the tool turns at up to {rate:.2g} rad/s on this way (give tool_turn): "
+                "how fast a controller lets it turn is not modelled"
             )
         legs.append(leg)
         leg.blend = waypoint.blend > NO_BLEND and k + 1 < len(program.waypoints)

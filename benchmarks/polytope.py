@@ -1,11 +1,14 @@
 """Exact force polytopes with asymmetric limits and gravity bias, against pycapacity, in one process.
 
-    python benchmarks/polytope.py            # needs pycapacity: pip install pycapacity (pulls cvxopt, GPL)
+    python benchmarks/polytope.py            # against pycapacity too where it is installed (it pulls
+                                             # cvxopt, which is GPL: so it is no dependency)
     python benchmarks/polytope.py --smoke    # a few poses against scipy only
 
 Poses, Jacobians and gravity torques of a UR10e and an LBR iiwa 14 come from Pinocchio and are not timed.
-Both sides get the same arrays: a Jacobian, limits and a bias; pycapacity returns vertices, seerob the
-farthest corner and the inscribed force (batch), or corners, faces and both (single call).
+All sides get the same arrays: a Jacobian, asymmetric limits and a bias. The ratio is of like things: every
+vertex of every polytope from `seerob.kernels.polytope.vertices` in a batch, against the vertices of
+pycapacity's ``force_polytope`` and against those of scipy's half-space intersection (Qhull), which is always
+there. Beside it: the farthest corner and the inscribed force alone, and one call with corners and faces.
 """
 
 from __future__ import annotations
@@ -18,10 +21,10 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from seerob.kernels.polytope import largest
+from seerob.kernels.polytope import largest, vertices
 from seerob.model_io import library
 from seerob.model_io.description import Description, JointKind
-from seerob.polytope import zero_moment
+from seerob.polytope import SAME, zero_moment
 from seerob.transforms import Array
 
 ROBOTS = ("ur10e", "iiwa14")
@@ -95,29 +98,38 @@ def measure(name: str, *, smoke: bool) -> None:
     error = float(np.abs(norm[:20] / theirs - 1).max())
     print(f"{name}: largest force against scipy HalfspaceIntersection, 20 poses: {error:.1e} relative")
     assert error < 1e-12
+    V, begin = vertices(J, low, high, SAME)
+    hulls = [ConvexHull(V[begin[k] : begin[k + 1]]).volume for k in range(20)]
+    peers = [ConvexHull(qhull(J[k], low[k], high[k])).volume for k in range(20)]
+    error = float(np.abs(np.divide(hulls, peers) - 1).max())
+    print(f"  volume of the vertices' hull against scipy, 20 poses: {error:.1e} relative")
+    assert error < 1e-9
+    count = len(J)
+    batch = seconds(lambda: vertices(J, low, high, SAME), 3 if smoke else 9) / count
+    scipy = seconds(lambda: [qhull(J[k], low[k], high[k]) for k in range(20)], 3 if smoke else 5) / 20
+    print(f"  all vertices, batch of {count}: {1e6 * batch:.2f} us; scipy {1e6 * scipy:.0f} us: "
+          f"{scipy / batch:.0f} x")  # fmt: skip
     if smoke:
         return
-    batch = seconds(lambda: largest(J, low, high), 9) / len(J)
+    farthest = seconds(lambda: largest(J, low, high), 9) / count
     single = seconds(lambda: [zero_moment(J[k], low[k], high[k]) for k in range(200)], 5) / 200
-    scipy = seconds(lambda: [qhull(J[k], low[k], high[k]) for k in range(50)], 5) / 50
-    print(f"  seerob, batch {1e6 * batch:.2f} us; one call with corners and faces {1e6 * single:.1f} us")
-    print(f"  scipy {1e6 * scipy:.0f} us: {scipy / batch:.0f} x, {scipy / single:.1f} x")
+    print(f"  farthest vertex and inscribed force alone, batch: {1e6 * farthest:.2f} us")
+    print(f"  one call with corners and faces: {1e6 * single:.1f} us, scipy {scipy / single:.1f} x")
     try:
         from pycapacity.robot import force_polytope
     except ImportError:
-        print("  pycapacity is not installed: no ratio to it")
+        print("  pycapacity is not installed: no ratio to it was measured in this run")
         return
 
     def peer(k: int) -> Array:
         return np.asarray(force_polytope(J[k], upper, lower, gravity[k]).vertices)
 
-    ours = [zero_moment(J[k], low[k], high[k]).corners for k in range(20)]
-    volumes = [ConvexHull(peer(k).T).volume / ConvexHull(ours[k]).volume - 1 for k in range(20)]
-    print(f"  volume against pycapacity, 20 poses: {np.abs(volumes).max():.1e} relative")
-    pycapacity = seconds(lambda: [peer(k) for k in range(30)], 5) / 30
+    theirs = [ConvexHull(peer(k).T).volume for k in range(20)]
+    print(f"  volume against pycapacity, 20 poses: {np.abs(np.divide(theirs, hulls) - 1).max():.1e} relative")
+    took = seconds(lambda: [peer(k) for k in range(30)], 5) / 30
     print(
-        f"  pycapacity {1e6 * pycapacity:.0f} us: {pycapacity / batch:.0f} x batch (goal: >= 500), "
-        f"{pycapacity / single:.0f} x one call"
+        f"  pycapacity, vertices: {1e6 * took:.0f} us: {took / batch:.0f} x the batch (goal: >= 500), "
+        f"{took / single:.0f} x one call"
     )
 
 

@@ -1,4 +1,4 @@
-"""Gaps that close: their rule, live and batch, and on moving shapes."""
+"""Gaps that clamp: their rule, live and batch, and on moving shapes."""
 
 from __future__ import annotations
 
@@ -10,33 +10,26 @@ from seerob.clamping import clamps, pinch_pairs, robot_pinch_pairs
 from seerob.distance import Shapes
 from seerob.geometry import Mesh, Solid, capsule
 
-T = np.arange(11) * 0.1
 HAND, BODY = 0.1, 0.5
 THICKNESS = np.array([HAND, BODY])
 
 
-def one(gaps: np.ndarray, *, opened: bool = True) -> np.ndarray:
-    return clamps(gaps[:, None], T[: len(gaps)], THICKNESS, opened=np.array([opened]))[:, 0]
+def one(gaps: np.ndarray, *, moved: float = 0.0, speed: float = 0.1, opened: bool = True) -> np.ndarray:
+    column = gaps[:, None]
+    every = np.full_like(column, moved), np.full_like(column, speed)
+    return clamps(column, *every, THICKNESS, opened=np.array([opened]))[:, 0]
 
 
-def test_closing_gap_clamps_from_the_body_parts_thickness_on() -> None:
-    gaps = np.linspace(0.35, 0.05, 11)
+def test_gap_no_wider_than_the_body_part_clamps_it_whether_it_closes_or_opens() -> None:
+    gaps = np.array([0.6, 0.5, 0.3, 0.1, 0.05, 0.05, 0.0, -0.02, 0.1, 0.11])
     found = one(gaps)
-    # One step of 0.03 m ahead of 0.1 m.
-    np.testing.assert_array_equal(found[1:, 0], gaps[1:] - 0.03 <= HAND + 1e-12)
-    assert found[:, 1].all()
+    np.testing.assert_array_equal(found[:, 0], gaps <= HAND)
+    np.testing.assert_array_equal(found[:, 1], gaps <= BODY)
 
 
-def test_wide_opening_and_still_gaps_clamp_nobody() -> None:
-    assert not one(np.linspace(0.9, 0.6, 11))[:, 1].any()
-    assert not one(np.linspace(0.05, 0.3, 11))[1:].any()
-    assert not one(np.full(11, 0.05))[1:].any()
-    assert not one(np.linspace(0.05, 0.05 - 0.9e-3, 11))[1:].any()
-
-
-def test_what_happened_before_the_first_instant_is_not_known() -> None:
-    assert one(np.full(3, 0.05))[0].all()
-    assert not one(np.full(3, -0.01))[0].any()
+def test_what_stands_still_clamps_nobody() -> None:
+    for speed, found in ((1.05e-3, True), (0.95e-3, False)):
+        assert one(np.full(3, 0.05), speed=speed).any() == found
 
 
 def test_parts_of_one_robot_clamp_only_what_once_had_room() -> None:
@@ -45,6 +38,19 @@ def test_parts_of_one_robot_clamp_only_what_once_had_room() -> None:
     assert not found[:3].any()
     assert found[4:, 0].all()
     assert not found[:, 1].any()
+
+
+def test_the_rest_of_the_way_is_looked_at_before_it_is_gone() -> None:
+    """What moved by 0.05 m may do so again; never more than `AHEAD` is looked ahead."""
+    gaps = np.array([0.16, 0.15, 0.14])
+    assert one(gaps, moved=0.05)[:, 0].tolist() == [False, True, True]
+    assert one(np.array([0.2, 0.18]), moved=7.0)[:, 0].tolist() == [False, True]
+
+
+def test_room_is_told_for_each_body_part() -> None:
+    opened = np.array([[True, False]])
+    found = clamps(np.full((1, 1), 0.05), np.zeros((1, 1)), np.ones((1, 1)), THICKNESS, opened=opened)
+    assert found[0, 0].tolist() == [True, False]
 
 
 def slotted() -> Mesh:
@@ -71,8 +77,10 @@ def test_gap_in_a_slot_is_found_where_a_hull_has_none() -> None:
     live = [pairs.gaps(r, p)[0] for r, p in zip(rotations, positions, strict=True)]
     np.testing.assert_array_equal(live, gaps)
     assert pairs.gaps(rotations[0], positions[0])[1].tolist() == [0]
-    found = clamps(gaps, np.arange(7) * 0.1, np.array([0.05]), opened=pairs.opened)
-    np.testing.assert_array_equal(found[1:, 0, 0], gaps[1:, 0] - 0.01 <= 0.05 + 1e-12)
+    found = clamps(
+        gaps, np.full_like(gaps, 0.01), np.full_like(gaps, 0.1), np.array([0.05]), opened=pairs.opened
+    )
+    np.testing.assert_array_equal(found[:, 0, 0], gaps[:, 0] - 0.01 <= 0.05)
 
 
 def test_own_links_are_paired_except_neighbours_and_both_sides_clamp() -> None:
@@ -85,27 +93,6 @@ def test_own_links_are_paired_except_neighbours_and_both_sides_clamp() -> None:
     assert not pairs.opened.any()
     clamped = ((pairs.first == 0) & (pairs.second == 2))[:, None]
     assert pairs.per_body(clamped)[:, 0].tolist() == [True, False, True]
-
-
-def test_what_closes_faster_than_1_mm_per_s_closes() -> None:
-    for rate, found in ((1.05e-3, True), (0.95e-3, False)):
-        assert one(0.05 - rate * T)[1:].any() == found
-
-
-def test_what_was_wide_before_the_first_instant_counts() -> None:
-    """And how fast it closes since then."""
-    gaps, opened = np.array([[0.08, 0.08], [0.07, 0.07]]), np.zeros(2, bool)
-    before = (-0.1, np.array([0.09, 0.09]), np.array([0.2, 0.09]))
-    found = clamps(gaps, T[:2], THICKNESS, opened=opened, before=before)
-    assert found[:, :, 0].tolist() == [[True, False], [True, False]]
-    opening = clamps(gaps, T[:2], THICKNESS, opened=opened, before=(-0.1, gaps[0] - 0.01, before[2]))
-    assert opening[:, 0, 0].tolist() == [False, True]
-
-
-def test_the_rest_of_the_way_is_looked_at_before_it_is_gone() -> None:
-    """From 0.19 m to 0.14 m in an instant: 0.09 m at the next one, less than a hand."""
-    assert one(np.array([0.3, 0.19, 0.14, 0.08]))[:, 0].tolist() == [False, True, True, True]
-    assert one(np.array([0.17, 0.14, 0.125]))[:, 0].tolist() == [False, False, False]
 
 
 def test_other_things_are_on_the_far_side_of_a_gap_and_flags_are_those_of_each_moving_body() -> None:

@@ -153,6 +153,11 @@ WRONG = {
         "safety[0].between[1]",
         "nothing named 'oper'",
     ),
+    "criterion of no sensor": (
+        ROBOT + "[[safety]]\nkind='scanner_field'\nsensor='scan'\nfield='f'\nof='ur10'",
+        "safety[0].sensor",
+        "no sensor named 'scan'; known: none",
+    ),
     "contact of nothing": (
         ROBOT + "[[contacts]]\nbetween=['zz','ur10']",
         "contacts[0].between[0]",

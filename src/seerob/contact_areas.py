@@ -16,6 +16,8 @@ NOT_MODELLED = (
     "the contact itself: its area grows with the indentation F/k by a convention of seerob; "
     "up to the permitted force the pressure is within its limit",
     "free or clamped is decided by gaps that are not verified (M), unless thickness is given",
+    "whether a moving part in a gap comes nearer to the surface or passes it: it counts as clamping",
+    "surfaces that no part of the workstation shows, but for the floor",
     "duration of the contact: what is free counts as transient, what is clamped as quasi-static",
     "forces that drives keep up after the impact, detection and stop of the robot",
 )

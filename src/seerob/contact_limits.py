@@ -149,6 +149,8 @@ class Judged:
     """2 exceeded, 1 open, 0 within, shape (k,)."""
     ends: Spread | None = None
     """Of the permissible speeds, shape (b, r), where something that they are made from may be off."""
+    on_floor: NDArray[np.bool_] | None = None
+    """Which of ``clamped`` are against the floor, shape (b, r)."""
 
     @property
     def least(self) -> Array:

@@ -262,7 +262,7 @@ class Engine:
     def start(self) -> State:
         """The twin at t = 0, placed on the first samples without being pulled there."""
         self._place(0.0)
-        self._note_bones()
+        self._note_errors()
         return self.state
 
     def tick(self) -> State:
@@ -293,7 +293,6 @@ class Engine:
         t = self._tick * self._period
         self._show(t)
         self._note_errors()
-        self._note_bones()
         return self.state
 
     def _follow(self) -> None:
@@ -372,7 +371,10 @@ class Engine:
         self.state.refresh(t)
 
     def _note_errors(self) -> None:
-        if not (self.controllers and self.physics):
+        for name, following in self._followings.items() if self.controllers else ():
+            q = self.state.joint_positions(self.model.mechanisms[name])
+            self._hearings[name].bones = following.errors(self.state.t, q)
+        if not (self.controllers and self.physics and self._tick):
             return
         off = np.abs(self._data.qpos - self._course.q[-1])
         self._force[self._dof] = np.abs(self._data.actuator_force)
@@ -381,11 +383,6 @@ class Engine:
             hearing = self._hearings[mechanism.name]
             hearing.error = float(off[mechanism.q_address].max(initial=0.0))
             hearing.saturated = bool(reached[mechanism.v_address].any())
-
-    def _note_bones(self) -> None:
-        for name, following in self._followings.items() if self.controllers else ():
-            q = self.state.joint_positions(self.model.mechanisms[name])
-            self._hearings[name].bones = following.errors(self.state.t, q)
 
     def _check_finite(self) -> None:
         if np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qvel).all():

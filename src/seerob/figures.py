@@ -131,3 +131,10 @@ def _back(text: str) -> float:
 
 def _beyond(value: float, limit: float, at_most: bool) -> bool:
     return value > limit if at_most else value < limit
+
+
+def whatever_is_missing(what: str, low: float, high: float) -> str:
+    """What a score that is not assessed in full may be: ``the score lies between 2 and 7``."""
+    if low == high:
+        return f"the {what} is {low:g} whatever is missing"
+    return f"the {what} lies between {low:g} and {high:g}"

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from msgspec import Struct
 
 from seerob.errors import Problem, suggestion
+from seerob.human.skeleton import BONES
 
 NAMED = ("robots", "tools", "workpieces", "parts", "machines", "areas", "sensors", "humans")
 """Tables whose entries have a name that is theirs alone."""
@@ -45,6 +46,7 @@ def check(names: Sequence[Named], entries: Entries, file: str) -> list[Problem]:
         *_taken(names, file),
         *_mounts(names, entries, file),
         *_sources(names, entries, file),
+        *_bones(entries, file),
         *_subjects(names, entries, file),
         *_results(entries, file),
     ]
@@ -111,6 +113,20 @@ def _sources(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Pr
         driven.setdefault(target, i)
 
 
+def _bones(entries: Entries, file: str) -> Iterator[Problem]:
+    """Bones of people that sources and rules name, whatever else they are."""
+    named: list[tuple[str, str]] = []
+    for i, source in entries.get("sources", {}).items():
+        bones = getattr(getattr(source, "weights", None), "bones", {})
+        named += [(f"sources[{i}].weights.bones.{bone}", bone) for bone in bones]
+    for i, rule in entries.get("ergonomics", {}).items():
+        unmeasured = getattr(rule, "unmeasured", ())
+        named += [(f"ergonomics[{i}].unmeasured[{k}]", bone) for k, bone in enumerate(unmeasured)]
+    for key, bone in named:
+        if bone not in BONES:
+            yield Problem(file, key, f"no bone named {bone!r}", suggestion(bone, BONES))
+
+
 def _subjects(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Problem]:
     known = [n.name for n in names]
     asked = [("contacts", i, contact, contact.between) for i, contact in entries.get("contacts", {}).items()]
@@ -121,8 +137,11 @@ def _subjects(names: Sequence[Named], entries: Entries, file: str) -> Iterator[P
             if not subject or _begins(subject, known):
                 continue
             place = next((f".{field}{where}" for field, where in _fields_with(entry, subject)), "")
-            what = f"nothing named {subject!r} in the workstation"
-            yield Problem(file, f"{group}[{i}]{place}", what, suggestion(subject, known))
+            what, fitting = f"nothing named {subject!r} in the workstation", known
+            if place == ".sensor":
+                what = f"no sensor named {subject!r}"
+                fitting = [entry.name for entry in entries.get("sensors", {}).values()]
+            yield Problem(file, f"{group}[{i}]{place}", what, suggestion(subject, fitting))
 
 
 def _begins(subject: str, known: Sequence[str]) -> bool:

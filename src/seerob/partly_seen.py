@@ -33,8 +33,10 @@ def partly_seen(model: Model, gap: Gap, bind: Callable[[Gap], Evaluate]) -> Eval
 
     def evaluate(state: State) -> Result:
         lost = state.lost_bodies(bodies)
+        if not lost:
+            return judge(state)
         a, b = (tuple(i for i in side if i not in lost) for side in (gap.a, gap.b))
-        if lost and a and b:
+        if a and b:
             if lost not in parts:
                 if len(parts) == MOST:
                     del parts[next(iter(parts))]

@@ -9,8 +9,10 @@ sample of joint space could never be. A whole turn is made in the half-plane of 
 is missed.
 
 That bodies collide with each other, and that mimic joints are tied to others, is not taken into account:
-both make the true set smaller. Every joint adds the rounding to voxels once more, so the volume is thicker
-than the truth by a few voxels; smaller ones bring it nearer.
+both make the true set smaller. Every joint rounds to voxels once more. So that this does not add up, each
+joint is swept in voxels as fine as `CELLS` allow, and what it moves is cut back to a ball that it cannot
+leave: from a point of its axis to one of the next, and so on to the farthest corner, no way is longer than
+the sum. What rounding can have added in all is counted step by step (`Swept.excess`).
 """
 
 from __future__ import annotations
@@ -23,16 +25,21 @@ import numpy as np
 
 from seerob.errors import InputError
 from seerob.kernels.fields import cells_field
-from seerob.kernels.revolve import profile, revolve
+from seerob.kernels.revolve import cut_to_ball, profile, revolve
 from seerob.kernels.voxels import stamp
 from seerob.model import Model
 from seerob.moving import Core, Moving, Progress, reach_box, with_field
-from seerob.swept import BAND, SLACK, SPACING, Swept
+from seerob.swept import SLACK, SPACING, Swept
 from seerob.transforms import Array
 from seerob.voxels import VoxelGrid, check_room
 
-LAYERS = 4
-"""Around a set of voxels, up to which distances from it are exact [voxels]."""
+CELLS = 6e6
+"""Voxels that the sweep of one joint may take, about, when they are made finer than asked."""
+FINEST = 8
+"""Parts of a voxel's edge in the sweep of a joint, at most; a power of 2."""
+EXACT = 2.0
+"""How far around a set distances from it are exact [voxels that are marked]; `_stamped_excess` needs it."""
+HALF_DIAGONAL = np.sqrt(3) / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +60,9 @@ class _Screw:
         cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         rotation = np.eye(3) + np.sin(delta) * cross + (1 - np.cos(delta)) * cross @ cross
         return rotation, self.anchor - rotation @ self.anchor
+
+
+STILL = _Screw(True, np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.0, 0.0)
 
 
 def reachable_volume(
@@ -90,8 +100,9 @@ def reachable_volume(
     check_room(low, high, voxel, memory)
     rotations, positions = moving.place(np.asarray(model.mj.qpos0, float))
     screws = _screws(model, moving)
+    balls = _balls(moving, screws, rotations, positions)
     work = _Work(voxel, slack, memory, stop)
-    beyond: dict[int, list[VoxelGrid]] = {}
+    beyond: dict[int, list[_Set]] = {}
     own: dict[int, list[tuple[Core, Array, Array]]] = {}
     parent: dict[int, int] = {}
     for i, (core, chain) in enumerate(zip(moving.cores, moving.chains, strict=True)):
@@ -99,19 +110,24 @@ def reachable_volume(
         parent |= dict(zip(chain, (-1, *chain), strict=False))
     order = sorted(parent, reverse=True)
     for done, joint in enumerate(order):
-        grid = work.sweep(screws[joint], own.get(joint, []), beyond.pop(joint, []))
-        if grid is None:
+        found = work.sweep(screws[joint], own.get(joint, []), beyond.pop(joint, []), balls[joint])
+        if found is None:
             return None
-        beyond.setdefault(parent[joint], []).append(grid)
+        beyond.setdefault(parent[joint], []).append(found)
         progress((done + 1) / len(order))
-    # The rest stands still: one sweep that does not move.
-    still = _Screw(True, np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.0, 0.0)
-    grids = beyond.pop(-1, [])
-    whole = grids[0] if len(grids) == 1 and -1 not in own else work.sweep(still, own.get(-1, []), grids)
+    whole = work.whole(own.get(-1, []), beyond.pop(-1, []))
     if whole is None:
         return None
     guarantee = "every voxel that a point of the bodies' shapes can reach within the joint limits"
-    return Swept(whole, work.dilation, work.dilation, work.stamps, guarantee)
+    return Swept(whole.grid, work.dilation, work.dilation, work.stamps, guarantee, whole.excess)
+
+
+@dataclass(frozen=True, eq=False)
+class _Set:
+    """Voxels, and how far any point of theirs can be from the set that they stand for [m]."""
+
+    grid: VoxelGrid
+    excess: float
 
 
 class _Work:
@@ -121,40 +137,71 @@ class _Work:
         self.stamps = 0
 
     def sweep(
-        self, screw: _Screw, cores: Sequence[tuple[Core, Array, Array]], beyond: Sequence[VoxelGrid]
-    ) -> VoxelGrid | None:
+        self,
+        screw: _Screw,
+        cores: Sequence[tuple[Core, Array, Array]],
+        beyond: Sequence[_Set],
+        ball: tuple[Array, float],
+    ) -> _Set | None:
         """All that solids and voxels, placed at the reference position, meet while one joint moves."""
-        grid = VoxelGrid(self.voxel, memory=self.memory)
-        if not screw.slide and screw.high - screw.low >= 2 * np.pi:
-            for core, rotation, position in cores:
-                if not self._stamped(grid, _still(screw), core, rotation, position):
-                    return None
-            return self._turned(screw, [grid, *beyond])
+        grid = VoxelGrid(_finer(self.voxel, ball[1]), memory=self.memory)
+        whole_turn = not screw.slide and screw.high - screw.low >= 2 * np.pi
+        excess = 0.0
         for core, rotation, position in cores:
-            if not self._stamped(grid, screw, core, rotation, position):
+            added = self._stamped(grid, STILL if whole_turn else screw, core, rotation, position)
+            if added is None:
                 return None
-        for voxels in beyond:
-            if not self._stamped(grid, screw, _core_of(voxels), np.eye(3), np.zeros(3), exact=voxels):
+            excess = max(excess, added)
+        if whole_turn:
+            found = self._turned(screw, [_Set(grid, excess), *beyond], grid.pitch)
+            if found is None:
                 return None
-        return grid
+            grid, excess = found.grid, found.excess
+        else:
+            for voxels in beyond:
+                core = _core_of(voxels.grid, grid.pitch * EXACT)
+                added = self._stamped(grid, screw, core, np.eye(3), np.zeros(3))
+                if added is None:
+                    return None
+                excess = max(excess, voxels.excess + added)
+        centre, radius = ball
+        grid.count -= cut_to_ball(grid.cells, grid.full, grid.origin, grid.pitch, centre, radius)
+        return _Set(grid, excess)
+
+    def whole(self, still: Sequence[tuple[Core, Array, Array]], moved: Sequence[_Set]) -> _Set | None:
+        """All of it, in voxels of the size that was asked for."""
+        grid = VoxelGrid(self.voxel, memory=self.memory)
+        excess = 0.0
+        for core, rotation, position in still:
+            added = self._stamped(grid, STILL, core, rotation, position)
+            if added is None:
+                return None
+            excess = max(excess, added)
+        for each in moved:
+            if not each.grid.count:
+                continue
+            factor = round(self.voxel / each.grid.pitch)
+            low, high = each.grid.bounds()
+            grid.cover(low * each.grid.pitch, (high + 1) * each.grid.pitch)
+            for i, layer in enumerate(each.grid.cells, int(each.grid.first[0])):
+                j, k = ((np.argwhere(layer) + each.grid.first[1:]) // factor - grid.first[1:]).T
+                grid.cells[i // factor - grid.first[0], j, k] = 1
+            # A point of a voxel, and one of the finer voxels in it.
+            excess = max(excess, each.excess + (0.0 if factor == 1 else 2 * HALF_DIAGONAL * self.voxel))
+        grid.count = int(grid.cells.sum(dtype=np.int64))
+        return _Set(grid, excess)
 
     def _stamped(
-        self,
-        grid: VoxelGrid,
-        screw: _Screw,
-        core: Core,
-        rotation: Array,
-        position: Array,
-        exact: VoxelGrid | None = None,
-    ) -> bool:
-        if exact is None:
-            band = (BAND + min(self.slack, 1.0)) * self.voxel
-            core = with_field(core, spacing=self.voxel * SPACING, band=band)
+        self, grid: VoxelGrid, screw: _Screw, core: Core, rotation: Array, position: Array
+    ) -> float | None:
+        """What was added to the set at most [m]; None when stopped."""
+        pitch = grid.pitch
+        core = with_field(core, spacing=pitch * SPACING, band=EXACT * pitch)
         corners = core.corners @ rotation.T + position
         arms = np.cross(corners - screw.anchor, screw.axis)
         arm = 1.0 if screw.slide else float(np.linalg.norm(arms, axis=1).max()) + core.radius
         span = screw.high - screw.low
-        count = max(int(np.ceil(span / 2 * arm / (self.slack * self.voxel))), 1)
+        count = max(int(np.ceil(span / 2 * arm / (self.slack * pitch))), 1)
         bound = span / (2 * count) * arm
         self.dilation = max(self.dilation, bound)
         reach = bound + core.radius
@@ -165,59 +212,106 @@ class _Work:
         grid.cover(points.min(axis=(0, 1)) - reach, points.max(axis=(0, 1)) + reach)
         for k in range(0, count, 16):
             if self.stop():
-                return False
+                return None
             some = slice(k, k + 16)
             grid.count += stamp(
-                grid.cells, grid.full, grid.origin, grid.pitch, core.nodes, core.start, core.spacing,
+                grid.cells, grid.full, grid.origin, pitch, core.nodes, core.start, core.spacing,
                 core.low, core.high, R[some], x[some], np.full(len(R[some]), reach), 0, grid.full.shape[0],
             )  # fmt: skip
         self.stamps += count
-        return True
+        return _stamped_excess(core, bound, pitch)
 
-    def _turned(self, screw: _Screw, grids: Sequence[VoxelGrid]) -> VoxelGrid | None:
-        grids = [grid for grid in grids if grid.count]
+    def _turned(self, screw: _Screw, sets: Sequence[_Set], pitch: float) -> _Set | None:
+        sets = [each for each in sets if each.grid.count]
         if self.stop():
             return None
-        centres = [grid.centres() - screw.anchor for grid in grids]
-        heights = [c @ screw.axis for c in centres]
-        radii = [np.linalg.norm(np.cross(c, screw.axis), axis=1) for c in centres]
-        rim = max(float(r.max()) for r in radii) + self.voxel
-        low = min(float(h.min()) for h in heights) - self.voxel
-        high = max(float(h.max()) for h in heights) + self.voxel
+        centres = [each.grid.centres() - screw.anchor for each in sets]
+        heights = np.concatenate([c @ screw.axis for c in centres])
+        radii = np.concatenate([np.linalg.norm(np.cross(c, screw.axis), axis=1) for c in centres])
+        edges = np.concatenate([np.full(len(c), s.grid.pitch) for c, s in zip(centres, sets, strict=True)])
+        largest = float(edges.max())
+        rim = float(radii.max()) + largest
+        low, high = float(heights.min()) - largest, float(heights.max()) + largest
         # The box around the drum: along each world axis its ends and its rim.
         side = rim * np.sqrt(np.clip(1 - screw.axis**2, 0, 1))
         ends = screw.anchor + np.array([low, high])[:, None] * screw.axis
-        turned = VoxelGrid(self.voxel, memory=self.memory)
+        turned = VoxelGrid(pitch, memory=self.memory)
         turned.cover(ends.min(axis=0) - side, ends.max(axis=0) + side)
-        pitch = self.voxel / 4
-        half = self.voxel / 2 * float(np.abs(screw.axis).sum())
-        plane = profile(
-            np.concatenate(radii), np.concatenate(heights) - low, self.voxel, half, pitch, rim, high - low
-        )
+        fine = pitch / 4
+        share = float(np.abs(screw.axis).sum()) / 2
+        plane = profile(radii, heights - low, edges, share, fine, rim, high - low)
         turned.count = revolve(
-            turned.cells,
-            turned.full,
-            turned.origin,
-            self.voxel,
-            plane,
-            pitch,
-            screw.anchor,
-            screw.axis,
-            low,
-            half,
+            turned.cells, turned.full, turned.origin, pitch, plane, fine, screw.anchor, screw.axis, low,
+            share * pitch,
+        )  # fmt: skip
+        # Both voxels meet one cell of the half-plane; then to the farthest point of the new voxel.
+        excess = max(
+            each.excess
+            + float(np.hypot(HALF_DIAGONAL * both + fine, share * both + fine))
+            + HALF_DIAGONAL * pitch
+            for each in sets
+            for both in [pitch + each.grid.pitch]
         )
-        return turned
+        return _Set(turned, excess)
 
 
-def _still(screw: _Screw) -> _Screw:
-    return _Screw(True, screw.anchor, screw.axis, 0.0, 0.0)
+def _finer(voxel: float, radius: float) -> float:
+    """Edge of the voxels in which a joint is swept that keeps what it moves in a ball [m]."""
+    parts = 1
+    while parts < FINEST and (4 * parts * radius / voxel) ** 3 <= CELLS:
+        parts *= 2
+    return voxel / parts
 
 
-def _core_of(grid: VoxelGrid) -> Core:
-    """A set of voxels as something that can be stamped."""
-    cells, first = grid.marked(LAYERS + 1)
+def _stamped_excess(core: Core, bound: float, pitch: float) -> float:
+    r"""How far a point of a voxel that was marked can be from the set itself [m].
+
+    Interpolated squares give away at most :math:`3 h^2 / 4`, and since distances are 1-Lipschitz the
+    interpolation itself no more than :math:`\sqrt3 h / 2` of the distance, see `seerob.kernels.fields`.
+    """
+    gap = HALF_DIAGONAL * core.spacing if core.nodes.size else 0.0
+    near = gap + float(np.hypot(bound + core.radius + 0.5 * pitch, gap)) - core.radius
+    return float(near + 2 * HALF_DIAGONAL * pitch)
+
+
+def _balls(
+    moving: Moving, screws: dict[int, _Screw], rotations: Array, positions: Array
+) -> dict[int, tuple[Array, float]]:
+    """Of each joint a ball that what it moves cannot leave: its centre on the axis (3,), its radius [m]."""
+    ways: list[tuple[tuple[int, ...], Array, float]] = []
+    for i, (core, chain) in enumerate(zip(moving.cores, moving.chains, strict=True)):
+        corners = core.corners @ rotations[i].T + positions[i]
+        points = [screws[j].anchor for j in chain]
+        # Any point of an axis will do; those near each other give a short way.
+        for _ in range(30):
+            for k, j in enumerate(chain):
+                after = points[k + 1] if k + 1 < len(chain) else corners.mean(axis=0)
+                middle = after if k == 0 else (points[k - 1] + after) / 2
+                points[k] = screws[j].anchor + screws[j].axis * (screws[j].axis @ (middle - screws[j].anchor))
+        if chain:
+            last = float(np.linalg.norm(corners - points[-1], axis=1).max()) + core.radius
+            ways.append((chain, np.array(points), last))
+    balls = {}
+    for joint in screws:
+        through = [(each[0].index(joint), *each) for each in ways if joint in each[0]]
+        centre = np.mean([way[k] for k, _, way, _ in through], axis=0)
+        radius = 0.0
+        for k, chain, way, last in through:
+            slides = [screws[j] for j in chain[k:] if screws[j].slide]
+            own = float(np.linalg.norm(way[k] - centre))
+            steps = float(np.linalg.norm(np.diff(way[k:], axis=0), axis=1).sum())
+            slid = sum(max(abs(s.low), abs(s.high)) for s in slides)
+            radius = max(radius, own + steps + last + slid)
+        balls[joint] = centre, radius
+    return balls
+
+
+def _core_of(grid: VoxelGrid, band: float) -> Core:
+    """A set of voxels as something that can be stamped; distances are exact up to ``band`` [m] around."""
+    layers = int(np.ceil(band / grid.pitch)) + 2
+    cells, first = grid.marked(layers + 1)
     low, high = grid.bounds()
-    field = cells_field(cells, grid.pitch, LAYERS)
+    field = cells_field(cells, grid.pitch, layers)
     return Core(
         body=-1,
         rotation=np.eye(3),

@@ -67,7 +67,9 @@ def bind(model: Model) -> tuple[Bound, ...]:
             try:
                 bound.append(Bound(criterion, group, criterion.bind(model), criterion.basis(model)))
             except SeerobError as error:
-                problems.append(Problem(file, f"{group}[{i}] ({criterion.name})", str(error)))
+                # Many messages begin with the name of the criterion, which the key already says.
+                text = str(error).removeprefix(f"{criterion.name}: ")
+                problems.append(Problem(file, f"{group}[{i}] ({criterion.name})", text))
     if problems:
         raise InputError(problems)
     return tuple(bound)

@@ -23,8 +23,8 @@ from seerob.joint_columns import Columns, moving_dofs
 from seerob.kernels.chain import along
 from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
 from seerob.model import Frame, Gap, Mechanism, Model
-from seerob.signals import Signals
 from seerob.seen_bones import bones_of, unseen_reason
+from seerob.signals import Signals
 from seerob.surveying import Surveyor
 from seerob.transforms import Array
 
@@ -148,9 +148,13 @@ class State:
         self.asked.add(name)
         if reason := self._doubt(name):
             raise Undecided(reason)
-        hearing = self.hearings[name]
-        doubted = (bone for _, bones in hearing.doubted(self.t) for bone in bones)
-        return tuple(dict.fromkeys((*doubted, *hearing.unseen(self.t))))
+        key = ("bones in doubt", name)
+        if key not in self._cache:
+            hearing = self.hearings[name]
+            doubted = (bone for _, bones in hearing.doubted(self.t) for bone in bones)
+            self._cache[key] = tuple(dict.fromkeys((*doubted, *hearing.unseen(self.t))))
+        bones: tuple[str, ...] = self._cache[key]
+        return bones
 
     def require_bodies(self, bodies: tuple[int, ...], *, estimates: bool = False) -> None:
         """Raise `Undecided` unless these bodies are where the twin shows them: of a person, these bones only.
@@ -161,9 +165,7 @@ class State:
                 (``unseen_uncertainty``): whoever asks adds `seerob.tracking_error.TrackingError`.
         """
         key = ("relied on", bodies, estimates)
-        if bodies not in self._bones_of:
-            self._bones_of[bodies] = bones_of(self.model, bodies)
-        others, people = self._bones_of[bodies]
+        others, people = self._bones(bodies)
         self.asked.update(others, people)
         if key in self._cache:
             return
@@ -190,14 +192,16 @@ class State:
 
     def lost_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
         """Those of some bodies that are bones in doubt of people of whom the others may be relied on."""
-        lost = []
-        for index in bodies:
-            body = self.model.bodies[index]
-            if body.role == "human" and body.carrier == body.owner and not self._doubt(body.owner):
-                names = (f"{body.owner}/{bone}" for bone in self.bones_in_doubt(body.owner))
-                if body.name in names:
-                    lost.append(index)
-        return tuple(lost)
+        _, people = self._bones(bodies)
+        lost = {
+            f"{name}/{bone}" for name in people if not self._doubt(name) for bone in self.bones_in_doubt(name)
+        }
+        return tuple(i for i in bodies if self.model.bodies[i].name in lost) if lost else ()
+
+    def _bones(self, bodies: tuple[int, ...]) -> tuple[tuple[str, ...], dict[str, frozenset[str]]]:
+        if bodies not in self._bones_of:
+            self._bones_of[bodies] = bones_of(self.model, bodies)
+        return self._bones_of[bodies]
 
     def signal(self, name: str) -> Value:
         """The value of a variable of the dictionary now, in SI.
@@ -326,10 +330,10 @@ class State:
     def body_velocity(self, index: int) -> tuple[Array, Array]:
         """Linear velocity at its origin [m/s] and angular velocity [rad/s] of a body, world axes."""
         self.require_bodies((index,))
-        linear, angular = self._velocities()
+        linear, angular = self.body_velocities()
         return linear[index], angular[index]
 
-    def _velocities(self) -> tuple[Array, Array]:
+    def body_velocities(self) -> tuple[Array, Array]:
         """Linear and angular velocities of all bodies at their origins, shape (n, 3) each."""
         if "v" not in self._cache:
             data = self.data
@@ -368,7 +372,7 @@ class State:
             speed, point, velocity = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
             corners, start = self._corners
             fastest(
-                self.rotations, self.positions, *self._velocities(), corners, start, self._reach,
+                self.rotations, self.positions, *self.body_velocities(), corners, start, self._reach,
                 speed, point, velocity,
             )  # fmt: skip
             self._cache["fastest"] = speed, point, velocity

@@ -60,14 +60,15 @@ class Station:
         """Areas that are swept, from a run of the same workstation without them."""
         if not any(area.swept for area in self.workstation.areas):
             return {}
-        from seerob.swept_areas import make, without_swept
+        from seerob.swept_areas import in_place, make, without_swept
 
-        bare = Station(without_swept(self.workstation), cache=cache, progress=progress)
-
-        def run(writer: Writer) -> None:
-            bare.run(writers=[writer])
-
-        return make(self.workstation, bare.model, bare.bound, bare.files, run, cache=cache, progress=progress)
+        with in_place(self.workstation):
+            bare = Station(without_swept(self.workstation), cache=cache, progress=progress)
+            bound = bare.bound
+        return make(
+            self.workstation, bare.model, bound, bare.files, lambda writer: bare.run(writers=[writer]),
+            cache=cache, progress=progress,
+        )  # fmt: skip
 
     @cached_property
     def bound(self) -> tuple[Bound, ...]:

@@ -66,6 +66,9 @@ class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     table_for: str | None = None
     """Name of the robot that the table is that of, by your own word; without it, a table that is not of the
     robot's ``model`` leaves what it would keep within undecided."""
+    rated_payload: Annotated[float, Meta(gt=0, extra={"unit": "kg"})] | None = None
+    """Payload at which the table's figures hold [kg], from the robot's data sheet, for a table that does not
+    say; refused beside one that does."""
     brakes: Annotated[tuple[Annotated[float, Meta(gt=0)], ...], Meta(extra={"unit": "N·m"})] | None = None
     """Torque of each joint's brake [N·m or N] with ``simulated``; ``torque_share`` of the robot's torque
     limits when not given."""
@@ -99,6 +102,7 @@ class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "deceleration": self.deceleration is not None and self.model != "constant_deceleration",
             "table": self.table is not None and self.model != "table",
             "table_for": self.table_for is not None and self.model != "table",
+            "rated_payload": self.rated_payload is not None and self.model != "table",
             "stopping": self.stopping is not None and self.model == "simulated",
             "brakes": self.brakes is not None and self.model != "simulated",
             "torque_share": self.torque_share != 0.8
@@ -221,8 +225,13 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopMode
         raise InputError.at("stop", "table", "not given", "the name of a table, or a table")
     if stop.table_for is not None and stop.table_for != robot.name:
         raise InputError.at("stop", "table_for", f"{stop.table_for} does not stop here", robot.name)
+    if stop.rated_payload is not None and table.rated_payload is not None:
+        what = f"{stop.rated_payload:g} kg, and the table of {table.robot} says {table.rated_payload:g} kg"
+        raise InputError.at("stop", "rated_payload", what, "leave it out: the table's own holds")
     doubt = not_its_own(table, model, robot) if stop.table_for is None else ""
-    courses, inputs = bind_table(table, stop.reaction, stop.stopping, model, robot, gap)
+    courses, inputs = bind_table(
+        table, stop.reaction, stop.stopping, model, robot, gap, rated_payload=stop.rated_payload
+    )
     source = f"{table.source} ({table.confidence})" + (f"; {table.note}" if table.note else "")
     named = Input(name="stopping table", value=table.robot, origin=Origin.STATED, source=source)
     rest = () if stop.stopping is None else (_given("T_s of joints without a table", stop.stopping, "s"),)

@@ -58,6 +58,8 @@ class Swept:
     """Poses of single solids that were marked."""
     guarantee: str
     """What is inside, in a sentence."""
+    excess: float | None = None
+    """How far a point of the voxels can be from the true set, all roundings added up [m]; None: not known."""
 
     @property
     def volume(self) -> float:

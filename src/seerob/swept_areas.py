@@ -6,7 +6,8 @@ import hashlib
 import io
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -30,10 +31,12 @@ from seerob.transforms import Array
 from seerob.voxels import check_room
 from seerob.workstation import Area, SweptArea, Workstation, content_hash
 
-VERSION = "seerob swept area 1"
+VERSION = "seerob swept area 2"
 """Changes whenever what is made does."""
 MOST = 6_000
 """Triangles of an area, about; it still contains every voxel."""
+
+SEPARATION = "criterion of kind separation"
 
 Run = Callable[[Writer], object]
 """Runs the workstation once and tells a writer."""
@@ -88,6 +91,47 @@ def without_swept(station: Workstation) -> Workstation:
     )
 
 
+@contextmanager
+def in_place(station: Workstation) -> Iterator[None]:
+    """Tells mistakes that are found without the swept areas at their places in the whole workstation.
+
+    `without_swept` counts areas and criteria anew. Wrong names of criteria are told with them.
+
+    Raises:
+        InputError: What was raised within, and every `SweptArea.separation` that nothing is named.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise InputError(_in_place(error.problems, station)) from None
+
+
+def _in_place(problems: Iterable[Problem], station: Workstation) -> list[Problem]:
+    bare = without_swept(station)
+    places = {
+        f"{table}[{i}]": f"{table}[{getattr(station, table).index(entry)}]"
+        for table in ("areas", "safety")
+        for i, entry in enumerate(getattr(bare, table))
+    }
+    found = []
+    for problem in problems:
+        head, bracket, rest = problem.key.partition("]")
+        place = head + bracket
+        found.append(problem._replace(key=places.get(place, place) + rest))
+    known, file = _separations(station), next(iter(station.files), "workstation")
+    for i, area in enumerate(station.areas):
+        name = None if area.swept is None else area.swept.separation
+        if name is not None and name not in known:
+            text = str(UnknownName(SEPARATION, name, known))
+            found.append(Problem(file, f"areas[{i}].swept.separation", text))
+    return found
+
+
+def _separations(station: Workstation) -> list[str]:
+    # The kind of a criterion is the name of its module.
+    return [c.name for c in station.safety if type(c).__module__.endswith(".separation")]
+
+
 def make(
     workstation: Workstation,
     model: Model,
@@ -115,7 +159,7 @@ def make(
     made: dict[str, MadeArea] = {}
     problems: list[Problem] = []
     file = next(iter(workstation.files), "workstation")
-    maker = _Maker(model, {b.criterion.name: b for b in bound}, run, progress)
+    maker = _Maker(model, {b.criterion.name: b for b in bound}, run, progress, _separations(workstation))
     for i, area in enumerate(workstation.areas):
         if area.swept is None:
             continue
@@ -147,8 +191,16 @@ def _short(key: str) -> str:
 
 
 class _Maker:
-    def __init__(self, model: Model, bound: Mapping[str, Bound], run: Run, progress: Progress) -> None:
+    def __init__(
+        self,
+        model: Model,
+        bound: Mapping[str, Bound],
+        run: Run,
+        progress: Progress,
+        separations: Sequence[str],
+    ) -> None:
         self.model, self.bound, self.run, self.progress = model, bound, run, progress
+        self.separations = separations
         self.record: MotionRecord | None = None
 
     def check(self, swept: SweptArea) -> None:
@@ -183,15 +235,18 @@ class _Maker:
                     text = f"the twin of {name} was off by up to {error:.3g} rad or m: it is the twin's way"
                     findings.append(Finding(level="warning", subject=area.name, text=text))
         text = f"{what}, in voxels of {swept.voxel:g} m: {found.volume:.3g} m³, not less than the truth"
+        if found.excess is not None:
+            text += f"; larger by at most {found.excess * 1e3:.0f} mm before any margin"
         if swept.margin:
             text += f"; dilated by {swept.margin:g} m"
         findings.insert(0, Finding(level="note", subject=area.name, text=text))
-        note = f"{what}, larger than the truth by up to some voxels of {swept.voxel:g} m"
+        more = f"some voxels of {swept.voxel:g} m" if found.excess is None else f"{found.excess * 1e3:.0f} mm"
+        note = f"{what}, larger than the truth by up to {more}"
         return MadeArea(found.mesh(most=MOST), note, tuple(findings))
 
     def _separation(self, name: str) -> Bound:
         if name not in self.bound:
-            raise UnknownName("criterion of kind separation", name, self.bound)
+            raise UnknownName(SEPARATION, name, self.separations)
         bound = self.bound[name]
         missing = [given.name for given in bound.basis.inputs if given.origin is Origin.MISSING]
         if missing:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import mujoco
 import numpy as np
+from msgspec.structs import replace
 
 from seerob.errors import InputError, Undecided
 from seerob.model import Body, Gap, Mechanism, Model
@@ -30,7 +31,14 @@ def not_its_own(table: StoppingTable, model: Model, robot: Mechanism) -> str:
 
 
 def bind_table(
-    table: StoppingTable, T_r: float, others: float | None, model: Model, robot: Mechanism, gap: Gap
+    table: StoppingTable,
+    T_r: float,
+    others: float | None,
+    model: Model,
+    robot: Mechanism,
+    gap: Gap,
+    *,
+    rated_payload: float | None = None,
 ) -> Bound:
     """Course of a robot's moving parts by its stopping table, and the inputs that it needs.
 
@@ -43,6 +51,7 @@ def bind_table(
         model: The workstation.
         robot: Who stops.
         gap: Its second set are the moving parts.
+        rated_payload: Payload at which the figures hold [kg], of a table that does not say.
 
     Raises:
         InputError: The table speaks of joints that the robot does not have.
@@ -55,6 +64,11 @@ def bind_table(
             f"{table.robot} has joint {beyond[0]}, {robot.name} has {len(robot.joints)} joints",
             "the table of this robot",
         )
+    said = Origin.MISSING if table.rated_payload is None else Origin.STATED
+    source = f"{table.source} ({table.confidence})"
+    if rated_payload is not None:
+        table = replace(table, rated_payload=rated_payload)
+        said, source = Origin.GIVEN, "workstation file"
     load = _payload(model, robot)
     inputs = (
         Input(
@@ -68,8 +82,8 @@ def bind_table(
             name="rated payload of the stopping table",
             value=table.rated_payload,
             unit="kg",
-            origin=Origin.MISSING if table.rated_payload is None else Origin.STATED,
-            source=f"{table.source} ({table.confidence})",
+            origin=said,
+            source=source,
         ),
     )
     if table.tool is not None:
@@ -147,7 +161,10 @@ def _by_joint(
 
 def _payload_share(table: StoppingTable, robot: Mechanism, load: float) -> float:
     if table.rated_payload is None:
-        raise Undecided("the stopping table does not say for which payload it holds (rated_payload)")
+        raise Undecided(
+            f"the stopping table of {table.robot} does not say for which payload it holds: give "
+            "stop.rated_payload, from the robot's data sheet"
+        )
     if not np.isfinite(load):
         raise Undecided("; ".join(robot.unknown_masses))
     return load / table.rated_payload

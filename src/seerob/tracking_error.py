@@ -16,8 +16,8 @@ class TrackingError:
     """Bound on the distance of every point of bones of the twin from the same point as devices see it.
 
     A bone that is off by p and turned by α moves its points by no more than p + α ρ, where ρ is how far they
-    are from its origin. What no device sees adds what the file accepts (``unseen_uncertainty``), else nothing:
-    how wrong it is nobody knows, and `State.require_bodies` leaves it undecided.
+    are from its origin. What no device sees adds what the file accepts (``unseen_uncertainty``), else
+    nothing: how wrong it is nobody knows, and `State.require_bodies` leaves it undecided.
 
     Args:
         model: The compiled workstation.

@@ -270,8 +270,7 @@ class Human(_Table, frozen=True, kw_only=True):
     follow: Literal["posture", "task"] = "posture"
     """What the controllers that pull the twin hold: each joint at its value, or each bone at its place."""
     unseen_uncertainty: Annotated[float, unit("m", gt=0, le=2)] | None = None
-    """How far bones that no device sees may be from where the twin estimates them [m]. It widens distances
-    to them. Not given: what depends on such bones stays undecided."""
+    """How far bones that no device sees may be from their estimate [m]; without it they stay undecided."""
     at: Pose = Pose()
     """Where the person stands: the point on the floor between the feet."""
     posture: str = "standing"

@@ -10,6 +10,7 @@ from msgspec import Meta
 from seerob import provenance
 from seerob.criterion import Evaluate, judge, judge_interval
 from seerob.ergonomic_posture import bind_posture
+from seerob.figures import whatever_is_missing
 from seerob.human.angles import NEEDS, Angles
 from seerob.human.skeleton import SIDES
 from seerob.model import Model
@@ -88,10 +89,8 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
         reasons = []
         if missing:
             reasons.append(f"not assessed: {', '.join(missing)}")
-        if low != high:
-            reasons.append(f"the score lies between {low:g} and {high:g}")
-        elif missing:
-            reasons.append(f"the score is {low:g} whatever is missing")
+        if missing or low != high:
+            reasons.append(whatever_is_missing("score", low, high))
         reasons += [self._said(rows, key, angles, scores[key]) for key in drivers[:4]]
         best = max((row.score for row in rows), default=0.0)
         top = best if self.combination() == "max" else sum(_tops(rows, scores).values())

@@ -176,6 +176,18 @@ def test_nothing_judged_is_undecided(capsys, tmp_path, monkeypatch):
     assert "nothing judged" in out
 
 
+def test_nobody_near_enough_for_contact_is_not_a_missing_limit(capsys, tmp_path):
+    cell = make_cell(tmp_path / "cell", more=HUMAN)
+    file = cell / "workstation.toml"
+    head = file.read_text().split("[[safety]]")[0]
+    pfl = '[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "ur5e"\nhuman = "op"\nhorizon = 0.01\n'
+    file.write_text(head + HUMAN + pfl)
+    code, out, _ = seerob(capsys, "assess", cell, "-o", tmp_path / "out")
+    (line,) = (line for line in out.splitlines() if line.startswith("nothing judged"))
+    assert code == 2
+    assert "pfl: nobody within 0.01 m of a moving part" in line
+
+
 @pytest.mark.parametrize("name", ["report.html", "results.xlsx"])
 @pytest.mark.parametrize("command", ["assess", "report"])
 def test_no_file_of_another_run_is_written_over(capsys, tmp_path, recorded, command, name):

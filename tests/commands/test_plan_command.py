@@ -1,14 +1,19 @@
 """`seerob plan` and emulated controllers on waypoints, as a user calls them."""
 
 import argparse
+import tomllib
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import seerob
 from seerob import cli
 from seerob.commands import Exit
 from seerob.commands.emulating import fri, rtde
+from seerob.errors import InputError
+from seerob.model_io import library
+from seerob.waypoints.arm import Arm
 
 CELL = """
 [[robots]]
@@ -58,6 +63,28 @@ def test_a_plan_is_written_run_and_drawn(cell, capsys):
     assert "a plan that was not executed" in texts
     (criterion,) = station.scene().criteria
     assert criterion.basis.inputs[0].value == "planned, preliminary"
+
+
+def test_waypoints_are_drawn_only_of_a_robot_that_has_some(cell):
+    (cell / "workstation.toml").write_text(
+        CELL + '[[safety]]\nkind = "waypoints"\nrobot = "ur5"\n', encoding="utf-8"
+    )
+    with pytest.raises(InputError, match="no source of kind waypoints drives ur5"):
+        seerob.load(cell).bound  # noqa: B018
+
+
+def test_of_a_pose_the_way_of_reaching_it_that_is_clear_is_planned(cell):
+    q = np.radians([-40, -70, 80, -100, -90, 0])
+    at = Arm(library.load("ur5"), base="base").posture(q)
+    numbers = [*at.position.tolist(), *Rotation.from_matrix(at.rotation).as_rotvec().tolist()]
+    pose = ", ".join(map(repr, numbers))
+    (cell / "goal.script").write_text(f"movej(p[{pose}])", encoding="utf-8")
+    call = ["plan", str(cell), "--waypoints", str(cell / "goal.script"), "-o"]
+    assert cli.main([*call, str(cell / "p.toml")]) == Exit.WITHIN
+    found = tomllib.loads((cell / "p.toml").read_text(encoding="utf-8"))["waypoints"]
+    np.testing.assert_allclose(found[-1]["q"], q, atol=1e-8)
+    (cell / "goal.script").write_text(f"movel(p[{pose}])", encoding="utf-8")
+    assert cli.main([*call, str(cell / "q.toml")]) == Exit.ERROR
 
 
 def test_a_path_that_is_not_found_is_undecided(cell):

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from seerob.kernels.polytope import largest
+from seerob.kernels.polytope import largest, vertices
 from seerob.polytope import Polytope, free_moment, torque_box, zero_moment
 
 
@@ -104,6 +104,24 @@ def test_batch_is_the_single_one() -> None:
         np.testing.assert_allclose(norm[k], p.largest, rtol=1e-13)
         np.testing.assert_allclose(point[k], p.farthest, rtol=1e-12, atol=1e-9)
         assert radius[k] == p.inscribed
+
+
+def test_vertices_of_a_batch_are_those_of_brute_force_and_none_of_an_empty_or_unbounded_one() -> None:
+    rng = np.random.default_rng(14)
+    for n in (4, 6, 7):
+        cases = [random_case(rng, n) for _ in range(8)]
+        A, low, high = map(np.array, zip(*cases, strict=True))
+        low[2, 0], high[2, 0] = high[2].max() * 1e3, high[2].max() * 2e3
+        A[2, :, 1], low[2, 1], high[2, 1] = -A[2, :, 0], low[2, 0], high[2, 0]  # contradicts joint 0
+        A[5, 0] = 0.0  # no force along x is felt
+        V, begin = vertices(A, low, high, 1e-9)
+        for k in range(8):
+            own = V[begin[k] : begin[k + 1]]
+            if k in (2, 5):
+                assert len(own) == 0
+            else:
+                same_points(own, brute_force(A[k], low[k], high[k]), 1e-10)
+                assert len(own) == len(zero_moment(A[k], low[k], high[k]).corners)
 
 
 def test_inscribed_force_is_possible_in_every_direction_and_a_little_more_is_not() -> None:

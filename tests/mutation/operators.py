@@ -51,7 +51,8 @@ DRAWN = ("Arrow", "Box", "Ellipsoid", "Highlight", "Hull", "Label", "Polyline", 
          "given", "errstate")  # fmt: skip
 """Calls whose arguments no verdict depends on."""
 SPOKEN = ("basis", "subjects", "_markers", "_arrow", "_vector", "_label", "_picture", "_beams", "_line",
-          "hull", "_hidden", "_told", "_limits_given", "_rounded")  # fmt: skip
+          "hull", "_hidden", "_told", "_limits_given", "_rounded",
+          "inputs")  # fmt: skip
 """Functions whose result no verdict depends on."""
 
 

@@ -100,6 +100,17 @@ def test_contact_counts_wherever_people_are_when_it_permits_alone(tmp_path):
     assert (either.share < 1).any()
 
 
+@pytest.mark.parametrize("by", [By.PFL, By.ALL])
+def test_contact_alone_permits_no_more_where_the_person_is_far(tmp_path, by):
+    """Nobody within the horizon is no permission by contact: nothing else keeps them away."""
+    contact = PFL + KEPT_OUT + 'human = "op"\nhorizon = 0.1\n'
+    near = PFL + KEPT_OUT + 'human = "op"\nhorizon = 10\nperson_speed = 0\n'
+    far = maps(cell(tmp_path / "far", contact + "person_speed = 0\n", x=9.0), by)[by]
+    close = maps(cell(tmp_path / "near", near, x=3.0), by)[by]
+    assert (far.share < 1).any()
+    np.testing.assert_allclose(far.permissible, close.permissible, rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("criteria", "by", "message"),
     [

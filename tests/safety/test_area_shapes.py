@@ -211,3 +211,14 @@ def test_a_grid_is_dilated_by_at_least_the_margin():
     out = rng.normal(size=(2000, 3))
     out *= 0.129 / np.linalg.norm(out, axis=1, keepdims=True)
     assert wide.contains(corner + rng.uniform(0, 0.05, (2000, 3)) + out).all()
+
+
+def test_mistakes_behind_a_swept_area_are_told_at_their_own_place_together_with_its_own(tmp_path):
+    swept = AREA.format(name="s", shape='swept = { of = "arm", separation = "nosep" }')
+    lost = AREA.format(name="l", shape='shape = { box = [1, 1, 1] }\non = "arm/nolink"')
+    with pytest.raises(InputError) as error:
+        made(tmp_path, TWO_R + swept + lost, {"arm.urdf": two_r()})
+    texts = {p.key: p.text for p in error.value.problems}
+    assert "nolink" in texts["areas[1]"]
+    assert "'nosep'" in texts["areas[0].swept.separation"]
+    assert len(texts) == 2

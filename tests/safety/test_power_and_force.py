@@ -217,10 +217,11 @@ def swing(station: Station, speed: float, q: float = 0.0) -> dict[str, Result]:
     return found
 
 
-@pytest.mark.parametrize(("speed", "how"), [(0.2, "clamped"), (-0.2, "free")])
-def test_only_a_gap_that_closes_clamps(tmp_path: Path, speed: float, how: str) -> None:
+@pytest.mark.parametrize("speed", [0.2, -0.2])
+def test_part_that_moves_in_a_narrow_gap_clamps_either_way(tmp_path: Path, speed: float) -> None:
+    """Where the least distance opens, another place may close."""
     chest = swing(flat(tmp_path, 'mass = "simplified"', more=WALL), speed)["Chest"]
-    assert f", {how}, arm/l2" in chest.reason
+    assert ", clamped, arm/l2" in chest.reason
 
 
 def test_clamped_is_the_static_limit_against_the_robots_mass_alone(tmp_path: Path) -> None:

@@ -299,6 +299,32 @@ def test_table_of_the_librarys_robot_is_known_to_be_its_own(tmp_path):
         assert results_at(cell, arm=q)["S"].verdict == verdict
 
 
+def test_table_without_a_payload_gives_its_printed_figures_once_the_file_says_which(tmp_path):
+    """First axis of the shipped KUKA table: 30.47° in 0.38 s at full speed, here that of the UR10's base."""
+    full = np.radians(120)
+    q = ([0.0, -1.2, 1.4, -1.5, -1.5, 0.0], [full, 0, 0, 0, 0, 0])
+    found = {}
+    for key in ("", ", rated_payload = 20.0"):
+        stop = f'reaction = 0.1, model = "table", table = "kuka_kr20_r3100", table_for = "arm"{key}'
+        text = UR10 + PERSON.format(x=15.0)
+        text += f'[[safety]]\nkind = "separation"\nname = "S"\nbetween = ["arm", "op"]\n{KNOWN}'
+        found[key] = results_at(made(tmp_path / str(len(key)), text + f"stop = {{ {stop} }}\n"), arm=q)["S"]
+    assert found[""].verdict == "undecided"
+    assert "give stop.rated_payload" in found[""].reason
+    S = found[", rated_payload = 20.0"]
+    S_h, S_r, S_s = terms(S)[:3]
+    assert S_h == pytest.approx(1.6 * (0.1 + 0.38))
+    # Its lever is bounded by the corners of the link's box, its speed found at its vertices.
+    assert S_s >= S_r * np.radians(30.47) / (full * 0.1) - 1e-4
+    assert S_s == pytest.approx(S_r * np.radians(30.47) / (full * 0.1), rel=0.1)
+    assert any((i.value, i.origin) == (20.0, "given") for i in S.basis.inputs if "rated payload" in i.name)
+
+
+def test_payload_of_a_table_that_says_its_own_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"5 kg.*leave it out"):
+        separation(tmp_path, TABLE + ", rated_payload = 6.0")
+
+
 def test_table_by_tool_speed(tmp_path):
     S = separation(tmp_path, UR10_TABLE, x=9.0)
     T_s = 0.55 + 0.1 * (V - 2)

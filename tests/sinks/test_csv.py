@@ -101,8 +101,10 @@ def test_joints_can_be_played_again(files):
         description=run.PERSON,
     )
     path = files / "joints_op.csv"
-    # The last column is ours alone.
-    text = [line.rpartition(",")[0] for line in path.read_text(encoding="utf-8").splitlines()]
+    # What follows the joints is ours alone: tracking error, and what is measured.
+    text = [
+        ",".join(line.split(",")[: 1 + len(JOINTS)]) for line in path.read_text(encoding="utf-8").splitlines()
+    ]
     (files.parent / "again.csv").write_text("\n".join(text), encoding="utf-8")
     played = JointAngleFile(human="op", file="again.csv").open(files.parent, target)
     (files.parent / "again.csv").unlink()
@@ -198,3 +200,15 @@ def test_a_folder_that_is_there_is_not_touched(tmp_path):
     (tmp_path / "csv").mkdir()
     with pytest.raises(InputError, match="exists already"):
         CsvFiles().open(run.scene(), {}, {}, tmp_path)
+
+
+def test_what_no_device_sees_is_told_tick_by_tick(files):
+    """A device sees head and right hand from the sixth tick on."""
+    bones, joints = rows(files / "bones_op.csv"), rows(files / "joints_op.csv")
+    assert {row[f"{bone} measured"] for row in bones[:5] for bone in BONES} == {""}
+    for row in bones[5:]:
+        assert {bone for bone in BONES if row[f"{bone} measured"] == "1"} == {"head", "right_hand"}
+        assert row["left_hand measured"] == "0"
+    # A joint's angle lies between two bones, and of none both are seen.
+    assert {row[f"{joint} measured"] for row in joints[:5] for joint in JOINTS} == {""}
+    assert {row[f"{joint} measured"] for row in joints[5:] for joint in JOINTS} == {"0"}

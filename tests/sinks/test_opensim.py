@@ -6,11 +6,14 @@ import made_person_run as run
 import made_run
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from seerob.errors import InputError
 from seerob.human.skeleton import BONES, JOINTS
-from seerob.motion_io import joint_angles, trc
+from seerob.motion_io import joint_angles, opensim_coordinates, trc
 from seerob.sinks import opensim
+from seerob.sinks._measured_coordinates import EstimatedCoordinates
+from seerob.sinks._people import people
 from seerob.sinks.opensim import OpenSim
 
 N = 100
@@ -82,3 +85,18 @@ def test_a_run_of_one_tick_is_a_file_too(tmp_path):
 def test_without_a_person_there_is_nothing_to_write(tmp_path):
     with pytest.raises(InputError, match="no person"):
         OpenSim().open(made_run.scene(), {}, {}, tmp_path)
+
+
+def test_coordinates_that_nobody_measured_are_named_in_the_header(tmp_path):
+    told = EstimatedCoordinates()
+    person = people(run.scene())[0]
+    seen = {bone: (1e-3, None) for bone in BONES if bone not in ("right_shank", "right_foot")}
+    for k in range(4):
+        told.add(person.joints_measured(replace(run.snapshot(k), bones={"op": seen} if k else {})))
+    text = "".join(told.lines())
+    named = {name for name in opensim_coordinates.coordinates() if f"{name} (75 % of the rows)" in text}
+    assert named == {"knee_angle_r", "ankle_angle_r", "subtalar_angle_r", "mtp_angle_r"}
+    assert "in 1 of 4 rows" in text
+    path = write(tmp_path) / "op_coordinates.mot"
+    assert "estimated, no device saw the bones: pelvis_tilt (95 % of the rows)" in path.read_text("utf-8")
+    assert len(joint_angles.from_storage(path, file="x").t) == N

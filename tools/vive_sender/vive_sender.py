@@ -2,6 +2,7 @@
 """Sends the poses of SteamVR's trackers to seerob, and records them; runs beside SteamVR.
 
 Needs ``pip install "seerob[vive]"`` there. ``python vive_sender.py --to 192.168.0.20``
+With ``--openxr`` it asks the OpenXR runtime instead, and needs ``pip install "seerob[openxr]"``.
 """
 
 from __future__ import annotations
@@ -14,21 +15,26 @@ import time
 
 from seerob.protocols import ProtocolError
 from seerob.protocols.openvr_devices import OpenVr
+from seerob.protocols.openxr_devices import OpenXr, Runtime
+from seerob.protocols.openxr_session import OpenXrSession
 from seerob.protocols.vive import PORT, encode
 
 
-def main(arguments: list[str] | None = None, *, openvr: object = None) -> int:
-    """Send until Ctrl-C, or for so many messages; 1 when SteamVR cannot be reached."""
+def main(arguments: list[str] | None = None, *, openvr: object = None, openxr: Runtime | None = None) -> int:
+    """Send until Ctrl-C, or for so many messages; 1 when the trackers cannot be had, or not any more."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--to", default="127.0.0.1", help="address of the computer with seerob")
     parser.add_argument("--port", type=int, default=PORT, help=f"its port (default: {PORT})")
     parser.add_argument("--rate", type=float, default=90.0, help="messages per second (default: 90)")
     parser.add_argument("--record", help="also write them to this file, one per line")
     parser.add_argument("--count", type=int, default=0, help="end after so many messages (default: never)")
+    parser.add_argument("--openxr", action="store_true", help="ask the OpenXR runtime, not SteamVR's OpenVR")
     options = parser.parse_args(arguments)
     with contextlib.ExitStack() as stack:
         try:
-            runtime = stack.enter_context(OpenVr(openvr))
+            runtime = stack.enter_context(
+                OpenXr(openxr or OpenXrSession()) if options.openxr else OpenVr(openvr)
+            )
         except ProtocolError as error:
             sys.stderr.write(f"{error}\n")
             return 1
@@ -37,7 +43,11 @@ def main(arguments: list[str] | None = None, *, openvr: object = None) -> int:
         begun, sent = time.monotonic(), 0
         with contextlib.suppress(KeyboardInterrupt):
             while not options.count or sent < options.count:
-                message = encode(runtime.read())
+                try:
+                    message = encode(runtime.read())
+                except ProtocolError as error:
+                    sys.stderr.write(f"{error}\n")
+                    return 1
                 with contextlib.suppress(ConnectionRefusedError):  # nobody listens yet
                     link.sendto(message, (options.to, options.port))
                 if record is not None:

@@ -218,7 +218,16 @@ def tell_results(summary: Summary) -> None:
     for person, errors in summary.results.bones.items():
         line("bones", f"{person}: {_missing(errors)}")
     if summary.verdict is None:
-        line("nothing judged", "no criterion has a verdict: give one a limit", WORDS[Verdict.UNDECIDED][1])
+        line("nothing judged", _why_nothing(summary), WORDS[Verdict.UNDECIDED][1])
+
+
+def _why_nothing(summary: Summary) -> str:
+    """What is missing where no criterion has a verdict: what those without a value say, else a limit."""
+    worst = {name: series.worst() for name, series in summary.results.items() if series.known}
+    said = [f"{name}: {w.reason}" for name, w in worst.items() if w.value is None and w.reason]
+    if len(said) == len(worst) and said:
+        return f"no criterion has a verdict: {'; '.join(said)}"
+    return "no criterion has a verdict: give one a limit"
 
 
 def _missing(errors: BoneErrors) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from seerob.commands.measure import add_person, measured, person_table, reader
 from seerob.errors import InputError
 from seerob.workstation import FILE_NAME
 
+COMMAND = "seerob capture"
 HELP = "make a workstation of a recorded person, let the twin follow it, and export the motion and its scores"
 EXAMPLE = "seerob capture bvh session.bvh --mass 72 --sex female -o my_session"
 
@@ -50,16 +50,7 @@ def run(options: argparse.Namespace) -> int:
 
     if options.output.exists():
         raise InputError.at(options.output, "", "exists already", "give another folder with -o")
-    recording = Path(options.file)
-    table = _person(options, recording)
-    source = [f"kind = {_quoted(options.kind)}", f"human = {_quoted(options.name)}"]
-    source.append(f"file = {_quoted(_path(recording, options.output))}")
-    if options.subject:
-        source.append(f"subject = {_quoted(options.subject)}")
-    source += [" = ".join(map(str.strip, text.split("=", 1))) for text in options.set]
-    text = "\n".join(
-        [f"title = {_quoted(recording.stem)}", "", table, "", "[[sources]]", *source, ""]
-    ) + _TABLES.format(human=_quoted(options.name))
+    text = _workstation(options, Path(options.file))
     try:
         options.output.mkdir(parents=True)
         (options.output / FILE_NAME).write_text(text, encoding="utf-8")
@@ -74,15 +65,39 @@ def run(options: argparse.Namespace) -> int:
     return assess.run(same.parse_args([str(options.output), *(["--json"] if options.json else [])]))
 
 
+def _workstation(options: argparse.Namespace, recording: Path) -> str:
+    """The workstation file; what is wrong with the options is said before anything is made."""
+    import tomllib
+
+    from seerob.commands.probe import options_of
+    from seerob.reading import convert_workstation
+    from seerob.tables.mapping import toml_value
+
+    table = _person(options, recording)
+    given = {"kind": options.kind, "human": options.name, "file": _path(recording, options.output)}
+    given |= {"subject": options.subject} if options.subject else {}
+    given |= options_of(options.set, COMMAND)
+    source = [f"{key} = {toml_value(value)}" for key, value in given.items()]
+    head = [f"title = {toml_value(recording.stem)}", "", table, "", "[[sources]]", *source, ""]
+    text = "\n".join(head) + _TABLES.format(human=toml_value(options.name))
+    _, problems = convert_workstation(tomllib.loads(text), COMMAND)
+    if problems:
+        raise InputError(problems)
+    return text
+
+
 def _person(options: argparse.Namespace, recording: Path) -> str:
     """The person as it was measured; of markers, which show no joint centres, as the tables have it."""
-    source = reader(options)
+    source = reader(options, COMMAND)
     source.read(recording)  # what is wrong with it is said first
     try:
         found, findings = measured(source, recording, options)
     except InputError as error:
-        if options.stature is None or not any(p.key == "morphology" for p in error.problems):
+        if not any(p.key == "morphology" for p in error.problems):
             raise
+        if options.stature is None:
+            remedy = "give --stature: the person has the usual proportions then"
+            raise InputError.at(options.file, "", error.problems[0].what, remedy) from error
         if not options.json:
             text = (
                 f"the bones of {options.name} are not measured ({error.problems[0].what}): usual proportions"
@@ -100,7 +115,3 @@ def _path(recording: Path, folder: Path) -> str:
         return os.path.relpath(recording, folder).replace(os.sep, "/")
     except ValueError:  # another drive
         return str(recording.resolve())
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from seerob.commands import OUT, Exit, line
-from seerob.errors import InputError
+from seerob.errors import InputError, Problem, suggestion
 
 if TYPE_CHECKING:
     from seerob.human.morphology import Morphology
@@ -43,18 +43,27 @@ def add_person(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure, tell, and print the table."""
-    found, findings = measured(reader(options), Path(options.file), options)
+    found, findings = measured(reader(options, "seerob measure"), Path(options.file), options)
     for finding in (*findings, *found.findings):
         line(finding.level, finding.text, "" if finding.level == "note" else "yellow")
     OUT.print(person_table(options, found.stature, found.lengths), markup=False, soft_wrap=True)
     return Exit.WITHIN
 
 
-def reader(options: argparse.Namespace) -> CaptureFile:
+GIVEN = {"human": "--name", "file": "give it as the argument", "subject": "--subject"}
+"""Options of the source that the command has arguments for."""
+
+
+def reader(options: argparse.Namespace, command: str) -> CaptureFile:
     """The source that reads a recording.
 
+    Args:
+        options: Of `add_person`.
+        command: For messages.
+
     Raises:
-        InputError: It is none of a person's motion.
+        InputError: It is none of a person's motion; or every option that it does not have, or that is the
+            command's own.
     """
     import msgspec
 
@@ -66,12 +75,23 @@ def reader(options: argparse.Namespace) -> CaptureFile:
     kind = load("sources", options.kind, Source)
     if not issubclass(kind, CaptureFile):
         what = f"{options.kind} reads no recording of a person"
-        raise InputError.at("seerob measure", "kind", what, "see: seerob kinds sources")
+        raise InputError.at(command, "kind", what, "see: seerob kinds sources")
+    where, more = f"{command} {options.kind}", options_of(options.set, command)
+    fields = [name for name in kind.__struct_fields__ if name not in GIVEN]
+    problems = [
+        Problem(where, f"--set {key}", "is an argument of the command itself", GIVEN[key])
+        if key in GIVEN
+        else Problem(where, f"--set {key}", "no such option", suggestion(key, fields))
+        for key in more
+        if key not in fields
+    ]
+    if problems:
+        raise InputError(problems)
     given = {"human": options.name, "file": Path(options.file).name, "subject": options.subject}
     try:
-        return msgspec.convert(given | options_of(options.set), kind)
+        return msgspec.convert(given | more, kind)
     except msgspec.ValidationError as error:
-        raise InputError.at(f"seerob measure {options.kind}", "", str(error)) from error
+        raise InputError.at(where, "--set", str(error), f"options: {', '.join(fields)}") from error
 
 
 def measured(
@@ -104,9 +124,11 @@ def measured(
 
 def person_table(options: argparse.Namespace, stature: float, lengths: dict[str, float]) -> str:
     """The table ``[[humans]]``; lengths of the tables where none are given [m]."""
+    from seerob.tables.mapping import toml_value
+
     shown = ", ".join(f"{key} = {value:.4f}" for key, value in lengths.items())
     table = (
-        f'[[humans]]\nname = "{options.name}"\nstature = {stature:.4f}\nmass = {options.mass:g}\n'
-        f'sex = "{options.sex}"'
+        f"[[humans]]\nname = {toml_value(options.name)}\nstature = {stature:.4f}\nmass = {options.mass:g}\n"
+        f"sex = {toml_value(options.sex)}"
     )
     return f"{table}\nlengths = {{ {shown} }}" if shown else table

@@ -5,9 +5,15 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from seerob.commands import Exit, add_workstation, compiled, describe, line, seconds
 from seerob.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from seerob.station import Station
 
 HELP = "plan a robot's path through postures that keeps a distance from everything"
 EXAMPLE = "seerob plan my_cell --to-deg 60,-70,80,-100,-90,0 --margin 0.05 -o planned.toml"
@@ -43,6 +49,11 @@ def add(sub: argparse.ArgumentParser) -> None:
         "--to-deg", type=posture, action="append", default=[], help="likewise in degrees, after --to"
     )
     sub.add_argument(
+        "--waypoints",
+        type=Path,
+        help="file of waypoints reached by joint moves to go through, after --to-deg",
+    )
+    sub.add_argument(
         "--from", dest="start", type=posture, help="posture to begin in (default: q of the file)"
     )
     sub.add_argument(
@@ -75,7 +86,9 @@ def run(options: argparse.Namespace) -> int:
         what = f"there are {len(names)} robots"
         raise InputError.at(options.workstation, "--robot", what, f"name one of {', '.join(names) or 'none'}")
     describe(station)
-    goals = [*options.to, *([math.radians(x) for x in goal] for goal in options.to_deg)]
+    goals: list[ArrayLike] = [*options.to, *([math.radians(x) for x in goal] for goal in options.to_deg)]
+    if options.waypoints is not None:
+        goals += _goals(station, options.robot or names[0], options.waypoints, options.start)
     asked = Asked()
     try:
         found = plan(
@@ -108,3 +121,35 @@ def run(options: argparse.Namespace) -> int:
         f'kind = "waypoints", robot = "{found.robot}", file = "{options.output.name}" with joint_speed …',
     )
     return Exit.WITHIN
+
+
+def _goals(station: Station, robot: str, path: Path, start: list[float] | None) -> list[ArrayLike]:
+    """Joint positions of the waypoints of a file; of a pose every way of reaching it, the nearest first."""
+    import numpy as np
+
+    from seerob.source import Target
+    from seerob.sources.waypoints import Waypoints
+    from seerob.transforms import rotation_from_wxyz
+    from seerob.waypoints.inverse import solutions
+
+    mechanism = station.model.robot(robot)
+    source = Waypoints(robot=robot, file=str(path))
+    program = source.program(path)
+    arm, said = source.arm(program, Target(name=robot, description=mechanism.description))
+    for text in said:
+        line("assumed", text, "yellow")
+    near = mechanism.home if start is None else np.array(start)
+    goals: list[ArrayLike] = []
+    for waypoint in program.waypoints:
+        if waypoint.move.of_tool:
+            what = f"{waypoint.shown} is reached by a {waypoint.move} move"
+            raise InputError.at(path, waypoint.place, what, "only joint moves are planned")
+        if waypoint.pose is None:
+            goals.append(waypoint.q or ())
+            continue
+        ways = solutions(arm, rotation_from_wxyz(waypoint.pose.wxyz), np.array(waypoint.pose.position), near)
+        if not ways:
+            what = "no joint positions within the limits bring the tool there"
+            raise InputError.at(path, waypoint.shown, what, "is the base or the tool point another one?")
+        goals.append(np.array([way.q for way in ways]))
+    return goals

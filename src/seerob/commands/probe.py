@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -155,19 +156,28 @@ def _source(options: argparse.Namespace) -> tuple[LiveSource, dict[str, Any]]:
         raise InputError.at(f"seerob probe {options.kind}", "", str(error)) from error
 
 
-def options_of(pairs: list[str]) -> dict[str, Any]:
-    """Options of a source from ``KEY=VALUE`` texts, values as in the workstation file."""
+def options_of(pairs: list[str], command: str = "seerob probe") -> dict[str, Any]:
+    """Options of a source from ``KEY=VALUE`` texts, values as in the workstation file.
+
+    Args:
+        pairs: Of the command line.
+        command: For messages.
+
+    Raises:
+        InputError: One of them is no such text.
+    """
     import tomllib
 
     found: dict[str, Any] = {}
     for pair in pairs:
         key, equals, text = pair.partition("=")
         if not (equals and key.isidentifier()):
-            raise InputError.at("seerob probe", "--set", f"{pair!r}", "write key=value")
-        try:
-            found[key] = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
-            found[key] = text  # a bare word, which a shell takes the quotes of
+            raise InputError.at(command, "--set", f"{pair!r}", "write key=value")
+        found[key] = text  # a bare word, which a shell takes the quotes of
+        with suppress(tomllib.TOMLDecodeError, RecursionError):
+            read = tomllib.loads(f"value = {text}")
+            if len(read) == 1:
+                found[key] = read["value"]
     return found
 
 

@@ -56,6 +56,7 @@ def add(sub: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Sweep, write the mesh and say what is in it."""
     from seerob.model_io.mesh_out import check_format, write_mesh
+    from seerob.model_io.moments import signed_volume
 
     check_format(options.output)
     if not options.output.parent.is_dir():
@@ -83,8 +84,13 @@ def run(options: argparse.Namespace) -> int:
     write_mesh(options.output, mesh)
     line("volume", f"{swept.volume:.4g} m³ in voxels of {options.voxel:g} m: not less than the truth")
     line("contains", swept.guarantee)
-    line("dilated", f"by up to {swept.dilation * 1e3:.1f} mm for motion between two stamps")
-    line("wrote", f"{options.output}: {len(mesh.faces)} triangles, metres")
+    if swept.excess is None:
+        line("dilated", f"by up to {swept.dilation * 1e3:.1f} mm for motion between two stamps")
+    else:
+        line("larger", f"than the truth by at most {swept.excess * 1e3:.0f} mm, all roundings added up")
+    line(
+        "wrote", f"{options.output}: {len(mesh.faces)} triangles, metres; holds {signed_volume(mesh):.4g} m³"
+    )
     return Exit.WITHIN
 
 

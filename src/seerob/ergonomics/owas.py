@@ -10,6 +10,7 @@ import numpy as np
 from seerob import provenance
 from seerob.criterion import Evaluate, judge, judge_interval
 from seerob.ergonomic_posture import bind_posture
+from seerob.figures import whatever_is_missing
 from seerob.human.angles import Angles
 from seerob.human.skeleton import SIDES
 from seerob.model import Model
@@ -131,8 +132,8 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         value = float(span.high) if span.known else None
         reasons = []
         if missing:
-            span_said = f"lies between {low} and {high}" if low != high else f"is {low} whatever is missing"
-            reasons.append(f"not assessed: {', '.join(missing)}; the category {span_said}")
+            said = whatever_is_missing("category", low, high)
+            reasons.append(f"not assessed: {', '.join(missing)}; {said}")
         elif verdict is Verdict.UNDECIDED:
             reasons.append(f"the accuracy leaves it open: the category lies between {low} and {high}")
         if drivers:

@@ -18,11 +18,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from seerob.human.chosen_points import best, between
 from seerob.human.estimated import in_doubt_with
 from seerob.human.fitting import Fitter, Pulls, pulls
 from seerob.human.skeleton import AXES, BONES
 from seerob.model_io.description import Description, JointKind
-from seerob.samples import BodyPoint, BodySample, Quality, Vec3, Vec4
+from seerob.samples import BodyPoint, BodySample, Quality, Vec3
 from seerob.transforms import Array, inverse
 
 POINT_SPEED = 10.0
@@ -46,8 +47,6 @@ SLACK = 1e-9
 """Instants that differ by less are the same [s]."""
 MANY = 0.3
 """Share of a device's points that jump at once, beyond which none of them is believed."""
-BETTER = 1.25
-"""By how much another device must count more for a bone before it takes it over: devices are offset."""
 ELSEWHERE = 0.1
 """Whoever was not seen for a while and is farther from before [rad or m] is put there, not pulled."""
 
@@ -168,7 +167,7 @@ class Following:
         points = [each.points for each in told]
         reasons = [each.reason for each in told if each.reason]
         parts = [each.part for each in told if each.part is not None]
-        chosen, last = _best(points, self._chosen), self._last
+        chosen, last = best(points, self._chosen), self._last
         if not chosen:
             if last is None or not any(each.jumped for each in told):
                 return None
@@ -210,7 +209,7 @@ class Following:
         if age > 0 and k + 1 < len(device.times) and device.times[k + 1] - device.times[k] <= sample.hold:
             share = age / (device.times[k + 1] - device.times[k])
             instant = t
-            points = _between(points, device.samples[k + 1].points, share)
+            points = between(points, device.samples[k + 1].points, share)
         reason = "" if sample.quality is Quality.GOOD else f"{name} says {sample.quality.value}"
         if sample.quality is Quality.INVALID:
             return _Told([], reason)
@@ -306,76 +305,6 @@ def _counts(point: BodyPoint) -> bool:
     """Whether it pulls at all."""
     return (point.position is not None and point.position_weight > 0) or (
         point.wxyz is not None and point.orientation_weight > 0
-    )
-
-
-def _best(devices: Sequence[Sequence[BodyPoint]], chosen: dict[tuple[str, bool], int]) -> list[BodyPoint]:
-    """Per bone the positions, and the orientations, of the device that counts most for it.
-
-    Args:
-        devices: What each of them sees.
-        chosen: The choice of the instant before, which holds until another device counts clearly more;
-            brought up to date.
-    """
-    if len(devices) == 1:
-        return list(devices[0])
-    best: dict[tuple[str, bool], tuple[float, int]] = {}
-    for k, points in enumerate(devices):
-        for p in points:
-            for turned, value, weight in (
-                (False, p.position, p.position_weight),
-                (True, p.wxyz, p.orientation_weight),
-            ):
-                if chosen.get((p.bone, turned)) == k:
-                    weight *= BETTER
-                if value is not None and weight > best.get((p.bone, turned), (0.0, 0))[0]:
-                    best[p.bone, turned] = weight, k
-    chosen |= {key: k for key, (_, k) in best.items()}
-    out = []
-    for k, points in enumerate(devices):
-        for p in points:
-            here = best.get((p.bone, False), (0.0, -1))[1] == k
-            turned = best.get((p.bone, True), (0.0, -1))[1] == k
-            if (here and p.position is not None) or (turned and p.wxyz is not None):
-                out.append(_point(p, p.position if here else None, p.wxyz if turned else None))
-    return out
-
-
-def _between(before: Sequence[BodyPoint], after: Sequence[BodyPoint], share: float) -> list[BodyPoint]:
-    """Points that both samples have, a share of the way from one to the other."""
-    later = {p.name: p for p in after}
-    out = []
-    for p in before:
-        other = later.get(p.name)
-        position: Vec3 | None = None
-        wxyz: Vec4 | None = None
-        if other is not None and p.position is not None and other.position is not None:
-            x, y, z = ((1 - share) * a + share * b for a, b in zip(p.position, other.position, strict=True))
-            position = x, y, z
-        if other is not None and p.wxyz is not None and other.wxyz is not None:
-            wxyz = _nlerp(p.wxyz, other.wxyz, share)
-        out.append(_point(p, position, wxyz))
-    return out
-
-
-def _nlerp(a: Vec4, b: Vec4, share: float) -> Vec4:
-    sign = 1.0 if sum(x * y for x, y in zip(a, b, strict=True)) >= 0 else -1.0
-    mixed = [(1 - share) * x + share * sign * y for x, y in zip(a, b, strict=True)]
-    norm = float(np.linalg.norm(mixed)) or 1.0
-    w, x, y, z = (value / norm for value in mixed)
-    return w, x, y, z
-
-
-def _point(p: BodyPoint, position: Vec3 | None, wxyz: Vec4 | None) -> BodyPoint:
-    return BodyPoint(
-        name=p.name,
-        bone=p.bone,
-        at=p.at,
-        position=position,
-        wxyz=wxyz,
-        position_weight=p.position_weight,
-        orientation_weight=p.orientation_weight,
-        confidence=p.confidence,
     )
 
 

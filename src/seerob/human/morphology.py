@@ -121,6 +121,8 @@ def measure(
             measured["trunk"] = found
     if not measured:
         what = f"no bone is seen well from both ends in {FEWEST} frames"
+        if not seen:
+            what = "no joint centres are seen but points on the skin, between which no bone's length lies"
         raise InputError.at(name, "morphology", what, "give a longer recording of joint centres")
     tall = stature if stature is not None else _stature(measured, sex, mass, lengths, name)
     usual = body(name=name, stature=tall, mass=mass, sex=sex, lengths=lengths).length

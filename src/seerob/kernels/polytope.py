@@ -208,6 +208,51 @@ def largest(A: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def vertices(A: Array, low: Array, high: Array, tolerance: float) -> tuple[Array, Indices]:
+    """All corners of many polytopes, each once.
+
+    Args:
+        A: Normals as columns, shape (N, 3, n).
+        low: Lower bounds, finite, shape (N, n).
+        high: Upper bounds, finite, shape (N, n).
+        tolerance: Corners nearer than this are one, relative to the farthest.
+
+    Returns:
+        The corners of one after the other, shape (m, 3), and where each begins, shape (N + 1,): the same
+        index twice where a polytope is empty or unbounded, which `largest` tells apart.
+    """
+    N, _, n = A.shape
+    V = np.empty((max(4 * n * (n - 1), 1), 3))
+    # A polytope of 2 n planes has at most 4 n - 4 corners, and rounding leaves a few of them double.
+    found = np.empty((N * (4 * n + 4), 3))
+    begin = np.zeros(N + 1, np.int64)
+    at = 0
+    for s in range(N):
+        possible, normals, l, h = unit_slabs(A[s], low[s], high[s])
+        count = corners(normals, l, h, V) if possible and len(l) else EMPTY
+        far = 0.0
+        for k in range(count):
+            far = max(far, V[k, 0] ** 2 + V[k, 1] ** 2 + V[k, 2] ** 2)
+        same = tolerance * math.sqrt(far)
+        for k in range(count):
+            new = True
+            for i in range(begin[s], at):
+                gap = max(abs(V[k, 0] - found[i, 0]), abs(V[k, 1] - found[i, 1]))
+                if max(gap, abs(V[k, 2] - found[i, 2])) <= same:
+                    new = False
+                    break
+            if new:
+                if at == len(found):
+                    more = np.empty((2 * len(found) + 1, 3))
+                    more[:at] = found
+                    found = more
+                found[at] = V[k]
+                at += 1
+        begin[s + 1] = at
+    return found[:at].copy(), begin
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def merged(V: Array, tolerance: float) -> Array:
     """Corners without those nearer than ``tolerance`` to an earlier one."""
     kept = np.empty_like(V)

@@ -17,15 +17,15 @@ Sums = NDArray[np.int64]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def profile(
-    radii: Array, heights: Array, pitch: float, half: float, fine: float, rim: float, height: float
+    radii: Array, heights: Array, edges: Array, share: float, fine: float, rim: float, height: float
 ) -> Sums:
     """Cells of the half-plane that any of some voxels meets while it turns, summed up over both axes.
 
     Args:
         radii: Of the voxels' centres from the axis [m], shape (n,).
         heights: Likewise along it, 0 and more [m].
-        pitch: Edge of a voxel [m].
-        half: Half of a voxel's extent along the axis [m].
+        edges: Edge of each voxel [m], shape (n,).
+        share: Half of a voxel's extent along the axis [edges].
         fine: Edge of a cell of the half-plane [m].
         rim: Radius that none passes [m].
         height: Likewise.
@@ -36,8 +36,9 @@ def profile(
     nr = int(rim / fine) + 2
     nz = int(height / fine) + 2
     met = np.zeros((nr, nz), np.bool_)
-    across = HALF_DIAGONAL * pitch + MARGIN
     for n in range(len(radii)):
+        across = HALF_DIAGONAL * edges[n] + MARGIN
+        half = share * edges[n]
         r0 = max(0, int(np.floor((radii[n] - across) / fine)))
         r1 = min(nr - 1, int(np.floor((radii[n] + across) / fine)))
         z0 = max(0, int(np.floor((heights[n] - half - MARGIN) / fine)))
@@ -77,7 +78,7 @@ def revolve(
         anchor: A point of the axis [m], shape (3,).
         axis: Unit, shape (3,).
         low: Height at which the profile begins [m].
-        half: As for `profile`.
+        half: Half of a voxel's extent along the axis [m].
     """
     nr = sums.shape[0] - 1
     nz = sums.shape[1] - 1
@@ -103,3 +104,33 @@ def revolve(
                     full[i // TOP, j // TOP, k // TOP] += 1
                     marked += 1
     return marked
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cut_to_ball(
+    cells: Cells, full: NDArray[np.int16], origin: Array, pitch: float, centre: Array, radius: float
+) -> int:
+    """Unmark every voxel that lies wholly outside a ball; returns how many.
+
+    Args:
+        cells: See `seerob.kernels.voxels.stamp`.
+        full: Likewise.
+        origin: Likewise.
+        pitch: Likewise.
+        centre: Of the ball [m], shape (3,).
+        radius: Likewise [m].
+    """
+    outside = (radius + MARGIN) ** 2
+    half = 0.5 * pitch
+    cut = 0
+    for i in range(cells.shape[0]):
+        x = max(abs(origin[0] + (i + 0.5) * pitch - centre[0]) - half, 0.0)
+        for j in range(cells.shape[1]):
+            y = max(abs(origin[1] + (j + 0.5) * pitch - centre[1]) - half, 0.0)
+            for k in range(cells.shape[2]):
+                z = max(abs(origin[2] + (k + 0.5) * pitch - centre[2]) - half, 0.0)
+                if cells[i, j, k] and x * x + y * y + z * z > outside:
+                    cells[i, j, k] = 0
+                    full[i // TOP, j // TOP, k // TOP] -= 1
+                    cut += 1
+    return cut

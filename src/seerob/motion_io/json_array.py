@@ -36,7 +36,8 @@ def elements(path: Path, key: str, *, file: str) -> Iterator[bytes]:
                 if scan.ended:
                     return
     except OSError as error:
-        raise InputError.at(file, "", f"cannot be read: {error.strerror}") from error
+        what = f"cannot be read: {error.strerror}"
+        raise InputError.at(file, "", what, "give the path of the recording") from error
     if scan.begun:
         raise InputError.at(file, key, f"the file ends in element {scan.count}", "was it cut short?")
     raise InputError.at(file, key, f"no list {key!r} of objects in it", "is it the file of a body tracker?")

@@ -150,13 +150,29 @@ def written(
         yield "\t".join([f"{instant:.6f}", *cells(row)]) + "\n"
 
 
-def head(labels: Sequence[str], rows: int, *, name: str = "motion", degrees: bool = True) -> Iterator[str]:
-    """Lines of a storage file before its rows; see `written`."""
+def head(
+    labels: Sequence[str],
+    rows: int,
+    *,
+    name: str = "motion",
+    degrees: bool = True,
+    remarks: Sequence[str] = (),
+) -> Iterator[str]:
+    """Lines of a storage file before its rows; see `written`.
+
+    Args:
+        labels: Of the columns but the time.
+        rows: How many there are.
+        name: Title of the file.
+        degrees: What it says of angles.
+        remarks: Lines that readers skip, with their ends; neither ``=`` nor ``endheader`` in them.
+    """
     yield f"{' '.join(name.split())}\n"
     yield "version=1\n"
     yield f"nRows={rows}\n"
     yield f"nColumns={len(labels) + 1}\n"
     yield f"inDegrees={'yes' if degrees else 'no'}\n"
+    yield from remarks
     yield "endheader\n"
     yield "\t".join(["time", *("_".join(label.split()) for label in labels)]) + "\n"
 

@@ -55,7 +55,7 @@ def _of_region(contacts: Contacts, judged: Judged, k: int) -> Ceiling | None:
     if column is None:
         region = contacts.limits.region(name)
         row = int(judged.v_r[rows].argmax())
-        within = None if contacts.people is None else f"{bodies[row]} moves within {spec.horizon:g} m"
+        within = None if contacts.people is None else f"{bodies[row]} moves {_where(spec)}"
         permitted = region is None or region.permitted
         verdict, reason = without_limit(name, permitted, within, contacts.limits.file)
         stopped = verdict is Verdict.EXCEEDED
@@ -81,6 +81,13 @@ def _of_region(contacts: Contacts, judged: Judged, k: int) -> Ceiling | None:
     limit = _limit(contacts, name, governs, row, clamped=bool(judged.clamped[row, column]))
     share, speed = float(shares[i]), float(v[i])
     return Ceiling(spec.name, share, speed, name, bodies[i], how, governs, reason, limit=limit)
+
+
+def _where(spec: PowerAndForce) -> str:
+    """How near to the person, in words."""
+    if spec.horizon >= ANYWHERE:
+        return "and nothing else keeps the person away"
+    return f"within {spec.horizon:g} m"
 
 
 def _limit(contacts: Contacts, region: str, governs: str, row: int, *, clamped: bool) -> Figure | None:

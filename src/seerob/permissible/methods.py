@@ -40,6 +40,14 @@ class By(StrEnum):
             return method is not Method.PFL
         return self is not By.PFL or method is not Method.SSM
 
+    def contact_anywhere(self, criteria: Sequence[Criterion], robot: str) -> bool:
+        """Whether contact is asked about wherever people are, not only within its horizon.
+
+        A speed that contact permits by itself holds for whoever comes near: nothing else keeps them away.
+        """
+        separated = any(isinstance(c, Separation) and robot in c.between for c in criteria)
+        return self in (By.PFL, By.EITHER) or (self is By.ALL and not separated)
+
 
 BY = {
     By.ALL: "by every criterion that limits it",

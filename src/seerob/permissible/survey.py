@@ -171,8 +171,9 @@ class Survey:
 
 def _asks(model: Model, robot: str, criteria: Sequence[Criterion], by: By) -> dict[str, Ask]:
     asks: dict[str, Ask] = {}
+    anywhere = by.contact_anywhere(criteria, robot)
     for criterion in criteria:
-        ask = ceilings_of(criterion, model, robot, anywhere=by is By.EITHER)
+        ask = ceilings_of(criterion, model, robot, anywhere=anywhere)
         if ask is not None and by.counts(ask.method):
             asks[criterion.name] = ask
     if not asks:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from seerob.errors import InputError, Problem
-from seerob.model import Model
+from seerob.model import Mechanism, Model
 from seerob.planning.clearance import Clearance
 from seerob.planning.search import search
 from seerob.transforms import Array
 
+LIMIT = 1e-9
+"""Beyond a limit by less is rounding [rad or m]."""
 MOST = 20_000
 """Postures tried per way."""
 
@@ -53,7 +56,7 @@ class Plan:
 def plan(
     model: Model,
     robot: str,
-    goals: Sequence[Sequence[float]],
+    goals: Sequence[ArrayLike],
     *,
     start: Sequence[float] | None = None,
     margin: float = 0.02,
@@ -69,7 +72,8 @@ def plan(
     Args:
         model: The compiled workstation.
         robot: Who moves.
-        goals: Joint positions to go through, (n,) each [rad or m].
+        goals: Joint positions to go through, (n,) each [rad or m]; or (k, n), of which the
+            first that is clear is taken: the ways of reaching one pose.
         start: Where it begins [rad or m]; its ``q`` in the file when not given.
         margin: Least distance from anything, itself included [m].
         seed: Same model, same seed, same path.
@@ -98,19 +102,11 @@ def plan(
     names = ["start", *(f"goal {i + 1}" for i in range(len(goals)))]
     problems: list[Problem] = []
     for name, q in zip(names, ways, strict=True):
-        if q.shape != (len(mechanism.joints),) or not np.isfinite(q).all():
-            what = f"{q.size} joint positions" if q.shape != (len(mechanism.joints),) else "is not finite"
-            problems.append(Problem("plan", name, what, f"give {len(mechanism.joints)} numbers [rad or m]"))
-            continue
-        for joint, low, value, high in zip(
-            mechanism.joints, mechanism.lower, q, mechanism.upper, strict=True
-        ):
-            if not low <= value <= high:
-                what = f"{joint.name} at {value:.4g} is beyond its limits {low:.4g} and {high:.4g}"
-                problems.append(Problem("plan", name, what, "choose another posture"))
+        problems += _wrong(mechanism, name, q)
     if problems:
         raise InputError(problems)
     clearance = Clearance(model, mechanism, ways[0])
+    ways = [_first_clear(clearance, q, margin) for q in ways]
     for name, q in zip(names, ways, strict=True):
         what = clearance.fault(q, margin)
         if what:
@@ -133,3 +129,20 @@ def plan(
         asked=clearance.asked,
         left_out=clearance.left_out,
     )
+
+
+def _first_clear(clearance: Clearance, ways: Array, margin: float) -> Array:
+    rows = np.atleast_2d(ways)
+    return next((q for q in rows if not clearance.fault(q, margin)), rows[0])
+
+
+def _wrong(robot: Mechanism, name: str, ways: Array) -> Iterator[Problem]:
+    n = len(robot.joints)
+    if ways.ndim not in (1, 2) or not ways.size or ways.shape[-1] != n:
+        yield Problem("plan", name, f"an array of shape {ways.shape}", f"give {n} numbers [rad or m]")
+        return
+    for q in np.atleast_2d(ways):
+        for joint, low, value, high in zip(robot.joints, robot.lower, q, robot.upper, strict=True):
+            if not low - LIMIT <= value <= high + LIMIT:
+                what = f"{joint.name} at {value:.4g} is beyond its limits {low:.4g} and {high:.4g}"
+                yield Problem("plan", name, what, "choose another posture")

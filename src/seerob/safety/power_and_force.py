@@ -11,9 +11,9 @@ from msgspec import Meta, field
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from seerob import clamping, collision, contact_limits, contact_shape, figures, provenance
-from seerob.closing_gaps import ClosingGaps
+from seerob import collision, contact_limits, contact_shape, figures, provenance
 from seerob.contact_areas import NOT_MODELLED, area_results, margin
+from seerob.contact_clamping import Clamping, floor_input
 from seerob.contact_limits import Judged
 from seerob.contact_regions import REGIONS, Person, without_limit
 from seerob.contact_rows import ContactRows
@@ -24,9 +24,9 @@ from seerob.impact_mass import masses_along_motion, moving_masses, simplified_ma
 from seerob.kernels.contact_speeds import governing
 from seerob.model import Frame, Model
 from seerob.norms import body_limits
-from seerob.norms.crushing_gaps import NOT_VERIFIED, crushing_gaps, gap_inputs
+from seerob.norms.crushing_gaps import NOT_VERIFIED, gap_inputs
 from seerob.norms.limit_inputs import excluded_input, limit_inputs, table_input
-from seerob.quantities import Tolerance
+from seerob.quantities import Coordinate, Tolerance
 from seerob.snapshot import Arrow, Basis, Highlight, Input, Origin, Result, Verdict
 from seerob.state import State
 from seerob.tolerances import Spread, deciding
@@ -41,6 +41,7 @@ CAP = 1e-4
 """Contact area that the stiffness of the table is good for [m²] (STIMBA PFL calculator, 1S)."""
 
 _Positive = Annotated[float, Meta(gt=0, extra={"unit": "m"})]
+_Height = Annotated[Coordinate, Meta(extra={"unit": "m"})]
 _Area = Annotated[float, Meta(gt=0, extra={"unit": "m²"})]
 _Credited = Annotated[float, Meta(gt=0, le=CAP, extra={"unit": "m²"})]
 
@@ -79,6 +80,10 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     """Likewise every contact area."""
     thickness: dict[str, _Positive] = field(default_factory=dict)
     """Gap in which a body region can be clamped [m], instead of the gaps of ISO 13854."""
+    floor: bool = True
+    """Whether the floor is a surface that clamps, also where no part of the workstation is drawn there."""
+    floor_height: _Height = 0.0
+    """Its height, z in the world [m]."""
 
     def subjects(self) -> tuple[str, ...]:
         """The robot and the human."""
@@ -163,6 +168,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
                     else "workstation file",
                 ),
                 *gap_inputs(self.thickness, [r.name for r in limits.regions.values() if r.permitted]),
+                floor_input(self.floor_height if self.floor else None),
                 *(excluded_input(region) for region in self.excluded),
             ),
             not_modelled=(
@@ -241,15 +247,8 @@ class Contacts:
             stiffness=spec.stiffness_tolerance,
             area=spec.area_tolerance,
         )
-        gaps = {**crushing_gaps()[0], **spec.thickness}
-        others = [b for b in model.bodies if b.role not in ("human", "area")]
-        deviation = 2 * max((body.deviation for body in others), default=0.0)
-        # The real surfaces may be nearer than the shapes.
-        self.thickness = np.array([gaps[region.name] + deviation for region in self.arrays.regions])
-        cap = float(self.thickness.max(initial=0.0)) + 0.1
-        pinch = clamping.robot_pinch_pairs(model, self.robot, cap=cap)
-        self.gaps = ClosingGaps(model.shapes, pinch, self.thickness, cap=cap)
-        self.robots = [name for name, m in model.mechanisms.items() if m.role == "robot"]
+        floor = spec.floor_height if spec.floor else None
+        self.clamping = Clamping(model, self.robot, spec.thickness, tuple(self.columns), floor)
         if spec.human is not None:
             model.human(spec.human)
         self.people = (
@@ -278,13 +277,13 @@ class Contacts:
         else:
             near, v_h = self.people.near(state, spec.person_speed)
         near &= (v_r > STANDSTILL)[:, None]
-        clamped = self._clamped(state, near)
+        clamped, on_floor = self.clamping.at(state, near[:, self.in_regions])
         speeds = self.arrays.speeds(masses, self.least, clamped)
         ends = None
         if self.ends.tolerances:
             ends = self.ends.at(state, self.moving, spec.mass, self.simplified, clamped, STANDSTILL)
         governing = self._governing(v_r[:, None] + v_h, near, speeds, ends)
-        return Judged(v_r, v_h, near, projected, speeds, clamped, *governing, ends)
+        return Judged(v_r, v_h, near, projected, speeds, clamped, *governing, ends, on_floor)
 
     def evaluate(self, state: State) -> Result:
         """The result at a state."""
@@ -327,12 +326,6 @@ class Contacts:
             rows=self.rows.of(found, judged, (lambda _: ()) if self.people is None else self.people.hit),
         )
 
-    def _clamped(self, state: State, near: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which moving body clamps which region that it could hit, shape (b, r)."""
-        state.require(*self.robots)
-        wanted = near[:, self.in_regions]
-        return self.gaps.clamped(state.t, state.rotations, state.positions, wanted)
-
     def _governing(
         self, v: Array, near: NDArray[np.bool_], speeds: contact_limits.Speeds, ends: Spread | None
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -362,6 +355,8 @@ class Contacts:
         verdict = (Verdict.WITHIN, Verdict.UNDECIDED, Verdict.EXCEEDED)[int(judged.ranks[k])]
         how = "clamped" if judged.clamped[row, column] else "free"
         reason = f"{GOVERNING[int(speeds.governing[row, column])]}, {how}, {body}"
+        if judged.on_floor is not None and judged.on_floor[row, column]:
+            reason += ", on the floor"
         if speeds.pressure[row, column] == 0.0:
             reason += (
                 ": by the shape of its contact every force exceeds the pressure; a contact_area replaces it"

@@ -18,6 +18,7 @@ from seerob.largest_separation import LargestSeparation
 from seerob.model import Gap, Model
 from seerob.norms import iso_13855
 from seerob.norms.iso_13855 import WALKING
+from seerob.partly_seen import partly_seen
 from seerob.separation_many import separations
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.state import State
@@ -149,20 +150,20 @@ class Separation(Criterion, frozen=True, kw_only=True):
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         own, _, _ = self._by_device(model)
-        unknown = self.unknown(model)
-        return partly_seen(model, own._gap(model), lambda gap: own._bound(model, gap, unknown))
+        ends = SeparationEnds(
+            own.stop, lambda new: replace(own, stop=new).required(model), remembers=own.mode == "fixed"
+        )
+        rest = self.unknown(model), LargestSeparation(), ends
+        return partly_seen(model, own._gap(model), lambda gap: own._bound(model, gap, *rest))
 
-    def _bound(self, model: Model, gap: Gap, unknown: str) -> Evaluate:
+    def _bound(
+        self, model: Model, gap: Gap, unknown: str, largest: LargestSeparation, ends: SeparationEnds
+    ) -> Evaluate:
         stop = self._stop(model)
         C, Z_d, Z_r = self._terms()[0]
         K = C + Z_d + Z_r + gap.deviation
         unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
-        largest, places = LargestSeparation(), BodyPlaces(model)
-        names = [body.name for body in model.bodies]
-        fixed = self.mode == "fixed"
-        ends = SeparationEnds(
-            self.stop, lambda changed: replace(self, stop=changed).required(model), remembers=fixed
-        )
+        places, names = BodyPlaces(model), [body.name for body in model.bodies]
         off = TrackingError(model, gap.a)
 
         def evaluate(state: State) -> Result:
@@ -170,7 +171,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             course = stop.courses(state)
             now = course(1.0)
             S_p = self._distance(now, K)
-            if fixed:
+            if self.mode == "fixed":
                 S_p = largest.including(state, S_p)
             seen = float(off.at(state).max(initial=0.0))
             span = ends.at(state) if ends.tolerances else None
@@ -231,14 +232,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
         S_h = S_p - float(now.S_r[k] + now.S_s[k]) - sum(rest)
         if self.mode == "dynamic" and self.human_speed is not None:
             S_h = float(way_of_person(self.human_speed, self.stop.reaction, now.T_s))
-        terms = {
-            "S_h": S_h,
-            "S_r": float(now.S_r[k]),
-            "S_s": float(now.S_s[k]),
-            "C": rest[0],
-            "Z_d": rest[1],
-            "Z_r": rest[2],
-        }
+        terms = {"S_h": S_h, "S_r": float(now.S_r[k]), "S_s": float(now.S_s[k])}
+        terms |= dict(zip(("C", "Z_d", "Z_r"), rest, strict=True))
         return tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
 
     def batch(self, model: Model) -> EvaluateMany | None:

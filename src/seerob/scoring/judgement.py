@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from seerob.criterion import judge, judge_interval
+from seerob.figures import whatever_is_missing
 from seerob.human.angles import SIDED, Angles
 from seerob.human.skeleton import SIDES
 from seerob.scoring.bands import Edges
@@ -206,7 +207,7 @@ def _reason(
 ) -> str:
     parts = []
     if missing:
-        parts.append(f"not assessed: {', '.join(missing)}; the score lies between {ends[0]} and {ends[1]}")
+        parts.append(f"not assessed: {', '.join(missing)}; {whatever_is_missing('score', *ends)}")
     elif verdict is Verdict.UNDECIDED:
         parts.append(f"the accuracy leaves it open: the score lies between {ends[0]} and {ends[1]}")
     if drivers:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from seerob.bone_errors import BoneErrors
+from seerob.human.skeleton import BONES
 from seerob.sinks._html import Html, joined, table, tag
 from seerob.sinks._sentences import number
 
@@ -21,10 +22,12 @@ def bone_rows(people: Mapping[str, BoneErrors]) -> Iterator[list[Cell]]:
 
 def bones_told(people: Mapping[str, BoneErrors]) -> Html | None:
     """The report's table; nothing when no device saw a person."""
+    # What no device saw has no error, which is no praise.
+    seen = {name: len({e.bone for e in errors.bones()}) for name, errors in people.items()}
     rows = [
         [
             str(name),
-            str(bone),
+            f"of the bones seen: {seen[str(name)]} of {len(BONES)}" if bone == "all" else str(bone),
             str(what),
             *(number(float(value), str(unit)) for value in (median, p95, largest) if value is not None),
             f"{float(t or 0.0):.2f} s",

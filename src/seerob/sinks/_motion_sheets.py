@@ -28,6 +28,7 @@ class MotionSheets:
         self._joint_rows, self._most = joint_rows, rows
         self._joints = _sample_cells.joint_titles(scene)
         self._people = people(scene) if rows else ()
+        self._measured = {person.name: person for person in self._people}
         self._wanted = {person.name for person in self._people} if everybody else set()
         self._tables: dict[str, ThinnedTable] = {}
 
@@ -39,9 +40,12 @@ class MotionSheets:
             table = self._tables.get(key)
             if table is None:
                 titles = _sample_cells.joint_head(self._joints, name, len(q))
+                titles += self._measured[name].joint_measured_titles if name in self._measured else ()
                 table = self._begin(key, self._joint_rows, titles)
             if table.wants():
-                table.keep_numbers([t, *q, snapshot.tracking.get(name)])
+                person = self._measured.get(name)
+                measured = [] if person is None else person.joints_measured(snapshot)
+                table.keep_numbers([t, *q, snapshot.tracking.get(name), *measured])
         if not self._most:
             return
         for sample in samples:
@@ -49,9 +53,11 @@ class MotionSheets:
         for person in self._people:
             if person.name in self._wanted:
                 key = f"bones {person.name}"
-                table = self._tables.get(key) or self._begin(key, self._most, person.bone_titles)
+                titles = [*person.bone_titles, *person.measured_titles]
+                table = self._tables.get(key) or self._begin(key, self._most, titles)
                 if table.wants():
-                    table.keep_numbers([t, *person.poses(snapshot).ravel().tolist()])
+                    poses = person.poses(snapshot).ravel().tolist()
+                    table.keep_numbers([t, *poses, *person.measured(snapshot)])
             if snapshot.bones.get(person.name):
                 key = f"errors {person.name}"
                 table = self._tables.get(key) or self._begin(key, self._most, person.error_titles)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from seerob.human.skeleton import AXES, PARENTS, ROOT
 from seerob.snapshot import Scene, Snapshot
 from seerob.transforms import Array
 
@@ -28,6 +29,16 @@ class Person:
         return [f"{bone} {what}" for bone in self.bones for what in places]
 
     @property
+    def measured_titles(self) -> list[str]:
+        """One per bone."""
+        return [f"{bone} measured" for bone in self.bones]
+
+    @property
+    def joint_measured_titles(self) -> list[str]:
+        """One per joint."""
+        return [f"{joint} measured" for joint, _ in self.joints]
+
+    @property
     def error_titles(self) -> list[str]:
         """Two per bone."""
         return [f"{bone} {what}" for bone in self.bones for what in ("position [m]", "angle [rad]")]
@@ -37,10 +48,38 @@ class Person:
         every = np.frombuffer(snapshot.poses, "<f4").reshape(-1, 7)
         return np.asarray(every[list(self.slots)])
 
+    def measured(self, snapshot: Snapshot) -> list[float | None]:
+        """Of each bone, 1 where a device sees it at this tick and 0 where it is estimated.
+
+        None for every bone where devices say nothing of the person: joints or keyframes move it then, or it
+        is not heard.
+        """
+        seen = _seen(snapshot, self.name)
+        return [float(bone in seen) if seen else None for bone in self.bones]
+
+    def joints_measured(self, snapshot: Snapshot) -> list[float | None]:
+        """Of each joint, 1 where devices see both bones that it connects, else as `measured`.
+
+        A joint of the waist, which no bone carries, needs the pelvis alone.
+        """
+        seen = _seen(snapshot, self.name)
+        return [float(_CONNECTED.get(j, _NONE) <= seen) if seen else None for j, _ in self.joints]
+
     def errors(self, snapshot: Snapshot) -> list[float | None]:
         """In the order of `error_titles`; None where no device sees the bone."""
         seen = snapshot.bones.get(self.name, {})
         return [error for bone in self.bones for error in seen.get(bone, (None, None))]
+
+
+_CONNECTED = {axis.name: frozenset({axis.bone, PARENTS[axis.bone]} - {ROOT}) for axis in AXES}
+_NONE = frozenset({""})
+"""Of a joint that is none of ours, which nothing measures."""
+
+
+def _seen(snapshot: Snapshot, name: str) -> frozenset[str]:
+    """Bones that devices see at this tick."""
+    bones = snapshot.bones.get(name, {})
+    return frozenset(bone for bone, (away, turned) in bones.items() if away is not None or turned is not None)
 
 
 def people(scene: Scene) -> tuple[Person, ...]:

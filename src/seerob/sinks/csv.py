@@ -87,6 +87,7 @@ class CsvWriter(WholeFolder):
         self._separator, self._decimal = _MARKS[options.separator], _MARKS[options.decimal]
         self._due = -math.inf
         self._people = people(scene)
+        self._measured = {person.name: person for person in self._people}
         self._joints = _sample_cells.joint_titles(scene)
         self._errors: dict[str, BoneErrors] = {}
         self._spoke: dict[str, float] = {}
@@ -106,13 +107,18 @@ class CsvWriter(WholeFolder):
             table = self.tables.get(f"joints {name}")
             if table is None:
                 titles = _sample_cells.joint_head(self._joints, name, len(q))
+                titles += self._measured[name].joint_measured_titles if name in self._measured else ()
                 table = self._table(f"joints {name}", [_sample_cells.TIME, *titles])
-            table.append([time, *map(self._text, q), self._text(snapshot.tracking.get(name))])
+            row = [time, *map(self._text, q), self._text(snapshot.tracking.get(name))]
+            if name in self._measured:
+                row += map(_flag, self._measured[name].joints_measured(snapshot))
+            table.append(row)
         for person in self._people:
             # Nine digits are all that the snapshot's numbers have.
             shown = (self._marked(f"{value:.9g}") for value in person.poses(snapshot).ravel().tolist())
-            head = [_sample_cells.TIME, *person.bone_titles]
-            self._table(f"bones {person.name}", head).append([time, *shown])
+            head = [_sample_cells.TIME, *person.bone_titles, *person.measured_titles]
+            measured = map(_flag, person.measured(snapshot))
+            self._table(f"bones {person.name}", head).append([time, *shown, *measured])
             if snapshot.bones.get(person.name):
                 head = [_sample_cells.TIME, *person.error_titles]
                 row = [time, *map(self._text, person.errors(snapshot))]
@@ -153,6 +159,10 @@ class CsvWriter(WholeFolder):
             ("seerob", scene.version),
             ("period of the ticks [s]", scene.period),
             ("frame", "world of the workstation, z up; orientations world from bone, w first"),
+            (
+                "measured",
+                "1: a device sees the bone (both of a joint); 0: estimated; empty: no device",
+            ),
         ]
         found += [(f"{f.level}: {f.subject}", f.text) for f in scene.findings]
         for name, table in self.tables.items():
@@ -184,3 +194,7 @@ class CsvWriter(WholeFolder):
 
     def _marked(self, number: str) -> str:
         return number if self._decimal == "." else number.replace(".", self._decimal)
+
+
+def _flag(measured: float | None) -> str:
+    return "" if measured is None else f"{measured:.0f}"

@@ -16,6 +16,7 @@ from seerob.motion_io import opensim_coordinates, storage, trc
 from seerob.samples import BodySample, Sample
 from seerob.sink import Sink
 from seerob.sinks._growing_table import GrowingTable
+from seerob.sinks._measured_coordinates import EstimatedCoordinates
 from seerob.sinks._people import Person, people
 from seerob.sinks._whole_folder import NAME, WholeFolder, checked
 from seerob.snapshot import Scene, Snapshot
@@ -68,6 +69,7 @@ class OpenSimWriter(WholeFolder):
         self._rates: dict[str, tuple[float, float]] = {}
         """Table → its first and last instant [s]."""
         self._heads: dict[str, Callable[[GrowingTable, float], list[str]]] = {}
+        self._estimated = {person.name: EstimatedCoordinates() for person in known}
         self._waiting: dict[str, list[tuple[float, tuple[float, ...], list[float]]]] = {}
 
     def take(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
@@ -82,6 +84,7 @@ class OpenSimWriter(WholeFolder):
         for person in self._people:
             places = person.poses(snapshot)[:, :3].astype(float)
             self._markers(f"{person.name} bones", person.bones, snapshot.t, places)
+            self._estimated[person.name].add(person.joints_measured(snapshot))
             waiting = self._waiting.setdefault(person.name, [])
             pelvis = places[person.bones.index(PELVIS)].tolist()
             waiting.append((snapshot.t, snapshot.joints[person.name], pelvis))
@@ -116,7 +119,11 @@ class OpenSimWriter(WholeFolder):
         values = np.where(lengths, found, np.degrees(found)).tolist()
         title = f"{name} coordinates"
         table = self._table(
-            title, ".mot", lambda table, _: list(storage.head(table.columns[1:], table.rows, name=title))
+            title,
+            ".mot",
+            lambda table, _: list(
+                storage.head(table.columns[1:], table.rows, name=title, remarks=self._estimated[name].lines())
+            ),
         )
         for (t, _, _), row in zip(waiting, values, strict=True):
             if self._later(title, t):

@@ -148,9 +148,10 @@ def read_bvh(path: Path, file: str) -> Bvh:
             joints, channels = _hierarchy(reader)
             return _motion(reader, joints, channels, path.stat().st_size)
     except FileNotFoundError as error:
-        raise InputError.at(file, "", "no such file") from error
+        raise InputError.at(file, "", "no such file", "give the path of a .bvh file") from error
     except OSError as error:
-        raise InputError.at(file, "", f"cannot be read: {error.strerror}") from error
+        what = f"cannot be read: {error.strerror}"
+        raise InputError.at(file, "", what, "give a .bvh file that may be read") from error
 
 
 def _hierarchy(reader: _Reader) -> tuple[list[Joint], int]:

@@ -12,6 +12,7 @@ from seerob.errors import InputError, Problem, UnknownName, suggestion
 from seerob.human import mapping as names
 from seerob.human.calibration import Calibrated, CalibrationPose, calibrate
 from seerob.human.captured import CaptureFrame, Layout
+from seerob.human.estimated import estimated as without_neighbours
 from seerob.human.observing import Observer, bind, with_mounts
 from seerob.human.skeleton import BONES
 from seerob.model_io.description import Description
@@ -190,6 +191,9 @@ def _told(layout: Layout, bound: Observer, subject: str, calibration: Calibratio
     if estimated:
         text = f"not measured but estimated from the bones beside them: {', '.join(estimated)}"
         yield Finding(level="assumed", subject=subject, text=text)
+    if unseen := without_neighbours({row.bone for row in bound.rows}):
+        text = f"no verdict rests on {', '.join(unseen)}: neither measured nor told by the bones beside them"
+        yield Finding(level="warning", subject=subject, text=text)
     if calibration.pose is CalibrationPose.NONE:
         blind = [r.name for r in bound.rows if r.orientation > 0 and r.segment_from_bone is None]
         if blind:

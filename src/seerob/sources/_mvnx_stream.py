@@ -165,9 +165,10 @@ def stream(path: Path, file: str) -> Iterator[Head | RawFrame]:
                     yield target.frames.popleft()
         parser.close()
     except FileNotFoundError as error:
-        raise InputError.at(file, "", "no such file") from error
+        raise InputError.at(file, "", "no such file", "give the path of an .mvnx file") from error
     except OSError as error:
-        raise InputError.at(file, "", f"cannot be read: {error.strerror}") from error
+        what = f"cannot be read: {error.strerror}"
+        raise InputError.at(file, "", what, "give an .mvnx file that may be read") from error
     except ParseError as error:
         raise InputError.at(
             file, f"line {error.position[0]}", f"not XML: {error}", "export it again"

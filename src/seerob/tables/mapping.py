@@ -134,7 +134,7 @@ class Mapping(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
                 continue
             if remarks and name in remarks:
                 lines.append(f"# {remarks[name]}")
-            lines.append(f"{name} = {_toml(value)}")
+            lines.append(f"{name} = {toml_value(value)}")
         return "\n".join(lines) + "\n"
 
     def without_joints(self) -> Mapping:
@@ -154,12 +154,15 @@ class Mapping(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return structs.replace(other, **given)
 
 
-def _toml(value: object) -> str:
+def toml_value(value: object) -> str:
+    """A value as it stands in a TOML file, on one line; any text that is neither number nor table quoted."""
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(map(toml_value, value)) + "]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{toml_value(str(k))} = {toml_value(v)}" for k, v in value.items()) + "}"
     text = json.dumps(str(value), ensure_ascii=False)
     return re.sub(r"[\x7f-\x9f\ud800-\udfff]", lambda m: f"\\u{ord(m[0]):04x}", text)

@@ -1,0 +1,157 @@
+"""What no device sees is not known: neither distances nor scores are made of it, with physics or without."""
+
+from __future__ import annotations
+
+from itertools import chain, combinations
+
+import numpy as np
+import pytest
+from made_capture import captured, frames_of, source, walking, workstation
+from msgspec.structs import replace
+
+from seerob import run as road
+from seerob.engine import Engine
+from seerob.ergonomic_posture import bind_posture
+from seerob.errors import Undecided
+from seerob.human.estimated import estimated
+from seerob.human.skeleton import BONES, PARENTS
+from seerob.run import Judge
+from seerob.safety.minimum_distance import MinimumDistance
+from seerob.snapshot import Verdict
+from seerob.sources._capture_options import Weights
+from seerob.station import Station
+
+RIGHT = ("right_clavicle", "right_upper_arm", "right_forearm", "right_hand")
+UPPER = ("pelvis", "lumbar", "thorax", "neck", "head", *RIGHT)
+TRACKERS = ("pelvis", "left_foot", "right_foot", "left_hand", "right_hand")
+BOX = {"shape": {"box": [0.1, 0.1, 0.1]}}
+
+
+def seen_only(bones, *, ticks=2, person=None, weights=None, physics=True, criteria=(), at=(3.0, 0.0, 1.0)):
+    """The twin after some ticks of a device that sees some bones, and what criteria say."""
+    frames = frames_of(*walking())
+    for frame in frames:
+        for k, bone in enumerate(BONES):
+            if bone not in bones:
+                frame.positions[k] = np.nan
+                frame.orientations[k] = np.nan
+    if weights is None:
+        mapping = {bone: "" for bone in BONES if bone not in bones}
+        made = source(captured(frames), mapping=mapping)
+    else:
+        made = source(captured(frames_of(*walking())), weights=Weights(bones=weights))
+    part = {"name": "post", "at": {"position": list(at)}, **BOX}
+    station = workstation(made, person=person, parts=[part], engine={"physics": physics})
+    stage = Station(replace(station, safety=tuple(criteria)))
+    engine, judge = Engine(stage.model, driven={"operator": 0.2}), Judge(stage.bound)
+    results = ()
+    for seq, samples in enumerate(road.pump(stage.sources, 0.01)):
+        engine.take(samples)
+        state = engine.tick() if seq else engine.start()
+        results = judge(state)
+        if seq + 1 == ticks:
+            break
+    return state, results
+
+
+def distance(to="operator", limit=0.3):
+    return MinimumDistance(name="d", between=("post", to), limit=limit)
+
+
+def test_a_bone_is_told_by_neighbours_on_both_sides_only():
+    assert estimated(BONES) == estimated(()) == ()
+    for bone in BONES:
+        ends = bone not in PARENTS.values() and "toes" not in bone
+        lonely = estimated(set(BONES) - {bone})
+        assert lonely == ((bone,) if ends else ()), bone
+    for upper, lower in PARENTS.items():
+        if lower in PARENTS and not {upper, lower} & {"pelvis", "thorax"} and "toes" not in upper:
+            assert {upper, lower} <= set(estimated(set(BONES) - {upper, lower})), (upper, lower)
+
+
+def test_more_seen_is_never_less_known():
+    few = ("pelvis", "thorax", "left_upper_arm", "right_upper_arm", "left_thigh", "right_thigh", "head")
+    sets = [frozenset(s) for s in chain.from_iterable(combinations(few, n) for n in range(1, len(few) + 1))]
+    for one in sets:
+        for bone in few:
+            assert set(estimated(one | {bone})) <= set(estimated(one))
+
+
+def test_hips_and_shoulders_of_a_picture_tell_the_trunk():
+    joints = {f"{s}_{b}" for s in ("left", "right") for b in ("thigh", "shank", "foot", "upper_arm", "hand")}
+    assert estimated({*joints, "head"}) == ()
+    assert "pelvis" in estimated({bone for bone in joints if "arm" not in bone and "hand" not in bone})
+
+
+@pytest.mark.parametrize("physics", [True, False])
+@pytest.mark.parametrize("ticks", [1, 3])
+def test_the_person_is_undecided_and_a_seen_bone_is_not(physics, ticks):
+    criteria = (distance(), distance("operator/left_hand"), distance("operator/right_hand"))
+    _, (whole, left, right) = seen_only(UPPER, ticks=ticks, physics=physics, criteria=criteria)
+    assert whole.verdict is left.verdict is Verdict.UNDECIDED
+    assert "no device sees left_clavicle" in whole.reason
+    assert right.verdict is Verdict.WITHIN
+
+
+@pytest.mark.parametrize("physics", [True, False])
+@pytest.mark.parametrize("ticks", [1, 3])
+def test_an_arm_that_nobody_sees_is_not_scored(physics, ticks):
+    state, _ = seen_only(UPPER, ticks=ticks, physics=physics)
+    found = bind_posture(state.model, "operator")(state)
+    assert np.isfinite(found.elbow_flexion[0])
+    assert np.isfinite(found.trunk_flexion)
+    assert np.isnan(found.elbow_flexion[1])
+    assert np.isnan(found.knee_flexion).all()
+
+
+def test_the_waist_alone_tells_no_trunk_and_five_trackers_no_person():
+    state, (result,) = seen_only(TRACKERS, criteria=(distance(),))
+    found = bind_posture(state.model, "operator")(state)
+    assert np.isnan(found.trunk_flexion)
+    assert np.isnan(found.elbow_flexion).all()
+    assert np.isnan(found.knee_flexion).all()
+    assert result.verdict is Verdict.UNDECIDED
+    with pytest.raises(Undecided, match="no device sees lumbar, thorax, neck, head"):
+        state.require("operator")
+
+
+def test_what_is_seen_exceeds_by_itself():
+    state, _ = seen_only(TRACKERS)
+    hand = next(k for k, body in enumerate(state.model.bodies) if body.name == "operator/right_hand")
+    _, (result,) = seen_only(TRACKERS, criteria=(distance(),), at=state.positions[hand].tolist())
+    assert result.verdict is Verdict.EXCEEDED
+    assert "right" in result.reason
+
+
+def test_an_accepted_estimate_widens_the_distance_by_its_uncertainty():
+    criteria = (distance(), distance("operator/right_hand"))
+    _, (whole, hand) = seen_only(UPPER, person={"unseen_uncertainty": 0.3}, criteria=criteria)
+    assert whole.verdict is hand.verdict is Verdict.WITHIN
+    assert whole.interval[0] == pytest.approx(whole.value - 0.3, abs=1e-9)
+    assert hand.interval is None or hand.interval[0] > hand.value - 0.1
+    near = (distance(limit=whole.value - 0.1),)
+    _, (open_,) = seen_only(UPPER, person={"unseen_uncertainty": 0.3}, criteria=near)
+    assert open_.verdict is Verdict.UNDECIDED
+
+
+def test_other_figures_of_an_accepted_estimate_stay_undecided():
+    state, _ = seen_only(UPPER, person={"unseen_uncertainty": 0.3})
+    index = {body.name: k for k, body in enumerate(state.model.bodies)}
+    state.fastest_point(index["operator/right_hand"])
+    with pytest.raises(Undecided, match="no device sees"):
+        state.fastest_point(index["operator/left_hand"])
+    with pytest.raises(Undecided, match="no device sees"):
+        state.mass_matrix(state.model.mechanisms["operator"])
+
+
+def test_a_weight_of_nought_is_as_good_as_not_mapped():
+    unseen = dict.fromkeys((bone for bone in BONES if bone not in UPPER), 0.0)
+    named, _ = seen_only(UPPER, ticks=40)
+    state, _ = seen_only(UPPER, ticks=40, weights=unseen)
+    assert state.bones_in_doubt("operator") == named.bones_in_doubt("operator") == estimated(UPPER)
+    assert state.interrupted("operator") == ""
+
+
+def test_a_person_whom_a_device_sees_whole_is_decided():
+    _, (result,) = seen_only([bone for bone in BONES if "toes" not in bone], criteria=(distance(),))
+    assert result.verdict is Verdict.WITHIN

@@ -70,7 +70,8 @@ def main() -> int:
             meshing = time.perf_counter() - start
             peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
             print(
-                f"voxel {voxel * 100:.0f} cm: {wall:.2f} s ({cpu:.2f} s of CPU, distance fields included), "
+                f"voxel {voxel * 100:.0f} cm: {cpu:.2f} s of CPU, {wall:.2f} s by the clock (distance fields "
+                f"included; goal at 1 cm and 1000 poses on a core of its own: <= 2 s, <= 500 MB), "
                 f"mesh {meshing:.2f} s, {len(mesh.faces)} triangles; "
                 f"grid {swept.grid.cells.nbytes / 1e6:.1f} MB, "
                 f"peak of the process {peak:.0f} MB ({before:.0f} MB before)"

@@ -10,6 +10,7 @@ import trimesh
 
 from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.errors import InputError
+from seerob.station import load
 
 LIMITS = files("seerob.norms").joinpath("iso_ts_15066_2016.toml").read_text(encoding="utf-8")
 BOX = trimesh.creation.box((0.2, 0.1, 0.1))
@@ -277,3 +278,16 @@ def test_what_only_some_figures_need_is_told_before_the_run(tmp_path, text, more
     """Drawings are open and frames weigh nothing; what needs them closed or heavy is undecided."""
     station = made(tmp_path, FLOATING + TWO_R + text, {"arm.urdf": two_r(), **more})
     assert any(f.level == level and words in f.text for f in station.model.findings)
+
+
+def test_wrong_names_of_person_and_bones_come_at_once(tmp_path):
+    (tmp_path / "workstation.toml").write_text(
+        'title = "x"\n[[humans]]\nname = "operator"\nstature = 1.7\nmass = 70\nsex = "male"\n'
+        '[[sources]]\nkind = "bvh"\nhuman = "operater"\nfile = "x.bvh"\nweights = { bones = { haed = 0.5 } }\n'
+        '[[ergonomics]]\nkind = "rula"\nhuman = "operator"\nunmeasured = ["hand"]\n'
+    )
+    with pytest.raises(InputError) as caught:
+        load(tmp_path)
+    assert [p.key for p in caught.value.problems] == [
+        "sources[0].human", "sources[0].weights.bones.haed", "ergonomics[0].unmeasured[0]",
+    ]  # fmt: skip

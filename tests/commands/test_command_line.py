@@ -185,7 +185,8 @@ def test_nobody_near_enough_for_contact_is_not_a_missing_limit(capsys, tmp_path)
     code, out, _ = seerob(capsys, "assess", cell, "-o", tmp_path / "out")
     (line,) = (line for line in out.splitlines() if line.startswith("nothing judged"))
     assert code == 2
-    assert "pfl: nobody within 0.01 m of a moving part" in line
+    assert "pfl: no part moves, nobody within 0.01 m of a moving part" in line
+    assert "limit" not in line
 
 
 @pytest.mark.parametrize("name", ["report.html", "results.xlsx"])

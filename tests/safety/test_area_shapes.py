@@ -218,7 +218,7 @@ def test_mistakes_behind_a_swept_area_are_told_at_their_own_place_together_with_
     lost = AREA.format(name="l", shape='shape = { box = [1, 1, 1] }\non = "arm/nolink"')
     with pytest.raises(InputError) as error:
         made(tmp_path, TWO_R + swept + lost, {"arm.urdf": two_r()})
-    texts = {p.key: p.text for p in error.value.problems}
+    texts = {p.key: p.what for p in error.value.problems}
     assert "nolink" in texts["areas[1]"]
     assert "'nosep'" in texts["areas[0].swept.separation"]
     assert len(texts) == 2

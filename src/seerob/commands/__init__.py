@@ -223,9 +223,10 @@ def tell_results(summary: Summary) -> None:
 
 def _why_nothing(summary: Summary) -> str:
     """What is missing where no criterion has a verdict: what those without a value say, else a limit."""
-    worst = {name: series.worst() for name, series in summary.results.items() if series.known}
-    said = [f"{name}: {w.reason}" for name, w in worst.items() if w.value is None and w.reason]
-    if len(said) == len(worst) and said:
+    known = {name: series for name, series in summary.results.items() if series.known}
+    if known and all(series.worst().value is None for series in known.values()):
+        reasons = {name: list(dict.fromkeys(series.reasons))[:3] for name, series in known.items()}
+        said = [f"{name}: {', '.join(texts)}" for name, texts in reasons.items()]
         return f"no criterion has a verdict: {'; '.join(said)}"
     return "no criterion has a verdict: give one a limit"
 

@@ -34,7 +34,7 @@ class EstimatedCoordinates:
         if joints[0] is None:  # joints or keyframes move the person
             return
         self._told += 1
-        lost = _follows()[:, [not value for value in joints]].any(axis=1)
+        lost: list[bool] = np.any(_follows()[:, [not v for v in joints]], axis=1).tolist()
         self._estimated.update(
             name for name, is_lost in zip(opensim_coordinates.coordinates(), lost, strict=True) if is_lost
         )

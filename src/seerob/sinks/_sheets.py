@@ -54,11 +54,14 @@ class Sheets:
         formats = [_format(_unit(title)) for title in head]
         unit_at = list(head).index("unit") if fit and "unit" in head else -1
         sheet: Any = None
+        # A row is written when it is appended, so that one cell per format serves all numbers of a column.
+        used: dict[tuple[int, str], Any] = {}
         written = EXCEL_ROWS
         for row in rows:
             if written >= EXCEL_ROWS:
                 sheet = self._begin(name, head, widths)
                 written = 1
+                used.clear()
             if 0 <= unit_at < len(row):
                 own = _format(str(row[unit_at] or ""))
                 formats = [
@@ -66,7 +69,9 @@ class Sheets:
                     for title, f in zip(head, formats, strict=True)
                 ]
             cells = [
-                self._cell(sheet, value, formats[k] if k < len(formats) else "", wrap=fit)
+                self._number(sheet, value, k, formats[k] if k < len(formats) else "", used)
+                if value is None or isinstance(value, float)
+                else self._cell(sheet, value, formats[k] if k < len(formats) else "", wrap=fit)
                 for k, value in enumerate(row)
             ]
             sheet.append(cells)
@@ -119,6 +124,20 @@ class Sheets:
         look = style if style == "head" else value if value in _WORDS else "wrap" if wrap else ""
         if look or quoted:
             cell._style = self._style(sheet, look, quoted=quoted)
+        return cell
+
+    def _number(
+        self, sheet: Any, value: float | None, k: int, style: str, used: dict[tuple[int, str], Any]
+    ) -> Any:
+        """A cell of column ``k`` that holds a number, used again; None for an empty one."""
+        if value is None or math.isnan(value):
+            return None
+        if math.isinf(value):
+            return self._cell(sheet, value, style)
+        cell = used.get((k, style))
+        if cell is None:
+            cell = used[k, style] = self._cell(sheet, value, style)
+        cell._value = value  # the setter looks for the type each time
         return cell
 
     def _style(self, sheet: Any, look: str, *, quoted: bool = False) -> Any:

@@ -48,7 +48,11 @@ _MARKS = {"comma": ",", "semicolon": ";", "tab": "\t", "point": "."}
 
 
 class CsvFiles(Sink, frozen=True, kw_only=True):
-    """Write samples, joints, bones, tracking errors and results to a folder of CSV files."""
+    """Write samples, joints, bones, tracking errors and results to a folder of CSV files.
+
+    Bones and joints of people have a column ``… measured`` each: 1 where a device sees the bone, or both
+    bones of the joint; 0 where it is estimated; empty where no device sees the person.
+    """
 
     file: Annotated[str, Meta(pattern=NAME, description="a name of letters, digits, _ and -")] = "csv"
     """Name of the folder in the run's folder; must not exist yet."""

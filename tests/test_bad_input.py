@@ -283,7 +283,8 @@ def test_what_only_some_figures_need_is_told_before_the_run(tmp_path, text, more
 def test_wrong_names_of_person_and_bones_come_at_once(tmp_path):
     (tmp_path / "workstation.toml").write_text(
         'title = "x"\n[[humans]]\nname = "operator"\nstature = 1.7\nmass = 70\nsex = "male"\n'
-        '[[sources]]\nkind = "bvh"\nhuman = "operater"\nfile = "x.bvh"\nweights = { bones = { haed = 0.5 } }\n'
+        '[[sources]]\nkind = "bvh"\nhuman = "operater"\nfile = "x.bvh"\n'
+        "weights = { bones = { haed = 0.5 } }\n"
         '[[ergonomics]]\nkind = "rula"\nhuman = "operator"\nunmeasured = ["hand"]\n'
     )
     with pytest.raises(InputError) as caught:

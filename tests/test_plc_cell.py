@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import shutil
 import time
-from argparse import Namespace
 from pathlib import Path
 
 from seerob import load
+from seerob.cli import parser
 from seerob.commands.emulating import opcua, rtde
 from seerob.recording import Recording
 from seerob.sinks.recorder import Recorder
@@ -76,8 +76,8 @@ def nothing():
 
 
 def test_the_plc_dies_and_comes_back(tmp_path):
-    common = Namespace(host="127.0.0.1", port=0, robot="ur10", file=None)
-    robot, plc = rtde.emulated(common).server, opcua.emulated(common).server
+    asked = {kind: parser().parse_args(["emulate", kind, "--port", "0"]) for kind in ("rtde", "opcua")}
+    robot, plc = rtde.emulated(asked["rtde"]).server, opcua.emulated(asked["opcua"]).server
     with robot, plc:
         station = here(tmp_path / "cell", robot.port, plc.port)
         assert not [f for f in station.scene().findings if "not reached" in f.text]

@@ -17,7 +17,13 @@ def test_every_point_of_a_voxel_stays_in_the_turned_set(axis):
     radii = np.linalg.norm(np.cross(corner - anchor, axis), axis=1)
     low, half = heights.min() - pitch, pitch / 2 * np.abs(axis).sum()
     plane = profile(
-        radii, heights - low, pitch, half, pitch / 16, radii.max() + pitch, np.ptp(heights) + 2 * pitch
+        radii,
+        heights - low,
+        np.full(3, pitch),
+        half / pitch,
+        pitch / 16,
+        radii.max() + pitch,
+        np.ptp(heights) + 2 * pitch,
     )
     grid = VoxelGrid(pitch)
     grid.cover(np.full(3, -1.5), np.full(3, 1.5))

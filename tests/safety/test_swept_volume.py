@@ -92,7 +92,7 @@ def test_not_heard_is_undecided(tmp_path):
 def test_wrong_options_are_told_before_the_run(tmp_path):
     text = FLOATING + TWO_R + SWEPT.replace("0.05", "0.00001")
     cell = made(tmp_path, text, {"arm.urdf": two_r()})
-    with pytest.raises(InputError, match=r"swept: voxel: 1e-05 m needs .* use voxels of"):
+    with pytest.raises(InputError, match=r"\(swept\): voxel: 1e-05 m needs .* use voxels of"):
         _ = cell.bound
     with pytest.raises(InputError, match="did you mean 'arm'"):
         made(tmp_path, TWO_R + SWEPT.replace('of = "arm"', 'of = "amr"'), {"arm.urdf": two_r()})

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from seerob.errors import InputError
 from seerob.reading import convert_workstation, read, readable
-from seerob.workstation import MAX_FILE_SIZE, TABLES, Workstation
+from seerob.toml_file import MAX_FILE_SIZE
+from seerob.workstation import TABLES, Workstation
 
 ROBOT = '[[robots]]\nname = "ur10"\nmodel = "library:ur10"\n'
 HUMAN = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'

@@ -17,7 +17,7 @@ from seerob.errors import InputError, Problem, suggestion
 from seerob.floor_polygon import check_polygon
 from seerob.quantities import Coordinate, Corners, Metres3, Name, Pose, Table, unit
 from seerob.simple_shape import MAX_SIZE
-from seerob.workstation import read_toml
+from seerob.toml_file import read_toml
 
 MOST_ZONES = 500
 MAX_SIZE_OF_JSON = 1 << 20

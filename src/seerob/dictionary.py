@@ -18,8 +18,8 @@ from msgspec import Meta, field
 from seerob.conversion import convert, tables
 from seerob.errors import InputError, Problem, suggestion
 from seerob.quantities import PathName, Seconds, Table
+from seerob.toml_file import read_toml
 from seerob.variable_units import UNITS, unit
-from seerob.workstation import read_toml
 
 MOST_VARIABLES = 10_000
 LONGEST_TEXT = 1000

@@ -17,7 +17,7 @@ from seerob.scoring.zones import ZoneRow, mistakes
 from seerob.tables.candidates import candidates
 from seerob.tables.grid import Cell, Grid, blank, number, place
 from seerob.tables.mapping import Mapping as TableMapping
-from seerob.workstation import read_toml
+from seerob.toml_file import read_toml
 
 MAX_ROWS = 2000
 """Rows of a table; more are a mistake."""

@@ -17,7 +17,8 @@ from seerob.criterion import Criterion
 from seerob.errors import InputError, Problem, SeerobError
 from seerob.sink import Sink
 from seerob.source import Source
-from seerob.workstation import PLUGINS, TABLES, Robot, Workstation, locate, read_toml
+from seerob.toml_file import read_toml
+from seerob.workstation import PLUGINS, TABLES, Robot, Workstation, locate
 
 BASES: dict[str, type[Struct]] = {
     "sources": Source,

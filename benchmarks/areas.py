@@ -24,14 +24,14 @@ import mujoco
 import numpy as np
 import trimesh
 
-from seerob.depth import Depths
-from seerob.distance import Shapes
+from seerob.distances.depth import Depths
+from seerob.distances.least import Shapes
+from seerob.distances.rays import Rays
 from seerob.geometry import Mesh, Solid, capsule
 from seerob.kernels.crossings import encloses
 from seerob.kernels.tree_file import tree_of
 from seerob.kernels.winding import contains
 from seerob.model_io.shapes import box_mesh
-from seerob.rays import Rays
 
 BEAMS, PARTS, TOLERANCE = 541, 21, 0.005
 

@@ -24,7 +24,7 @@ import pinocchio as pin
 import trimesh
 from defusedxml import ElementTree
 
-from seerob.distance import Per, Query, Reach, Shapes
+from seerob.distances.least import Per, Query, Reach, Shapes
 from seerob.geometry import Mesh, Solid, capsule
 from seerob.transforms import Array, rotation_from_rpy
 

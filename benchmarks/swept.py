@@ -23,8 +23,8 @@ import coal
 from made_sweep import missed
 from seerob.model import Model
 from seerob.station import load
-from seerob.swept import swept_volume
 from seerob.transforms import Array
+from seerob.volumes.swept import swept_volume
 
 ROBOTS = Path(coal.__file__).parents[4] / "share" / "example-robot-data" / "robots"
 HOME = np.array([0.0, -1.2, 1.4, -1.5, -1.57, 0.0])

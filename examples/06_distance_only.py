@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from seerob.distance import Query, Reach, Shapes
+from seerob.distances.least import Query, Reach, Shapes
 from seerob.geometry import Mesh, Solid, capsule
 from seerob.model_io.shapes import box_mesh
 

@@ -6,7 +6,7 @@ import numpy as np
 from seerob.geometry import Mesh
 from seerob.kernels.tree_file import tree_of
 from seerob.kernels.winding import contains
-from seerob.moving import posed
+from seerob.volumes.moving import posed
 
 
 def points_of(solid, count, rng):

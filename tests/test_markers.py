@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from seerob.ear_cutting import cut_ears
 from seerob.snapshot import Polyline, Prism, Rays
 from seerob.transforms import Array
+from seerob.volumes.ear_cutting import cut_ears
 
 
 def test_an_open_line_has_a_leg_less_than_points_and_a_closed_one_as_many() -> None:

@@ -7,7 +7,7 @@ from seerob.human.body_areas import body_area, in_front
 from seerob.human.skeleton import BONES
 from seerob.human.skin import body_region
 from seerob.model import Model
-from seerob.people import size
+from seerob.mounting.people import size
 from seerob.state import State
 from seerob.transforms import Array
 

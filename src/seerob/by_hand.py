@@ -10,8 +10,8 @@ import numpy as np
 
 from seerob.errors import InputError, Problem, UnknownName
 from seerob.model_io.description import Description, Joint, JointKind, Quantity
+from seerob.mounting.things import link_by_hand
 from seerob.snapshot import Origin
-from seerob.things import link_by_hand
 from seerob.transforms import Array
 from seerob.workstation import Robot
 

@@ -10,7 +10,7 @@ from seerob.geometry import Solid
 from seerob.model import Mechanism
 from seerob.model_io.description import Description, Inertial, Joint
 from seerob.model_io.lint import TIPS
-from seerob.mounting import extreme_points
+from seerob.mounting.specification import extreme_points
 from seerob.snapshot import Finding, Origin
 from seerob.transforms import Array
 

@@ -21,20 +21,20 @@ import mujoco
 import numpy as np
 
 from seerob.actuation import set_gains, set_torque_limits
-from seerob.compilation import pose_matrix
 from seerob.errors import InputError, SimulationDiverged
 from seerob.human.following import Following
 from seerob.inverse_kinematics import solve_pose
 from seerob.kernels import pull as kernel
-from seerob.machines import Machines, Moved
+from seerob.machines.following import Machines, Moved
 from seerob.model import Mechanism, Model
+from seerob.mounting.compilation import pose_matrix
 from seerob.reference import Reference
 from seerob.sample_values import is_finite, largest_speed, torques_of
 from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
-from seerob.signals import Signals
 from seerob.state import Hearing, State
 from seerob.task_space import TaskPull
 from seerob.transforms import Array, rotation_from_wxyz
+from seerob.variables.signals import Signals
 
 DEFAULT_TIMEOUT = 0.2
 """Of what is heard without a source that states one [s]."""

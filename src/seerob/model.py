@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.dictionary import Variable
-from seerob.distance import Query, Shapes
+from seerob.distances.least import Query, Shapes
 from seerob.errors import UnknownName
 from seerob.geometry import Solid
 from seerob.model_io.description import Description, Joint, Quantity
 from seerob.snapshot import Finding, Origin
 from seerob.transforms import Array
+from seerob.variables.dictionary import Variable
 from seerob.workstation import Workstation
 
 Indices = NDArray[np.int64]
@@ -145,7 +145,7 @@ class Gap:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A compiled workstation; frozen. Made by `seerob.compilation.compile_workstation`."""
+    """A compiled workstation; frozen. Made by `seerob.mounting.compilation.compile_workstation`."""
 
     workstation: Workstation
     mj: Any

@@ -11,10 +11,10 @@ import msgspec
 from msgspec import Struct
 
 from seerob import naming, plugin
-from seerob.controller_zones import zones_of
 from seerob.conversion import convert, tables
 from seerob.criterion import Criterion
 from seerob.errors import InputError, Problem, SeerobError
+from seerob.sensors.controller_zones import zones_of
 from seerob.sink import Sink
 from seerob.source import Source
 from seerob.toml_file import read_toml

@@ -14,14 +14,14 @@ from importlib.metadata import version
 
 from msgspec.structs import replace
 
-from seerob.compilation import pose_matrix
-from seerob.displays import Looks
 from seerob.engine import Engine
 from seerob.errors import InputError, Problem, SeerobError
 from seerob.judging import Bound as Bound  # noqa: PLC0414
 from seerob.judging import Judge as Judge  # noqa: PLC0414
 from seerob.live import LiveSource, delay_of
+from seerob.machines.displays import Looks
 from seerob.model import Model
+from seerob.mounting.compilation import pose_matrix
 from seerob.real_time import Clock
 from seerob.results import ResultLog
 from seerob.samples import Sample

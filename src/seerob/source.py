@@ -15,10 +15,10 @@ from typing import Annotated, ClassVar
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
-from seerob.dictionary import Variable
 from seerob.model_io.description import Description
 from seerob.samples import JointSample, PoseSample, Quality, Sample
 from seerob.snapshot import Finding
+from seerob.variables.dictionary import Variable
 
 _seconds = Meta(gt=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})
 

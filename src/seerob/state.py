@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.dictionary import Value
-from seerob.distance import Closest, Closests, Per, Query
+from seerob.distances.least import Closest, Closests, Per, Query
+from seerob.distances.surveying import Surveyor
 from seerob.errors import Undecided
 from seerob.hearing import SLACK
 from seerob.hearing import Hearing as Hearing  # noqa: PLC0414
@@ -24,9 +24,9 @@ from seerob.kernels.chain import along
 from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
 from seerob.model import Frame, Gap, Mechanism, Model
 from seerob.seen_bones import bones_of, unseen_reason
-from seerob.signals import Signals
-from seerob.surveying import Surveyor
 from seerob.transforms import Array
+from seerob.variables.dictionary import Value
+from seerob.variables.signals import Signals
 
 Indices = NDArray[np.int64]
 

@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.distance import Closests, Per, Query, Survey
+from seerob.distances.least import Closests, Per, Query, Survey
 from seerob.errors import Undecided
 from seerob.joint_columns import Columns, moving_dofs
 from seerob.kernels.chain import held_many, jacobians

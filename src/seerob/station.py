@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike
 from seerob import batch
 from seerob import run as road
 from seerob.batch import Batch
-from seerob.compilation import Progress, compile_workstation
 from seerob.criterion import Criterion
 from seerob.errors import InputError, Problem
 from seerob.filing import SOURCES, source_files
 from seerob.given_states import motion_of
 from seerob.live import Listening, LiveSource
 from seerob.model import Model
+from seerob.mounting.compilation import Progress, compile_workstation
+from seerob.mounting.things import MadeArea
 from seerob.permissible import evaluation
 from seerob.permissible.evaluation import PermissibleSpeed, Say, Wish
 from seerob.permissible.joint_limits import Given, joint_limits
@@ -32,7 +33,6 @@ from seerob.run import Bound, Feed, Summary
 from seerob.sink import Sink, Writer
 from seerob.snapshot import Scene
 from seerob.source import Opened, Source
-from seerob.things import MadeArea
 from seerob.workstation import FILE_NAME, Workstation
 
 
@@ -60,7 +60,7 @@ class Station:
         """Areas that are swept, from a run of the same workstation without them."""
         if not any(area.swept for area in self.workstation.areas):
             return {}
-        from seerob.swept_areas import in_place, make, without_swept
+        from seerob.volumes.areas import in_place, make, without_swept
 
         with in_place(self.workstation):
             bare = Station(without_swept(self.workstation), cache=cache, progress=progress)

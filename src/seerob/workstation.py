@@ -12,9 +12,10 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Struct
 
-from seerob.display_table import Display
 from seerob.errors import InputError
-from seerob.machine_tables import Belt, Motion, Slide, Turn, Vehicle
+from seerob.machines.display_table import Display
+from seerob.machines.tables import Belt, Motion, Slide, Turn, Vehicle
+from seerob.mounting.simple_shape import Shape as Shape  # noqa: PLC0414
 from seerob.quantities import (
     Coordinate,
     Density,
@@ -31,11 +32,10 @@ from seerob.quantities import (
 )
 from seerob.quantities import Metres3 as Metres3  # noqa: PLC0414
 from seerob.quantities import Pose as Pose  # noqa: PLC0414
-from seerob.sensor_tables import Sensor
-from seerob.simple_shape import Shape as Shape  # noqa: PLC0414
-from seerob.target_table import CartesianTarget
+from seerob.sensors.tables import Sensor
 from seerob.task_phase import TaskPhase
-from seerob.trigger_table import Trigger
+from seerob.writing.target_table import CartesianTarget
+from seerob.writing.trigger_table import Trigger
 
 FILE_NAME = "workstation.toml"
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from seerob import cli
 from seerob.commands import Exit
 from seerob.commands.emulating import siemens_web
-from seerob.dictionary import read
-from seerob.dictionary_skeleton import skeleton
 from seerob.errors import InputError
 from seerob.sources._variables import Node
+from seerob.variables.dictionary import read
+from seerob.variables.skeleton import skeleton
 
 STATION = """
 variables = "variables.toml"

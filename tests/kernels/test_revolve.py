@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from seerob.kernels.revolve import profile, revolve
-from seerob.voxels import VoxelGrid
+from seerob.volumes.voxels import VoxelGrid
 
 
 @pytest.mark.parametrize("axis", [(0, 0, 1), (1, 1, 1), (0.3, -0.8, 0.2)])

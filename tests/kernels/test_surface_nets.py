@@ -6,7 +6,7 @@ import trimesh
 
 from made_sweep import inside
 from seerob.geometry import Mesh
-from seerob.voxels import VoxelGrid
+from seerob.volumes.voxels import VoxelGrid
 
 
 def grid_of(marked, pitch=0.1):

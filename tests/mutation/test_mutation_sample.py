@@ -49,7 +49,10 @@ def test_equivalent_mutants_have_a_reason_and_are_named_once():
 
 @pytest.mark.parametrize(
     ("only", "tests"),
-    [("collision.py", "tests/test_collision.py"), ("stopping.py", "tests/test_stopping.py")],
+    [
+        ("contact/collision.py", "tests/contact/test_collision.py"),
+        ("stopping/terms.py", "tests/stopping/test_stopping.py"),
+    ],
 )
 def test_a_sample_is_killed(only, tests):
     """In a process of its own: it changes living code."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, UR10, heard, judged, made, results_at, state_at, two_r
-from seerob.contact_regions import FORBIDDEN, REGIONS
+from seerob.contact.regions import FORBIDDEN, REGIONS
 from seerob.engine import Engine
 from seerob.errors import InputError
 from seerob.norms.body_limits import SHIPPED

@@ -7,7 +7,7 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
 from seerob.errors import InputError, UnknownName
-from seerob.offset_shell import offset_shell
+from seerob.volumes.offset_shell import offset_shell
 
 CELL = (
     FLOATING

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, UR10, heard, judged, made, results_at, state_at, two_r
-from seerob import stop_models
 from seerob.engine import Engine
 from seerob.errors import InputError
-from seerob.stop_simulation import StopSimulation
+from seerob.stopping import models as stop_models
+from seerob.stopping.simulated import StopSimulation
 
 PERSON = (
     '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = {{ position = [{x}, 0, -1] }}\n'

@@ -10,7 +10,7 @@ from seerob.errors import InputError
 from seerob.geometry import Mesh
 from seerob.run import Judge
 from seerob.snapshot import Verdict
-from seerob.swept import swept_volume
+from seerob.volumes.swept import swept_volume
 
 SWEPT = '[[safety]]\nkind = "swept_volume"\nname = "swept"\nof = "arm"\nvoxel = 0.05\n'
 

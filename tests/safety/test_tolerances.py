@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob.contact.impact_mass import simplified_mass
 from seerob.errors import InputError
-from seerob.impact_mass import simplified_mass
-from seerob.mass_tolerances import MassTolerances
+from seerob.mounting.mass_tolerances import MassTolerances
 from seerob.tolerances import Tolerance, deciding, spread
 
 POSE = ((0.0, np.pi / 2), (1.0, -2.0))
@@ -273,7 +273,7 @@ def test_permissible_speed_lies_between_those_of_the_ends(tmp_path):
     assert mass == pytest.approx(4.0)
 
     def speed(m, k, A):
-        from seerob import collision
+        from seerob.contact import collision
 
         mu = collision.reduced_mass(40.0, m)
         by_force = collision.speed_at_force(280.0, mu, k * 25e3)

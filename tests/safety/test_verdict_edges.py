@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob.contact_areas import area_results, margin
-from seerob.contact_limits import Judged, RegionArrays
-from seerob.contact_shape import ContactShape, force_at_pressure
-from seerob.contact_tolerances import area_verdict, ranks
+from seerob.contact.areas import area_results, margin
+from seerob.contact.limits import Judged, RegionArrays
+from seerob.contact.shape import ContactShape, force_at_pressure
+from seerob.contact.tolerances import area_verdict, ranks
 from seerob.criterion import judge, judge_interval, worst
 from seerob.errors import InputError
 from seerob.judging import Judge

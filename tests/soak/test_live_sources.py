@@ -86,9 +86,9 @@ def vrpn(_):
 
 
 def siemens_web(patch):
-    from seerob.dictionary import Variable
     from seerob.emulators.siemens_web import SiemensWebServer
     from seerob.sources.siemens_web import SiemensWeb
+    from seerob.variables.dictionary import Variable
 
     patch.setenv("PLC_PASSWORD", "secret")
     speed = Variable(name="speed", source="plc", address="speed", unit="mm/s", timeout=1)
@@ -99,9 +99,9 @@ def siemens_web(patch):
 
 def opcua(_):
     pytest.importorskip("asyncua")
-    from seerob.dictionary import Variable
     from seerob.emulators.opcua import URI, Emulated, OpcuaServer
     from seerob.sources.opcua import Opcua
+    from seerob.variables.dictionary import Variable
 
     address = f"nsu={URI};s=Belt/position"
     position = Variable(name="position", source="plc", address=address, unit="mm", timeout=1)

@@ -20,7 +20,6 @@ from live_story import Story, lived, open_files, wait_for
 from made_cell import made
 from seerob import cli
 from seerob.commands.emulating import modbus as emulating
-from seerob.dictionary import Kind, Variable
 from seerob.emulators.modbus import ModbusServer
 from seerob.emulators.modbus_robot import program
 from seerob.errors import InputError, UnknownName
@@ -31,6 +30,7 @@ from seerob.samples import JointSample, Quality, SignalSample
 from seerob.source import Target
 from seerob.sources.modbus import Modbus
 from seerob.sources.modbus_robot import ModbusRobot
+from seerob.variables.dictionary import Kind, Variable
 
 HOME, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([0.4, 0.2, 0.3, 0.2, 0.4, 0.3])
 DOOSAN = load("doosan", Path())

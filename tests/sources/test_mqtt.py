@@ -14,12 +14,12 @@ import pytest
 from paho.mqtt import publish
 
 from live_story import open_files, wait_for
-from seerob.dictionary import Kind, Variable
 from seerob.errors import InputError
 from seerob.live import Listener
 from seerob.protocols.sparkplug import Metric, Payload, encode
 from seerob.source import Target
 from seerob.sources.mqtt import Mqtt, Plain, address, plain_change
+from seerob.variables.dictionary import Kind, Variable
 
 pytest.importorskip("aiomqtt")
 

@@ -14,7 +14,6 @@ pytest.importorskip("asyncua")
 
 from live_story import Story, lived, wait_for
 from made_cell import made
-from seerob.dictionary import Kind, Variable
 from seerob.emulators.opcua import URI, Emulated, OpcuaServer
 from seerob.errors import InputError
 from seerob.live import Listener
@@ -25,7 +24,8 @@ from seerob.samples import JointSample, SignalSample
 from seerob.source import Target
 from seerob.sources.opcua import Opcua
 from seerob.sources.opcua_robot import OpcuaRobot
-from seerob.variable_units import UNITS
+from seerob.variables.dictionary import Kind, Variable
+from seerob.variables.units import UNITS
 
 HOME, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([0.5, 0.3, -0.3, 0.4, -0.4, 0.5])
 

@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from live_story import wait_for
-from seerob.dictionary import Kind, Variable
 from seerob.emulators.siemens_web import SiemensWebServer
 from seerob.errors import InputError
 from seerob.live import Listener
@@ -20,6 +19,7 @@ from seerob.protocols import ProtocolError
 from seerob.protocols.s7_web import reading, result, results
 from seerob.source import Target
 from seerob.sources.siemens_web import SiemensWeb
+from seerob.variables.dictionary import Kind, Variable
 
 SPEED = Variable(name="belt/speed", source="plc", address='"Belt".speed', unit="mm/s", timeout=1)
 RUNS = Variable(name="belt/runs", source="plc", address='"Belt".runs', type=Kind.BOOL, timeout=1)

@@ -24,10 +24,10 @@ from seerob.commands.sinks import file_of, refuse_existing, sinks_of, tell_files
 from seerob.errors import InputError
 
 if TYPE_CHECKING:
-    from seerob.cartesian_targets import CartesianTargets
     from seerob.snapshot import Scene
     from seerob.station import Station
-    from seerob.triggers import Triggers
+    from seerob.writing.cartesian_targets import CartesianTargets
+    from seerob.writing.triggers import Triggers
 
 HELP = "run a workstation live: sources connect, the page opens, recording starts"
 EXAMPLE = "seerob run my_cell            (then open the address it prints; Ctrl-C ends the run)"
@@ -132,7 +132,7 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
 
 def _triggers(station: Station, *, allow: bool) -> list[Triggers]:
     """What writes to machines; nothing unless file and command line both allow it, which is said."""
-    from seerob.triggers import Triggers, allowed
+    from seerob.writing.triggers import Triggers, allowed
 
     names = ", ".join(trigger.variable for trigger in station.workstation.triggers)
     if allowed(station.model, on_command_line=allow):
@@ -147,7 +147,7 @@ def _triggers(station: Station, *, allow: bool) -> list[Triggers]:
 
 def _targets(station: Station, *, allow: bool) -> list[CartesianTargets]:
     """What publishes Cartesian targets; nothing unless file and command line both allow it, which is said."""
-    from seerob.cartesian_targets import CartesianTargets, targets_allowed
+    from seerob.writing.cartesian_targets import CartesianTargets, targets_allowed
 
     topics = ", ".join(f"{target.topic} ({target.host})" for target in station.workstation.targets)
     if targets_allowed(station.model, on_command_line=allow):

@@ -62,10 +62,10 @@ def run(options: argparse.Namespace) -> int:
     if not options.output.parent.is_dir():
         raise InputError.at(options.output, "", "its folder does not exist", "make it, or give another place")
     station = compiled(options.workstation, sources=not options.reach)
-    from seerob.moving import reach_box
-    from seerob.reachable import reachable_volume
-    from seerob.swept import swept_volume
-    from seerob.voxels import check_room
+    from seerob.volumes.moving import reach_box
+    from seerob.volumes.reachable import reachable_volume
+    from seerob.volumes.swept import swept_volume
+    from seerob.volumes.voxels import check_room
 
     model = station.model
     bodies = model.select(_subject(station, options.of))
@@ -111,7 +111,7 @@ def _motion(station: Station, start: float, end: float | None) -> dict[str, Arra
         raise InputError.at(
             "seerob swept", "--from", f"{start:g} s is after {last:g} s", "begin before the end"
         )
-    from seerob.swept_areas import MotionRecord
+    from seerob.volumes.areas import MotionRecord
 
     path = MotionRecord(start, last)
     with progress(station.duration, f"{station.duration:.1f} s of motion") as tick:

@@ -12,10 +12,10 @@ from seerob.commands.run import Stopped
 from seerob.errors import InputError, SeerobError
 
 if TYPE_CHECKING:
-    from seerob.dictionary import Variable
     from seerob.samples import Sample
     from seerob.sources._variables import Node, VariablesSource
     from seerob.station import Station
+    from seerob.variables.dictionary import Variable
 
 HELP = "what the variable dictionary covers, what is heard of it, and a skeleton by browsing a device"
 EXAMPLE = "seerob variables my_cell --browse plc   > variables.toml"
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     if not variables:
         what = "the workstation names no dictionary"
         raise InputError.at(options.workstation, "variables", what, 'add variables = "variables.toml"')
-    from seerob.variable_binding import uses
+    from seerob.variables.binding import uses
 
     used: dict[str, list[str]] = {}
     for key, name, _ in uses(station.workstation):
@@ -109,11 +109,11 @@ def _listen(station: Station, wait: float) -> dict[str, str]:
 def _browse(path: Path, name: str) -> int:
     import asyncio
 
-    from seerob.dictionary_skeleton import skeleton
     from seerob.errors import suggestion
     from seerob.live import because
     from seerob.reading import readable
     from seerob.sources._variables import VariablesSource
+    from seerob.variables.skeleton import skeleton
 
     # The dictionary may not be there yet, or may not be right yet.
     found = readable(path)
@@ -135,7 +135,7 @@ def _browse(path: Path, name: str) -> int:
 async def _nodes(source: VariablesSource) -> list[Node]:
     from contextlib import aclosing
 
-    from seerob.dictionary import MOST_VARIABLES
+    from seerob.variables.dictionary import MOST_VARIABLES
 
     nodes: list[Node] = []
     async with aclosing(source.browse()) as found:

@@ -1,4 +1,4 @@
-r"""Permissible speeds of many surfaces against many body regions: `seerob.collision` in one loop."""
+r"""Permissible speeds of many surfaces against many body regions: `seerob.contact.collision` in one loop."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def permissible_speeds(
         energy: Printed transient energy [J], NaN when there is none, shape (r,).
 
     Returns:
-        The least [m/s]; which it is (`seerob.collision.Governing`); by force, pressure, energy [m/s]; reduced
-        mass [kg]; shape (b, r) each.
+        The least [m/s]; which it is (`seerob.contact.collision.Governing`); by force, pressure, energy [m/s];
+        reduced mass [kg]; shape (b, r) each.
     """
     b, r = clamped.shape
     least, by_force, by_pressure, by_energy, reduced = (

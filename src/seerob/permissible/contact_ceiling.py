@@ -11,9 +11,9 @@ import math
 import numpy as np
 from msgspec.structs import replace as changed
 
-from seerob.collision import Governing
-from seerob.contact_limits import Judged
-from seerob.contact_regions import REGIONS, without_limit
+from seerob.contact.collision import Governing
+from seerob.contact.limits import Judged
+from seerob.contact.regions import REGIONS, without_limit
 from seerob.model import Model
 from seerob.permissible.ceiling import Answer, Ceiling, Figure
 from seerob.safety.power_and_force import STANDSTILL, Contacts, PowerAndForce

@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.model import Model
-from seerob.moving import Joints, chain_of
 from seerob.permissible.given_motion import GivenMotion, largest_on
 from seerob.transforms import Array
+from seerob.volumes.moving import Joints, chain_of
 
 
 @dataclass(frozen=True, eq=False)

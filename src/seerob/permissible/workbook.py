@@ -24,6 +24,7 @@ from seerob.permissible.tables import (
     trajectory_rows,
 )
 from seerob.sinks._sheets import Sheets
+from seerob.sinks._xlsx import Workbook
 from seerob.snapshot import Scene
 
 INPUT_HEAD: list[Cell] = ["of", "input", "value", "unit", "origin", "source"]
@@ -48,11 +49,9 @@ def workbook(found: PermissibleSpeed, cut: Sequence[PathSegment], scene: Scene, 
         scene: Of the workstation, for hashes and where inputs are from.
         period: Of the rescaled motion's rows [s].
     """
-    from openpyxl import Workbook
-
-    book = Workbook(write_only=True)
-    sheets = Sheets(book)
-    try:
+    out = io.BytesIO()
+    with Workbook(out) as book:
+        sheets = Sheets(book)
         sheets.add("Summary", ["what", "value"], _summary(found, scene), fit=True)
         sheets.add("Segments", list(SEGMENT_HEAD), segment_rows(cut))
         sheets.add("Map", list(map_head(found.map)), map_rows(found.map))
@@ -66,10 +65,6 @@ def workbook(found: PermissibleSpeed, cut: Sequence[PathSegment], scene: Scene, 
         sheets.add("Inputs", INPUT_HEAD, _inputs(found, scene), fit=True)
         about: list[list[Cell]] = [[f.level, f.subject, f.text] for f in (*scene.findings, *found.findings)]
         sheets.add("Findings", ["level", "about", "text"], about, fit=True)
-    finally:
-        sheets.close()
-    out = io.BytesIO()
-    book.save(out)
     return out.getvalue()
 
 

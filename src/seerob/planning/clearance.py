@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from seerob.distance import Per, Query, Survey
+from seerob.distances.least import Per, Query, Survey
 from seerob.errors import InputError, Problem
 from seerob.model import Mechanism, Model
 from seerob.permissible.moving_joints import Chain, chains_of

@@ -13,12 +13,12 @@ import msgspec
 from msgspec import Meta
 
 from seerob.conversion import convert
-from seerob.dictionary import Kind, Variable
 from seerob.errors import InputError, Problem, UnknownName
 from seerob.protocols.modbus import MOST, Block, Place, Table, Type, Words, blocks
 from seerob.quantities import Seconds
 from seerob.toml_file import read_toml
-from seerob.variable_units import unit
+from seerob.variables.dictionary import Kind, Variable
+from seerob.variables.units import unit
 
 MOST_SIGNALS = 200
 MOST_JOINTS = 12

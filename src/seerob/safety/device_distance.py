@@ -22,8 +22,8 @@ from seerob.kernels.speed import stacked
 from seerob.model import Model
 from seerob.norms import iso_13855
 from seerob.norms.iso_13855 import Approach, Edition
-from seerob.sensing import Names, bodies_of, carriers_of, names_of
-from seerob.sensor_tables import Sensor
+from seerob.sensors.sensing import Names, bodies_of, carriers_of, names_of
+from seerob.sensors.tables import Sensor
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.state import State
 from seerob.transforms import Array

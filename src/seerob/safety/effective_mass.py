@@ -10,11 +10,11 @@ from msgspec import Meta
 
 from seerob import provenance
 from seerob.answers import Answers
+from seerob.contact.impact_mass import simplified_mass
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
-from seerob.impact_mass import simplified_mass
 from seerob.kernels.axes import mobility, principal_axes, reciprocals
-from seerob.mass_tolerances import MassTolerances, Matrices
 from seerob.model import Mechanism, Model
+from seerob.mounting.mass_tolerances import MassTolerances, Matrices
 from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Ellipsoid, Result, Verdict
 from seerob.state import State

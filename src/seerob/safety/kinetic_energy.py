@@ -10,8 +10,8 @@ from msgspec import Meta
 from seerob import provenance
 from seerob.answers import Answers
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
-from seerob.mass_tolerances import MassTolerances
 from seerob.model import Model
+from seerob.mounting.mass_tolerances import MassTolerances
 from seerob.snapshot import Basis, Result, Sphere, Verdict
 from seerob.state import State
 from seerob.states import States

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.criterion import Criterion, Evaluate
+from seerob.distances.rays import Rays
 from seerob.model import Model
-from seerob.rays import Rays
-from seerob.sensing import (
+from seerob.sensors.sensing import (
     Names,
     Presence,
     Seen,
@@ -21,7 +21,7 @@ from seerob.sensing import (
     others,
     sensor_of,
 )
-from seerob.sensor_tables import Sensor
+from seerob.sensors.tables import Sensor
 from seerob.snapshot import Basis, Marker, Result, Segment, Verdict
 from seerob.state import State
 from seerob.transforms import Array

@@ -11,7 +11,7 @@ from seerob import provenance
 from seerob.answers import Answers
 from seerob.body_place import BodyPlaces
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge_interval
-from seerob.distance import Reach
+from seerob.distances.least import Reach
 from seerob.errors import InputError
 from seerob.model import Gap, Model
 from seerob.partly_seen import partly_seen

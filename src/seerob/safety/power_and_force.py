@@ -11,16 +11,19 @@ from msgspec import Meta, field
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from seerob import collision, contact_limits, contact_shape, figures, provenance
-from seerob.contact_areas import NOT_MODELLED, area_results, margin
-from seerob.contact_clamping import Clamping, floor_input
-from seerob.contact_limits import Judged
-from seerob.contact_regions import REGIONS, Person, without_limit
-from seerob.contact_rows import ContactRows
-from seerob.contact_tolerances import ContactEnds, ranks, robot_masses
+from seerob import figures, provenance
+from seerob.contact import collision
+from seerob.contact import limits as contact_limits
+from seerob.contact import shape as contact_shape
+from seerob.contact.areas import NOT_MODELLED, area_results, margin
+from seerob.contact.clamped_regions import Clamping, floor_input
+from seerob.contact.impact_mass import masses_along_motion, moving_masses, simplified_mass
+from seerob.contact.limits import Judged
+from seerob.contact.regions import REGIONS, Person, without_limit
+from seerob.contact.rows import ContactRows
+from seerob.contact.tolerances import ContactEnds, ranks, robot_masses
 from seerob.criterion import Criterion, Evaluate, worst
 from seerob.errors import Undecided, UnknownName
-from seerob.impact_mass import masses_along_motion, moving_masses, simplified_mass
 from seerob.kernels.contact_speeds import governing
 from seerob.model import Frame, Model
 from seerob.norms import body_limits

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from seerob.criterion import Criterion, Evaluate
 from seerob.model import Model
-from seerob.sensing import Names, Presence, Seen, Sight, bodies_of, names_of, sensor_of
+from seerob.sensors.sensing import Names, Presence, Seen, Sight, bodies_of, names_of, sensor_of
 from seerob.snapshot import Basis, Result
 from seerob.state import State
 

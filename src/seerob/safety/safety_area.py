@@ -12,8 +12,8 @@ from msgspec import Meta
 
 from seerob import provenance
 from seerob.criterion import Criterion, Evaluate
-from seerob.depth import Depth, Depths
-from seerob.distance import Closests
+from seerob.distances.depth import Depth, Depths
+from seerob.distances.least import Closests
 from seerob.errors import InputError, UnknownName
 from seerob.model import Gap, Model
 from seerob.snapshot import Basis, Highlight, Marker, Result, Segment, Verdict

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from seerob import markers
 from seerob.criterion import Criterion, Evaluate
+from seerob.distances.rays import Rays
 from seerob.errors import InputError, Undecided
-from seerob.floor_polygon import contains
 from seerob.model import Model
-from seerob.rays import Rays
-from seerob.scan import Coverage, beam_angles, directions, outline, spans
-from seerob.sensing import (
+from seerob.sensors.scan import Coverage, beam_angles, directions, outline, spans
+from seerob.sensors.sensing import (
     Names,
     Presence,
     Seen,
@@ -27,11 +26,12 @@ from seerob.sensing import (
     others,
     sensor_of,
 )
-from seerob.sensor_tables import MonitoredField as Field
-from seerob.sensor_tables import Sensor
+from seerob.sensors.tables import MonitoredField as Field
+from seerob.sensors.tables import Sensor
 from seerob.snapshot import Basis, Result
 from seerob.state import State
 from seerob.transforms import Array
+from seerob.volumes.floor_polygon import contains
 
 FINER = 64
 """Beams that a body's seen width is measured with."""

@@ -12,19 +12,19 @@ from msgspec.structs import replace
 from seerob import figures, provenance
 from seerob.body_place import BodyPlaces
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge_interval, worst
-from seerob.detection import Detection, device_of
 from seerob.errors import InputError, Undecided
-from seerob.largest_separation import LargestSeparation
 from seerob.model import Gap, Model
 from seerob.norms import iso_13855
 from seerob.norms.iso_13855 import WALKING
 from seerob.partly_seen import partly_seen
-from seerob.separation_many import separations
+from seerob.sensors.detection import Detection, device_of
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.state import State
-from seerob.stop_models import MOVING, Stop, StopModel, bind_stop
-from seerob.stop_tolerances import SIMULATED, SeparationEnds, intervals, tolerances
-from seerob.stopping import At, Course, largest_scale, separation_distance, way_of_person
+from seerob.stopping.largest import LargestSeparation
+from seerob.stopping.many_instants import separations
+from seerob.stopping.models import MOVING, Stop, StopModel, bind_stop
+from seerob.stopping.terms import At, Course, largest_scale, separation_distance, way_of_person
+from seerob.stopping.tolerances import SIMULATED, SeparationEnds, intervals, tolerances
 from seerob.tolerances import deciding
 from seerob.tracking_error import TrackingError, tracking
 from seerob.transforms import Array

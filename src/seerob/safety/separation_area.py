@@ -17,14 +17,14 @@ from msgspec import Meta
 
 from seerob import provenance
 from seerob.criterion import Criterion, Evaluate
-from seerob.distance import Per
+from seerob.distances.least import Per
 from seerob.errors import InputError, UnknownName
 from seerob.model import Model
-from seerob.offset_shell import offset_shell
-from seerob.sensing import Names, bodies_of, names_of
+from seerob.sensors.sensing import Names, bodies_of, names_of
 from seerob.snapshot import Basis, Highlight, Hull, Marker, Result, Segment, Verdict
 from seerob.state import State
 from seerob.transforms import Array
+from seerob.volumes.offset_shell import offset_shell
 
 
 class SeparationArea(Criterion, frozen=True, kw_only=True):

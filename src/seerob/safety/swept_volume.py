@@ -10,11 +10,11 @@ from seerob import provenance
 from seerob.criterion import Criterion, Evaluate, judge
 from seerob.errors import InputError, Undecided
 from seerob.model import Model
-from seerob.moving import reach_box
 from seerob.snapshot import Basis, Hull, Input, Origin, Result, Verdict
 from seerob.state import State
-from seerob.swept import Sweep
-from seerob.voxels import check_room
+from seerob.volumes.moving import reach_box
+from seerob.volumes.swept import Sweep
+from seerob.volumes.voxels import check_room
 
 DRAWN = 2000
 """Triangles of the surface as drawn, about; it still contains every voxel."""

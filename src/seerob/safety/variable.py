@@ -9,11 +9,11 @@ from msgspec import Meta
 
 from seerob import provenance
 from seerob.criterion import Criterion, Evaluate, judge
-from seerob.dictionary import Kind, Value
 from seerob.errors import InputError
 from seerob.model import Model
 from seerob.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.state import State
+from seerob.variables.dictionary import Kind, Value
 
 
 class MachineVariable(Criterion, frozen=True, kw_only=True):

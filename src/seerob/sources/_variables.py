@@ -16,11 +16,11 @@ from typing import ClassVar, NamedTuple, Self
 
 from msgspec.structs import replace
 
-from seerob.dictionary import BadValue, Value, Variable
 from seerob.live import LiveSource
 from seerob.quantities import Seconds
 from seerob.samples import Sample, SignalSample
 from seerob.source import Target
+from seerob.variables.dictionary import BadValue, Value, Variable
 
 BEAT = 0.05
 """A sample is sent at least this often while there is a connection [s]: no news is news, too."""

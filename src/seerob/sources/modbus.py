@@ -10,7 +10,6 @@ from typing import Annotated, ClassVar
 import msgspec
 from msgspec import Meta
 
-from seerob.dictionary import Variable
 from seerob.errors import InputError, Problem
 from seerob.protocols import modbus
 from seerob.protocols.modbus import Place
@@ -19,6 +18,7 @@ from seerob.quantities import Seconds
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.sources._variables import Change, Node, VariablesSource
+from seerob.variables.dictionary import Variable
 
 
 class Modbus(VariablesSource, frozen=True, kw_only=True):

@@ -16,7 +16,6 @@ from typing import Annotated
 from msgspec import Meta
 from msgspec.structs import replace
 
-from seerob.dictionary import BadValue
 from seerob.errors import InputError
 from seerob.live import LiveSource
 from seerob.protocols import ProtocolError, modbus
@@ -28,6 +27,7 @@ from seerob.samples import JointSample, Quality, Sample, SignalSample
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.trajectory import MotionOrigin, origin_finding
+from seerob.variables.dictionary import BadValue
 
 Values = Mapping[str, int | float | bool]
 COARSE = "its registers are too coarse for energies, impact and measured torques"

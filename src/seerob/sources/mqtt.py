@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import msgspec
 from msgspec import Meta
 
-from seerob.dictionary import Variable
 from seerob.errors import InputError, Problem, SeerobError
 from seerob.protocols import ProtocolError, sparkplug
 from seerob.protocols.json_pointer import at, document, parts
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.sources._variables import BEAT, Change, Node, VariablesSource
+from seerob.variables.dictionary import Variable
 
 if TYPE_CHECKING:
     import aiomqtt

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import msgspec
 from msgspec import Meta
 
-from seerob.dictionary import Kind, Variable
 from seerob.errors import InputError, Problem
 from seerob.protocols import ProtocolError
 from seerob.protocols.opcua_client import (
@@ -27,6 +26,7 @@ from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.sources._opcua_files import at_home, missing
 from seerob.sources._variables import Change, Node, VariablesSource
+from seerob.variables.dictionary import Kind, Variable
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client

@@ -22,7 +22,7 @@ from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.sources._opcua_files import at_home, missing
 from seerob.trajectory import MotionOrigin, origin_finding
-from seerob.variable_units import unit
+from seerob.variables.units import unit
 
 SIGNAL_PERIOD = 0.1
 """Signals are repeated after this time, or when a state changes [s]."""

@@ -15,13 +15,13 @@ from urllib.parse import urlsplit
 from msgspec import Meta
 from msgspec.structs import replace
 
-from seerob.dictionary import Variable
 from seerob.errors import InputError, Problem
 from seerob.protocols import ProtocolError, s7_web
 from seerob.quantities import Seconds
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.sources._variables import Change, Node, VariablesSource
+from seerob.variables.dictionary import Variable
 
 if TYPE_CHECKING:
     import httpx
@@ -124,7 +124,7 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
                         yield Node(below, str(entry.get("datatype", "")), "", "")
 
     async def write(self, variable: Variable, raw: bool, folder: Path) -> None:
-        """Write one bool; called by `seerob.triggers` alone."""
+        """Write one bool; called by `seerob.writing.triggers` alone."""
         async with self._session(folder) as session:
             s7_web.result(await session.post(s7_web.writing(variable.address, raw)))
 

@@ -11,11 +11,11 @@ from typing import Annotated, ClassVar, Literal, TextIO
 
 from msgspec import Meta
 
-from seerob.dictionary import BadValue, Kind, Value, Variable
 from seerob.errors import InputError, Problem, suggestion
 from seerob.samples import Sample, SignalSample
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
+from seerob.variables.dictionary import BadValue, Kind, Value, Variable
 
 MOST_ROWS = 1_000_000
 LONGEST_LINE = 100_000

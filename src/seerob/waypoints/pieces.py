@@ -1,17 +1,19 @@
-r"""Pieces of a path: tables of joint positions over the way, with exact tangents, between which cubics run.
+r"""Pieces of a path: joint positions as curves over the way, twice continuously differentiable.
 
 A joint move is a straight line in joint space. A linear or circular one is solved at close points from the
-one before, so that it stays on its branch, with tangents :math:`dq/ds = J^+ \, (dp/ds, \omega)`. Where a
-path is rounded off it is the quintic in joint space that has position, tangent and curvature of both sides:
-accelerations of the joints do not jump there.
+one before, so that it stays on its branch, and a cubic spline runs through them. Where a path is rounded
+off it is the quintic in joint space that has position, velocity and acceleration of both sides: at the
+joins of pieces no acceleration of a joint jumps.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from seerob.errors import InputError
 from seerob.transforms import Array, rotation_from_axis_angle
@@ -26,21 +28,17 @@ REACHED = 1e-7
 """Error of a solved point [m, rad]."""
 SINGULAR = 0.02
 """A least singular value of the Jacobian (m and rad alike) below it is a passage by a singularity."""
-ROUNDING_POINTS = 65
-LEAVING = 1.6
-"""Slope of a rounding at its ends, per length cut off: of 1 to 2.5 the one that is passed fastest."""
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
     """A piece of the path."""
 
-    s: Array
-    """Way from its begin, shape (k,): of the tool point [m], or in joint space [rad or m]."""
-    q: Array
-    """Joint positions, shape (k, n) [rad or m]."""
-    dq: Array
-    """Tangents dq/ds, shape (k, n)."""
+    curve: Any
+    """Joint positions over the way, a `scipy.interpolate` polynomial: ``curve(s, order)``, shape (…, n)."""
+    start: float
+    """Place of its begin on the curve: way of the tool point [m], or in joint space [rad or m]."""
+    end: float
     tool: bool
     """Whether the way is that of the tool point."""
     leading: float = 1.0
@@ -57,28 +55,37 @@ class Piece:
     @property
     def length(self) -> float:
         """Of the way."""
-        return float(self.s[-1] - self.s[0])
+        return self.end - self.start
 
-    def at(self, s: Array) -> tuple[Array, Array]:
-        """Joint positions and tangents at places of the way, counted from its begin, shape (m, n) each."""
-        s = np.clip(np.asarray(s, float) + self.s[0], self.s[0], self.s[-1])
-        k = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
-        h = (self.s[k + 1] - self.s[k])[:, None]
-        x = (s - self.s[k])[:, None] / h
-        a, b, c, d = self.q[k], self.q[k + 1], h * self.dq[k], h * self.dq[k + 1]
-        c2, c3 = 3 * (b - a) - 2 * c - d, c + d - 2 * (b - a)
-        return a + x * (c + x * (c2 + x * c3)), (c + x * (2 * c2 + 3 * x * c3)) / h
+    @property
+    def last(self) -> Array:
+        """Joint positions at its end, shape (n,)."""
+        return self.derivative(self.length, 0)
+
+    def derivative(self, s: ArrayLike, order: int) -> Array:
+        """Derivatives of the joint positions by the way, at places counted from its begin, shape (…, n)."""
+        place = np.clip(np.asarray(s, float) + self.start, self.start, self.end)
+        return np.asarray(self.curve(place, order))
+
+    def fastest(self) -> Array:
+        """Largest speed of each joint per speed along the way, shape (n,)."""
+        inside = self.curve.x[(self.curve.x > self.start) & (self.curve.x < self.end)]
+        return np.asarray(np.abs(self.curve(np.array([self.start, *inside, self.end]), 1)).max(axis=0))
 
     def part(self, start: float, end: float) -> Piece:
         """The piece from one place of the way to another."""
-        inside = (self.s - self.s[0] > start + 1e-12) & (self.s - self.s[0] < end - 1e-12)
-        ends, tangents = self.at(np.array([start, end]))
-        return replace(
-            self,
-            s=np.concatenate([[start], (self.s - self.s[0])[inside], [end]]),
-            q=np.vstack([ends[:1], self.q[inside], ends[1:]]),
-            dq=np.vstack([tangents[:1], self.dq[inside], tangents[1:]]),
-        )
+        return replace(self, start=self.start + start, end=self.start + end)
+
+
+@dataclass(frozen=True, eq=False)
+class Rounding:
+    """A piece that rounds a corner off, passed at a steady rate of its parameter."""
+
+    piece: Piece
+    enter: float
+    """Speed along the piece before it, per rate."""
+    leave: float
+    """Likewise along the piece after it."""
 
 
 def joint_line(a: Array, b: Array) -> Piece | None:
@@ -86,9 +93,14 @@ def joint_line(a: Array, b: Array) -> Piece | None:
     length = float(np.linalg.norm(b - a))
     if length < 1e-9:
         return None
-    tangent = (b - a) / length
-    q = np.vstack([a, b])
-    return Piece(np.array([0.0, length]), q, np.vstack([tangent] * 2), False, float(np.abs(tangent).max()))
+    curve = _curve(np.array([0.0, length]), np.vstack([a, b]))
+    return Piece(curve, 0.0, length, False, float(np.abs(b - a).max()) / length)
+
+
+def _curve(s: Array, q: Array) -> Any:
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(s, q)
 
 
 def tool_way(
@@ -151,13 +163,11 @@ def tool_way(
     J = posture.jacobian()
     sigma = np.linalg.svd(J, compute_uv=False)[:, -1]
     _one_branch(arm, factors(posture) if is_classic(arm) else None, u, file, place)
-    twist = np.concatenate([way.slopes(u), np.broadcast_to(angle * axis, (count, 3))], axis=1)
-    dq = (np.linalg.pinv(J, rcond=1e-9) @ twist[..., None])[..., 0] / length
     worst = int(np.argmin(sigma))
     return Piece(
-        u * length,
-        q,
-        dq,
+        _curve(u * length, q),
+        0.0,
+        length,
         True,
         least=float(sigma[worst]),
         least_at=float(u[worst]),
@@ -188,9 +198,6 @@ class _Straight:
     def point(self, u: float) -> Array:
         return np.asarray(self._a + u * self._d)
 
-    def slopes(self, u: Array) -> Array:
-        return np.broadcast_to(self._d, (len(u), 3))
-
 
 class _Arc:
     fewest = 32
@@ -215,44 +222,22 @@ class _Arc:
         w = u * self.angle
         return np.asarray(self._center + math.cos(w) * self._x + math.sin(w) * self._y)
 
-    def slopes(self, u: Array) -> Array:
-        w = (u * self.angle)[:, None]
-        return np.asarray(self.angle * (-np.sin(w) * self._x + np.cos(w) * self._y))
 
-
-def rounding(before: Piece, after: Piece, cut_before: float, cut_after: float) -> Piece:
-    """The quintic that leaves a piece and enters the next one.
+def rounding(before: Piece, after: Piece, cut_before: float, cut_after: float, slope: float) -> Rounding:
+    """The quintic that leaves a piece and enters the next one, over 0…1.
 
     Args:
         before: The piece that ends in the waypoint.
         after: The one that begins there.
         cut_before: Place of ``before`` where it is left.
         cut_after: Place of ``after`` where it is entered.
+        slope: Of it at its ends, per way that is cut off.
     """
-    A, tA, kA, lA = _end(before, cut_before, before.length - cut_before)
-    B, tB, kB, lB = _end(after, cut_after, cut_after)
-    vA, vB, wA, wB = LEAVING * lA * tA, LEAVING * lB * tB, (LEAVING * lA) ** 2 * kA, (LEAVING * lB) ** 2 * kB
-    c = np.array([A, A + vA / 5, A + 2 * vA / 5 + wA / 20, B - 2 * vB / 5 + wB / 20, B - vB / 5, B])
-    u = np.linspace(0.0, 1.0, 16 * (ROUNDING_POINTS - 1) + 1)
-    q, slope = _bezier(c, u), 5 * _bezier(np.diff(c, axis=0), u)
-    speed = np.linalg.norm(slope, axis=1)
-    s = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(u))])
-    keep = slice(None, None, 16)
-    return Piece(s[keep], q[keep], (slope / speed[:, None])[keep], False)
+    from scipy.interpolate import BPoly
 
-
-def _bezier(c: Array, u: Array) -> Array:
-    degree = len(c) - 1
-    powers = [math.comb(degree, i) * u**i * (1 - u) ** (degree - i) for i in range(degree + 1)]
-    return np.stack(powers, axis=1) @ c
-
-
-def _end(piece: Piece, s: float, remaining: float) -> tuple[Array, Array, Array, float]:
-    """Position, unit tangent, curvature (per length in joint space) and what is cut off, in joint space."""
-    h = max(1e-4 * piece.length, 1e-9)
-    places = np.clip(np.array([s - h, s, s + h]), 0.0, piece.length)
-    q, dq = piece.at(places)
-    size = np.linalg.norm(dq, axis=1)
-    unit = dq / size[:, None]
-    bend = (unit[2] - unit[0]) / ((places[2] - places[0]) * size[1])
-    return q[1], unit[1], bend, remaining * float(size[1])
+    enter, leave = slope * (before.length - cut_before), slope * cut_after
+    ends = [
+        [piece.derivative(s, order) * rate**order for order in range(3)]
+        for piece, s, rate in ((before, cut_before, enter), (after, cut_after, leave))
+    ]
+    return Rounding(Piece(BPoly.from_derivatives([0.0, 1.0], ends), 0.0, 1.0, False), enter, leave)

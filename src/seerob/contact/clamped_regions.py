@@ -1,0 +1,125 @@
+"""Which body regions each moving body of a robot clamps: against surfaces, itself and the floor.
+
+People stand on z = 0 by definition, whether or not a part of the workstation is drawn there: unless told
+otherwise it is a surface, endless and horizontal. A body clamps against it where its lowest point is no
+higher than the body part is thick while any of its points comes down; see `seerob.contact.clamping`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from seerob.contact.clamping import STILL, Flags, robot_pinch_pairs
+from seerob.contact.closing_gaps import ClosingGaps
+from seerob.kernels.approach import lowest_and_falling
+from seerob.kernels.speed import stacked
+from seerob.model import Mechanism, Model
+from seerob.norms.crushing_gaps import crushing_gaps
+from seerob.provenance import given
+from seerob.snapshot import Input, Origin
+from seerob.state import State
+from seerob.transforms import Array
+
+ROOM = 0.1
+"""How far beyond the thickest body part gaps are told [m]."""
+
+
+class FloorGap:
+    """The gap between the moving bodies of a robot and the floor, bound once."""
+
+    def __init__(self, model: Model, moving: Sequence[int], height: float) -> None:
+        """Bind.
+
+        Args:
+            model: The compiled workstation.
+            moving: Bodies that the robot's joints move.
+            height: Of the floor, z in the world [m].
+        """
+        bodies = [model.bodies[i] for i in moving]
+        self._height, self._moving = height, np.array(moving, np.int64)
+        self._corners = stacked([body.corners for body in bodies])
+        self._radius = np.array([body.radius for body in bodies], float)
+
+    def lowest_and_falling(self, state: State) -> Array:
+        """Gap to the floor [m] and largest downward speed [m/s] of each moving body, shape (b, 2)."""
+        found = np.empty((len(self._moving), 2))
+        lowest_and_falling(
+            self._moving, state.rotations, state.positions, *state.body_velocities(),
+            *self._corners, self._radius, found,
+        )  # fmt: skip
+        found[:, 0] -= self._height
+        return found
+
+    def clamped(self, state: State, thickness: Array, wanted: Flags) -> Flags:
+        """Which moving bodies clamp which body parts.
+
+        Args:
+            state: The twin.
+            thickness: Of body parts [m], shape (r,).
+            wanted: Of which bodies and body parts that matters, shape (b, r).
+        """
+        gap, fall = self.lowest_and_falling(state).T
+        return np.asarray((fall > STILL)[:, None] & (gap[:, None] <= thickness) & wanted)
+
+
+class Clamping:
+    """What clamps which body region, bound once."""
+
+    def __init__(
+        self,
+        model: Model,
+        robot: Mechanism,
+        gaps: dict[str, float],
+        regions: Sequence[str],
+        floor: float | None,
+    ) -> None:
+        """Bind.
+
+        Args:
+            model: The compiled workstation.
+            robot: The robot.
+            gaps: Thickness of body regions by name [m], instead of those of ISO 13854.
+            regions: Body regions in the order of the answers.
+            floor: Height of the floor [m]; None when it is no surface.
+        """
+        known = {**crushing_gaps()[0], **gaps}
+        others = [b for b in model.bodies if b.role not in ("human", "area")]
+        # The real surfaces may be nearer than the shapes.
+        deviation = 2 * max((body.deviation for body in others), default=0.0)
+        self._thickness = np.array([known[name] + deviation for name in regions])
+        cap = float(self._thickness.max(initial=0.0)) + ROOM
+        self._gaps = ClosingGaps(
+            model.shapes, robot_pinch_pairs(model, robot, cap=cap), self._thickness, cap=cap
+        )
+        self._floor = None if floor is None else FloorGap(model, robot.moving, floor)
+        self._robots = [name for name, m in model.mechanisms.items() if m.role == "robot"]
+
+    def at(self, state: State, wanted: Flags) -> tuple[Flags, Flags]:
+        """Which moving bodies clamp which regions, and which of those against the floor.
+
+        Args:
+            state: The twin.
+            wanted: Of which bodies, that move now, and which regions that matters, shape (b, r).
+
+        Raises:
+            Undecided: A robot that was not heard.
+        """
+        state.require(*self._robots)
+        twists = state.body_velocities()
+        clamped = self._gaps.clamped(state.t, state.rotations, state.positions, twists, wanted)
+        if self._floor is None:
+            return clamped, np.zeros_like(clamped)
+        floor = self._floor.clamped(state, self._thickness, wanted)
+        return clamped | floor, floor
+
+
+def floor_input(height: float | None) -> Input:
+    """Whether the floor is a surface, and at which height."""
+    name = "floor as a surface that clamps"
+    if height is None:
+        return Input(name=name, value="left out", origin=Origin.GIVEN, source="workstation file")
+    if height:
+        return given(name, height, "m")
+    return Input(name=name, value=0.0, unit="m", origin=Origin.STATED, source="people stand on z = 0")

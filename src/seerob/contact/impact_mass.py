@@ -1,0 +1,59 @@
+r"""Mass that a person hit by a moving part of a robot would feel: by the norm, and along the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from seerob.contact import collision
+from seerob.kernels.speed import directions
+from seerob.model import Mechanism, Model
+from seerob.state import State
+from seerob.transforms import Array
+
+
+def simplified_mass(model: Model, robot: Mechanism) -> float:
+    """M/2 + m_L of ISO/TS 15066:2016 A.4 [kg]: links by half, tools and workpieces in full.
+
+    Means nothing where `Mechanism.unknown_masses` names any.
+    """
+    return float(collision.robot_mass(*moving_masses(model, robot)))
+
+
+def moving_masses(model: Model, robot: Mechanism) -> tuple[float, float]:
+    """M and m_L: mass of the links that the joints move, and of tools and workpieces [kg].
+
+    Mean nothing where `Mechanism.unknown_masses` names any.
+    """
+    names = {int(i): model.mj.body(int(i)).name for i in robot.mj_bodies}
+    masses = {i: float(model.mj.body_mass[i]) for i in names}
+    links = sum(masses[i] for i, name in names.items() if name.startswith(f"{robot.name}/"))
+    return links, sum(masses.values()) - links
+
+
+def masses_along_motion(
+    state: State, robot: Mechanism, bodies: Sequence[int], *, standstill: float, M: Array | None = None
+) -> Array:
+    r"""Effective mass of each body at its fastest point along its motion [kg], shape (b,).
+
+    Args:
+        state: The twin.
+        robot: The robot.
+        bodies: The bodies, by index.
+        standstill: Speed below which a motion has no direction [m/s].
+        M: Another mass matrix than that of the state, shape (n, n).
+
+    Returns:
+        NaN where a body stands still.
+
+    Raises:
+        Undecided: Not heard, or a mass that nobody gave.
+    """
+    M = state.mass_matrix(robot) if M is None else M
+    _, points, velocities = state.fastest_points(tuple(bodies))
+    some, u = directions(velocities, standstill)
+    if not some:
+        return np.full(len(bodies), np.nan)
+    rows = state.along(tuple(bodies), robot, points, u)
+    return np.where(np.isnan(u[:, 0]), np.nan, collision.mass_of_rows(rows, M))

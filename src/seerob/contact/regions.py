@@ -1,0 +1,104 @@
+"""Which body regions of a person each moving part of a robot could hit in the present posture."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.distances.least import Per, Query, Reach
+from seerob.human.skeleton import without_side
+from seerob.human.skin import BODY_REGION
+from seerob.model import Mechanism, Model
+from seerob.norms import body_limits
+from seerob.snapshot import Verdict
+from seerob.state import State
+from seerob.transforms import Array
+
+SENSITIVE = "Larynx, eyes and ears"
+"""In no row of the table; contact is not permitted."""
+FEET = "Feet"
+"""In no row of the table; no limit is available."""
+REGIONS = (*body_limits.REGIONS, SENSITIVE, FEET)
+_WITHIN_CAP = int(Reach.WITHIN_CAP)
+FORBIDDEN = frozenset({*body_limits.FORBIDDEN, SENSITIVE})
+
+
+def without_limit(name: str, permitted: bool, within: str | None, file: str) -> tuple[Verdict, str]:
+    """Verdict on a region that has no permissible speed, and why.
+
+    Args:
+        name: One of `REGIONS`.
+        permitted: What the table says of contact; True when it says nothing.
+        within: What of the robot a person's region is near to; None when there is no person to ask.
+        file: Of the table.
+    """
+    if permitted and name not in FORBIDDEN:
+        return Verdict.UNDECIDED, "no limit available" if name == FEET else f"no limit in {file}"
+    if within is not None:
+        return Verdict.EXCEEDED, f"contact not permitted, {within}"
+    return Verdict.UNDECIDED, (
+        "contact not permitted, and whether it can occur is open without a person: "
+        "name one, or exclude the region if other measures keep it out"
+    )
+
+
+class Person:
+    """The bones of a person by body region, bound once.
+
+    A bone counts for its region in front and for that behind: a person can turn. Head and neck count
+    for larynx, eyes and ears too.
+    """
+
+    def __init__(self, model: Model, robot: Mechanism, human: str, *, horizon: float) -> None:
+        """Bind.
+
+        Args:
+            model: The compiled workstation.
+            robot: A robot with moving bodies that have shapes.
+            human: A human's name.
+            horizon: Distance within which a part could hit a bone [m].
+
+        Raises:
+            UnknownName: No such human.
+        """
+        self.bodies = model.human(human).bodies
+        self._gap = model.gap(robot.moving, self.bodies)
+        # Not the gap's own query: that measures pairs however far they are.
+        reach = float(np.nextafter(horizon + self._gap.deviation, np.inf))
+        self._query = Query(model.shapes, robot.moving, self.bodies, cap=reach)
+        self._names = [model.bodies[body].name for body in self.bodies]
+        self._close: NDArray[np.bool_] = np.zeros(len(self.bodies), bool)
+        self._shape = len(robot.moving), len(self.bodies)
+        self._member = np.zeros((len(self.bodies), len(REGIONS)), bool)
+        for i, body in enumerate(self.bodies):
+            bone = without_side(model.bodies[body].name.rsplit("/", 1)[-1])
+            for region in BODY_REGION[bone]:
+                self._member[i, REGIONS.index(FEET if region is None else region)] = True
+            if bone in ("head", "neck"):
+                self._member[i, REGIONS.index(SENSITIVE)] = True
+
+    def hit(self, region: str) -> tuple[str, ...]:
+        """Full names of the bones of one of `REGIONS` that were within the horizon at the latest `near`."""
+        return tuple(
+            self._names[i] for i in np.flatnonzero(self._close & self._member[:, REGIONS.index(region)])
+        )
+
+    def near(self, state: State, speed: float | None) -> tuple[NDArray[np.bool_], Array]:
+        """What could be hit.
+
+        Args:
+            state: The twin.
+            speed: Of every region, instead of the observed one [m/s].
+
+        Returns:
+            Per moving body and region, shape (b, len(REGIONS)), and bounds on the regions' speeds [m/s].
+        """
+        state.require(*self._gap.carriers)
+        found = state.distances(self._query, Per.WHETHER)
+        close: NDArray[np.bool_] = np.asarray(found.reach == _WITHIN_CAP).reshape(self._shape)
+        self._close = np.asarray(close.any(axis=0))
+        near: NDArray[np.bool_] = close @ self._member
+        if speed is not None:
+            return near, np.full(len(REGIONS), speed)
+        v = np.where(self._close, state.fastest_points(self.bodies)[0], 0.0)
+        return near, np.asarray(np.max(v[:, None] * self._member, axis=0))

@@ -1,0 +1,1 @@
+"""Questions to the shapes of the scene: least distances, depths and rays."""

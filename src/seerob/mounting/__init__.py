@@ -1,0 +1,1 @@
+"""From a workstation file to one MuJoCo model: robots, machines, people, things and areas."""

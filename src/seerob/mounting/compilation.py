@@ -1,0 +1,393 @@
+"""From a `Workstation` to a `Model`: read every file, mount everything, compile one MuJoCo model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from seerob.by_hand import by_hand, home
+from seerob.chains import assumed, couple, payload, placeholder, unknown_masses
+from seerob.distances.least import Shapes
+from seerob.errors import InputError, Problem, UnknownName
+from seerob.filing import filed
+from seerob.human import posture
+from seerob.machines import mounting as machine_mounting
+from seerob.model import Body, Frame, Mechanism, Model
+from seerob.model_io.calibration import calibrated_by
+from seerob.model_io.description import Description, Link, Quantity
+from seerob.model_io.loader import load_robot
+from seerob.mounting.areas import mount_sensor, mount_swept
+from seerob.mounting.body_list import listed
+from seerob.mounting.contacts import add_contacts
+from seerob.mounting.people import describe
+from seerob.mounting.specification import Mounting
+from seerob.mounting.specification import pose_matrix as pose_matrix  # noqa: PLC0414
+from seerob.mounting.things import AREA_COLOR, PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, MadeArea, load_thing
+from seerob.snapshot import Finding
+from seerob.transforms import Array
+from seerob.variables.binding import Bound, bound
+from seerob.workstation import Area, Human, Machine, Mounted, Robot, Tool, Workstation
+
+Progress = Callable[[str], None]
+
+
+def compile_workstation(
+    station: Workstation,
+    *,
+    cache: Path | None = None,
+    progress: Progress = lambda _: None,
+    made: Mapping[str, MadeArea] = MappingProxyType({}),
+) -> Model:
+    """Read every file that the workstation names and compile the twin.
+
+    Args:
+        station: From `seerob.reading.read`.
+        cache: Folder for distance trees and convex pieces that take long to make.
+        progress: Told what is being read.
+        made: Areas that are swept, by name.
+
+    Raises:
+        InputError: With every mistake in every file.
+    """
+    return _Compiler(station, cache, progress, made).run()
+
+
+@dataclass
+class _Chain:
+    """A robot or human on its way to a `Mechanism`."""
+
+    description: Description
+    role: str
+    home: Array
+    home_given: bool
+    tip: Frame | None = None
+
+
+class _Compiler:
+    def __init__(
+        self, station: Workstation, cache: Path | None, progress: Progress, made: Mapping[str, MadeArea]
+    ) -> None:
+        self.station, self.made = station, made
+        self.cache = cache
+        self.progress = progress
+        self.folder = Path(station.folder)
+        self.mounting = Mounting()
+        self.problems: list[Problem] = []
+        self.chains: dict[str, _Chain] = {}
+        self.carriers: dict[str, str] = {}
+        self.file = next(iter(station.files), "workstation")
+        self.bound = Bound({}, {}, ())
+
+    def run(self) -> Model:
+        self.mounting.option(timestep=self.station.engine.timestep, gravity=self.station.engine.gravity)
+        self._try("", self._variables, None)
+        for i, robot in enumerate(self.station.robots):
+            self._try(f"robots[{i}]", self._robot, robot)
+        for i, human in enumerate(self.station.humans):
+            self._try(f"humans[{i}]", self._human, human)
+        for i, part in enumerate(self.station.parts):
+            self._try(f"parts[{i}]", self._part, part)
+        for i, machine in enumerate(self.station.machines):
+            self._try(f"machines[{i}]", self._machine, machine)
+        if not self.problems:
+            self._mount_all()
+        if not self.problems:
+            for i, area in enumerate(self.station.areas):
+                self._try(f"areas[{i}]", self._area, area)
+            for i, sensor in enumerate(self.station.sensors):
+                self._try(f"sensors[{i}]", partial(mount_sensor, self.mounting, self.carriers), sensor)
+        if self.problems:
+            raise InputError(self.problems)
+        bodies = listed(self.mounting)
+        self._actuators()
+        add_contacts(self.mounting, bodies, self.station.contacts, file=self.file, cache=self.cache)
+        self.progress("compiling")
+        try:
+            mj = self.mounting.spec.compile()
+        except ValueError as error:
+            raise InputError.at(self.file, "", f"MuJoCo refuses the model: {error}") from error
+        return self._model(mj, bodies)
+
+    def _try(self, key: str, build: Callable[[Any], None], table: Any) -> None:
+        try:
+            build(table)
+        except InputError as error:
+            self.problems += [
+                p._replace(key=f"{key} ({p.key})" if p.key and key else p.key or key) for p in error.problems
+            ]
+        except UnknownName as error:
+            self.problems.append(Problem(self.file, key, str(error)))
+
+    def _variables(self, _: None) -> None:
+        self.bound = bound(self.station)
+        self.mounting.findings += self.bound.findings
+        self.mounting.files |= self.bound.files
+
+    # -- robots and humans ------------------------------------------------------------------
+
+    def _robot(self, robot: Robot) -> None:
+        self.progress(f"reading {robot.name} ({robot.model})")
+        if robot.arguments and not robot.model.lower().endswith(".xacro"):
+            what = f"{robot.model} is not a xacro file and takes none"
+            raise InputError.at(self.file, "arguments", what, "leave them out, or name the .xacro file")
+        description = load_robot(
+            robot.model,
+            folder=self.folder,
+            packages=robot.packages,
+            meshes=robot.meshes,
+            arguments=robot.arguments,
+            name=robot.name,
+        )
+        description = by_hand(description, robot, self.file)
+        if robot.calibration is not None:
+            description = calibrated_by(description, robot.calibration, self.folder)
+        q = home(description, robot, self.file)
+        self._chain(robot.name, description, "robot", pose_matrix(robot.base), q, robot.q is not None)
+        self.mounting.files |= filed(
+            robot.name,
+            description.files,
+            folder=self.folder,
+            references=(robot.model, robot.meshes, robot.calibration),
+            packages=robot.packages,
+        )
+        if robot.tool is not None:
+            self.chains[robot.name].tip = self._tip_frame(robot)
+
+    def _tip_frame(self, robot: Robot) -> Frame | None:
+        assert robot.tool is not None
+        if any(tool.name == robot.tool for tool in self.station.tools):
+            return None  # set when the tool is mounted
+        name = robot.tool if "/" in robot.tool else f"{robot.name}/{robot.tool}"
+        if not self.mounting.has(name):
+            links = [f"{robot.name}/{link.name}" for link in self.chains[robot.name].description.links]
+            wrong = UnknownName("link or tool", robot.tool, links + [t.name for t in self.station.tools])
+            raise InputError.at(self.file, "tool", str(wrong))
+        return Frame(name, -1, np.eye(4))
+
+    def _human(self, human: Human) -> None:
+        self.progress(f"making {human.name}")
+        description, said = describe(human, touches=bool(self.station.contacts))
+        self.mounting.findings += said
+        q = posture.posture(description, human.posture, joints=human.joints, file=f"{human.name}.joints")
+        self._chain(human.name, description, "human", pose_matrix(human.at), q, True)
+
+    def _chain(
+        self, name: str, description: Description, role: str, world_from_base: Array, home: Array, given: bool
+    ) -> None:
+        self.chains[name] = _Chain(description, role, home, given)
+        self.mounting.findings += description.findings
+        for link in description.links:
+            self._link(name, role, link, world_from_base)
+
+    def _link(self, owner: str, role: str, link: Link, world_from_base: Array) -> None:
+        full = f"{owner}/{link.name}"
+        parent = None if link.parent is None else f"{owner}/{link.parent}"
+        pose = link.parent_from_link if parent is not None else world_from_base @ link.parent_from_link
+        body = self.mounting.body(full, parent, pose)
+        self.carriers[full] = owner
+        for joint in link.joints:
+            self.mounting.joint(body, f"{owner}/{joint.name}", joint)
+        mass = None
+        if link.inertial is not None:
+            self.mounting.inertial(body, link.inertial)
+            mass = Quantity(link.inertial.mass, link.inertial.origin, link.inertial.source)
+        elif link.joints and link.solids:
+            self.mounting.inertial(body, placeholder(link.solids))
+        elif link.joints:
+            self.mounting.massless(body)
+        if link.solids or link.visual:
+            self.mounting.shape(
+                full, role=role, owner=owner, carrier=owner, solids=link.solids, visual=link.visual, mass=mass
+            )
+
+    # -- things -----------------------------------------------------------------------------
+
+    def _part(self, part: Any) -> None:
+        self._thing(part, "part", None, pose_matrix(part.at), PART_COLOR)
+
+    def _machine(self, machine: Machine) -> None:
+        description, thing = machine_mounting.loaded(machine, self.folder, file=self.file)
+        start = machine_mounting.home(machine.motion)
+        self._chain(machine.name, description, "machine", pose_matrix(machine.at), start, True)
+        self.mounting.files |= filed(
+            machine.name, thing.files, folder=self.folder, references=(machine.mesh,)
+        )
+
+    def _area(self, area: Area) -> None:
+        if area.on is not None and not self.mounting.has(area.on):
+            raise UnknownName("link, tool or bone", area.on, self.carriers)
+        if area.swept is not None:
+            mount_swept(self.mounting, area, self.made, file=self.file)
+        else:
+            self._thing(area, "area", area.on, pose_matrix(area.at), AREA_COLOR)
+
+    def _mount_all(self) -> None:
+        """Mount tools and workpieces; what they are mounted on may come later in the file."""
+        waiting: list[tuple[str, str, Mounted]] = [
+            *((f"tools[{i}]", "tool", t) for i, t in enumerate(self.station.tools)),
+            *((f"workpieces[{i}]", "workpiece", w) for i, w in enumerate(self.station.workpieces)),
+        ]
+        while waiting:
+            ready = [entry for entry in waiting if self.mounting.has(entry[2].on)]
+            if not ready:
+                for key, _, thing in waiting:
+                    known = list(self.carriers)
+                    self.problems.append(
+                        Problem(self.file, f"{key}.on", str(UnknownName("link or tool", thing.on, known)))
+                    )
+                return
+            for entry in ready:
+                waiting.remove(entry)
+                self._try(entry[0], lambda table, role=entry[1]: self._mount(role, table), entry[2])  # type: ignore[misc]
+
+    def _mount(self, role: str, thing: Mounted) -> None:
+        color = TOOL_COLOR if role == "tool" else WORKPIECE_COLOR
+        self._thing(thing, role, thing.on, pose_matrix(thing.at), color)
+        carrier = self.carriers[thing.on]
+        if isinstance(thing, Tool):
+            chain = self.chains[carrier]
+            robot = next(r for r in self.station.robots if r.name == carrier)
+            if thing.tcp is not None and robot.tool in (None, thing.name):
+                chain.tip = Frame(thing.name, -1, pose_matrix(thing.tcp))
+
+    def _thing(
+        self,
+        thing: Any,
+        role: str,
+        parent: str | None,
+        parent_from_thing: Array,
+        color: tuple[float, float, float, float],
+    ) -> None:
+        self.progress(f"reading {thing.name}")
+        moves = role in ("tool", "workpiece")
+        loaded = load_thing(thing, self.folder, color, needs_mass=moves, file=self.file)
+        self.mounting.findings += loaded.findings
+        self.mounting.files |= filed(thing.name, loaded.files, folder=self.folder, references=(thing.mesh,))
+        carrier = "" if parent is None else self.carriers[parent]
+        body = self.mounting.body(thing.name, parent, parent_from_thing)
+        if carrier:
+            self.carriers[thing.name] = carrier
+        mass = None
+        if loaded.inertial is not None:
+            self.mounting.inertial(body, loaded.inertial)
+            mass = Quantity(loaded.inertial.mass, loaded.inertial.origin, loaded.inertial.source)
+        for piece in loaded.pieces:
+            name = f"{thing.name}/{piece.name}" if piece.name else thing.name
+            if piece.name:
+                self.mounting.body(name, thing.name, np.eye(4))
+                if carrier:
+                    self.carriers[name] = carrier
+            self.mounting.shape(
+                name,
+                role=role,
+                owner=thing.name,
+                carrier=carrier,
+                solids=piece.solids,
+                visual=piece.visual,
+                mass=mass if piece is loaded.pieces[0] else None,
+            )
+
+    # -- the model --------------------------------------------------------------------------
+
+    def _actuators(self) -> None:
+        """One per degree of freedom, in the same order; the engine sets gains and limits."""
+        for joint in self.mounting.spec.joints:
+            self.mounting.spec.add_actuator(
+                name=joint.name,
+                target=joint.name,
+                trntype=mujoco.mjtTrn.mjTRN_JOINT,
+                gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+                biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            )
+
+    def _model(self, mj: Any, bodies: Sequence[Body]) -> Model:
+        numbered = tuple(replace(body, mj=_body_id(mj, body.name)) for body in bodies)
+        frames = {
+            name: Frame(name, _body_id(mj, name), np.eye(4))
+            for name in (*self.carriers, *(part.name for part in self.station.parts))
+        }
+        self.progress("building distance trees")
+        shapes = Shapes.build([(body.name, body.solids) for body in numbered], cache=self.cache)
+        mechanisms = {name: self._mechanism(mj, name, numbered) for name in self.chains}
+        return Model(
+            workstation=self.station,
+            mj=mj,
+            bodies=numbered,
+            frames=frames,
+            mechanisms=mechanisms,
+            shapes=shapes,
+            meshes=self.mounting.meshes,
+            findings=(
+                *self.mounting.findings,
+                *(f for robot in self.station.robots for f in self._about(robot, mechanisms[robot.name])),
+            ),
+            files={**self.station.files, **self.mounting.files},
+            dictionary=self.bound.variables,
+        )
+
+    def _mechanism(self, mj: Any, name: str, bodies: tuple[Body, ...]) -> Mechanism:
+        chain = self.chains[name]
+        every = [joint for link in chain.description.links for joint in link.joints]
+        commanded = [joint for joint in every if joint.mimic is None]
+        coupling, offset = couple(every, commanded)
+        ids = [mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_JOINT, f"{name}/{joint.name}") for joint in every]
+        own = {full for full, carrier in self.carriers.items() if carrier == name}
+        mj_bodies = np.array(
+            sorted(i for i in (_body_id(mj, full) for full in own) if mj.body_weldid[i] != 0), np.int64
+        )
+        moving_ids = set(mj_bodies.tolist())
+        own_bodies = [b for b in bodies if b.carrier == name and b.role != "area"]
+        tip = chain.tip if chain.tip is not None else Frame(f"{name}/{chain.description.tip}", -1, np.eye(4))
+        tip = replace(tip, mj=_body_id(mj, tip.name))
+        return Mechanism(
+            name=name,
+            role=chain.role,
+            description=chain.description,
+            joints=tuple(commanded),
+            q_address=np.array([mj.jnt_qposadr[i] for i in ids], np.int64),
+            v_address=np.array([mj.jnt_dofadr[i] for i in ids], np.int64),
+            coupling=coupling,
+            offset=offset,
+            own=np.array([i for i, joint in enumerate(every) if joint.mimic is None], np.int64),
+            home=chain.home,
+            home_given=chain.home_given,
+            tip=tip,
+            bodies=tuple(b.index for b in bodies if b.owner == name),
+            carried=tuple(b.index for b in own_bodies if b.owner != name),
+            moving=tuple(b.index for b in own_bodies if b.mj in moving_ids),
+            mj_bodies=mj_bodies,
+            unknown_masses=self._unknown_masses(name),
+            velocity_limits=tuple(joint.velocity for joint in commanded),
+            effort_limits=tuple(joint.effort for joint in commanded),
+            rotor_inertia_known=all(joint.armature is not None for joint in commanded),
+        )
+
+    def _about(self, robot: Robot, mechanism: Mechanism) -> list[Finding]:
+        given = self.chains[robot.name].tip is not None or robot.model.startswith("library:")
+        return [*assumed(mechanism, tip_given=given), *payload(robot.name, self._carried(robot.name))]
+
+    def _carried(self, name: str) -> dict[str, float | None]:
+        """Mass [kg] of each tool and workpiece on a robot; None when nobody gave one."""
+        things: dict[str, float | None] = {}
+        for entry in self.mounting.entries:
+            if entry.carrier == name and entry.role in ("tool", "workpiece"):
+                known = things.get(entry.owner)
+                things[entry.owner] = known if entry.mass is None else entry.mass.value
+        return things
+
+    def _unknown_masses(self, name: str) -> tuple[str, ...]:
+        mounted = {thing.on for thing in (*self.station.tools, *self.station.workpieces)}
+        on = {full.partition("/")[2] for full in mounted if full.startswith(f"{name}/")}
+        things = {thing: mass is not None for thing, mass in self._carried(name).items()}
+        return unknown_masses(name, self.chains[name].description, loaded=on, things=things)
+
+
+def _body_id(mj: Any, name: str) -> int:
+    return int(mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name))

@@ -1,0 +1,1 @@
+"""Protective devices: what the workstation file says of them, their fields, and what they detect."""

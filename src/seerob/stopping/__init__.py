@@ -1,0 +1,1 @@
+"""How a robot stops, and the terms of the protective separation distance that follow from it."""

@@ -1,0 +1,42 @@
+"""Distances of the moving parts of a robot against S_p, of many instants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from seerob.answers import Answers
+from seerob.criterion import EvaluateMany
+from seerob.model import Gap
+from seerob.states import States
+from seerob.stopping.models import SHARES, Stop
+from seerob.stopping.terms import Course, course
+from seerob.transforms import Array
+
+
+def separations(
+    stop: Stop, gap: Gap, S_p: Callable[[Course], Array], *, incomplete: bool
+) -> EvaluateMany | None:
+    """What the part that governs comes to; None where the stopping time is not given, or has a tolerance.
+
+    Args:
+        stop: How the robot stops.
+        gap: From whom to its moving parts.
+        S_p: Of a course [m], shape (N, b).
+        incomplete: Whether S_p may be larger than what is computed.
+    """
+    if stop.model not in SHARES or stop.stopping is None or stop.tolerance is not None:
+        return None
+    T_s, share = stop.stopping, SHARES[stop.model]
+
+    def evaluate(states: States) -> Answers:
+        distance = states.closest_per_body(gap).distance
+        v_r, _, _ = states.fastest_points(gap.b)
+        least = S_p(course(v_r, stop.reaction, T_s, share))
+        k = (distance - least).argmin(axis=1)[:, None]
+        value, limit = (np.take_along_axis(found, k, axis=1)[:, 0] for found in (distance, least))
+        found = Answers.against(value, limit, at_most=False)
+        return found.open() if incomplete else found
+
+    return evaluate

@@ -1,0 +1,335 @@
+"""How a robot stops, as the workstation file says it: which model gives the ways while it stops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from msgspec import Meta, Struct
+
+from seerob.distances.least import Per
+from seerob.errors import InputError, Undecided
+from seerob.model import Gap, Mechanism, Model
+from seerob.snapshot import Input, Origin
+from seerob.state import State
+from seerob.stopping import table as stopping_table
+from seerob.stopping.by_table import bind_table, not_its_own
+from seerob.stopping.simulated import Stopped, StopSimulation
+from seerob.stopping.table import StoppingTable
+from seerob.stopping.terms import (
+    BOUND,
+    CONSTANT,
+    At,
+    Course,
+    course,
+    largest_factor,
+    largest_speed_decelerating,
+    largest_speed_in_time,
+)
+from seerob.transforms import Array
+
+SHARE = 0.8
+"""Of the torque limits, unless the file says otherwise."""
+SHARES = {"bound": BOUND, "constant_deceleration": CONSTANT}
+"""Of v_r T_s, by how a stop is modelled whose time is known."""
+MOVING = 1e-6
+"""Speed above which a robot moves [m/s]."""
+INSTANTS = 16
+"""At most this many instants of a stop are asked for their distance to the person."""
+
+
+class StopTolerance(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How far figures of a stop may be off, either way."""
+
+    reaction: Annotated[float, Meta(ge=0, extra={"unit": "s"})] = 0.0
+    stopping: Annotated[float, Meta(ge=0, extra={"unit": "s"})] = 0.0
+    deceleration: Annotated[float, Meta(ge=0, extra={"unit": "m/s²"})] = 0.0
+
+
+class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the robot stops."""
+
+    reaction: Annotated[float, Meta(gt=0, extra={"unit": "s"})]
+    """T_r: from the event to the onset of braking, detection and processing included [s]; without the
+    response time of a ``sensor`` that the criterion names, which is added."""
+    stopping: Annotated[float, Meta(gt=0, extra={"unit": "s"})] | None = None
+    """T_s: from the onset of braking to standstill [s]; with a table, of the joints that it does not have."""
+    model: Literal["bound", "constant_deceleration", "table", "simulated"] = "bound"
+    """``bound``: full speed during the whole stop, Eq. 2; ``constant_deceleration``: half of that;
+    ``table``: the maker's stopping tables; ``simulated``: the dynamics with all brakes on."""
+    deceleration: Annotated[float, Meta(gt=0, extra={"unit": "m/s²"})] | None = None
+    """Of the fastest point [m/s²], instead of ``stopping``, with ``constant_deceleration``."""
+    table: str | StoppingTable | None = None
+    """Name of a table that comes with seerob (`seerob.stopping.table.shipped`), or the table itself."""
+    table_for: str | None = None
+    """Name of the robot that the table is that of, by your own word; without it, a table that is not of the
+    robot's ``model`` leaves what it would keep within undecided."""
+    rated_payload: Annotated[float, Meta(gt=0, extra={"unit": "kg"})] | None = None
+    """Payload at which the table's figures hold [kg], from the robot's data sheet, for a table that does not
+    say; refused beside one that does."""
+    brakes: Annotated[tuple[Annotated[float, Meta(gt=0)], ...], Meta(extra={"unit": "N·m"})] | None = None
+    """Torque of each joint's brake [N·m or N] with ``simulated``; ``torque_share`` of the robot's torque
+    limits when not given."""
+    torque_share: Annotated[float, Meta(gt=0, le=1)] = SHARE
+    """Share of the torque limits that brakes, with ``simulated``."""
+    direction: Literal["path", "toward"] = "path"
+    """With ``simulated``: whole path of the part, or how much nearer to the person it comes."""
+    tolerance: StopTolerance | None = None
+    """How far ``reaction``, ``stopping`` and ``deceleration`` may be off, either way."""
+
+    def __post_init__(self) -> None:
+        for key in StopTolerance.__struct_fields__ if self.tolerance is not None else ():
+            half, figure = getattr(self.tolerance, key), getattr(self, key)
+            if half and (figure is None or half >= figure):
+                what = "is not given" if figure is None else f"= {figure:g} is not more"
+                raise ValueError(f"tolerance.{key} = {half:g}, but {key} {what}")
+        needs = {
+            "bound": self.stopping is not None,
+            "constant_deceleration": (self.stopping is None) != (self.deceleration is None),
+            "table": self.table is not None,
+            "simulated": True,
+        }
+        wanted = {
+            "bound": "stopping",
+            "constant_deceleration": "either stopping or deceleration",
+            "table": "table",
+        }
+        if not needs[self.model]:
+            raise ValueError(f'model = "{self.model}" needs {wanted[self.model]}')
+        idle = {
+            "deceleration": self.deceleration is not None and self.model != "constant_deceleration",
+            "table": self.table is not None and self.model != "table",
+            "table_for": self.table_for is not None and self.model != "table",
+            "rated_payload": self.rated_payload is not None and self.model != "table",
+            "stopping": self.stopping is not None and self.model == "simulated",
+            "brakes": self.brakes is not None and self.model != "simulated",
+            "torque_share": self.torque_share != 0.8
+            and (self.model != "simulated" or self.brakes is not None),
+            "direction": self.direction != "path" and self.model != "simulated",
+        }
+        for name, there in idle.items():
+            if there:
+                raise ValueError(f'{name} does nothing with model = "{self.model}" as it is given')
+
+
+Courses = Callable[[State], At]
+"""Course of the moving parts from where they are now; may raise `Undecided`."""
+
+
+Inverse = Callable[[Array, Array, Array, float], tuple[float, float | None]]
+"""Largest permissible speed of the fastest part [m/s], and as a factor of the present speeds (None at rest),
+from speeds [m/s] (n,), distances [m] (n,), approach speeds of the person [m/s] (n,) and K [m]."""
+
+
+@dataclass(frozen=True)
+class StopModel:
+    """A way to stop, bound to a robot and what it is to keep away from."""
+
+    courses: Courses
+    formula: str
+    """Of S_s."""
+    inputs: tuple[Input, ...]
+    doubts: tuple[str, ...] = ()
+    """Why ways may be longer than it says."""
+    not_modelled: tuple[str, ...] = ()
+    inverse: Inverse | None = None
+    """In closed form, where there is one."""
+    costly: bool = False
+    """Takes milliseconds: searches ask it seldom."""
+
+
+def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel:
+    """Resolve how a robot stops.
+
+    Args:
+        stop: As the file says.
+        model: The workstation.
+        robot: Who stops.
+        gap: From what it is to keep away (first set) to its moving parts (second set).
+
+    Raises:
+        InputError: Options that do not fit the robot.
+        UnknownName: No such table.
+    """
+    if stop.model == "table":
+        return _tabulated(stop, model, robot, gap)
+    return _simulated(stop, model, robot, gap) if stop.model == "simulated" else _timed(stop, gap)
+
+
+def _given(name: str, value: float, unit: str) -> Input:
+    return Input(name=name, value=value, unit=unit, origin=Origin.GIVEN, source="workstation file")
+
+
+def fastest(state: State, gap: Gap) -> Array:
+    """Speed of the fastest point of each moving part [m/s], shape (n,)."""
+    return state.fastest_points(gap.b)[0]
+
+
+def _timed(stop: Stop, gap: Gap) -> StopModel:
+    share = SHARES[stop.model]
+
+    def courses(state: State) -> At:
+        v = fastest(state, gap)
+        top = float(v.max())
+
+        def at(scale: float) -> Course:
+            a = stop.deceleration
+            T_s = scale * top / a if a is not None else stop.stopping or 0.0
+            return course(scale * v, stop.reaction, T_s, share)
+
+        return at
+
+    def inverse(v: Array, d: Array, v_h: Array, K: float) -> tuple[float, float | None]:
+        T_r, a, T_s = stop.reaction, stop.deceleration, stop.stopping or 0.0
+        top = float(v.max())
+        if top < MOVING:
+            # At rest nobody knows which part will be fastest: each may be.
+            if a is None:
+                return float(largest_speed_in_time(d, v_h, T_r, T_s, K, share).min()), None
+            return float(largest_speed_decelerating(d, v_h, T_r, a, K).min()), None
+        if a is None:
+            factor = largest_factor(v_h * (T_r + T_s) + K - d, v * (T_r + share * T_s))
+        else:
+            factor = largest_factor(v_h * T_r + K - d, v_h * top / a + v * T_r, share * v * top / a)
+        return factor * top, factor
+
+    if stop.deceleration is not None:
+        known = _given("deceleration", stop.deceleration, "m/s²")
+    else:
+        known = _given("T_s", stop.stopping or 0.0, "s")
+    if share == BOUND:
+        return StopModel(
+            courses,
+            "S_s = v_r T_s",
+            (known,),
+            inverse=inverse,
+            not_modelled=("deceleration during the stop: full speed is assumed until standstill",),
+        )
+    return StopModel(
+        courses,
+        "S_s = v_r T_s / 2" + ("" if stop.deceleration is None else ", T_s = v / a of the fastest point"),
+        (known,),
+        inverse=inverse,
+        not_modelled=(
+            "a deceleration that sets in late or is uneven: published tables have joints that travel more "
+            "than half of speed times time (up to 0.51)",
+        ),
+    )
+
+
+def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel:
+    table = stopping_table.table(stop.table) if isinstance(stop.table, str) else stop.table
+    if table is None:
+        raise InputError.at("stop", "table", "not given", "the name of a table, or a table")
+    if stop.table_for is not None and stop.table_for != robot.name:
+        raise InputError.at("stop", "table_for", f"{stop.table_for} does not stop here", robot.name)
+    if stop.rated_payload is not None and table.rated_payload is not None:
+        what = f"{stop.rated_payload:g} kg, and the table of {table.robot} says {table.rated_payload:g} kg"
+        raise InputError.at("stop", "rated_payload", what, "leave it out: the table's own holds")
+    doubt = not_its_own(table, model, robot) if stop.table_for is None else ""
+    courses, inputs = bind_table(
+        table, stop.reaction, stop.stopping, model, robot, gap, rated_payload=stop.rated_payload
+    )
+    source = f"{table.source} ({table.confidence})" + (f"; {table.note}" if table.note else "")
+    named = Input(name="stopping table", value=table.robot, origin=Origin.STATED, source=source)
+    rest = () if stop.stopping is None else (_given("T_s of joints without a table", stop.stopping, "s"),)
+    if stop.table_for is not None:
+        said = Input(
+            name="stopping table is of", value=robot.name, origin=Origin.GIVEN, source="workstation file"
+        )
+        rest = (said, *rest)
+    formula = (
+        "S_s = v_r T_s(v_r)"
+        if table.tool is not None
+        else "S_s from each joint's way times its lever, T_s the longest"
+    )
+    return StopModel(
+        courses,
+        formula,
+        (named, *inputs, *rest),
+        doubts=(doubt,) if doubt else (),
+        not_modelled=(
+            f"stop category {table.category} only, as tabulated",
+            "below the table's first speed, payload and extension its first stopping time holds"
+            + ("" if table.tool is not None else ", and the lesser of its first way and speed times time"),
+        ),
+    )
+
+
+def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel:
+    brakes, origin, source = _brakes(stop, robot)
+    unknown = [joint.name for joint, torque in zip(robot.joints, brakes, strict=True) if np.isnan(torque)]
+    simulation = StopSimulation(model, robot, brakes, gap.b)
+
+    def courses(state: State) -> At:
+        if unknown:
+            raise Undecided(f"{robot.name}: nobody gave the torque limit of {', '.join(unknown)}")
+
+        def at(scale: float) -> Course:
+            stopped = simulation.stop(state, stop.reaction, scale)
+            found = stopped.course()
+            if stop.direction == "path":
+                return found
+            nearer = approach(stopped, state, gap)
+            # S_r and S_s only count together; neither may be larger than its path.
+            S_r = np.minimum(found.S_r, nearer)
+            return Course(found.v_r, S_r, nearer - S_r, found.T_s)
+
+        return at
+
+    shown = ", ".join("?" if np.isnan(b) else f"{b:g}" for b in brakes)
+    inputs = (Input(name="brake torques", value=shown, unit="N·m or N", origin=origin, source=source),)
+    way = "whole path" if stop.direction == "path" else "loss of distance to where the person is now"
+    return StopModel(
+        courses,
+        f"S_r + S_s: {way} from M q̈ + c + g = τ, |τ_j| ≤ B_j against q̇_j, until standstill",
+        inputs,
+        doubts=()
+        if robot.rotor_inertia_known
+        else (f"{robot.name}: rotor inertia is not given, so the simulated stop may be too short",),
+        not_modelled=(
+            "joint friction, damping and mechanical stops, which would shorten the stop",
+            "brakes that act late or one after the other: their delay belongs into the reaction time",
+            "acceleration during the reaction time",
+        ),
+        costly=True,
+    )
+
+
+def _brakes(stop: Stop, robot: Mechanism) -> tuple[Array, Origin, str]:
+    """Torques, NaN where unknown, and where they come from."""
+    if stop.brakes is not None:
+        if len(stop.brakes) != len(robot.joints):
+            raise InputError.at(
+                "stop",
+                "brakes",
+                f"{len(stop.brakes)} torques for the {len(robot.joints)} joints of {robot.name}",
+                "one per joint",
+            )
+        return np.array(stop.brakes), Origin.GIVEN, "workstation file"
+    limits = robot.effort_limits
+    torques = np.array([np.nan if limit is None else stop.torque_share * limit.value for limit in limits])
+    sources = "; ".join(dict.fromkeys(limit.source for limit in limits if limit is not None))
+    missing = bool(np.isnan(torques).any())
+    source = f"{stop.torque_share:g} of the torque limits ({sources or 'not given'})"
+    return torques, Origin.MISSING if missing else Origin.ESTIMATED, source
+
+
+def approach(stopped: Stopped, state: State, gap: Gap) -> Array:
+    """How much nearer each part comes while it stops to what stands still where it is now [m], (n,).
+
+    A bound for all instants: between two of them a distance changes by no more than the path.
+    """
+    K = len(stopped.t)
+    picked = np.unique(np.linspace(0, K - 1, min(K, INSTANTS)).round().astype(int))
+    rotations = np.repeat(state.rotations[None], len(picked), axis=0)
+    positions = np.repeat(state.positions[None], len(picked), axis=0)
+    rotations[:, gap.b] = stopped.rotations[picked]
+    positions[:, gap.b] = stopped.positions[picked]
+    distances = gap.query.batch(rotations, positions, Per.BODY).distance
+    reached = np.vstack([np.zeros(len(gap.b)), np.cumsum(stopped.ways, axis=0)])[picked]
+    between = (distances[:-1] + distances[1:] - np.diff(reached, axis=0)) / 2
+    least = np.minimum(distances.min(axis=0), between.min(axis=0, initial=np.inf))
+    return np.asarray(np.maximum(distances[0] - least, 0.0))

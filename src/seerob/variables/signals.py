@@ -1,0 +1,93 @@
+"""What machines say: newest values of variables, and why one may not be relied on now."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from seerob.errors import Undecided
+from seerob.samples import Quality, SignalSample
+from seerob.variables.dictionary import Value, Variable
+
+DEFAULT_TIMEOUT = 1.0
+"""Of what is heard without a source that states one [s]."""
+SLACK = 1e-9
+"""Instants that differ by less are the same [s]."""
+MAX_KEPT = 4096
+"""Pictures kept per source at most."""
+
+
+class Known(NamedTuple):
+    """What is known of a variable at an instant."""
+
+    value: Value | None
+    """In SI; None when it was never heard. The last one known when there is a doubt."""
+    doubt: str
+    """Why it may not be relied on; empty when it may."""
+
+
+class Signals:
+    """The newest pictures of all sources of variables, a few of which may lie ahead of the tick.
+
+    Args:
+        dictionary: Variables by name.
+        timeouts: Of their sources [s], by name.
+    """
+
+    def __init__(self, dictionary: Mapping[str, Variable], timeouts: Mapping[str, float]) -> None:
+        self.dictionary = dictionary
+        self._timeouts = timeouts
+        self._heard: dict[str, list[SignalSample]] = {}
+
+    def take(self, sample: SignalSample) -> None:
+        """Hear a picture; one that is older than the newest is dropped."""
+        heard = self._heard.setdefault(sample.source, [])
+        if heard and sample.t < heard[-1].t:
+            return
+        heard.append(sample)
+        del heard[: len(heard) - MAX_KEPT]
+
+    def forget(self, t: float) -> None:
+        """Drop what is older than the last picture at or before ``t`` [s]."""
+        for heard in self._heard.values():
+            while len(heard) > 1 and heard[1].t <= t:
+                del heard[0]
+
+    def at(self, name: str, t: float) -> Known:
+        """What is known of a variable of the dictionary at an instant [s]."""
+        source = self.dictionary[name].source
+        picture = next((s for s in reversed(self._heard.get(source, ())) if s.t <= t + SLACK), None)
+        if picture is None:
+            return Known(None, f"{name}: nothing heard yet")
+        value = picture.values.get(name)
+        age = t - picture.t
+        timeout = self._timeouts.get(source, DEFAULT_TIMEOUT)
+        if age > timeout + SLACK:
+            return Known(value, f"{name}: {source} not heard for {age:.2f} s (time-out {timeout:g} s)")
+        return Known(value, doubt_of(picture, name))
+
+    def value(self, name: str, t: float) -> Value:
+        """The value of a variable of the dictionary at an instant [s].
+
+        Raises:
+            Undecided: It is not known, or may not be relied on.
+        """
+        known = self.at(name, t)
+        if known.value is None or known.doubt:
+            raise Undecided(known.doubt or f"{name}: not heard")
+        return known.value
+
+    def picture(self, t: float) -> tuple[dict[str, Value], dict[str, str]]:
+        """Every variable that was heard, and every doubt, at an instant [s]."""
+        known = {name: self.at(name, t) for name, v in self.dictionary.items() if not v.write}
+        values = {name: k.value for name, k in known.items() if k.value is not None}
+        return values, {name: k.doubt for name, k in known.items() if k.doubt}
+
+
+def doubt_of(picture: SignalSample, name: str) -> str:
+    """Why a variable of a picture may not be relied on; empty when it may."""
+    if name in picture.doubts:
+        return picture.doubts[name]
+    if picture.quality is not Quality.GOOD:
+        return f"{name}: its source says {picture.quality.value}"
+    return "" if name in picture.values else f"{name}: not heard"

@@ -1,0 +1,1 @@
+"""Volumes in voxels and as polygons: swept, reachable, extruded."""

@@ -1,0 +1,136 @@
+"""Gaps that clamp: their rule, live and batch, and on moving shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from made_cell import UR10, made
+from seerob.contact.clamping import clamps, pinch_pairs, robot_pinch_pairs
+from seerob.distances.least import Shapes
+from seerob.geometry import Mesh, Solid, capsule
+
+HAND, BODY = 0.1, 0.5
+THICKNESS = np.array([HAND, BODY])
+
+
+def one(gaps: np.ndarray, *, moved: float = 0.0, speed: float = 0.1, opened: bool = True) -> np.ndarray:
+    column = gaps[:, None]
+    every = np.full_like(column, moved), np.full_like(column, speed)
+    return clamps(column, *every, THICKNESS, opened=np.array([opened]))[:, 0]
+
+
+def test_gap_no_wider_than_the_body_part_clamps_it_whether_it_closes_or_opens() -> None:
+    gaps = np.array([0.6, 0.5, 0.3, 0.1, 0.05, 0.05, 0.0, -0.02, 0.1, 0.11])
+    found = one(gaps)
+    np.testing.assert_array_equal(found[:, 0], gaps <= HAND)
+    np.testing.assert_array_equal(found[:, 1], gaps <= BODY)
+
+
+def test_what_stands_still_clamps_nobody() -> None:
+    for speed, found in ((1.05e-3, True), (0.95e-3, False)):
+        assert one(np.full(3, 0.05), speed=speed).any() == found
+
+
+def test_parts_of_one_robot_clamp_only_what_once_had_room() -> None:
+    gaps = np.array([0.08, 0.06, 0.04, 0.12, 0.08, 0.04])
+    found = one(gaps, opened=False)
+    assert not found[:3].any()
+    assert found[4:, 0].all()
+    assert not found[:, 1].any()
+
+
+def test_the_rest_of_the_way_is_looked_at_before_it_is_gone() -> None:
+    """What moved by 0.05 m may do so again; never more than `AHEAD` is looked ahead."""
+    gaps = np.array([0.16, 0.15, 0.14])
+    assert one(gaps, moved=0.05)[:, 0].tolist() == [False, True, True]
+    assert one(np.array([0.2, 0.18]), moved=7.0)[:, 0].tolist() == [False, True]
+
+
+def test_room_is_told_for_each_body_part() -> None:
+    opened = np.array([[True, False]])
+    found = clamps(np.full((1, 1), 0.05), np.zeros((1, 1)), np.ones((1, 1)), THICKNESS, opened=opened)
+    assert found[0, 0].tolist() == [True, False]
+
+
+def slotted() -> Mesh:
+    """A block with a slot 0.2 m wide along y, open on top: its convex hull has none."""
+    walls = [trimesh.creation.box([0.1, 1, 0.4]) for _ in range(2)]
+    walls[0].apply_translation([-0.15, 0, 0])
+    walls[1].apply_translation([0.15, 0, 0])
+    floor = trimesh.creation.box([0.4, 1, 0.1])
+    floor.apply_translation([0, 0, -0.25])
+    made = trimesh.util.concatenate([*walls, floor])
+    return Mesh(np.array(made.vertices), np.array(made.faces, np.int32))
+
+
+def test_gap_in_a_slot_is_found_where_a_hull_has_none() -> None:
+    rod = Solid(points=np.array([[0, 0, 0], [0, 0, 0.5]]), radius=0.02)
+    shapes = Shapes.build([("block", [Solid(mesh=slotted())]), ("rod", [rod])])
+    pairs = pinch_pairs(shapes, [1], [0], frozenset(), cap=0.6)
+    x = np.linspace(0.0, 0.06, 7)
+    positions = np.zeros((7, 2, 3))
+    positions[:, 1, 0] = x
+    rotations = np.broadcast_to(np.eye(3), (7, 2, 3, 3))
+    gaps = pairs.batch(rotations, positions)
+    np.testing.assert_allclose(gaps[:, 0], 0.1 - 0.02 - x, atol=1e-12)
+    live = [pairs.gaps(r, p)[0] for r, p in zip(rotations, positions, strict=True)]
+    np.testing.assert_array_equal(live, gaps)
+    assert pairs.gaps(rotations[0], positions[0])[1].tolist() == [0]
+    found = clamps(
+        gaps, np.full_like(gaps, 0.01), np.full_like(gaps, 0.1), np.array([0.05]), opened=pairs.opened
+    )
+    np.testing.assert_array_equal(found[:, 0, 0], gaps[:, 0] - 0.01 <= 0.05)
+
+
+def test_own_links_are_paired_except_neighbours_and_both_sides_clamp() -> None:
+    bodies = [(n, [capsule(np.zeros(3), np.array([0.0, 0, 0.1]), 0.02)]) for n in "abcd"]
+    neighbours = frozenset({(0, 1), (1, 2)})
+    pairs = pinch_pairs(Shapes.build(bodies), [0, 1, 2], [], neighbours, still=[3], cap=1.0)
+    assert sorted(zip(pairs.first.tolist(), pairs.second.tolist(), strict=True)) == [
+        (0, -1), (0, 2), (1, -1), (2, -1),
+    ]  # fmt: skip
+    assert not pairs.opened.any()
+    clamped = ((pairs.first == 0) & (pairs.second == 2))[:, None]
+    assert pairs.per_body(clamped)[:, 0].tolist() == [True, False, True]
+
+
+def test_other_things_are_on_the_far_side_of_a_gap_and_flags_are_those_of_each_moving_body() -> None:
+    bodies = [(n, [capsule(np.zeros(3), np.array([0.0, 0, 0.1]), 0.02)]) for n in "abcd"]
+    pairs = pinch_pairs(Shapes.build(bodies), [1, 2, 3], [0], frozenset(), cap=1.0)
+    assert pairs.first.tolist() == [0, 1, 2, 0, 0, 1]
+    assert pairs.second.tolist() == [-1, -1, -1, 1, 2, 2]
+    assert pairs.opened.tolist() == [True] * 3 + [False] * 3
+    flags = np.random.default_rng(0).random((5, 6, 2)) < 0.3
+    expected = np.zeros((5, 3, 2), bool)
+    for n, gap, part in np.argwhere(flags):
+        for body in {pairs.first[gap], pairs.second[gap]} - {-1}:
+            expected[n, body, part] = True
+    np.testing.assert_array_equal(pairs.per_body(flags), expected)
+
+
+def test_own_links_of_a_robot_that_no_joint_connects_are_paired(tmp_path) -> None:
+    """A tool is one with the last link; the parts around count as surfaces, areas and people do not."""
+    text = UR10 + '[[parts]]\nname = "wall"\nshape = { box = [0.1, 1, 1] }\nat = { position = [2, 0, 0] }\n'
+    text += '[[areas]]\nname = "zone"\nshape = { sphere = 0.5 }\n'
+    model = made(tmp_path, text).model
+    robot = model.robot("arm")
+    pairs = robot_pinch_pairs(model, robot, cap=0.6)
+    own = [
+        {model.bodies[query.a[i]].name, model.bodies[query.b[0]].name}
+        for query, _ in pairs.queries[1:]
+        for i in range(len(query.a))
+    ]
+    chain = ["base", "shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3", "load"]
+
+    def link(name):
+        return next(k for k, word in enumerate(chain) if word in name)
+
+    solid = [b.name for b in model.bodies if b.index in (*robot.bodies, *robot.carried)]
+    # The load is welded to the last link.
+    place = {name: min(link(name), 6) for name in solid}
+    expected = [{a, b} for a in solid for b in solid if a < b and abs(place[a] - place[b]) > 1]
+    moving = {model.bodies[i].name for i in pairs.moving}
+    assert sorted(map(sorted, own)) == sorted(sorted(p) for p in expected if p & moving)
+    (surfaces, _), *_ = pairs.queries
+    assert [model.bodies[i].name for i in surfaces.a] == ["wall"]

@@ -1,0 +1,72 @@
+"""Files broken in every way: bytes, numbers, and what is packed inside a container."""
+
+import gzip
+import io
+import re
+import zipfile
+
+NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+NASTY = (
+    *(b"nan", b"inf", b"-inf", b"1e309", b"-1e308", b"1e-320", b"0", b"-0", b"-1", b"0.5", b"2147483648"),
+    *(b"99999999999999999999", b"1" * 400, b"", b"true", b"null", b'"', b"[", b"{", b"}", b"<", b"]]>", b"&x;"),
+    *(b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b",", b";", b"\t", b"=", b"#", b"1,5", b"0x10", b"\xb2"),
+)
+"""What stands where a number was."""
+
+
+def mutated(data, rng):
+    """``data`` with one or more bytes changed, moved, cut out, doubled, or lengths blown up."""
+    out = bytearray(data)
+    for _ in range(rng.choice((1, 1, 2, 8))):
+        at, size = rng.randrange(len(out)), rng.choice((1, 4, 8, 64, 1000))
+        match rng.randrange(7):
+            case 0:
+                out[at] ^= 1 << rng.randrange(8)
+            case 1:
+                out[at : at + size] = rng.randbytes(size)
+            case 2:
+                del out[at : at + size]
+            case 3:
+                out[at:at] = out[at : at + size]
+            case 4:
+                out[at : at + 8] = rng.choice((0, 2**31, 2**40, 2**63, 2**64 - 1)).to_bytes(8, "little")
+            case 5:
+                del out[max(1, at) :]
+            case 6:
+                other = rng.randrange(len(out))
+                out[at : at + size] = out[other : other + size]
+        if len(out) < 2:
+            break
+    return bytes(out)
+
+
+def mutated_text(data, rng):
+    """``data`` with numbers that are none, or mutated as bytes."""
+    if rng.random() < 0.4:
+        return mutated(data, rng)
+    places = [match.span() for match in NUMBER.finditer(data)]
+    out = bytearray(data)
+    for begin, end in sorted(rng.sample(places, min(len(places), rng.choice((1, 1, 2, 5)))), reverse=True):
+        out[begin:end] = rng.choice(NASTY)
+    return bytes(out)
+
+
+def mutated_zip(data, rng):
+    """A container whose members are mutated and packed again, or mutated as bytes."""
+    if rng.random() < 0.3:
+        return mutated(data, rng)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as whole, zipfile.ZipFile(packed, "w") as broken:
+        names = whole.namelist()
+        victim = rng.choice([name for name in names if "sheet" in name.lower()] * 3 + names)
+        for name in names:
+            content = whole.read(name)
+            broken.writestr(name, mutated_text(content, rng) if name == victim else content)
+    return packed.getvalue()
+
+
+def mutated_gzip(data, rng):
+    """The same of one packed file."""
+    if rng.random() < 0.3:
+        return mutated(data, rng)
+    return gzip.compress(mutated_text(gzip.decompress(data), rng), 1)

@@ -93,8 +93,9 @@ package: $(DEV) $(PAGE)
 bench: $(DEV)
 	for file in benchmarks/[a-z]*.py; do echo "== $$file"; $(BIN)/python $$file; done
 
+# KINDS="rtde opcua" KILLS=1000: only live sources, these of them, so many kills. Hours without.
 soak: $(DEV)
-	$(BIN)/pytest -m soak tests/soak
+	$(if $(KINDS)$(KILLS),SEEROB_SOAK_KINDS="$(KINDS)" SEEROB_SOAK_KILLS=$(or $(KILLS),1000) $(BIN)/pytest -m soak -rP tests/soak/test_live_sources.py,$(BIN)/pytest -m soak tests/soak)
 
 format: $(DEV)
 	$(BIN)/ruff check --fix

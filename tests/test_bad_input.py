@@ -27,6 +27,14 @@ FLAT = 'mesh = "it.obj"\nunits = "m"\n'
 PART = '[[parts]]\nname = "table"\n'
 ZONE = '[[areas]]\nname = "zone"\n'
 FILE = '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "motion.csv"\n'
+OWN_TABLE = (
+    'robot = "arm", category = 1, source = "measured", confidence = "1S", joints = ['
+    "{ joint = 0, speed = [1], way = [[[0.1]]], time = [[[0.1]]] }]"
+)
+MJCF = (
+    '<mujoco><worldbody><body><joint axis="0 0 1"/><geom type="box" size="1 1 1" mass="0"/></body>'
+    "</worldbody></mujoco>"
+)
 HEAD = "t [s],j1 [rad],j2 [rad]\n"
 
 
@@ -124,6 +132,30 @@ WRONG = {
         "workstation.toml: robots[0].masses.l1.mass",
         "> 0 [kg]",
     ),
+    "zero mass of a link that a figure needs": (
+        criterion("kinetic_energy", 'robot = "arm"'),
+        {"arm.urdf": two_r(masses=(0, 1))},
+        "arm.urdf: link[l1].inertial.mass.value: is 0 kg",
+        "give it in masses of arm",
+    ),
+    "zero mass of a link that contact needs": (
+        contact(""),
+        {"arm.urdf": two_r(masses=(1, 0))},
+        "arm.urdf: link[l2].inertial.mass.value: is 0 kg",
+        "give it in masses of arm",
+    ),
+    "zero mass of a link that a simulated stop needs": (
+        separation('reaction = 0.1, model = "simulated", brakes = [9, 9]'),
+        {"arm.urdf": two_r(masses=(1, 0))},
+        "arm.urdf: link[l2].inertial.mass.value: is 0 kg",
+        "give it in masses of arm",
+    ),
+    "zero mass of a body of MuJoCo": (
+        "",
+        {"arm.urdf": MJCF},
+        "arm.urdf: robots[0]",
+        "give every moving body a mass greater than 0",
+    ),
     "negative mass of a link": (
         "",
         {"arm.urdf": two_r(masses=(-1, 1))},
@@ -157,6 +189,12 @@ WRONG = {
         "it.stl: tools[0] (density)",
         "give the mass, or close the mesh",
     ),
+    "open mesh that sweeps a volume": (
+        TOOL + MESH + "mass = 1\n" + criterion("swept_volume", 'of = "arm"'),
+        {"it.stl": OPEN},
+        "workstation.toml: tools[0].mesh: the mesh of grip is open",
+        "close it, or give a shape",
+    ),
     "open mesh of an area": (ZONE + MESH, {"it.stl": OPEN}, "it.stl: areas[0]", "close it"),
     # Limits.
     "negative limit": (
@@ -182,6 +220,19 @@ WRONG = {
         {"own.toml": LIMITS.replace("140", "0", 1)},
         "own.toml: regions[2] (Neck)",
         "a number above 0",
+    ),
+    "negative acceleration": (
+        "acceleration_limits = [-1, 1]",
+        {},
+        "workstation.toml: robots[0] (acceleration_limits)",
+        "above 0",
+    ),
+    "no jerk": ("jerk_limits = [0]", {}, "workstation.toml: robots[0] (jerk_limits)", "above 0"),
+    "negative stopping distance": (
+        separation(f'reaction = 1, model = "table", table = {{ {OWN_TABLE.replace("[[[0.1]]]", "[[[-1]]]")} }}'),
+        {},
+        "workstation.toml: safety[0].stop.table.joints[0].way[0][0][0]",
+        ">= 0",
     ),
     # Body regions.
     "unknown region of a table": (
@@ -221,6 +272,26 @@ WRONG = {
         {},
         "workstation.toml: areas[0].shape",
         "lower end comes first",
+    ),
+    "inverted phase that no rule reads": (
+        OPERATOR + '[[phases]]\nhuman = "op"\nstart = 3\nend = 2',
+        {},
+        "workstation.toml: phases[0]",
+        "let it end later",
+    ),
+    "phase beyond its cycle": (
+        OPERATOR + "[[phases]]\nstart = 3\nend = 9\ncycle = 5",
+        {},
+        "workstation.toml: phases[0]",
+        "beyond its cycle of 5 s",
+    ),
+    "stopping table whose speeds descend": (
+        separation(
+            f'reaction = 1, model = "table", table = {{ {OWN_TABLE.replace("speed = [1]", "speed = [1, 0.5]")} }}'
+        ),
+        {},
+        "workstation.toml: safety[0].stop.table",
+        "does not ascend",
     ),
     "time that goes back": (
         FILE,

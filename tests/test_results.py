@@ -48,12 +48,11 @@ def test_arrays_hold_what_was_added_and_the_worst_is_the_smallest_severity(rows)
     first = min(range(len(rows)), key=lambda k: (severity(rows[k]), k))
     worst = series.worst()
     assert (worst.seq, worst.t) == (first, first * 0.01)
-    assert (worst.value, worst.verdict, worst.reason) == (
-        rows[first].value,
-        rows[first].verdict,
-        rows[first].reason,
-    )
-    assert series.verdict == worst_verdict(r.verdict for r in rows) == worst.verdict
+    assert (worst.value, worst.reason) == (rows[first].value, rows[first].reason)
+    judged = worst_verdict(r.verdict for r in rows)
+    # A limit that no tick judged leaves the run undecided.
+    open_ = judged is None and any(r.limit is not None for r in rows)
+    assert series.verdict == worst.verdict == (U if open_ else judged)
 
 
 @settings(max_examples=60, deadline=None)
@@ -74,13 +73,18 @@ def test_thinning_loses_no_extremum_and_no_exceedance(rows, most):
 
 @pytest.mark.parametrize(
     ("rows", "expected"),
-    [([W, E, U], E), ([W, U, None], U), ([None, W], W), ([None], None), ([], U)],
+    [([W, E, U], E), ([W, U, None], U), ([None, W], W), ([None], U), ([], U)],
 )
 def test_a_run_is_as_good_as_its_worst_tick(rows, expected):
     log = ResultLog([CriterionInfo(name="speed", kind="k", group="safety", title="")])
     for k, verdict in enumerate(rows):
         log.add(tick(k, result(1.0, verdict)))
     assert log["speed"].verdict == log.verdict == expected
+
+
+def test_without_a_limit_there_is_no_verdict():
+    log = log_of([tick(0, result(1.0, None, limit=None))])
+    assert (log.verdict, log["speed"].worst().verdict) == (None, None)
 
 
 def test_what_was_announced_and_never_heard_is_undecided():

@@ -41,6 +41,15 @@ def by_hand(description: Description, robot: Robot, file: str) -> Description:
             _check(table, values, names, file)
             for name, value in zip(names, values, strict=True):
                 changes[name][key] = Quantity(float(value), Origin.GIVEN, "workstation file")
+    for table, values in (
+        ("acceleration_limits", robot.acceleration_limits),
+        ("jerk_limits", robot.jerk_limits),
+    ):
+        # Nothing but a rescaled motion reads them, and one for all joints will do.
+        if values is not None and (len(values) not in (1, len(names)) or min(values) <= 0):
+            what = f"{list(values)} does not fit"
+            remedy = f"give one value above 0, or one for each of {', '.join(names)}"
+            raise InputError.at(file, table, what, remedy)
     known = {link.name for link in description.links}
     for name in robot.masses:
         if name not in known:
@@ -51,14 +60,15 @@ def by_hand(description: Description, robot: Robot, file: str) -> Description:
     findings = list(description.findings)
     for link in description.links:
         joints = tuple(replace(j, **changes[j.name]) if changes.get(j.name) else j for j in link.joints)
-        inertial = link.inertial
+        inertial, impossible = link.inertial, link.impossible_mass
         if link.name in robot.masses:
+            impossible = None
             try:
                 inertial, more = link_by_hand(robot.masses[link.name], link, robot=robot.name, file=file)
                 findings += more
             except InputError as error:
                 problems += error.problems
-        links.append(replace(link, joints=joints, inertial=inertial))
+        links.append(replace(link, joints=joints, inertial=inertial, impossible_mass=impossible))
     if problems:
         raise InputError(problems)
     return replace(description, links=tuple(links), findings=tuple(findings))

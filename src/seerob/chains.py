@@ -8,7 +8,7 @@ import numpy as np
 
 from seerob.geometry import Solid
 from seerob.model import Mechanism
-from seerob.model_io.description import Description, Inertial, Joint
+from seerob.model_io.description import Description, Inertial, Joint, Link
 from seerob.model_io.lint import TIPS
 from seerob.mounting.specification import extreme_points
 from seerob.snapshot import Finding, Origin
@@ -45,31 +45,40 @@ def couple(every: Sequence[Joint], commanded: Sequence[Joint]) -> tuple[Array, A
     return coupling, offset
 
 
-def unknown_masses(
-    name: str, description: Description, *, loaded: Collection[str], things: Mapping[str, bool]
-) -> tuple[str, ...]:
-    """What of a robot's moving bodies has a mass that nobody gave, one sentence each.
+def unweighed_links(description: Description, *, loaded: Collection[str]) -> list[Link]:
+    """Links that joints move and whose mass nobody gave.
 
     A frame between two joints has no mass of its own; a joint that moves nothing heavy has no
     mass matrix.
 
     Args:
-        name: The robot.
-        description: Its links.
+        description: Of the robot.
         loaded: Links that something is mounted on.
-        things: Tools and workpieces mounted on it, and whether their mass is known.
     """
     heavy = {link.name for link in description.links if link.inertial is not None or link.name in loaded}
     for link in reversed(description.links):
         if link.name in heavy and link.parent is not None:
             heavy.add(link.parent)
-    links = [
-        f"nobody gave the mass of {name}/{link.name}"
+    return [
+        link
         for link in description.links
         if link.joints and link.inertial is None and (link.solids or link.name not in heavy)
     ]
+
+
+def unknown_masses(name: str, links: Sequence[Link], things: Mapping[str, bool]) -> tuple[str, ...]:
+    """What of a robot's moving bodies has a mass that nobody gave, one sentence each.
+
+    Args:
+        name: The robot.
+        links: Of it, whose mass nobody gave.
+        things: Tools and workpieces mounted on it, and whether their mass is known.
+    """
     unweighed = [thing for thing, known in things.items() if not known]
-    return (*links, *(f"nobody gave the mass or the density of {thing}" for thing in unweighed))
+    return (
+        *(f"nobody gave the mass of {name}/{link.name}" for link in links),
+        *(f"nobody gave the mass or the density of {thing}" for thing in unweighed),
+    )
 
 
 def assumed(robot: Mechanism, *, tip_given: bool) -> list[Finding]:

@@ -28,6 +28,7 @@ from seerob.kernels import pull as kernel
 from seerob.machines.following import Machines, Moved
 from seerob.model import Mechanism, Model
 from seerob.mounting.compilation import pose_matrix
+from seerob.moving_base import moved_by_poses
 from seerob.reference import Reference
 from seerob.sample_values import is_finite, largest_speed, torques_of
 from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
@@ -188,6 +189,7 @@ class Engine:
                 hearing.parts.append((found.t, found.parts))
                 if found.observed:
                     hearing.observed.append((found.t, found.observed))
+                    hearing.aims.append((found.t, found.unaimed))
                 hearing.torques.append(None)
 
     def _silent(self, name: str) -> bool:
@@ -227,11 +229,10 @@ class Engine:
         """Robot or human that a sample drives.
 
         Raises:
-            UnknownName: There is none.
-            InputError: It has another number of joints.
+            UnknownName, InputError: There is none; it has another number of joints, or takes no poses.
         """
         if isinstance(sample, PoseSample):
-            return self.model.carrier(self.model.frame(sample.target))
+            return moved_by_poses(self.model, sample)
         mechanism = self.model.mechanism(sample.target)
         n = len(mechanism.joints)
         if any(len(values) != n for values in (sample.q, sample.qd, sample.tau) if values is not None):

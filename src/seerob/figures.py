@@ -74,6 +74,11 @@ def against(value: float | None, limit: float | None, unit: str = "", *, at_most
     return Pair(_signed(repr(float(value))), _signed(repr(float(limit))))
 
 
+def told(value: float, limit: float | None, unit: str = "", *, at_most: bool) -> str:
+    """A value with its unit, on its side of the limit where there is one: what a label in a picture says."""
+    return with_unit(against(value, limit, unit, at_most=at_most).value, unit)
+
+
 def margin(value: float, limit: float, unit: str = "", *, at_most: bool) -> str:
     """How far a value is inside (rounded down) or beyond (rounded up) its limit, with the unit."""
     gap = limit - value if at_most else value - limit

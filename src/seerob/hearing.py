@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -38,6 +39,9 @@ class Hearing:
     """The same of single bones of a person, when the rest may be relied on."""
     observed: list[tuple[float, frozenset[str]]] = field(default_factory=list)
     """Of a person that devices see: instant [s] and bones that some device sees then, oldest first."""
+    aims: list[tuple[float, Mapping[str, float]]] = field(default_factory=list)
+    """Of a person that devices see: instant [s], and hands, feet and heads of which only the joint is seen,
+    with a bound on how far they may be turned from the twin's [rad]; oldest first."""
     lost: float = -np.inf
     """When the physics last lost it, so that it was put back [s]."""
     saturated: bool = False
@@ -50,7 +54,7 @@ class Hearing:
         while len(self.heard) > 1 and self.heard[1][0] <= t:
             del self.heard[0]
             del self.torques[:1]
-        for told in (self.parts, self.observed):
+        for told in (self.parts, self.observed, self.aims):
             while len(told) > 1 and told[1][0] <= t:
                 del told[0]
 
@@ -74,6 +78,17 @@ class Hearing:
         """Bones that may not be relied on at ``t`` [s], with the reasons."""
         k = sum(1 for instant, _ in self.parts if instant <= t + SLACK)
         return tuple(part for _, told in self.parts[max(k - 1, 0) : k + 1] for part in told)
+
+    def unaimed(self, t: float) -> dict[str, float]:
+        """Hands, feet and heads at ``t`` [s] of which only the joint is seen, each with a bound [rad].
+
+        It bounds the angle between how the twin's is turned and how the person's may be.
+        """
+        k = sum(1 for instant, _ in self.aims if instant <= t + SLACK)
+        found: dict[str, float] = {}
+        for _, told in self.aims[max(k - 1, 0) : k + 1]:
+            found |= {bone: max(angle, found.get(bone, 0.0)) for bone, angle in told.items()}
+        return found
 
     def unseen(self, t: float) -> tuple[str, ...]:
         """Bones that no device sees at ``t`` [s] and that the bones beside them do not tell.

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
 from seerob.criterion import Criterion, Evaluate
 from seerob.errors import Undecided
+from seerob.hearing import SLACK
 from seerob.snapshot import Basis, Result, Verdict
 from seerob.state import State
 
@@ -24,29 +26,33 @@ class Bound:
     basis: Basis
 
 
+class _Kept(NamedTuple):
+    """An answer of a criterion with a period of its own, until it is asked again."""
+
+    result: Result
+    due: float
+    """Run time from which it is asked again [s]."""
+    asked: tuple[str, ...]
+    """Robots, people and variables that it rests on."""
+
+
 class Judge:
     """Asks every criterion at its period; what it cannot know becomes UNDECIDED."""
 
     def __init__(self, bound: Sequence[Bound]) -> None:
         self._bound = bound
-        self._due = [0.0] * len(bound)
-        self._last: list[Result | None] = [None] * len(bound)
-        self._asked: list[tuple[str, ...]] = [()] * len(bound)
+        self._kept: dict[int, _Kept] = {}
 
     def __call__(self, state: State) -> tuple[Result, ...]:
         """Results at this state, in the order of the file."""
         return tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
 
     def _one(self, i: int, bound: Bound, state: State) -> Result:
-        last = self._last[i]
+        kept = self._kept.get(i)
         criterion = bound.criterion
         # A result between two evaluations lasts only as long as what it rests on is heard.
-        if (
-            last is not None
-            and state.t < self._due[i] - 1e-9
-            and not any(map(state.interrupted, self._asked[i]))
-        ):
-            return last
+        if kept and state.t < kept.due - SLACK and not any(map(state.interrupted, kept.asked)):
+            return kept.result
         state.asked.clear()
         try:
             result = self._muted(criterion, state) or bound.evaluate(state)
@@ -64,9 +70,7 @@ class Judge:
         result = replace(result, basis=bound.basis)
         if criterion.every is not None:
             result = replace(result, t=state.t)
-            self._due[i] = state.t + criterion.every
-            self._last[i] = result
-            self._asked[i] = tuple(sorted(state.asked))
+            self._kept[i] = _Kept(result, state.t + criterion.every, tuple(sorted(state.asked)))
         return result
 
     @staticmethod

@@ -19,6 +19,7 @@ import sys
 import time
 from collections.abc import AsyncGenerator, Callable, Coroutine, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import ContextVar
 from pathlib import Path
 from threading import Lock, Thread
 from types import TracebackType
@@ -51,6 +52,23 @@ PATIENCE = 1.0
 PROMPT = 5e-4
 """How long a thread keeps the interpreter while others wait for it [s], during a live run. Python's own 5 ms
 is as long as samples then wait for the twin's computations."""
+
+
+_said: ContextVar[set[str]] = ContextVar("said")
+MOST_SAID = 1000
+
+
+def say_once(log: logging.Logger, level: int, text: str) -> None:
+    """Log a line that is as true of each connection, the first time only.
+
+    Of a loss and of a return there is one line each; what was said at the first connection is not said
+    again at the next.
+    """
+    said = _said.get(set())
+    if text not in said:
+        log.log(level, "%s", text)
+        if len(said) < MOST_SAID:
+            said.add(text)
 
 
 class LiveSource(Source, frozen=True, kw_only=True):
@@ -86,6 +104,10 @@ class LiveSource(Source, frozen=True, kw_only=True):
         """
         return ()
 
+    async def inquire(self, folder: Path, target: Target | None) -> tuple[Finding, ...]:
+        """The same at the start of a run, when it is known what it is asked for; raises as `ask` does."""
+        return await self.ask()
+
     def open(self, folder: Path, target: Target | None) -> Opened:
         """Ask the other end what it has, if it can be reached: a run may begin before it can.
 
@@ -98,13 +120,18 @@ class LiveSource(Source, frozen=True, kw_only=True):
         )
         behind = Finding(level="note", subject=about, text=text)
         try:
-            said = at_start(self.ask())
+            said = at_start(self.inquire(folder, target), within=self.patience())
         except InputError:
             raise
         except (OSError, EOFError, SeerobError) as error:
-            text = f"{self.name}: not reached at start: {because(error)}; it is tried again during the run"
+            who = "" if about == self.name else f"{self.name}: "
+            text = f"{who}not reached at start: {because(error)}; it is tried again during the run"
             said = (Finding(level="warning", subject=about, text=text),)
         return Opened(samples=(), duration=0.0, findings=(behind, *said))
+
+    def patience(self) -> float:
+        """How long a run waits for the answer at start [s]."""
+        return ASK_WITHIN
 
     def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Connect, and yield what is heard until the connection ends; then it is called again.
@@ -119,15 +146,15 @@ class LiveSource(Source, frozen=True, kw_only=True):
         raise NotImplementedError
 
 
-def at_start(question: Coroutine[Any, Any, T]) -> T:
+def at_start(question: Coroutine[Any, Any, T], *, within: float = ASK_WITHIN) -> T:
     """The answer to what is asked when a source is opened.
 
     Raises:
-        TimeoutError: There was none within `ASK_WITHIN`.
+        TimeoutError: There was none within that time [s].
     """
     # In a thread: whoever opens it may be in an event loop, a notebook for one.
     with ThreadPoolExecutor(1) as thread:
-        return thread.submit(asyncio.run, asyncio.wait_for(question, ASK_WITHIN)).result()
+        return thread.submit(asyncio.run, asyncio.wait_for(question, within)).result()
 
 
 def because(error: BaseException) -> str:
@@ -198,11 +225,14 @@ class Listener:
             self._loop, self._task = asyncio.get_running_loop(), asyncio.current_task()
             if self._stopping:
                 return
+        _said.set(set())
         pause = FIRST_PAUSE
         while True:
             self._clock.restart()
             begun = time.monotonic()
             reason = await self._session()
+            if self._stopping:
+                return
             # Who speaks for less than the last pause and falls silent again is tried less and less often.
             if self._up and time.monotonic() - begun > pause:
                 pause = FIRST_PAUSE
@@ -215,6 +245,10 @@ class Listener:
         try:
             async with contextlib.aclosing(self._source.listen(self._target)) as samples:
                 async for sample in samples:
+                    # `asyncio.wait_for`, which some libraries use, forgets a cancellation that comes
+                    # together with what it waits for (Python 3.11).
+                    if self._stopping:
+                        break
                     self._take(sample)
         except (OSError, EOFError, SeerobError) as error:
             return because(error)
@@ -231,7 +265,7 @@ class Listener:
             if instant is None:
                 self._arrivals.repeat()
                 return
-        if not isinstance(sample, SignalSample):
+        if not (self.drives and isinstance(sample, SignalSample)):
             self._arrivals.add(host, sample.t_device)
         if not self._up:
             if self._up is False:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.distances.least import Query, Shapes
-from seerob.errors import UnknownName
+from seerob.errors import InputError, Problem, UnknownName
 from seerob.geometry import Solid
 from seerob.model_io.description import Description, Joint, Quantity
 from seerob.snapshot import Finding, Origin
@@ -110,6 +110,33 @@ class Mechanism:
     velocity_limits: tuple[Quantity | None, ...]
     effort_limits: tuple[Quantity | None, ...]
     rotor_inertia_known: bool
+    impossible_masses: tuple[Problem, ...] = ()
+    """What files say of those that no body has, such as 0 kg."""
+    on: str = ""
+    """Robot or machine that carries it; empty when it stands in the world."""
+    riders: tuple[str, ...] = ()
+    """Machines that are mounted on it: their bodies are among its own, their joints are not."""
+
+    @property
+    def alone(self) -> bool:
+        """Whether all that its bodies do follows from its own joints."""
+        return not self.on and not self.riders
+
+    def require_masses(self, who: str) -> None:
+        """Refuse a figure that rests on masses that cannot be; those that nobody gave leave it undecided.
+
+        Args:
+            who: The criterion whose figure it is.
+
+        Raises:
+            InputError: With every such mass.
+        """
+        if self.impossible_masses:
+            remedy = f"give it in masses of {self.name} in the workstation file, or mend that file"
+            raise InputError(
+                p._replace(what=f"{p.what}; {who} needs it", remedy=f"{p.remedy}: {remedy}")
+                for p in self.impossible_masses
+            )
 
     @property
     def lower(self) -> Array:
@@ -204,10 +231,14 @@ class Model:
         return self.frames[name]
 
     def carrier(self, frame: Frame) -> Mechanism:
-        """The robot or human that moves a frame; UnknownName when none does."""
-        for mechanism in self.mechanisms.values():
-            if frame.mj in mechanism.mj_bodies:
-                return mechanism
+        """The robot, human or machine that moves a frame: of several the robot, else the innermost.
+
+        Raises:
+            UnknownName: None does.
+        """
+        movers = [m for m in self.mechanisms.values() if frame.mj in m.mj_bodies]
+        if movers:
+            return min(movers, key=lambda m: (m.role == "machine", len(m.mj_bodies)))
         raise UnknownName("robot or human that moves", frame.name, self.mechanisms)
 
     def select(self, name: str) -> tuple[int, ...]:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from msgspec.structs import replace
+
 from seerob.criterion import Evaluate
 from seerob.model import Gap, Model
 from seerob.snapshot import Result, Verdict
@@ -18,8 +20,42 @@ MOST = 16
 """Sets of bones for which a question is kept."""
 
 
+def seen_first(
+    bodies: tuple[int, ...],
+    judge: Evaluate,
+    without: Callable[[tuple[int, ...]], Evaluate | None],
+) -> Evaluate:
+    """Ask about what is known first: the worst that is known is enough for exceeded, never for within.
+
+    Args:
+        bodies: That the question is about, by index.
+        judge: The whole question; undecided while bones are in doubt, unless the file accepts estimates.
+        without: Makes the question about the rest of the bodies; None when nothing of it is left.
+    """
+    parts: dict[tuple[int, ...], Evaluate | None] = {}
+
+    def evaluate(state: State) -> Result:
+        lost = state.lost_bodies(bodies)
+        if not lost:
+            return judge(state)
+        if lost not in parts:
+            if len(parts) == MOST:
+                del parts[next(iter(parts))]
+            parts[lost] = without(lost)
+        part = parts[lost]
+        if part is not None:
+            result = part(state)
+            if result.verdict is Verdict.EXCEEDED:
+                names = [state.model.bodies[i].name for i in lost]
+                shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+                return replace(result, reason=f"{result.reason}; without {shown}, which may be elsewhere")
+        return judge(state)
+
+    return evaluate
+
+
 def partly_seen(model: Model, gap: Gap, bind: Callable[[Gap], Evaluate]) -> Evaluate:
-    """Ask about the bones that are seen first, then about all.
+    """The same of a question about a gap.
 
     Args:
         model: The compiled workstation.
@@ -27,23 +63,9 @@ def partly_seen(model: Model, gap: Gap, bind: Callable[[Gap], Evaluate]) -> Eval
         bind: Makes the criterion for a part of the gap. It asks for distances with ``estimates`` and widens
             them by `seerob.tracking_error.TrackingError`.
     """
-    bodies = (*gap.a, *gap.b)
-    judge = bind(gap)
-    parts: dict[tuple[int, ...], Evaluate] = {}
 
-    def evaluate(state: State) -> Result:
-        lost = state.lost_bodies(bodies)
-        if not lost:
-            return judge(state)
+    def without(lost: tuple[int, ...]) -> Evaluate | None:
         a, b = (tuple(i for i in side if i not in lost) for side in (gap.a, gap.b))
-        if a and b:
-            if lost not in parts:
-                if len(parts) == MOST:
-                    del parts[next(iter(parts))]
-                parts[lost] = bind(model.gap(a, b))
-            result = parts[lost](state)
-            if result.verdict is Verdict.EXCEEDED:
-                return result
-        return judge(state)
+        return bind(model.gap(a, b)) if a and b else None
 
-    return evaluate
+    return seen_first((*gap.a, *gap.b), bind(gap), without)

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.kernels import polytope as kernel
 from seerob.kernels.contact_forces import zero_moment_set
@@ -97,18 +98,18 @@ def free_moment(J: Array, low: Array, high: Array) -> Polytope:
         ValueError: Bounds that are not finite or are inverted; more than 10 driven joints.
     """
     J, low, high = _checked(J, low, high)
-    moves = np.abs(J).max(axis=0) > kernel.INERT * np.abs(J).max(initial=1e-300)
+    moves = _moving(J)
     if ((low > 0) | (high < 0))[~moves].any():
         return _nothing()
     J, low, high = J[:, moves], low[moves], high[moves]
     U, sigma, Vt = np.linalg.svd(J, full_matrices=True)
-    rank = int((sigma > SINGULAR * sigma.max(initial=0.0)).sum())
+    rank = _rank(sigma)
     torques = _corners_of_section(Vt[rank:], low, high)
     if not len(torques):
         return _nothing()
     force_from_torque = (U[:3, :rank] / sigma[:rank]) @ Vt[:rank]
     undriven, size, _ = np.linalg.svd(U[:3, rank:], full_matrices=False)
-    free = undriven[:, size > SINGULAR] if rank < 6 else np.zeros((3, 0))
+    free = undriven[:, size > SINGULAR]
     forces = torques @ force_from_torque.T
     return _hull(forces - forces @ free @ free.T, free)
 
@@ -125,10 +126,10 @@ def torque_box(J_v: Array, low: Array, high: Array) -> Polytope:
         ValueError: Bounds that are not finite or are inverted; more than 10 driven joints.
     """
     J_v, low, high = _checked(J_v, low, high)
-    moves = np.abs(J_v).max(axis=0) > kernel.INERT * np.abs(J_v).max(initial=1e-300)
+    moves = _moving(J_v)
     J_v, low, high = J_v[:, moves], low[moves], high[moves]
     U, sigma, Vt = np.linalg.svd(J_v, full_matrices=True)
-    rank = int((sigma > SINGULAR * sigma.max(initial=0.0)).sum())
+    rank = _rank(sigma)
     torques = _corners_of_section(np.zeros((0, len(low))), low, high)
     return _hull(torques @ ((U[:, :rank] / sigma[:rank]) @ Vt[:rank]).T, U[:, rank:])
 
@@ -142,6 +143,17 @@ def _checked(J: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
     return J, low, high
 
 
+def _moving(J: Array) -> NDArray[np.bool_]:
+    """Joints that move the point."""
+    size = np.abs(J)
+    return np.asarray(size.max(axis=0) > kernel.INERT * size.max(initial=0.0))
+
+
+def _rank(sigma: Array) -> int:
+    """How many directions are driven, of singular values in falling order."""
+    return int((sigma > SINGULAR * sigma[:1]).sum())
+
+
 def _nothing() -> Polytope:
     return Polytope(np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros((3, 0)), float("nan"))
 
@@ -151,7 +163,7 @@ def _corners_of_section(N: Array, low: Array, high: Array) -> Array:
     n, r = len(low), len(N)
     if n > 10:
         raise ValueError(f"{n} driven joints are too many for this set; zero_moment has no such bound")
-    slack = 1e-12 * max(float(np.abs([low, high]).max(initial=0.0)), 1e-300)
+    slack = 1e-12 * np.abs([low, high]).max(initial=0.0)
     at_high = (np.arange(2 ** (n - r))[:, None] >> np.arange(n - r)) & 1
     found = []
     for between in combinations(range(n), r):
@@ -166,14 +178,15 @@ def _corners_of_section(N: Array, low: Array, high: Array) -> Array:
             torques[:, between] = -np.linalg.solve(block, N[:, held] @ torques[:, held].T).T
         inside = ((torques >= low - slack) & (torques <= high + slack)).all(axis=1)
         found.append(torques[inside])
-    return np.vstack(found) if found else np.zeros((0, n))
+    # At least one block is regular: the rows of N are orthonormal.
+    return np.vstack(found)
 
 
 def _hull(points: Array, free: Array) -> Polytope:
     """Convex hull of a cloud that spans space, or its points alone when it is flat."""
-    size = float(np.abs(points).max(initial=0.0))
+    size = float(np.abs(points).max())
     V = kernel.merged(np.ascontiguousarray(points), SAME * size)
-    flat = np.linalg.matrix_rank(V - V[0], tol=SINGULAR * max(size, 1e-300)) < 3
+    flat = np.linalg.matrix_rank(V - V[0], tol=SINGULAR * size) < 3
     if flat:
         return Polytope(V, np.zeros((0, 3), np.int64), free, 0.0 if free.shape[1] == 0 else float("nan"))
     from scipy.spatial import ConvexHull
@@ -182,8 +195,6 @@ def _hull(points: Array, free: Array) -> Polytope:
     a, b, c = (V[hull.simplices[:, i]] for i in range(3))
     outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) > 0
     triangles = np.where(outward[:, None], hull.simplices, hull.simplices[:, ::-1])
-    number = np.full(len(V), -1)
+    number = np.empty(len(V), np.int64)
     number[hull.vertices] = np.arange(len(hull.vertices))
-    return Polytope(
-        V[hull.vertices], number[triangles].astype(np.int64), free, float(-hull.equations[:, 3].max())
-    )
+    return Polytope(V[hull.vertices], number[triangles], free, float(-hull.equations[:, 3].max()))

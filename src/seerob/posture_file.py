@@ -38,6 +38,12 @@ COLUMNS: dict[str, tuple[str, float]] = {
 }
 """Columns with numbers: the field, and the factor to its unit."""
 TEXTS = ("angle", "side", "support", "colour", "label", "confidence")
+SAME = {"points": "score", "color": "colour"}
+"""Other words for a column."""
+REMARKS = ("remark", "remarks", "comment", "comments", "note", "notes")
+"""Columns for whoever reads the table; not read here."""
+UNITS = {"deg": ("°", "deg"), "rad": ("rad",), "s": ("s",)}
+"""What may stand behind a number, by the end of the column's name."""
 YES_NO = {"yes": True, "no": False, "true": True, "false": False, "1": True, "0": False}
 
 
@@ -69,11 +75,12 @@ def read_zones(path: Path, name: str, *, sheet: str | None = None) -> ZoneTable:
     for grid, _ in candidates(path, name, TableMapping(sheet=sheet)):
         header = _header(grid)
         if header is None:
-            what = f"no row with the columns {' and '.join(NAMES)}"
-            missing.append(Problem(name, place(grid), what, "head the table with " + ", ".join(_known())))
+            missing.append(_headless(grid))
         else:
             return ZoneTable(title=Path(name).stem, source=name, rows=_rows(grid, *header))
-    raise InputError(missing[:1] or Problem(name, "", "holds no table"))
+    # A reading with a header that lacks a column is nearer than one without any.
+    nearest = sorted(missing, key=lambda problem: "row" not in problem.key)
+    raise InputError(nearest[:1] or Problem(name, "", "holds no table"))
 
 
 def zones_of(table: Mapping[str, Any], name: str) -> ZoneTable:
@@ -112,12 +119,38 @@ def _key(cell: Cell) -> str:
     return "_".join(text.replace("-", " ").replace("_", " ").split())
 
 
+def _column(cell: Cell) -> str:
+    key = _key(cell)
+    return SAME.get(key, key)
+
+
 def _header(grid: Grid) -> tuple[int, dict[int, str]] | None:
     for count, row in enumerate(islice(grid.rows(), MAX_HEAD), start=1):
-        names = {i: _key(cell) for i, cell in enumerate(row) if not blank(cell)}
+        names = {i: _column(cell) for i, cell in enumerate(row) if not blank(cell)}
         if set(NAMES) <= set(names.values()):
-            return count, names
+            return count, {i: name for i, name in names.items() if name not in REMARKS}
     return None
+
+
+def _headless(grid: Grid) -> Problem:
+    """What is missing, of the row that looks most like a header."""
+    rows = [[_column(cell) for cell in row] for row in islice(grid.rows(), MAX_HEAD)]
+    fits = [len(set(row) & {*_known()}) for row in rows]
+    best = max(range(len(rows)), key=lambda k: fits[k], default=0)
+    remedy = "head the table with " + ", ".join(_known())
+    if not rows or not fits[best]:
+        return Problem(grid.file, place(grid), f"no row with the columns {' and '.join(NAMES)}", remedy)
+    absent = " and ".join(name for name in NAMES if name not in rows[best])
+    return Problem(grid.file, place(grid, best + 1), f"the header has no column {absent}", remedy)
+
+
+def _bare(cell: Cell, column: str) -> Cell:
+    """A cell without the unit that its column says anyway: ``45°``."""
+    if isinstance(cell, str):
+        for unit in UNITS.get(column.rpartition("_")[2], ()):
+            if cell.strip().lower().endswith(unit):
+                return cell.strip()[: -len(unit)]
+    return cell
 
 
 def _rows(grid: Grid, header: int, names: Mapping[int, str]) -> tuple[ZoneRow, ...]:
@@ -161,7 +194,7 @@ def _row(
             continue
         if name in COLUMNS:
             field, factor = COLUMNS[name]
-            value = number(cell, decimal_comma=True)
+            value = number(_bare(cell, name), decimal_comma=True)
             column_of[field] = name
             if isinstance(value, str):
                 wrong(name, value, "give a number")

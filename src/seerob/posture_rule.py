@@ -7,11 +7,20 @@ from typing import Annotated, ClassVar
 import numpy as np
 from msgspec import Meta
 
+from seerob import provenance
 from seerob.criterion import Criterion, Evaluate
 from seerob.ergonomic_posture import bind_posture
 from seerob.errors import InputError
 from seerob.human.angles import Angles
 from seerob.model import Model
+from seerob.scoring.basis import (
+    ACCURACY_NOTE,
+    PROJECTION_NOTE,
+    choices,
+    entered,
+    posture_quality,
+    watched,
+)
 from seerob.scoring.held_work import Watch, WorkDetection
 from seerob.scoring.judgement import Method, judged
 from seerob.scoring.measured import Accuracy, JointAccuracy, accuracy_of
@@ -20,7 +29,7 @@ from seerob.scoring.repetition import GAP
 from seerob.scoring.shoulder import ArmPolicy
 from seerob.scoring.spans import Span
 from seerob.scoring.thresholds import Thresholds
-from seerob.snapshot import Level, Result
+from seerob.snapshot import Basis, Input, Level, Result
 from seerob.state import State
 
 
@@ -54,6 +63,8 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
 
     METHOD: ClassVar[Method]
     PHASE: ClassVar[type[Phase]]
+    REPEATED: ClassVar[int]
+    """Movements per minute from which on work is repeated."""
 
     thresholds: Thresholds = Thresholds()
     """Where a posture counts as twisted, raised, upright and so on."""
@@ -73,8 +84,9 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
         """Action levels, the lowest first."""
         return self.METHOD.classes
 
-    def watch(self) -> Watch | None:
-        """What finds static and repeated work; None when it is entered."""
+    @property
+    def static(self) -> float:
+        """How long a posture is held to be static [s]."""
         raise NotImplementedError
 
     def components(
@@ -102,7 +114,7 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
         """See `Criterion.bind`."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases, unknown, error = self.entered(model), self.PHASE(), self.error()
-        watch = None if self.detect is None else self.watch()
+        watch = None if self.detect is None else Watch(self.detect, hold=self.static, count=self.REPEATED)
         if watch is not None and self.every is not None and self.every > GAP:
             raise InputError.at(
                 self.name,
@@ -128,3 +140,40 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
             )
 
         return evaluate
+
+    def based(
+        self,
+        model: Model,
+        *,
+        formula: str,
+        source: str,
+        not_modelled: tuple[str, ...],
+        options: tuple[Input, ...] = (),
+    ) -> Basis:
+        """The basis, with the inputs and limits that rules of this sort share.
+
+        Args:
+            model: The compiled workstation.
+            formula: Of the score.
+            source: Of the tables, with how sure they are.
+            not_modelled: What the rule leaves out.
+            options: Of this rule alone.
+        """
+        return Basis(
+            formula=formula,
+            source=source,
+            inputs=(
+                *provenance.motion(model, self.human),
+                *options,
+                *entered(self.entered(model), self.PHASE()),
+                *watched(self.detect, self.static, self.REPEATED),
+                *choices(self.thresholds, self.arm),
+                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
+                *(() if self.limit is None else provenance.limit(self.limit, "")),
+            ),
+            not_modelled=(
+                *not_modelled,
+                PROJECTION_NOTE,
+                *((ACCURACY_NOTE,) if self.error() is not None else ()),
+            ),
+        )

@@ -76,14 +76,10 @@ def masses(model: Model, mechanism: Mechanism) -> tuple[Input, ...]:
     tables: tuple[Robot | Mounted, ...] = (*station.robots, *station.tools, *station.workpieces)
     carried = {model.bodies[index].owner for index in mechanism.carried}
     found += [
-        Input(
-            name=f"mass_tolerance of {table.name}",
-            value=table.mass_tolerance,
-            origin=Origin.GIVEN,
-            source=FILE,
-        )
+        Input(name=f"{key} of {table.name}", value=value, unit=unit, origin=Origin.GIVEN, source=FILE)
         for table in tables
-        if table.mass_tolerance and (table.name == mechanism.name or table.name in carried)
+        for key, unit in (("mass_tolerance", ""), ("density_tolerance", ""), ("com_tolerance", "m"))
+        if (value := getattr(table, key, None)) and (table.name == mechanism.name or table.name in carried)
     ]
     rotors = [joint.armature for joint in mechanism.joints if joint.armature is not None]
     found.append(

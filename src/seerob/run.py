@@ -120,7 +120,8 @@ def signal_timeouts(model: Model) -> tuple[dict[str, float], dict[str, float]]:
 
 def _world_from_base(model: Model, name: str) -> Matrix4 | None:
     station = model.workstation
-    places = {**{r.name: r.base for r in station.robots}, **{h.name: h.at for h in station.humans}}
+    standing = {r.name: r.base for r in station.robots if r.on is None}
+    places = {**standing, **{h.name: h.at for h in station.humans}}
     if name not in places:
         return None
     a, b, c, d = (tuple(row) for row in pose_matrix(places[name]).tolist())
@@ -157,6 +158,7 @@ def scene(
 ) -> Scene:
     """What sinks and the page need to know once; ``files`` are what the hash is of."""
     station = model.workstation
+    too_coarse = coarse(model)
     return Scene(
         title=station.title,
         edition=station.edition,
@@ -185,6 +187,7 @@ def scene(
                     JointInfo(name=joint.name, unit=unit, lower=joint.lower, upper=joint.upper)
                     for joint, unit in zip(m.joints, m.units, strict=True)
                 ),
+                coarse=too_coarse.get(m.name, ""),
             )
             for m in model.mechanisms.values()
         ),
@@ -266,6 +269,12 @@ def warm_up(model: Model) -> None:
     Engine(model).tick()
 
 
+def coarse(model: Model) -> dict[str, str]:
+    """Robots and humans that are heard too coarsely for energies and forces, and why."""
+    said = ((source.target(), source.coarse(model.folder)) for source in model.workstation.sources)
+    return {name: why for name, why in said if why}
+
+
 def engine_of(model: Model) -> Engine:
     """The twin as the workstation's sources drive it."""
     # What is shown is a delay old: silence shows that much earlier, so that it shows within the time-out.
@@ -279,9 +288,8 @@ def engine_of(model: Model) -> Engine:
     live = {s.target() for s in model.workstation.sources if isinstance(s, LiveSource)}
     signals, following = signal_timeouts(model)
     engine = Engine(model, driven={**following, **driven}, live={*live, *following}, signals=signals)
-    for source in model.workstation.sources:
-        if why := source.coarse():
-            engine.state.hearings[source.target()].coarse = why
+    for name, why in coarse(model).items():
+        engine.state.hearings[name].coarse = why
     return engine
 
 

@@ -102,6 +102,9 @@ class BodySample(SampleBase, frozen=True, kw_only=True, tag="body"):
     """By how much ``t`` was put earlier than the device's time of arrival or stamp [s]."""
     hold: float = 0.5
     """Age at which a bone that this device no longer sees does not count any more [s]."""
+    smoothing: float = 0.0
+    """Cut-off frequency of the low-pass filter through which the twin sees it [Hz]; 0 for none. The points
+    here are raw, and ``latency`` holds the filter's delay, too."""
 
 
 class SignalSample(SampleBase, frozen=True, kw_only=True, tag="signal"):

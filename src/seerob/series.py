@@ -201,11 +201,16 @@ class Series:
 
     @property
     def verdict(self) -> Verdict | None:
-        """Of the whole run; UNDECIDED when nothing was heard."""
+        """Of the whole run; UNDECIDED when nothing was heard, or a limit was never judged."""
         if not self.known:
             return Verdict.UNDECIDED
         present = set(np.unique(self.verdicts).tolist())
-        return worst_verdict(v for v, code in CODES.items() if code in present)
+        found = worst_verdict(v for v, code in CODES.items() if code in present)
+        return Verdict.UNDECIDED if found is None and self._never_judged() else found
+
+    def _never_judged(self) -> bool:
+        """Whether a criterion, not a part of one, has a limit and a run too short to judge it by."""
+        return self._tracker is not None and not np.isnan(self.limits).all()
 
     def max(self) -> float:
         """Largest value.
@@ -242,7 +247,8 @@ class Series:
             Undecided: Nothing was heard.
         """
         if self._tracker is not None and self._tracker.worst is not None:
-            return self._tracker.worst
+            worst = self._tracker.worst
+            return worst if worst.verdict is not None else worst._replace(verdict=self.verdict)
         if not self.known:
             raise Undecided(f"{self.name} was never heard in this run")
         return self._worst_of_arrays()

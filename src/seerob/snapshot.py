@@ -305,6 +305,8 @@ class MechanismInfo(Struct, frozen=True, kw_only=True):
     role: str
     """``robot`` or ``human``."""
     joints: tuple[JointInfo, ...]
+    coarse: str = ""
+    """Why what its source says is too coarse for energies and forces; empty when it is not."""
 
 
 class Scene(Struct, frozen=True, kw_only=True, tag="scene"):

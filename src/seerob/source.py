@@ -87,8 +87,12 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """Name of the robot or human it drives; empty for signals."""
         return ""
 
-    def coarse(self) -> str:
-        """Why what it says is too coarse for energies and forces; empty when it is not."""
+    def coarse(self, folder: Path) -> str:
+        """Why what it says is too coarse for energies and forces; empty when it is not.
+
+        Args:
+            folder: Folder of the workstation file; relative paths start there.
+        """
         return ""
 
     def open(self, folder: Path, target: Target | None) -> Opened:

@@ -188,7 +188,8 @@ class State:
         if hearing.error > limit:
             why = " (a torque limit is reached)" if hearing.saturated else ""
             return f"{name}: the twin is off by {hearing.error:.3g} rad or m, more than {limit:g}{why}"
-        return ""
+        above = self.model.mechanisms[name].on
+        return self._doubt(above) if above else ""
 
     def lost_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
         """Those of some bodies that are bones in doubt of people of whom the others may be relied on."""

@@ -5,9 +5,9 @@ A rule has phases of its own, or reads those of ``[[phases]]``, which every rule
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Annotated, Literal, Self, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from msgspec import Meta, Struct
 
@@ -31,7 +31,11 @@ _ROUNDING = 1e-9
 
 
 class Phase(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Base of the phases of a rule; what a phase leaves out is not assessed."""
+    """Base of the phases of a rule; what a phase leaves out is not assessed.
+
+    Raises:
+        ValueError: It ends before it begins, or lies outside its cycle; also of a phase that no rule reads.
+    """
 
     title: str = ""
     """What the phase is called in reports."""
@@ -42,10 +46,26 @@ class Phase(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     cycle: Period | None = None
     """Length of a cycle that repeats from the begin of the run on [s]; the same for all phases."""
 
+    def __post_init__(self) -> None:
+        if self.end is not None and self.end <= self.start:
+            raise ValueError(
+                f"phases: one ends at {self.end:g} s, not after its start at {self.start:g} s; "
+                "let it end later"
+            )
+        last = self.start if self.end is None else self.end
+        if self.cycle is not None and (last > self.cycle + _ROUNDING or self.start >= self.cycle):
+            raise ValueError(f"phases: one reaches to {last:g} s, beyond its cycle of {self.cycle:g} s")
+
     @classmethod
     def from_task(cls, task: TaskPhase) -> Self:
         """What a rule takes from a phase that all rules share: every field that has the same name."""
-        return cls(**{name: getattr(task, name) for name in cls.__struct_fields__ if hasattr(task, name)})
+        same = {name: getattr(task, name) for name in cls.__struct_fields__ if hasattr(task, name)}
+        return cls(**{**same, **cls.read(task)})
+
+    @classmethod
+    def read(cls, task: TaskPhase) -> Mapping[str, Any]:
+        """Fields that a rule takes in words of its own, by name."""
+        return {}
 
 
 class TaskPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -88,8 +108,8 @@ def check_order(phases: Sequence[Phase]) -> None:
     """Refuse phases that do not follow each other.
 
     Raises:
-        ValueError: A phase does not begin after the one before, overlaps the next one, ends before it
-            begins, or lies outside its cycle.
+        ValueError: A phase does not begin after the one before or overlaps the next one, or their cycles
+            differ.
     """
     for before, after in pairwise(phases):
         if after.start <= before.start:
@@ -104,15 +124,6 @@ def check_order(phases: Sequence[Phase]) -> None:
             )
     if len({phase.cycle for phase in phases}) > 1:
         raise ValueError("phases: they have different cycles; give all of them the same, or none")
-    for phase in phases:
-        if phase.end is not None and phase.end <= phase.start:
-            raise ValueError(
-                f"phases: one ends at {phase.end:g} s, not after its start at {phase.start:g} s; "
-                "let it end later"
-            )
-        last = phase.start if phase.end is None else phase.end
-        if phase.cycle is not None and (last > phase.cycle + _ROUNDING or phase.start >= phase.cycle):
-            raise ValueError(f"phases: one reaches to {last:g} s, beyond its cycle of {phase.cycle:g} s")
 
 
 def phase_at(phases: Sequence[P], t: float, unknown: P) -> P:

@@ -13,11 +13,13 @@ from seerob.transforms import Array
 
 
 class TrackingError:
-    """Bound on the distance of every point of bones of the twin from the same point as devices see it.
+    r"""Bound on the distance of every point of bones of the twin from the same point as devices see it.
 
     A bone that is off by p and turned by α moves its points by no more than p + α ρ, where ρ is how far they
-    are from its origin. What no device sees adds what the file accepts (``unseen_uncertainty``), else
-    nothing: how wrong it is nobody knows, and `State.require_bodies` leaves it undecided.
+    are from its origin. Of a hand, foot or head of which only the joint is seen, α is not known but bounded
+    by φ (`seerob.human.ends`), and the chord :math:`2 ρ \sin(φ/2)` takes its place. What no device sees adds
+    what the file accepts (``unseen_uncertainty``), else nothing: how wrong it is nobody knows, and
+    `State.require_bodies` leaves it undecided.
 
     Args:
         model: The compiled workstation.
@@ -42,9 +44,11 @@ class TrackingError:
             return found
         for person, bones in self._bones.items():
             errors = state.hearings[person].bones
+            unaimed = state.hearings[person].unaimed(state.t) if errors else {}
             for row, bone, reach in bones if errors else ():
                 position, angle = errors.get(bone, (None, None))
-                found[row] = (position or 0.0) + (angle or 0.0) * reach
+                chord = 2 * reach * np.sin(unaimed.get(bone, 0.0) / 2)
+                found[row] = (position or 0.0) + max((angle or 0.0) * reach, chord)
             if person in self._accepted:
                 unseen = state.hearings[person].unseen(state.t)
                 for row, bone, _ in bones if unseen else ():

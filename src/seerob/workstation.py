@@ -14,7 +14,7 @@ from msgspec import Struct
 
 from seerob.errors import InputError
 from seerob.machines.display_table import Display
-from seerob.machines.tables import Belt, Motion, Slide, Turn, Vehicle
+from seerob.machines.tables import Belt, Grip, Motion, Route, Slide, Turn, Vehicle
 from seerob.mounting.simple_shape import Shape as Shape  # noqa: PLC0414
 from seerob.quantities import (
     Coordinate,
@@ -77,8 +77,10 @@ class Robot(_Table, frozen=True, kw_only=True):
     name: Name
     model: str
     """``library:ur10``, ``package:…/ur10_robot.urdf``, or a path to URDF, xacro or MJCF."""
+    on: str | None = None
+    """Machine that carries it, an axis, a turntable or a cart; it stands in the world when not given."""
     base: Pose = Pose()
-    """Pose of its root link in the world."""
+    """Pose of its root link in the world, or in the frame of the machine it is on."""
     meshes: str | None = None
     """The maker's description (as ``model``) whose shapes replace the library's envelope."""
     calibration: str | None = None
@@ -105,6 +107,8 @@ class Robot(_Table, frozen=True, kw_only=True):
     """Mass properties by hand, per link name."""
     mass_tolerance: Tolerance | None = None
     """How far the masses of its links may be off, all alike, as a share: 0.05 for ± 5 %."""
+    com_tolerance: Annotated[float, unit("m", ge=0, le=10)] | None = None
+    """How far the centre of mass of every link may be from where it is said to be, in any direction [m]."""
 
 
 class Body(_Table, frozen=True, kw_only=True):
@@ -159,6 +163,15 @@ class Mounted(Thing, frozen=True, kw_only=True):
     """Full name of the link that carries it, such as ``ur10/tool0``, or of another tool."""
     mass_tolerance: Tolerance | None = None
     """How far its mass may be off, as a share: 0.05 for ± 5 %."""
+    density_tolerance: Tolerance | None = None
+    """How far its ``density`` may be off, as a share, and with it its mass."""
+    com_tolerance: Annotated[float, unit("m", ge=0, le=10)] | None = None
+    """How far its centre of mass may be from where it is, in any direction [m]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.density_tolerance is not None and self.density is None:
+            raise ValueError("density_tolerance is of a density, which is not given: give mass_tolerance")
 
 
 class Tool(Mounted, frozen=True, kw_only=True):
@@ -177,26 +190,31 @@ class Part(Thing, frozen=True, kw_only=True):
 
 
 class Machine(Thing, frozen=True, kw_only=True):
-    """Something of the environment that moves: an axis, a door, a turntable, what a belt carries, a cart."""
+    """Something that moves: an axis, a door, a turntable, what a belt carries, a cart, a gripper."""
 
+    on: str | None = None
+    """Machine, link or tool that carries it, such as ``ur10/tool0``; stands in the world when not given."""
     slide: Slide | None = None
     turn: Turn | None = None
     belt: Belt | None = None
     vehicle: Vehicle | None = None
+    route: Route | None = None
+    grip: Grip | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if "/" in self.name:
             raise ValueError(f"name = {self.name!r}: the name of a machine has no /")
-        if sum(m is not None for m in (self.slide, self.turn, self.belt, self.vehicle)) != 1:
-            raise ValueError("give exactly one of slide, turn, belt, vehicle")
+        if sum(m is not None for m in self._motions()) != 1:
+            raise ValueError("give exactly one of slide, turn, belt, vehicle, route, grip")
+
+    def _motions(self) -> tuple[Motion | None, ...]:
+        return self.slide, self.turn, self.belt, self.vehicle, self.route, self.grip
 
     @property
     def motion(self) -> Motion:
         """How it moves."""
-        motion = self.slide or self.turn or self.belt or self.vehicle
-        assert motion is not None
-        return motion
+        return next(motion for motion in self._motions() if motion is not None)
 
 
 class SweptArea(_Table, frozen=True, kw_only=True):

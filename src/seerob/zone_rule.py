@@ -237,6 +237,6 @@ def _stated(row: ZoneRow) -> Input:
     return Input(
         name=f"{side}{row.angle.replace('_', ' ')}, {', '.join(words)}",
         value=row.score,
-        origin=Origin.STATED if row.confidence else Origin.GIVEN,
+        origin={"": Origin.GIVEN, "M": Origin.ESTIMATED}.get(row.confidence, Origin.STATED),
         source=" ".join(filter(None, (row.label, f"[{row.confidence}]" if row.confidence else ""))),
     )

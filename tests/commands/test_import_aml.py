@@ -186,3 +186,11 @@ def test_a_container_that_unpacks_to_too_much_is_refused(tmp_path):
     file.write_bytes(buffer.getvalue())
     with pytest.raises(InputError, match="larger than 64 MiB"):
         read(file)
+
+
+def test_a_plant_of_structure_alone_is_said_to_be_so(tmp_path, capsys):
+    inner = '<InternalElement Name="Site"><InternalElement Name="Cell"/></InternalElement>'
+    (tmp_path / "plant.aml").write_text("\ufeff" + hierarchy(inner), encoding="utf-8")
+    assert cli.main(["import-aml", str(tmp_path / "plant.aml"), str(tmp_path / "made")]) == Exit.WITHIN
+    said = " ".join(capsys.readouterr().out.split())
+    assert "3 elements, none of which has a geometry file" in said

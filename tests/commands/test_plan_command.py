@@ -1,7 +1,11 @@
 """`seerob plan` and emulated controllers on waypoints, as a user calls them."""
 
 import argparse
+import os
+import signal
+import time
 import tomllib
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -14,6 +18,7 @@ from seerob.commands.emulating import fri, rtde
 from seerob.errors import InputError
 from seerob.model_io import library
 from seerob.waypoints.arm import Arm
+from seerob.waypoints.branches import branch
 
 CELL = """
 [[robots]]
@@ -73,7 +78,7 @@ def test_waypoints_are_drawn_only_of_a_robot_that_has_some(cell):
         seerob.load(cell).bound  # noqa: B018
 
 
-def test_of_a_pose_the_way_of_reaching_it_that_is_clear_is_planned(cell):
+def test_of_a_pose_the_way_of_reaching_it_that_is_clear_is_planned(cell, capsys):
     q = np.radians([-40, -70, 80, -100, -90, 0])
     at = Arm(library.load("ur5"), base="base").posture(q)
     numbers = [*at.position.tolist(), *Rotation.from_matrix(at.rotation).as_rotvec().tolist()]
@@ -81,6 +86,8 @@ def test_of_a_pose_the_way_of_reaching_it_that_is_clear_is_planned(cell):
     (cell / "goal.script").write_text(f"movej(p[{pose}])", encoding="utf-8")
     call = ["plan", str(cell), "--waypoints", str(cell / "goal.script"), "-o"]
     assert cli.main([*call, str(cell / "p.toml")]) == Exit.WITHIN
+    named = str(branch(Arm(library.load("ur5"), base="base").posture(q)))
+    assert f"line 1: branch {named}, the first of 8 that is clear" in capsys.readouterr().out
     found = tomllib.loads((cell / "p.toml").read_text(encoding="utf-8"))["waypoints"]
     np.testing.assert_allclose(found[-1]["q"], q, atol=1e-8)
     (cell / "goal.script").write_text(f"movel(p[{pose}])", encoding="utf-8")
@@ -92,6 +99,60 @@ def test_a_path_that_is_not_found_is_undecided(cell):
     call = ["plan", str(cell), "--to-deg=60,-70,80,-100,-90,0", "--seconds", "0.001"]
     assert cli.main([*call, "-o", str(cell / "p.toml")]) == Exit.UNDECIDED
     assert not (cell / "p.toml").exists()
+
+
+LEVER = """<robot name="lever"><link name="base"/><link name="lever"><collision>
+<origin xyz="0.5 0 0"/><geometry><box size="1 0.05 0.05"/></geometry></collision></link>
+<joint name="hinge" type="revolute"><parent link="base"/><child link="lever"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
+BEHIND_A_POST = """
+[[robots]]
+name = "lever"
+model = "lever.urdf"
+q = [-1.0]
+
+[[parts]]
+name = "post"
+shape = { box = [0.1, 0.1, 0.1] }
+at = { position = [0.8, 0, 0] }
+"""
+
+
+@pytest.fixture
+def behind_a_post(tmp_path):
+    (tmp_path / "lever.urdf").write_text(LEVER, encoding="utf-8")
+    (tmp_path / "workstation.toml").write_text(BEHIND_A_POST, encoding="utf-8")
+    return tmp_path
+
+
+def test_where_there_is_no_way_it_says_so_and_what_to_do(behind_a_post, capsys):
+    call = ["plan", str(behind_a_post), "--to=1", "--seconds", "0.5", "-o", str(behind_a_post / "p.toml")]
+    assert cli.main(call) == Exit.UNDECIDED
+    said = capsys.readouterr().out
+    assert "from start to goal 1: no path was found in 0.5 s" in said
+    assert "that there is none is not known; give a posture in between" in said
+
+
+def test_ctrl_c_ends_a_plan_and_leaves_nothing_behind(behind_a_post, capsys):
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    there = sorted(behind_a_post.iterdir())
+
+    def press():
+        while signal.getsignal(signal.SIGINT) is before[0]:
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    pressing = Thread(target=press, daemon=True)
+    pressing.start()
+    try:
+        call = ["plan", str(behind_a_post), "--to=1", "--seconds", "300", "-o", str(behind_a_post / "p.toml")]
+        assert cli.main(call) == Exit.UNDECIDED
+    finally:
+        pressing.join()
+        for number, handler in zip((signal.SIGINT, signal.SIGTERM), before, strict=True):
+            signal.signal(number, handler)
+    assert "stopped after" in capsys.readouterr().out
+    assert sorted(behind_a_post.iterdir()) == there
 
 
 @pytest.mark.parametrize("text", ["1,a", "", "1,,2", "nan"])

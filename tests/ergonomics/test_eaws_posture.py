@@ -9,6 +9,7 @@ from made_postures import PERSON, made_angles
 from made_cell import judged, made, state_at
 from seerob.human.posture import posture
 from seerob.human.skeleton import JOINTS
+from seerob.results import ResultLog
 from seerob.scoring.eaws_posture import (
     EawsThresholds,
     Interpolation,
@@ -19,7 +20,7 @@ from seerob.scoring.eaws_posture import (
 )
 from seerob.scoring.posture_time import PostureTime
 from seerob.scoring.published import published
-from seerob.snapshot import Verdict
+from seerob.snapshot import Snapshot, Verdict
 
 USUAL = EawsThresholds()
 STILL = np.zeros(len(JOINTS))
@@ -194,12 +195,26 @@ def test_there_is_no_rating_without_sections_2_to_4(tmp_path):
 def test_with_everything_entered_the_limit_is_judged_once_a_cycle_is_whole(tmp_path):
     found = list(run(station(tmp_path, ENTERED + "limit = 25\n"), lambda _: "bent", 20))
     assert {r.verdict for r in found[:-1]} <= {None, Verdict.EXCEEDED}
-    assert found[10].reason.count("counting: 2.0 of 20 s")
+    assert found[10].reason.count("counting: 2.0 of 20 s, judged after a whole cycle")
+    # The upper limbs alone are beyond the limit: no cycle makes that less.
+    assert found[0].verdict is Verdict.EXCEEDED
     assert found[-1].verdict is Verdict.EXCEEDED
     values = [r.value for r in found]
     assert values == sorted(values)
     assert values[0] == 30  # the upper limbs, until the whole body has more
     assert values[-1] == pytest.approx(40 + 15)
+
+
+@pytest.mark.parametrize(("seconds", "expected"), [(10, Verdict.UNDECIDED), (20, Verdict.WITHIN)])
+def test_a_run_that_ends_before_its_cycle_is_undecided(tmp_path, seconds, expected):
+    """Half a cycle upright may end in any way; the log of the run says so, and why."""
+    found = list(run(station(tmp_path, ENTERED + "limit = 35\n"), lambda _: "up", seconds))
+    assert {r.verdict for r in found[:-1]} == {None}
+    log = ResultLog()
+    for k, result in enumerate(found):
+        log.add(Snapshot(seq=k, t=k / 5, poses=b"", results=(result,)))
+    assert log.verdict is log["s"].verdict is log["s"].worst().verdict is expected
+    assert ("judged after a whole cycle" in log["s"].worst().reason) == (seconds < 20)
 
 
 def test_what_is_unknown_makes_an_interval(tmp_path):

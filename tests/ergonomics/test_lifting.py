@@ -64,6 +64,24 @@ def test_package_inspection():
     assert [round(w, 1) for w in weights] == [34.8, 15.3]  # the manual's own full-precision figures
 
 
+def test_loading_supply_rolls():
+    """Example 2 of the manual, figure 9: 35 lb, 28.0 lb and LI 1.3 at the origin, 18.1 lb and 1.9 at the
+    destination; printed with multipliers of two digits, 0.67, 0.98, 0.93, 0.90 and 0.50, 0.85, 0.93, 0.90."""
+    task = lift(
+        average=35 * POUND,
+        heaviest=35 * POUND,
+        origin=End(H=15 * INCH, V=27 * INCH),
+        destination=End(H=20 * INCH, V=10 * INCH),
+        grip=Grip.POOR,
+    )
+    weights = [frequency_independent(task, end) / POUND for end in (task.origin, task.destination)]
+    assert weights == pytest.approx([28.0, 18.1], rel=0.02)
+    assert [round(35 / w, 1) for w in weights] == [1.3, 1.9]
+    printed = [51 * 0.67 * 0.98 * 0.93 * 0.90, 51 * 0.50 * 0.85 * 0.93 * 0.90]
+    assert printed == pytest.approx([28.0, 18.1], abs=0.05)
+    assert governing(task)[1] == "destination"
+
+
 @pytest.mark.parametrize(
     ("inches", "printed"), [(10, 1.0), (12, 0.83), (15, 0.67), (20, 0.5), (22, 0.46), (23, 0.44), (25, 0.40)]
 )

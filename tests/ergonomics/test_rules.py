@@ -69,7 +69,7 @@ def test_somebody_who_stands_scores_least_but_for_the_straight_elbows(tmp_path):
     assert {r.verdict for r in found.values()} == {None}
     assert parts(found["rula"])["right lower arm"].value == 2
     assert found["rula"].reason == (
-        "right side: lower arm 2; action level 1: acceptable if not maintained or repeated for long periods"
+        "both sides: lower arm 2; action level 1: acceptable if not maintained or repeated for long periods"
     )
 
 

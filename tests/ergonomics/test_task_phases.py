@@ -72,17 +72,17 @@ def test_without_a_cycle_the_last_phase_goes_on():
 @pytest.mark.parametrize(
     ("phases", "message"),
     [
-        ((phase(1), phase(1)), "start after the one before"),
-        ((phase(1, 4), phase(3)), "overlaps"),
-        ((phase(3, 2),), "not after its start"),
-        ((phase(1, 5, 4),), "beyond its cycle"),
-        ((phase(5, None, 4),), "beyond its cycle"),
-        ((phase(1, 2, 4), phase(3, 4, 5)), "different cycles"),
+        (((1,), (1,)), "start after the one before"),
+        (((1, 4), (3,)), "overlaps"),
+        (((3, 2),), "not after its start"),
+        (((1, 5, 4),), "beyond its cycle"),
+        (((5, None, 4),), "beyond its cycle"),
+        (((1, 2, 4), (3, 4, 5)), "different cycles"),
     ],
 )
 def test_phases_that_cannot_be(phases, message):
     with pytest.raises(ValueError, match=message):
-        check_order(phases)
+        check_order([phase(*given) for given in phases])
 
 
 def test_every_rule_reads_the_shared_phases(tmp_path):

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from made_capture import PERSON, captured, frames_of, play, source, walking, workstation
 
-from seerob.human.following import POINT_SPEED, Following
+from seerob.human.following import Following
 from seerob.human.skeleton import BONES, JOINTS, bone_poses
+from seerob.human.smoothing import POINT_SPEED
 from seerob.quantities import Pose
 from seerob.samples import BodyPoint, BodySample, Quality
 from seerob.station import Station

@@ -1,7 +1,20 @@
 """One change at a time to a source file: comparisons, signs, limits, units and verdicts.
 
-A `Mutant` says which node of the syntax tree is replaced by what; `mutated` makes the changed tree.
-What only draws or describes (markers, bases, messages) is left alone: no verdict hangs on it.
+A `Mutant` says which node of the syntax tree is replaced by what; `mutated` makes the changed tree. Each of
+these is changed:
+
+- each comparison, also within a chain: turned round, and with or without the edge;
+- each sign: ``+`` and ``-``, ``*`` and ``/``, ``+=``, a minus, an ``abs``, ``not``, ``and`` and ``or``;
+- each number: a tenth and a thousandfold more (one more of whole ones), and each ``True`` and ``False``,
+  defaults of arguments among them;
+- each name of a unit of the SI, to a thousand of it;
+- each verdict, and each name with an opposite, such as ``min``.
+
+No verdict hangs on what only draws or describes, and that is left alone by name: markers and what they are
+made with, bases and inputs, messages (`DRAWN`, `SPOKEN`), what is raised or asserted, text with fields in it.
+So are indices and shapes of arrays, where a wrong one is another array and no other limit. Options, with
+their bounds and defaults, are fixed when their class is made and cannot be changed in a living process: the
+tables of docs/ say them a second time, and ``tests/test_docs.py`` fails where the two differ.
 """
 
 from __future__ import annotations
@@ -46,9 +59,11 @@ SLIGHT = 1.1
 ROUNDING = 1e-6
 """Figures up to this absorb rounding: no limit."""
 
-DRAWN = ("Arrow", "Box", "Ellipsoid", "Highlight", "Hull", "Label", "Polyline", "Prism", "Rays", "Segment",
-         "Sphere", "Basis", "Input", "InputError", "at", "Undecided", "ValueError", "UnknownName", "Meta",
-         "given", "errstate")  # fmt: skip
+UNITS = frozenset(("m", "s", "kg", "N", "J", "Pa", "m/s", "rad", "rad/s", "N/m", "N·m", "m/rad", "%"))
+
+DRAWN = ("Arrow", "Ellipsoid", "Highlight", "Hull", "Label", "Polyline", "markers.Rays", "Segment", "Sphere",
+         "Basis", "Input", "provenance.given", "InputError", "InputError.at", "Undecided", "ValueError",
+         "UnknownName", "Meta", "np.errstate")  # fmt: skip
 """Calls whose arguments no verdict depends on."""
 SPOKEN = ("basis", "subjects", "_markers", "_arrow", "_vector", "_label", "_picture", "_beams", "_line",
           "hull", "_hidden", "_told", "_limits_given", "_rounded",
@@ -84,17 +99,20 @@ class Mutant(NamedTuple):
 def _choices(node: ast.AST) -> Iterator[ast.AST]:
     """Whatever a node could be mistaken for."""
     new = copy.deepcopy(node)
-    if isinstance(node, ast.Compare) and len(node.ops) == 1:
-        for kind in FLIPPED[type(node.ops[0])]:
-            assert isinstance(new, ast.Compare)
-            new.ops = [kind()]
-            yield copy.deepcopy(new)
-    elif isinstance(node, ast.BinOp) and type(node.op) in TURNED:
-        assert isinstance(new, ast.BinOp)
+    if isinstance(node, ast.Compare):
+        for k, old in enumerate(node.ops):
+            for kind in FLIPPED[type(old)]:
+                assert isinstance(new, ast.Compare)
+                new.ops = [*node.ops[:k], kind(), *node.ops[k + 1 :]]
+                yield copy.deepcopy(new)
+    elif isinstance(node, (ast.BinOp, ast.AugAssign)) and type(node.op) in TURNED:
+        assert isinstance(new, (ast.BinOp, ast.AugAssign))
         new.op = TURNED[type(node.op)]()
         yield new
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.Not)):
         yield copy.deepcopy(node.operand)
+    elif isinstance(node, ast.Call) and _called(node) in ("abs", "np.abs", "np.fabs", "math.fabs"):
+        yield copy.deepcopy(node.args[0])
     elif isinstance(node, ast.BoolOp):
         assert isinstance(new, ast.BoolOp)
         new.op = ast.And() if isinstance(node.op, ast.Or) else ast.Or()
@@ -108,6 +126,8 @@ def _choices(node: ast.AST) -> Iterator[ast.AST]:
             yield ast.Constant(value * UNIT)
         elif isinstance(value, (int, float)) and not 0 < abs(value) <= ROUNDING:
             yield ast.Constant(value + 1)
+        elif value in UNITS:
+            yield ast.Constant(f"k{value}")
     elif isinstance(node, ast.Name) and node.id in OPPOSITE and isinstance(node.ctx, ast.Load):
         yield ast.Name(OPPOSITE[node.id], ast.Load())
     elif isinstance(node, ast.Attribute) and node.attr in OPPOSITE and isinstance(node.ctx, ast.Load):
@@ -125,9 +145,8 @@ def _left_alone(node: ast.AST) -> bool:
 
 
 def _called(node: ast.Call) -> str:
-    """Name of what is called."""
-    called = node.func
-    return called.attr if isinstance(called, ast.Attribute) else getattr(called, "id", "")
+    """What is called, as it is written."""
+    return ast.unparse(node.func)
 
 
 def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, str, str]]:
@@ -139,8 +158,7 @@ def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, str, str]]:
         if depth:
             yield node, function
         for name, value in ast.iter_fields(node):
-            called = isinstance(node, (ast.Call, ast.Lambda))
-            if not called and name in ("annotation", "returns", "decorator_list", "args"):
+            if name in ("annotation", "returns", "decorator_list"):
                 continue
             # Which element of what: a wrong one is no wrong limit. A strict zip only guards its author.
             if name == "slice" and isinstance(value, (ast.Constant, ast.Slice, ast.Tuple, ast.UnaryOp)):
@@ -148,7 +166,7 @@ def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, str, str]]:
             if isinstance(node, ast.keyword) and node.arg == "strict":
                 continue
             # Of a new shape: whatever is left.
-            if name == "args" and isinstance(node, ast.Call) and _called(node) == "reshape":
+            if name == "args" and isinstance(node, ast.Call) and _called(node).endswith(".reshape"):
                 continue
             for child in value if isinstance(value, list) else [value]:
                 if isinstance(child, ast.AST):

@@ -8,6 +8,7 @@ unchanged.
 from __future__ import annotations
 
 import ast
+import gc
 import importlib
 import inspect
 import os
@@ -17,7 +18,7 @@ import threading
 import time
 import types
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,6 +31,8 @@ from mutation.operators import Mutant, mutated
 PACKAGE = Path(inspect.getfile(seerob)).parent
 LEAST = 20
 """Seconds that a mutant may take at least before it counts as one that never ends."""
+NOT_PUT_IN = 1
+"""Exit code of a process that could not change its code: nothing is known of the mutant."""
 FIRST = 3
 """Exit code of a process whose first test failed; one more for each that did not."""
 
@@ -62,7 +65,9 @@ class Mutation:
     ) -> None:
         self.sources, self.mutants, self.jobs, self.tell = sources, mutants, jobs, tell
         self.failed: list[str] = []
-        """Tests that fail without any change."""
+        """Tests that fail without any change, and mutants that could not be put in."""
+        self.detour: dict[str, float] = {}
+        """Of each test: how long it takes, times how much it calls; little where it asks one function."""
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection(self) -> None:
@@ -88,6 +93,9 @@ class Mutation:
         queue = [(mutant, self._tests(mutant, session, callers, seconds)) for mutant in self.mutants]
         running: dict[int, tuple[Mutant, list[Any]]] = {}
         kills: Counter[tuple[str, str, str]] = Counter()
+        # Whatever is here by now stays: a collection in a forked process would copy it all.
+        gc.collect()
+        gc.freeze()
         while queue or running:
             while queue and len(running) < self.jobs:
                 mutant, items = queue.pop(0)
@@ -102,6 +110,9 @@ class Mutation:
                 pid, status = os.wait()
                 if pid in running:
                     mutant, items = running.pop(pid)
+                    if os.WIFEXITED(status) and os.WEXITSTATUS(status) == NOT_PUT_IN:
+                        self.failed.append(mutant.key)
+                        continue
                     self.tell(Outcome(mutant, status != 0, len(items)))
                     first = os.WEXITSTATUS(status) - FIRST if os.WIFEXITED(status) else -1
                     if 0 <= first < len(items):
@@ -111,27 +122,32 @@ class Mutation:
     def _unchanged(self, session: pytest.Session) -> tuple[Callers, dict[str, float]]:
         """Tests that call each function, and how long each takes."""
         files = {str(PACKAGE / mutant.file): mutant.file for mutant in self.mutants}
+        modules = {_module(mutant.file) for mutant in self.mutants}
         callers: Callers = defaultdict(list)
         seconds = {}
         for item in session.items:
             seen: set[types.CodeType] = set()
 
+            # Of what a tracer that follows no line is told: calls, and of Python's functions only.
             def note(frame: types.FrameType, event: str, _: object, seen: set[Any] = seen) -> None:
-                if event == "call":
-                    seen.add(frame.f_code)
+                seen.add(frame.f_code)
 
-            threading.setprofile(note)
-            sys.setprofile(note)
+            # Else only the first test that asks would be seen to call what is behind the cache.
+            for cached in _cached(modules):
+                cached.cache_clear()
+            threading.settrace(note)
+            sys.settrace(note)
             start = time.perf_counter()
             try:
                 reports = runtestprotocol(item, log=False, nextitem=None)
             finally:
-                sys.setprofile(None)
-                threading.setprofile(None)  # type: ignore[arg-type]
+                sys.settrace(None)
+                threading.settrace(None)
             seconds[item.nodeid] = time.perf_counter() - start
             if any(report.failed for report in reports):
                 self.failed.append(item.nodeid)
                 continue
+            self.detour[item.nodeid] = seconds[item.nodeid] * len(seen)
             called = {
                 (files[code.co_filename], code.co_qualname.split(".<")[0])
                 for code in seen
@@ -141,9 +157,8 @@ class Mutation:
                 callers[where].append(item)
         return callers, seconds
 
-    @staticmethod
     def _tests(
-        mutant: Mutant, session: pytest.Session, callers: Callers, seconds: dict[str, float]
+        self, mutant: Mutant, session: pytest.Session, callers: Callers, seconds: dict[str, float]
     ) -> list[Any]:
         whole = mutant.function == "<module>"
         found = {
@@ -157,7 +172,7 @@ class Mutation:
         for item in session.items:
             if mutant.assigned and mutant.assigned in _names(item) and item.nodeid in seconds:
                 found[item.nodeid] = item
-        return sorted(found.values(), key=lambda item: seconds[item.nodeid])
+        return sorted(found.values(), key=lambda item: self.detour[item.nodeid])
 
 
 def _names(item: pytest.Item) -> set[str]:
@@ -176,7 +191,10 @@ def _forked(mutant: Mutant, source: str, items: Sequence[Any], limit: int) -> in
         silence = os.open(os.devnull, os.O_WRONLY)
         os.dup2(silence, 1)
         os.dup2(silence, 2)
-        put_in(mutant, source)
+        try:
+            put_in(mutant, source)
+        except (LookupError, StopIteration, AttributeError):
+            os._exit(NOT_PUT_IN)
         for k, item in enumerate(items):
             if any(report.failed for report in runtestprotocol(item, log=False, nextitem=None)):
                 os._exit(min(FIRST + k, 255))
@@ -188,10 +206,9 @@ def _forked(mutant: Mutant, source: str, items: Sequence[Any], limit: int) -> in
 def put_in(mutant: Mutant, source: str) -> None:
     """Change the living code of this process."""
     path, tree = PACKAGE / mutant.file, mutated(source, mutant)
-    name = ".".join(("seerob", *Path(mutant.file).with_suffix("").parts))
-    module = importlib.import_module(name)
+    module = importlib.import_module(_module(mutant.file))
     owner, _, method = mutant.function.partition(".")
-    for cached in _cached():
+    for cached in _cached(name for name in sys.modules if name.startswith("seerob")):
         cached.cache_clear()
     if mutant.function == "<module>":
         _rebind(module, tree, mutant)
@@ -200,13 +217,19 @@ def put_in(mutant: Mutant, source: str) -> None:
     else:
         holder = getattr(module, owner) if method else module
         code = next(c for c in _codes(compile(tree, str(path), "exec")) if c.co_qualname == mutant.function)
-        _plain(vars(holder)[method or owner]).__code__ = code
+        function = _plain(vars(holder)[method or owner])
+        function.__code__ = code
+        _defaults(function, ast.parse(source), tree, mutant)
 
 
-def _cached() -> Iterator[Any]:
-    for name, module in list(sys.modules.items()):
-        if name.startswith("seerob"):
-            yield from (value for value in vars(module).values() if hasattr(value, "cache_clear"))
+def _module(file: str) -> str:
+    return ".".join(("seerob", *Path(file).with_suffix("").parts))
+
+
+def _cached(modules: Iterable[str]) -> Iterator[Any]:
+    """Functions that keep their answers; of modules that are imported by now."""
+    for module in [sys.modules[name] for name in modules if name in sys.modules]:
+        yield from (value for value in vars(module).values() if hasattr(value, "cache_clear"))
 
 
 def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
@@ -222,6 +245,31 @@ def _plain(function: Any) -> Any:
         return _plain(function.fget)
     function = getattr(function, "__func__", function)
     return _plain(function.__wrapped__) if hasattr(function, "__wrapped__") else function
+
+
+def _defaults(function: types.FunctionType, plain: ast.Module, tree: ast.Module, mutant: Mutant) -> None:
+    """Those of the arguments, where one of them is what is changed: a function's code does not hold them."""
+    old, new = (_arguments(each, mutant.function) for each in (plain, tree))
+    if ast.dump(old) == ast.dump(new):
+        return
+
+    def value(default: ast.expr) -> Any:
+        return eval(compile(ast.Expression(default), mutant.file, "eval"), function.__globals__)
+
+    function.__defaults__ = tuple(map(value, new.defaults))
+    function.__kwdefaults__ = {
+        argument.arg: value(default)
+        for argument, default in zip(new.kwonlyargs, new.kw_defaults, strict=True)
+        if default is not None
+    }
+
+
+def _arguments(tree: ast.Module, name: str) -> ast.arguments:
+    owner, _, method = name.partition(".")
+    body = tree.body
+    if method:
+        body = next(s.body for s in body if isinstance(s, ast.ClassDef) and s.name == owner)
+    return next(s.args for s in body if isinstance(s, ast.FunctionDef) and s.name == (method or owner))
 
 
 def _rebind(module: types.ModuleType, tree: ast.Module, mutant: Mutant) -> None:

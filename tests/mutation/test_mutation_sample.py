@@ -12,33 +12,55 @@ from pathlib import Path
 import pytest
 
 from mutation.operators import mutants, mutated
+from mutation.session import PACKAGE, put_in
+from seerob.criterion import judge
+from seerob.verdict import Verdict
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = '''
 LIMIT = 0.5
-def judged(v: float, limits=(1, 2)) -> bool:
-    """Within 3 of it."""
-    return not v * 1000.0 <= max(LIMIT, -v)
+def judged(v: float, limits=(1, 2), *, strict: bool = True) -> bool:
+    """Within 3 of it, in "m"."""
+    v += told(f"{v * 2:.3f}", at=Label(position=2 * v), row=[3])
+    return not v * 1000.0 <= max(LIMIT, -v) < abs(v), Result(unit="m", reason="none")
 '''
 
 
 def test_each_mutant_is_one_change():
     found = mutants(SOURCE, "made.py")
+    compared = "v * 1000.0 {} max(LIMIT, -v) {} abs(v)"
+    statement = "v += told(f'{v * 2:.3f}', at=Label(position=2 * v), row=[3])"
     assert [(m.before, m.after) for m in found] == [
         ("0.5", "0.55"),
         ("0.5", "500.0"),
-        ("not v * 1000.0 <= max(LIMIT, -v)", "v * 1000.0 <= max(LIMIT, -v)"),
-        ("v * 1000.0 <= max(LIMIT, -v)", "v * 1000.0 > max(LIMIT, -v)"),
-        ("v * 1000.0 <= max(LIMIT, -v)", "v * 1000.0 < max(LIMIT, -v)"),
+        ("True", "False"),
+        ("1", "2"),
+        ("2", "3"),
+        (statement, statement.replace("+=", "-=")),
+        ("3", "4"),
+        ("not " + compared.format("<=", "<"), compared.format("<=", "<")),
+        *((compared.format("<=", "<"), compared.format(*ops)) for ops in ("><", "<<")),
+        *((compared.format("<=", "<"), compared.format("<=", op)) for op in (">=", "<=")),
         ("v * 1000.0", "v / 1000.0"),
         ("1000.0", "1100.0"),
         ("1000.0", "1000000.0"),
         ("max", "min"),
         ("-v", "v"),
+        ("abs(v)", "v"),
+        ("'m'", "'km'"),
     ]
     texts = {ast.unparse(mutated(SOURCE, mutant)) for mutant in found}
     assert len(texts) == len(found)
     assert ast.unparse(ast.parse(SOURCE)) not in texts
+
+
+def test_a_default_is_changed_where_the_function_keeps_it(monkeypatch):
+    source = (PACKAGE / "criterion.py").read_text("utf-8")
+    (mutant,) = (m for m in mutants(source, "criterion.py") if (m.function, m.before) == ("judge", "True"))
+    monkeypatch.setattr(judge, "__kwdefaults__", dict(judge.__kwdefaults__))
+    assert judge(1.0, 2.0) is Verdict.WITHIN
+    put_in(mutant, source)
+    assert judge(1.0, 2.0) is Verdict.EXCEEDED
 
 
 def test_equivalent_mutants_have_a_reason_and_are_named_once():

@@ -62,6 +62,8 @@ def test_figures_of_the_region_in_si(name: str) -> None:
     assert region.energy is not None
     figures = (region.force.value, region.stiffness.value / 1e3, region.mass.value, region.energy.value)
     assert figures == REGION_FIGURES[name]
+    found = (region.force, region.stiffness, region.mass, region.energy, region.pressure)
+    assert [figure.unit for figure in found] == ["N", "N/m", "kg", "J", "Pa"]
     assert (region.multiplier.value if region.multiplier else None) == (None if name in FORBIDDEN else 2)
     assert region.permitted == (name not in FORBIDDEN)
 

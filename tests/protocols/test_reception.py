@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.protocols.connection import connected
+from seerob.protocols.connection import CHUNK, MOST, connected
 from seerob.protocols.datagrams import listening
 from seerob.protocols.reception import Reception, instant
 
@@ -125,12 +125,60 @@ def test_a_connection_is_read_waited_for_and_ends(loop):
                     await connection.write(b"question")
                     assert other.recv(100) == b"question"
                     with pytest.raises(TimeoutError, match="silent for 0"):
-                        await connection.read(100, 0.01)
+                        await connection.read(0.01)
                     asyncio.get_running_loop().call_later(0.01, other.send, b"answer")
-                    assert (await connection.read(100, 10)).data == b"answer"
-                assert (await connection.read(100, 10)).data == b""
+                    assert (await connection.read(10)).data == b"answer"
+                assert (await connection.read(10)).data == b""
         with pytest.raises(ConnectionRefusedError):
             async with connected("127.0.0.1", gone, 10):
                 pass
 
     run(loop, talk())
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_who_reads_late_gets_everything_and_little_waits_meanwhile(loop):
+    whole = bytes(range(256)) * (1 << 14)
+
+    async def talk():
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            async with connected("127.0.0.1", server.getsockname()[1], 10) as connection:
+                other, _ = server.accept()
+                with other:
+                    other.setblocking(False)
+                    sending = asyncio.create_task(asyncio.get_running_loop().sock_sendall(other, whole))
+                    await asyncio.sleep(0.05)
+                    assert sum(len(r.data) for r in connection._waiting) <= MOST + CHUNK
+                    found = bytearray()
+                    while len(found) < len(whole):
+                        found += (await connection.read(10)).data
+                    await sending
+                assert found == whole
+                assert [(await connection.read(10)).data for _ in range(3)] == [b""] * 3
+
+    run(loop, talk())
+
+
+def test_who_waits_for_a_datagram_has_it_before_it_is_answered():
+    happened = []
+
+    def answer(data):
+        happened.append(("answered", data))
+
+    async def listen(heard):
+        async for datagram in heard:
+            happened.append(("heard", datagram.data))
+
+    async def talk():
+        with socket.socket(type=socket.SOCK_DGRAM) as other:
+            async with listening("127.0.0.1", 0, answer=answer) as port:
+                waiting = asyncio.create_task(listen(port.receive(10)))
+                for k in range(3):
+                    await asyncio.sleep(0)
+                    other.sendto(b"%d" % k, ("127.0.0.1", port.port))
+                    while len(happened) < 2 * k + 2:
+                        await asyncio.sleep(0.001)
+                waiting.cancel()
+
+    run(asyncio.SelectorEventLoop, talk())
+    assert happened == [(what, b"%d" % k) for k in range(3) for what in ("heard", "answered")]

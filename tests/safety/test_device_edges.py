@@ -67,6 +67,22 @@ def test_which_kinds_bound_from_below():
         assert kind.at_most is (name not in BELOW), name
 
 
+def test_units_of_all_kinds():
+    units = dict.fromkeys(BELOW | {"waypoints"}, "m") | {
+        "effective_mass": "kg",
+        "force_polytope": "N",
+        "kinetic_energy": "J",
+        "manipulability": "m/rad",
+        "path_speed": "",
+        "power_and_force": "m/s",
+        "swept_volume": "m³",
+        "tool_force": "N",
+        "velocity": "m/s",
+    }
+    for name, unit in units.items():
+        assert load("safety", name, Criterion).unit == unit, name
+
+
 # -- scanner --------------------------------------------------------------------------------------
 
 

@@ -126,7 +126,7 @@ def test_manipulability_falls_to_zero_at_the_stretched_arm(tmp_path):
 def test_effective_mass_along_the_motion(tmp_path, limit, verdict):
     (result,) = judged(tmp_path, [f'kind = "effective_mass"\nat = "arm"\nlimit = {limit}'])
     assert result.value == pytest.approx(4 / 3)
-    assert (result.verdict, result.unit) == (verdict, "kg")
+    assert (result.verdict, result.unit, result.reason) == (verdict, "kg", "")
     masses = {part.name: part.value for part in result.parts}
     assert (masses["m1"], masses["m2"], masses["m3"]) == (pytest.approx(1), pytest.approx(2), None)
     assert masses["M/2 + m_L"] == pytest.approx(1.0)
@@ -146,6 +146,13 @@ def test_effective_mass_has_no_direction_at_standstill(tmp_path):
     assert result.value is None
     assert result.verdict is None
     assert "stands still" in result.reason
+
+
+@pytest.mark.parametrize(("speed", "known"), [(0.99e-3, False), (1.01e-3, True)])
+def test_a_motion_has_a_direction_from_a_millimetre_per_second_on(tmp_path, speed, known):
+    """Of a stretched arm turning about its base: the tip is 2 m out."""
+    (result,) = judged(tmp_path, ['kind = "effective_mass"\nat = "arm"'], pose=((0, 0), (speed / 2, 0)))
+    assert (result.value is not None) is known
 
 
 @pytest.mark.parametrize(("limit", "verdict"), [(1e6, "exceeded")])

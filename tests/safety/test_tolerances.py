@@ -91,6 +91,7 @@ def test_a_mass_that_is_off_is_a_robot_of_another_mass(tmp_path):
         ("kinetic_energy", 'robot = "arm"'),
         ("effective_mass", 'at = "arm"'),
         ("effective_mass", 'at = "arm"\ntoward = "wall"'),
+        ("effective_mass", 'at = "arm"\ntoward = "wall"\nalong = "worst"'),
     ],
 )
 def test_energy_and_mass_lie_between_those_of_the_lightest_and_the_heaviest(tmp_path, kind, options):
@@ -326,3 +327,100 @@ def test_without_tolerances_nothing_changes(tmp_path):
     assert [(p.value, p.limit, p.verdict) for p in plain.parts] == [
         (p.value, p.limit, p.verdict) for p in zero.parts
     ]
+
+
+@pytest.mark.parametrize("kind", ["kinetic_energy", "effective_mass"])
+def test_a_centre_of_mass_that_is_off_in_any_direction_is_within_the_interval(tmp_path, kind):
+    """Hundreds of shifts of 2 cm; the energy's upper end is met where the shift is along the motion."""
+    options = 'robot = "arm"' if kind == "kinetic_energy" else 'at = "arm"'
+    off = loaded(tmp_path / "off", grip="com_tolerance = 0.02", criteria=criterion(kind, options))
+    found = results_at(off, arm=POSE)["it"]
+    low, high = found.interval
+    real = loaded(tmp_path / "real", criteria=criterion(kind, options))
+    mj = real.model.mj
+    body = mj.body("grip").id
+    given = mj.body_ipos[body].copy()
+    mj.body_sameframe[body] = mj.body_simple[body] = 0
+    mj.dof_simplenum[:] = 0
+    rng = np.random.default_rng(7)
+    ways = rng.normal(size=(60, 3))
+    ways[:2] = (0, 1, 0), (0, -1, 0)
+    values = []
+    for way in 0.02 * ways / np.linalg.norm(ways, axis=1)[:, None]:
+        mj.body_ipos[body] = given + way
+        values.append(results_at(real, arm=POSE)["it"].value)
+    assert low <= min(values) < found.value < max(values) <= high
+    assert "com_tolerance of grip" in {i.name for i in found.basis.inputs}
+    if kind == "kinetic_energy":
+        state = state_at(off, arm=POSE)
+        J = state.jacobian(off.model.frame("grip"), off.model.robot("arm"))
+        v, w = (np.linalg.norm(rows @ POSE[1]) for rows in (J[:3], J[3:]))
+        assert high - found.value == pytest.approx(0.5 * 0.7 * ((v + 0.02 * w) ** 2 - v**2), rel=1e-9)
+        assert found.value - low == pytest.approx(0.5 * 0.7 * (v**2 - (v - 0.02 * w) ** 2), rel=1e-9)
+
+
+def test_a_density_that_is_off_is_a_mass_that_is_off(tmp_path):
+    """And a tolerance of a density that nobody gave is refused."""
+    text = FLOATING + TWO_R + GRIP.format(mass=0.7, more="MORE").replace("mass = 0.7\nMORE", "{}")
+    text += criterion("kinetic_energy", 'robot = "arm"')
+    density = 0.7 / (4 / 3 * np.pi * 0.02**3)
+    by_density, by_mass = (
+        results_at(made(tmp_path / str(i), text.replace("{}", more), {"arm.urdf": two_r()}), arm=POSE)["it"]
+        for i, more in enumerate(
+            (f"density = {density}\ndensity_tolerance = 0.1", "mass = 0.7\nmass_tolerance = 0.1")
+        )
+    )
+    assert by_density.interval == pytest.approx(by_mass.interval, rel=1e-9)
+    with pytest.raises(InputError, match="density_tolerance is of a density"):
+        made(
+            tmp_path / "none", text.replace("{}", "mass = 1\ndensity_tolerance = 0.1"), {"arm.urdf": two_r()}
+        )
+
+
+@pytest.mark.parametrize(
+    ("more", "low", "high", "decides"),
+    [
+        (
+            "human_speed_tolerance = 0.2\n",
+            "human_speed = 1.4\n",
+            "human_speed = 1.8\n",
+            "human_speed ± 0.2 m/s",
+        ),
+        ("intrusion_tolerance = 0.03\n", "intrusion = 0.02\n", "intrusion = 0.08\n", "intrusion ± 30 mm"),
+        ("intrusion_tolerance = 0.3\n", "intrusion = 0\n", "intrusion = 0.35\n", "intrusion ± 300 mm"),
+    ],
+)
+@pytest.mark.parametrize("mode", ["dynamic", "fixed"])
+def test_approach_speed_and_intrusion_that_are_off(tmp_path, more, low, high, decides, mode):
+    nominal = "human_speed = 1.6\nintrusion = 0.05\n"
+    given = dict(line.split(" = ") for line in nominal.splitlines())
+
+    def result(name, changed, x=3.4):
+        keys = {**given, **dict(line.split(" = ") for line in changed.splitlines())}
+        text = FLOATING + TWO_R + PERSON.format(x=x)
+        text += criterion(
+            "separation",
+            'between = ["arm", "op"]\nstop = { reaction = 0.1, stopping = 0.3 }\nhuman_uncertainty = 0\n'
+            f'robot_uncertainty = 0\nmode = "{mode}"\n' + "\n".join(f"{k} = {v}" for k, v in keys.items()),
+        )
+        return results_at(made(tmp_path / name, text, {"arm.urdf": two_r()}), arm=((0, 0), (0.3, 0)))["it"]
+
+    found, least, most = result("off", more), result("low", low), result("high", high)
+    middle = result("middle", "")
+    a, b = found.interval
+    assert found.value - a == pytest.approx(most.limit - middle.limit, abs=1e-12)
+    assert b - found.value == pytest.approx(middle.limit - least.limit, abs=1e-12)
+    # Just outside of the nominal S_p.
+    x = 3.4 - (middle.value - middle.limit) + 0.01
+    open_ = result("open", more, x=x)
+    assert open_.verdict == "undecided"
+    assert f"decided by {decides}" in open_.reason
+
+
+def test_tolerances_of_what_is_not_given_are_refused(tmp_path):
+    for key in ("human_speed_tolerance", "intrusion_tolerance"):
+        text = PERSON.format(x=3) + criterion(
+            "separation", f'between = ["arm", "op"]\nstop = {{ reaction = 1, stopping = 1 }}\n{key} = 0.1'
+        )
+        with pytest.raises(InputError, match=key):
+            made(tmp_path, FLOATING + TWO_R + text, {"arm.urdf": two_r()})

@@ -90,22 +90,22 @@ def test_units_of_a_table(quantity, unit, si):
 
 
 @pytest.mark.parametrize(
-    ("old", "low", "high"),
+    ("old", "low", "high", "range_"),
     [
-        ("pressure = [140, ", 60, 300),
-        ("force = [150, ", 50, 250),
-        ("stiffness = [50, ", 5, 200),
-        ("mass = [1.2, ", 0.3, 100),
-        ("energy = [0.84, ", 0.05, 5),
+        ("pressure = [140, ", 60, 300, r"600000 to 3e\+06 Pa"),
+        ("force = [150, ", 50, 250, "50 to 250 N"),
+        ("stiffness = [50, ", 5, 200, "5000 to 200000 N/m"),
+        ("mass = [1.2, ", 0.3, 100, "0.3 to 100 kg"),
+        ("energy = [0.84, ", 0.05, 5, "0.05 to 5 J"),
     ],
 )
-def test_figures_are_plausible_up_to_their_edges_and_not_beyond(old, low, high):
+def test_figures_are_plausible_up_to_their_edges_and_not_beyond(old, low, high, range_):
     """Pressures below 60 and above 300 N/cm² are a wrong column or a wrong unit."""
     assert old in TEXT
     for figure in (low, high):
         parse(TEXT.replace(old, f"{old.split('[')[0]}[{figure}, ", 1).encode(), file="mine.toml")
-    for figure in (low * 0.99, high * 1.01, 0):
-        with pytest.raises(InputError):
+    for figure, said in ((low * 0.99, range_), (high * 1.01, range_), (0, "above 0")):
+        with pytest.raises(InputError, match=f"{said}(:|;|$)"):
             parse(TEXT.replace(old, f"{old.split('[')[0]}[{figure}, ", 1).encode(), file="mine.toml")
 
 

@@ -8,8 +8,9 @@ import zipfile
 NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 NASTY = (
     *(b"nan", b"inf", b"-inf", b"1e309", b"-1e308", b"1e-320", b"0", b"-0", b"-1", b"0.5", b"2147483648"),
-    *(b"99999999999999999999", b"1" * 400, b"", b"true", b"null", b'"', b"[", b"{", b"}", b"<", b"]]>", b"&x;"),
-    *(b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b",", b";", b"\t", b"=", b"#", b"1,5", b"0x10", b"\xb2"),
+    *(b"99999999999999999999", b"1" * 5000, b"", b"true", b"null", b'"', b"[", b"{", b"}", b"<", b"]]>"),
+    *(b"&x;", b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b",", b";", b"\t", b"=", b"#", b"1,5"),
+    *(b"0x10", b"\xb2"),
 )
 """What stands where a number was."""
 

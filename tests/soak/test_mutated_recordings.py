@@ -8,34 +8,9 @@ from seerob.errors import InputError
 from seerob.recording import Recording
 from seerob.sinks.recorder import Recorder
 from sinks import made_run
+from soak.mutations import mutated
 
 N = 60
-
-
-def mutated(data, rng):
-    """``data`` with one or more bytes changed, moved, cut out, doubled, or lengths blown up."""
-    out = bytearray(data)
-    for _ in range(rng.choice((1, 1, 2, 8))):
-        at, size = rng.randrange(len(out)), rng.choice((1, 4, 8, 64, 1000))
-        match rng.randrange(7):
-            case 0:
-                out[at] ^= 1 << rng.randrange(8)
-            case 1:
-                out[at : at + size] = rng.randbytes(size)
-            case 2:
-                del out[at : at + size]
-            case 3:
-                out[at:at] = out[at : at + size]
-            case 4:
-                out[at : at + 8] = rng.choice((0, 2**31, 2**40, 2**63, 2**64 - 1)).to_bytes(8, "little")
-            case 5:
-                del out[max(1, at) :]
-            case 6:
-                other = rng.randrange(len(out))
-                out[at : at + size] = out[other : other + size]
-        if len(out) < 2:
-            break
-    return bytes(out)
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,9 @@ from seerob.errors import InputError, UnknownName
 from seerob.live import Listener
 from seerob.protocols.modbus import MOST, Block, Place, Table, Type, Words, blocks, decode, encode
 from seerob.protocols.modbus_map import load, names
+from seerob.recording import Recording
 from seerob.samples import JointSample, Quality, SignalSample
+from seerob.sinks.recorder import Recorder
 from seerob.source import Target
 from seerob.sources.modbus import Modbus
 from seerob.sources.modbus_robot import ModbusRobot
@@ -134,6 +136,16 @@ def test_variables_arrive_and_a_wrong_address_takes_none_with_it():
         wait_for(lambda: good(heard), 20)
         assert set(heard[-1].doubts) == {"gone"}
         assert "no such register" in heard[-1].doubts["gone"]
+
+
+def test_at_start_it_is_told_what_the_device_does_not_have(monkeypatch):
+    monkeypatch.setattr("seerob.live.ASK_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.sources._variables.COVER_WITHIN", 30.0)
+    with plc() as server:
+        findings = Modbus(host="127.0.0.1", port=server.port).open(Path(), TARGET).findings
+    told = {f.subject: f.text for f in findings if f.level == "warning"}
+    assert told == {"gone": "the device has no such register"}
+    assert "3 of 4 variables are heard at start" in " ".join(f.text for f in findings)
 
 
 def test_a_device_that_is_switched_off_and_on_is_asked_again(monkeypatch):
@@ -244,6 +256,30 @@ def test_the_twin_follows_and_energies_are_undecided(tmp_path):
     assert np.abs(steps - np.round(steps)).max() < 1e-9
     assert np.abs(np.array([s.q for s in joints]) - HOME).max() < 0.4 + np.radians(0.05)
     assert all(s.tau == (0.0,) * 6 for s in joints)
+
+
+def test_a_recording_keeps_that_it_was_coarse(tmp_path):
+    with robot() as server:
+        station = cell(tmp_path, server.port)
+        story = Story(30, lambda story: story.decided() > 5)
+        lived(station, story, folder=tmp_path, sinks=[Recorder(lossless=True)])
+    (again := tmp_path / "again").mkdir()
+    (tmp_path / "run.mcap").rename(again / "first.mcap")
+    replayed = made(
+        again,
+        '[[robots]]\nname = "other"\nmodel = "library:ur10"\n'
+        '[[sources]]\nkind = "recording"\ndrives = "other"\nrecorded = "arm"\nfile = "first.mcap"\n'
+        'timeout = 1.0\n[[safety]]\nkind = "velocity"\nname = "speed"\nat = "other"\nlimit = 1.5\n'
+        '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "other"\nlimit = 500\n',
+    )
+    second = Story(1)
+    replayed.run(writers=[second], folder=again, sinks=[Recorder(lossless=True)])
+    assert "within" in second.verdicts()
+    assert {s.results[1].verdict for s in second.snapshots} == {"undecided"}
+    assert "too coarse" in second.snapshots[-1].results[1].reason
+    # And a recording of the replay keeps it, too.
+    (mechanism,) = Recording.open(again / "run.mcap").scene.mechanisms
+    assert (mechanism.name, "too coarse" in mechanism.coarse) == ("other", True)
 
 
 def test_the_controller_that_dies_is_undecided_and_followed_again(tmp_path):

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import json
 import logging
 import socket
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import asynccontextmanager, contextmanager
 
 import pytest
 from paho.mqtt import publish
 
+from amqtt_broker import broker
 from live_story import open_files, wait_for
 from seerob.errors import InputError
 from seerob.live import Listener
@@ -36,40 +38,6 @@ def port():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         return free.getsockname()[1]
-
-
-@contextmanager
-def broker(port):
-    """Another maker's broker, in a thread of its own."""
-    from amqtt.broker import Broker
-
-    logging.getLogger("amqtt").setLevel(logging.CRITICAL)
-    logging.getLogger("transitions").setLevel(logging.CRITICAL)
-    config = {
-        "listeners": {"default": {"type": "tcp", "bind": f"127.0.0.1:{port}"}},
-        "plugins": {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}},
-    }
-    up, over, loops = threading.Event(), [], []
-
-    async def serve():
-        found = Broker(config)
-        await found.start()
-        stop = asyncio.Event()
-        loops.append(asyncio.get_running_loop())
-        over.append(stop)
-        up.set()
-        await stop.wait()
-        await found.shutdown()
-
-    thread = threading.Thread(target=lambda: asyncio.run(serve()), daemon=True)
-    thread.start()
-    assert up.wait(20)
-    try:
-        yield
-    finally:
-        loops[0].call_soon_threadsafe(over[0].set)
-        thread.join(20)
-        assert not thread.is_alive()
 
 
 def said(port, topic, payload, **more):
@@ -121,6 +89,17 @@ def test_values_arrive_in_si_and_grow_old(port):
         )
 
 
+def test_topics_that_nobody_publishes_to_are_told_at_start(port, monkeypatch, tmp_path):
+    monkeypatch.setattr("seerob.live.ASK_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.sources._variables.COVER_WITHIN", 0.2)
+    target = Target(variables=(SPEED, COUNT))
+    with broker(port):
+        findings = Mqtt(name="plc", host="127.0.0.1", port=port).open(tmp_path, target).findings
+    told = {f.subject: f.text for f in findings if f.level == "warning"}
+    assert told["belt/speed"] == "not heard within 0.2 s"
+    assert "birth was not heard" in told["count"]
+
+
 def test_a_sparkplug_device_is_known_from_birth_to_death(port):
     def send(kind, *metrics, seq, device="/belt"):
         said(port, f"spBv1.0/plant/{kind}/edge{device}", encode(Payload(seq=seq, metrics=metrics)))
@@ -154,6 +133,48 @@ def test_a_broker_that_is_killed_is_found_again(port, monkeypatch):
                 heard.clear()
                 until(heard, lambda: known(heard, "door") is True, lambda: said(port, "cell/door", "1"))
     wait_for(lambda: open_files() <= files and threading.active_count() <= threads, 20)
+
+
+@asynccontextmanager
+async def rude(port):
+    """A broker that takes clients in and falls over; how many so far."""
+    clients = []
+
+    async def serve(reader, writer):
+        clients.append(await reader.read(100))
+        writer.write(b"\x20\x02\x00\x00")
+        await writer.drain()
+        writer.close()
+
+    async with await asyncio.start_server(serve, "127.0.0.1", port):
+        yield clients
+
+
+def test_why_a_broker_left_is_no_riddle_in_the_log(port, caplog):
+    async def visit():
+        async with rude(port), Mqtt(host="127.0.0.1", port=port)._client() as client:
+            while client._client.is_connected():
+                await asyncio.sleep(0.005)
+        del client
+        gc.collect()
+
+    with caplog.at_level(logging.WARNING, "asyncio"):
+        asyncio.run(visit())
+    assert "never retrieved" not in caplog.text
+
+
+def test_a_broker_that_falls_over_again_and_again_is_tried_again_and_again(port, monkeypatch):
+    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.01)
+    monkeypatch.setattr("seerob.protocols.broker_pulse.PATIENCE", 0.1)
+
+    async def wait():
+        async with rude(port) as clients:
+            with listening(port, DOOR):
+                async with asyncio.timeout(30):
+                    while len(clients) < 4:
+                        await asyncio.sleep(0.01)
+
+    asyncio.run(wait())
 
 
 # -- payloads -----------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ pytest.importorskip("asyncua")
 from live_story import Story, lived, wait_for
 from made_cell import made
 from seerob.emulators.opcua import URI, Emulated, OpcuaServer
-from seerob.errors import InputError
+from seerob.errors import InputError, SeerobError
 from seerob.live import Listener
 from seerob.protocols.opcua_client import Address, Security, address
 from seerob.protocols.opcua_robotics import natural
@@ -49,10 +49,16 @@ def target(*variables, folder=""):
     )
 
 
+@pytest.fixture(autouse=True)
+def patience(monkeypatch):
+    """A machine under load answers late."""
+    monkeypatch.setattr("seerob.live.ASK_WITHIN", 30.0)
+
+
 @pytest.fixture(scope="module")
 def server():
     """A PLC with a robot: starting one takes seconds."""
-    with OpcuaServer(PLC, {"R1": motion, "R2": motion}) as found:
+    with OpcuaServer(PLC, {"R1": motion, "R2": motion}, outputs=("Twin/fast",)) as found:
         yield found
 
 
@@ -113,6 +119,36 @@ def test_browsing_names_what_can_be_written_into_a_dictionary(server):
     # What was found is an address.
     with listening(Opcua(name="plc", url=server.url), target(RUNS)) as heard:
         wait_for(lambda: good(heard, "belt/runs"), 30)
+
+
+def test_a_bool_that_may_be_written_is_and_nothing_else(server, tmp_path):
+    source = Opcua(name="plc", url=server.url)
+
+    def write(path, value):
+        there = Variable(name="v", source="plc", address=f"nsu={URI};s={path}", type=Kind.BOOL, write=True)
+        asyncio.run(source.write(there, value, tmp_path))
+
+    for value in (True, False):
+        write("Twin/fast", value)
+        wait_for(lambda value=value: server.written["Twin/fast"][-1:] == [value], 30)
+    for path, why in (("Belt/running", "refuses"), ("Belt/speed", "only a Boolean"), ("Gone", "exist")):
+        with pytest.raises(SeerobError, match=why):
+            write(path, True)
+
+
+def test_at_start_it_is_told_what_the_server_does_not_have_or_states_otherwise(server, tmp_path, monkeypatch):
+    monkeypatch.setattr("seerob.sources._variables.COVER_WITHIN", 30.0)
+    same = Variable(name="same", source="plc", unit="mm/s", address=f"nsu={URI};s=Belt/speed")
+    scaled = Variable(name="scaled", source="plc", unit="m/s", scale=1e-3, address=same.address)
+    wrong = Variable(name="wrong", source="plc", unit="kg", scale=1e-3, address=same.address)
+    far = Variable(name="far", source="plc", unit="mm/s", range=(0, 10), address=same.address)
+    aim = target(SPEED, RUNS, GONE, OTHER, same, scaled, wrong, far)
+    findings = Opcua(name="plc", url=server.url).open(tmp_path, aim).findings
+    told = {f.subject: f.text for f in findings if f.level == "warning"}
+    assert set(told) == {"gone", "other", "wrong", "far"}
+    assert "states the unit mm/s, the dictionary kg" in told["wrong"]
+    assert "is not in [0, 10]" in told["far"]
+    assert "4 of 8 variables are heard at start" in " ".join(f.text for f in findings)
 
 
 def cell(folder, server, more=""):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import socket
 import struct
 from itertools import pairwise
 
@@ -12,6 +14,7 @@ from hypothesis import strategies as st
 from listening import free_port, heard
 
 from live_story import wait_for
+from seerob.commands.emulating import ros_tcp as emulating
 from seerob.emulators.ros_tcp import RosTcpEndpoint, UnityProject
 from seerob.errors import InputError
 from seerob.live import Listener
@@ -46,8 +49,6 @@ def test_an_endpoint_is_read(edition):
 
 @pytest.mark.parametrize("edition", list(Edition))
 def test_unity_connects_to_us_and_may_come_back(edition):
-    import socket
-
     port = free_port(socket.SOCK_STREAM)
     said = RosTcp(robot="arm", side=Side.ENDPOINT, port=port, edition=edition)
     project = UnityProject(motion, NAMES, port=port).start()
@@ -139,3 +140,33 @@ def test_hostile_lengths_are_refused_before_anything_is_kept():
     for wrong in (b"\xff\xff\xff\xff", struct.pack("<I", 1) + b"/" + b"\xff\xff\xff\x7f"):
         with pytest.raises(ProtocolError, match="is that ROS-TCP"):
             Splitter().feed(wrong)
+
+
+# -- as a user starts it ------------------------------------------------------------------------
+
+
+def asked(*arguments):
+    parser = argparse.ArgumentParser()
+    emulating.add(parser)
+    options = parser.parse_args(["--robot", "ur10", *arguments])
+    return emulating.emulated(argparse.Namespace(**vars(options), host="127.0.0.1"))
+
+
+def test_an_emulated_endpoint_and_an_emulated_unity_project_are_heard():
+    server, what, _ = asked("--port", "0")
+    assert what == "ur10, a calm swing"
+    with server:
+        samples = heard(RosTcp(robot="arm", host="127.0.0.1", port=server.port), lambda s: len(s) > 2)
+    assert {len(s.q) for s in samples} == {6}
+    port = free_port(socket.SOCK_STREAM)
+    project, what, where = asked("--unity", "127.0.0.1", "--port", str(port))
+    assert (what, where) == ("a Unity project, ur10, a calm swing", f"127.0.0.1:{port}")
+    with project:
+        samples = heard(RosTcp(robot="arm", side=Side.ENDPOINT, port=port), lambda s: len(s) > 2)
+    assert {len(s.q) for s in samples} == {6}
+
+
+@pytest.mark.parametrize("wrong", [("--rate", "0"), ("--rate", "nan"), ("--unity", "here", "--port", "0")])
+def test_what_cannot_be_emulated_is_refused(wrong):
+    with pytest.raises(InputError, match=wrong[-2].replace("--unity", "--port")):
+        asked(*wrong)

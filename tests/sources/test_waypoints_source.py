@@ -189,6 +189,14 @@ def test_mistakes_are_named(tmp_path, name, content, said):
         opened(tmp_path, file=name)
 
 
+def test_nodes_of_a_polyscope_program_that_are_left_out_are_named(tmp_path):
+    nodes = '<Popup/><Gripper><x/></Gripper><Wait type="Sleep"><waitTime>0.5</waitTime></Wait>'
+    inside = MOVE.format(waypoint("a", A) + waypoint("b", B)) + nodes
+    (tmp_path / "w.urp").write_bytes(urp(polyscope(inside)))
+    texts = " ".join(f.text for f in opened(tmp_path, file="w.urp").findings)
+    assert "taken to move nothing and left out: Gripper, Popup" in texts
+
+
 def test_a_file_that_unpacks_without_end_is_not_unpacked(tmp_path):
     (tmp_path / "w.urp").write_bytes(gzip.compress(b"\0" * (65 << 20), mtime=0))
     with pytest.raises(InputError, match="unpacks to more than"):

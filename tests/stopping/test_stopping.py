@@ -163,6 +163,9 @@ def test_travel_bounds_the_path_of_a_folded_arm():
         (ACROSS, "2010", 0.014, None, 0.01, 0.100),  # never nearer than 100 mm
         (ACROSS, "2010", 0.014, None, 0.26, 0.500),  # 520 mm at 2 m/s, 416 mm at 1.6 m/s
         (ACROSS, "2010", 0.010, None, 0.1, 0.200),  # C is never negative
+        (ACROSS, "2010", 0.040, None, 0.1, 0.408),  # 40 mm is a fine field still: 2 m/s
+        (ALONG, "2010", 0.05, 0.0, 0.0, 1.200),
+        (ALONG, "2010", 0.05 + 1 / 15, 1.0, 0.0, 0.850),  # the coarsest, as high as it must be
         (ACROSS, "2010", None, None, 0.3, 1.330),
         (Approach.TWO_HAND, "2010", None, None, 0.5, 1.05),
     ],
@@ -209,6 +212,7 @@ def test_two_hand_control_of_2024_is_undecided():
         ("capability", {"approach": ALONG, "capability": 0.1167}),
         ("capability", {"approach": ALONG, "capability": 0.2}),
         ("capability", {"approach": ACROSS, "capability": -0.03}),
+        ("capability", {"approach": ACROSS, "capability": 0.0}),
         ("capability", {"approach": ACROSS, "capability": float("nan")}),
     ],
 )
@@ -253,7 +257,9 @@ def test_ways_around_the_field_are_open_until_somebody_speaks_of_them(approach, 
     assert closed.uncovered == ()
     if approach is ACROSS:
         assert closed.value == pytest.approx(0.128)
-        assert intrusion(approach, Edition(edition), **field, over=0.9, under=0.0).value == 0.9
+        longer = intrusion(approach, Edition(edition), **field, over=0.9, under=0.0)
+        assert longer.value == 0.9
+        assert longer.source == f"{closed.source}; reaching over the field: 0.9 m"
     if ways:
         with pytest.raises(Undecided, match=ways[0]):
             minimum_distance(approach, Edition(edition), 0.3, **field, supplement=0.0)
@@ -262,7 +268,8 @@ def test_ways_around_the_field_are_open_until_somebody_speaks_of_them(approach, 
 def test_what_is_from_memory_says_so():
     for edition in Edition:
         assert "M)" in intrusion(ACROSS, edition, capability=0.07).source
-        assert "M)" not in intrusion(ACROSS, edition, capability=0.03).source
+        fine = intrusion(ACROSS, edition, capability=0.03).source
+        assert fine.endswith("(2S)" if edition is Edition.E2010 else "(1S)")
 
 
 @given(v=st.floats(0, 3), T=st.floats(0.01, 0.5), d=st.floats(0, 2))

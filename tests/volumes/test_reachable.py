@@ -57,9 +57,9 @@ def test_nothing_within_the_limits_is_outside(tmp_path, more):
     model = limited(tmp_path, *more)
     reach = reachable_volume(model, model.select("arm"), voxel=0.04)
     rng = np.random.default_rng(0)
-    assert outside(model, reach.grid.contains, 800, rng) == 0
+    assert outside(model, reach.grid.contains, 150, rng) == 0
     mesh = reach.mesh()
-    assert outside(model, lambda p: inside(mesh, p), 10, rng) == 0
+    assert outside(model, lambda p: inside(mesh, p), 2, rng) == 0
 
 
 def test_joint_that_is_not_there_yet_is_not_reached(tmp_path):
@@ -109,14 +109,38 @@ def farthest_from_reach(model, points, count, rng):
     return cKDTree(np.vstack(found)).query(points)[0]
 
 
+def nearest_pose(model, point, rng):
+    """Distance of a point to the arm in the best of many poses, each a small step from the best so far [m]."""
+    mechanism, data = model.mechanism("arm"), mujoco.MjData(model.mj)
+    low, high = np.maximum(mechanism.lower, -np.pi), np.minimum(mechanism.upper, np.pi)
+    bodies = [model.bodies[i] for i in model.select("arm")]
+    clouds = [np.vstack([points_of(solid, 1500, rng) for solid in body.solids]) for body in bodies]
+
+    def distance(q):
+        data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
+        mujoco.mj_kinematics(model.mj, data)
+        at = [(point - data.xpos[b.mj]) @ data.xmat[b.mj].reshape(3, 3) for b in bodies]
+        return min(np.linalg.norm(c - x, axis=1).min() for c, x in zip(clouds, at, strict=True))
+
+    poses = rng.uniform(low, high, (150, len(low)))
+    best, q = min((distance(q), tuple(q)) for q in poses)
+    for step in np.geomspace(0.5, 0.01, 200):
+        tried = np.clip(q + rng.normal(size=len(q)) * step, low, high)
+        best, q = min((best, tuple(q)), (distance(tried), tuple(tried)))
+    return best
+
+
 @pytest.mark.parametrize(
     "more", [(), ("continuous", '<limit effort="1" velocity="1"/>')], ids=["limits", "whole turn"]
 )
 def test_no_voxel_is_farther_from_the_reach_than_the_excess_says(tmp_path, more):
     model = limited(tmp_path, *more)
     reach = reachable_volume(model, model.select("arm"), voxel=0.04)
-    farthest = farthest_from_reach(model, reach.grid.centres(), 3000, np.random.default_rng(3)).max()
-    assert farthest < reach.excess < 8 * 0.04
+    rng, centres = np.random.default_rng(3), reach.grid.centres()
+    farthest = farthest_from_reach(model, centres, 400, rng)
+    # Random poses are sparse at the border: for the worst voxels the nearest pose is looked for.
+    found = [nearest_pose(model, centres[k], rng) for k in farthest.argsort()[-4:]]
+    assert max(found) < reach.excess < 4 * 0.04
 
 
 def test_whole_ur10_is_as_wide_as_random_poses_reach_and_a_voxel_or_two(tmp_path):
@@ -139,3 +163,38 @@ def test_slide_without_limits_is_refused(tmp_path):
 def test_stopped_is_nothing(tmp_path):
     model = limited(tmp_path)
     assert reachable_volume(model, model.select("arm"), voxel=0.05, stop=lambda: True) is None
+
+
+def turned(points, anchor, axis, angle):
+    """Points (n, 3) turned about an axis by an angle each, Rodrigues' formula."""
+    x, c, s = points - anchor, np.cos(angle)[:, None], np.sin(angle)[:, None]
+    return anchor + x * c + np.cross(axis, x) * s + axis * ((x @ axis)[:, None] * (1 - c))
+
+
+def test_a_hundred_thousand_poses_of_a_ur10_are_inside_and_the_excess_is_a_few_voxels(tmp_path):
+    """Points of every link, posed by products of screws; no voxel is said to be farther than 0.21 m off."""
+    model = made(tmp_path, '[[robots]]\nname = "arm"\nmodel = "library:ur10"\n').model
+    reach = reachable_volume(model, model.select("arm"), voxel=0.05)
+    assert reach.excess < 0.21
+    rng = np.random.default_rng(11)
+    robot, data = model.robot("arm"), mujoco.MjData(model.mj)
+    mujoco.mj_kinematics(model.mj, data)
+    count = 100_000 // len(robot.moving)
+    joints = [int(np.flatnonzero(model.mj.jnt_qposadr == a)[0]) for a in robot.q_address]
+    for index in robot.moving:
+        body = model.bodies[index]
+        solid = body.solids[rng.integers(len(body.solids))]
+        points = points_of(solid, count, rng) @ data.xmat[body.mj].reshape(3, 3).T + data.xpos[body.mj]
+        chain = [j for j in joints if body.mj in descendants(model.mj, int(model.mj.jnt_bodyid[j]))]
+        for j in reversed(chain):
+            points = turned(points, data.xanchor[j], data.xaxis[j], rng.uniform(-np.pi, np.pi, count))
+        assert reach.grid.contains(points).all()
+
+
+def descendants(mj, body):
+    """A body and all that hangs on it."""
+    found = {body}
+    for i in range(body + 1, mj.nbody):
+        if int(mj.body_parentid[i]) in found:
+            found.add(i)
+    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 
 import numpy as np
 import pytest
@@ -10,13 +11,16 @@ import pytest
 from live_story import wait_for
 from made_cell import made
 from seerob.emulators.motions import swing
+from seerob.emulators.ros_tcp import RosTcpEndpoint
 from seerob.emulators.rosbridge import RosbridgeServer
 from seerob.errors import InputError
+from seerob.protocols.ros_serialised import Edition
 from seerob.samples import PoseSample, Quality
 from seerob.snapshot import Snapshot
 from seerob.transforms import rotation_from_wxyz, transform
 from seerob.writing.cartesian_targets import CartesianTargets, message, targets_allowed
-from seerob.writing.target_table import CartesianTarget, TargetMessage
+from seerob.writing.target_table import CartesianTarget, TargetMessage, TargetWire
+from seerob.writing.target_wires import serialised
 
 HALF = math.sqrt(0.5)
 STATION = """
@@ -124,3 +128,48 @@ def test_messages_have_the_fields_of_their_types():
     moved = said(TargetMessage.TRANSFORM_STAMPED, 2)
     assert moved["child_frame_id"] == "tool0"
     assert moved["transform"]["translation"] == {"x": 1.0, "y": 2.0, "z": 3.0}
+
+
+@pytest.mark.parametrize("edition", [Edition.ROS1, Edition.ROS2])
+def test_targets_reach_an_endpoint_of_ros_tcp_as_it_serialises(tmp_path, edition):
+    with RosTcpEndpoint(swing((0.0,)), ("a",), edition=edition) as server:
+        text = STATION.replace('host = "127.0.0.1"', 'host = "127.0.0.1"\nwire = "ros_tcp"')
+        model = station(tmp_path, server, text).model
+        with pytest.raises(InputError, match="not allowed; it takes both"):
+            CartesianTargets(model, on_command_line=False)
+        with CartesianTargets(model, on_command_line=True) as targets:
+
+            def sent():
+                targets.write(at(0.0), (pose(1.25),))
+                return [f for f in list(server.received) if f.destination == "/target_pose"]
+
+            wait_for(sent, 30.0)
+    announced = server.received[0]
+    assert announced.destination == "__publish"
+    assert announced.fields()["message_name"] == "geometry_msgs/PoseStamped"
+    body = next(f.body for f in server.received if f.destination == "/target_pose")
+    # Whatever the header is, a pose ends with its seven numbers.
+    place, turn = np.split(np.array(struct.unpack("<7d", body[-56:])), [3])
+    np.testing.assert_allclose(place, (0.0, -0.25, 1.0), atol=1e-9)
+    np.testing.assert_allclose(turn, (0.0, 0.0, 0.0, 1.0), atol=1e-9)
+    assert b"base_link" in body
+
+
+@pytest.mark.parametrize("edition", [Edition.ROS1, Edition.ROS2])
+@pytest.mark.parametrize("kind", list(TargetMessage))
+def test_every_message_is_serialised_as_ros_has_it(kind, edition):
+    table = CartesianTarget(at="arm/tool0", host="h", topic="/t", message=kind)
+    said = message(table, transform(rotation_from_wxyz((HALF, 0, 0, HALF)), (1, 2, 3)), 12.5)
+    raw = serialised(kind, said, edition)
+    assert struct.unpack("<7d", raw[-56:]) == pytest.approx((1, 2, 3, 0, 0, HALF, HALF))
+    if kind is TargetMessage.POSE:
+        # By hand: seven numbers, in ROS 2 behind the four bytes of CDR.
+        assert len(raw) == 56 + 4 * (edition is Edition.ROS2)
+    else:
+        start = 4  # seq in ROS 1, the header of CDR in ROS 2
+        assert struct.unpack("<2I", raw[start : start + 8]) == (12, 500_000_000)
+
+
+def test_encryption_is_of_rosbridge_only():
+    with pytest.raises(ValueError, match="has no encryption"):
+        CartesianTarget(at="arm/tool0", host="h", topic="/t", wire=TargetWire.ROS_TCP, tls=True)

@@ -22,15 +22,6 @@ export function formatQuantity(value: number | null, unit: string, like: number 
   return value === null || unit === "" ? text : `${text}${NO_BREAK}${unit}`;
 }
 
-/** A share in percent with its sign; tenths where whole ones would hide on which side of zero it is. */
-export function formatPercent(share: number | null): string {
-  if (share === null) return "–";
-  const percent = share * 100;
-  if (Math.abs(percent) > 999) return percent > 0 ? `>999${NO_BREAK}%` : `<−999${NO_BREAK}%`;
-  const text = percent.toFixed(Math.abs(percent) < 2 && percent !== 0 ? 1 : 0);
-  return `${text}${NO_BREAK}%`.replace("-", "−");
-}
-
 /** Run time as minutes and seconds. */
 export function formatTime(t: number): string {
   if (!Number.isFinite(t)) return "–";

@@ -1,7 +1,10 @@
 // The keys of the page; they do nothing while one writes or uses a control that needs them itself.
 
-import { rows, select, toggleMuted } from "./page_state";
+import { rows, select, selection, toggleMuted } from "./page_state";
 import type { Actions } from "./panels/app_context";
+import { worstOf } from "./posture/instants";
+import { orderedRows } from "./row_order";
+import type { TimeControl } from "./time_control";
 
 const BACK = -1;
 const AHEAD = 1;
@@ -38,6 +41,9 @@ function actionOf(key: string, shift: boolean, actions: Actions): (() => void) |
       return () => time.violation(false);
     case "]":
       return () => time.violation(true);
+    case "w":
+    case "W":
+      return () => visitWorst(time);
     case "f":
     case "F":
       return () => actions.frameSelection();
@@ -49,6 +55,14 @@ function actionOf(key: string, shift: boolean, actions: Actions): (() => void) |
     default:
       return overlay(key);
   }
+}
+
+// To the worst instant of the selected criterion, or of the one that the pill names.
+function visitWorst(time: TimeControl): void {
+  const chosen = selection.value?.kind === "criterion" ? selection.value.name : null;
+  const row = orderedRows.value.find(({ info }) => chosen === null || info.name === chosen);
+  const instant = row && worstOf(row.info)[0];
+  if (instant) time.visit(instant.t);
 }
 
 // 1 to 9: the markers of a criterion, in the order of the workstation file.

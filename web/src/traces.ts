@@ -30,6 +30,8 @@ export class Trace {
   judged = false;
   /** Whether there ever was a limit. */
   limited = false;
+  /** Whether it was ever said to be within. */
+  kept = false;
   /** Whether the limit was ever exceeded. */
   exceeded = false;
 
@@ -75,6 +77,7 @@ export class Trace {
     this.length += 1;
     this.judged ||= verdict !== NO_VERDICT;
     this.limited ||= !Number.isNaN(limit);
+    this.kept ||= verdict === VERDICT_CODES.within;
     this.exceeded ||= verdict === VERDICT_CODES.exceeded;
     this.extendSpans(i);
   }

@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "cf996722825fe543";
+export const SCHEMA = "2316e2a2172299d4";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -359,6 +359,8 @@ export interface MechanismInfo {
   /** `robot` or `human`. */
   role: string;
   joints: JointInfo[];
+  /** Why what its source says is too coarse for energies and forces; empty when it is not. */
+  coarse: string;
 }
 
 /** Everything about a run that does not change while it runs; sent once. */

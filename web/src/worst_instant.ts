@@ -2,6 +2,7 @@
 
 import { VERDICT_CODES } from "./points";
 import type { Trace } from "./traces";
+import type { Verdict } from "./wire";
 
 export interface Instant {
   t: number;
@@ -11,6 +12,8 @@ export interface Instant {
   /** 0 within, 1 exceeded, 2 undecided, 255 none. */
   verdict: number;
 }
+
+const VERDICTS: readonly Verdict[] = ["within", "exceeded", "undecided"];
 
 /** Sooner than this after another instant is the same event [s]. */
 const APART_S = 1;
@@ -59,6 +62,11 @@ export function worstWith(trace: Trace, atMost: boolean, verdict: "exceeded" | "
     if (best < 0 || left(trace, i, atMost) < left(trace, best, atMost)) best = i;
   }
   return best < 0 ? null : pointAt(trace, best);
+}
+
+/** Verdict of an instant; null for none. */
+export function verdictOf({ verdict }: Instant): Verdict | null {
+  return VERDICTS.find((name) => VERDICT_CODES[name] === verdict) ?? null;
 }
 
 /** What held at an instant: the last point at or before it; null before the first. */

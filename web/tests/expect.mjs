@@ -1,6 +1,8 @@
 // What the tests compare with, and how they wait for it.
 
 import assert from "node:assert/strict";
+import { openBrowser } from "./browser.mjs";
+import { serve } from "./served.mjs";
 
 /** A pose of the wire (z up; x, y, z, w, x, y, z) as three.js must have it (y up; quaternion x, y, z, w). */
 export function turned([x, y, z, qw, qx, qy, qz]) {
@@ -24,6 +26,21 @@ export function assertSamePose(actual, expected, name) {
         expected.quaternion,
       ));
   assert.ok(same, `${name}: ${JSON.stringify(actual)} instead of ${JSON.stringify(expected)}`);
+}
+
+/**
+ * A server and a page that shows something of it; they start side by side.
+ *
+ * @param {string[]} options Options of serve.py, such as "--mode", "replay".
+ * @param view Size of the window, and `before`: what runs in the page before its own code.
+ */
+export async function open(options, { before, ...size } = {}) {
+  const [served, browser] = await Promise.all([serve(...options), openBrowser(size)]);
+  const { page } = browser;
+  if (before) await page.addInitScript(before);
+  await show(page, served.url);
+  const close = () => Promise.all([browser.close(), served.close()]);
+  return { served, browser, page, close };
 }
 
 /** Open the page and wait until it shows something. */

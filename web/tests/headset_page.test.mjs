@@ -2,11 +2,9 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { openBrowser } from "./browser.mjs";
-import { show } from "./expect.mjs";
-import { serve } from "./served.mjs";
+import { open } from "./expect.mjs";
 
-let served;
+let opened;
 let browser;
 let page;
 
@@ -34,17 +32,11 @@ function madeUpHeadset() {
 }
 
 before(async () => {
-  served = await serve("--mode", "live");
-  browser = await openBrowser({ width: 1280 });
-  page = browser.page;
-  await page.addInitScript(madeUpHeadset);
-  await show(page, served.url);
+  opened = await open(["--mode", "live"], { width: 1280, before: madeUpHeadset });
+  ({ browser, page } = opened);
 });
 
-after(async () => {
-  await browser?.close();
-  await served?.close();
-});
+after(() => opened?.close());
 
 test("whoever wears it offers to be the person, and hears when nothing waits for it", async () => {
   await page.getByRole("button", { name: "be operator", exact: true }).click({ timeout: 120_000 });

@@ -3,9 +3,7 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { openBrowser } from "./browser.mjs";
-import { pixels, settled, show } from "./expect.mjs";
-import { serve } from "./served.mjs";
+import { open, pixels, settled } from "./expect.mjs";
 
 const COLORS = {
   within: [20, 170, 184],
@@ -14,16 +12,14 @@ const COLORS = {
   none: [170, 182, 198],
 };
 const AROUND_PX = 16;
+let opened;
 let served;
-let browser;
 let page;
 let results;
 
 before(async () => {
-  served = await serve("--mode", "replay", "--seconds", "8");
-  browser = await openBrowser({ width: 1280, height: 800 });
-  page = browser.page;
-  await show(page, served.url);
+  opened = await open(["--mode", "replay", "--seconds", "8"], { width: 1280, height: 800 });
+  ({ served, page } = opened);
   await page.keyboard.press("Shift+ArrowRight");
   await page.waitForFunction(() => Math.abs(window.seerob.t - 1) < 0.006);
   // Labels would lie over what is looked at.
@@ -34,10 +30,7 @@ before(async () => {
   results = Object.fromEntries(told.results.map((result) => [result.name, result]));
 });
 
-after(async () => {
-  await browser?.close();
-  await served?.close();
-});
+after(() => opened?.close());
 
 const marker = (criterion, type) => results[criterion].markers.find((m) => m.type === type);
 const plus = (a, b, share = 1) => a.map((x, i) => x + share * b[i]);
@@ -191,7 +184,16 @@ test("a label is written, as text whatever it says", async () => {
 
 test("markers vanish while nothing is known", async () => {
   const { center, size } = marker("work area", "box");
+  const hand = marker("separation", "sphere");
+  const painted = async () => {
+    const [x, y] = await page.evaluate((p) => window.seerob.project(p), plus(hand.center, [0.02, 0, 0]));
+    const [r, g, b] = await pixels(page, { x: Math.round(x), y: Math.round(y), width: 1, height: 1 });
+    return distance([r, g, b], COLORS[hand.verdict]);
+  };
+  const shown = await painted();
   await served.tell("stop");
   await page.waitForSelector(".pill.state-off");
+  await drawn();
+  assert.ok((await painted()) > shown + 30, "a body keeps the colour of a verdict");
   assert.deepEqual(await changed("work area", plus(center, size, 0.5)), []);
 });

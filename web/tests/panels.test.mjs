@@ -2,25 +2,21 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { openBrowser } from "./browser.mjs";
-import { settled, show } from "./expect.mjs";
-import { serve } from "./served.mjs";
+import { open, settled, show } from "./expect.mjs";
+import { load } from "./source.mjs";
 
+const { against } = await load("figures");
+let opened;
 let served;
 let browser;
 let page;
 
 before(async () => {
-  served = await serve("--mode", "replay", "--seconds", "12");
-  browser = await openBrowser({ width: 1280, height: 900 });
-  page = browser.page;
-  await show(page, served.url);
+  opened = await open(["--mode", "replay", "--seconds", "12"], { width: 1280, height: 900 });
+  ({ served, browser, page } = opened);
 });
 
-after(async () => {
-  await browser?.close();
-  await served?.close();
-});
+after(() => opened?.close());
 
 async function seek(t) {
   const box = await page.locator(".strip").boundingBox();
@@ -31,6 +27,8 @@ async function seek(t) {
 
 const spot = (key) => page.locator(`[data-spot="${key}"]`);
 const look = async (key) => (await spot(key).getAttribute("class")).match(/look-(\w+)/)[1];
+/** A verdict within its limit may be close to it. */
+const STATES = { within: "state-(within|close)", exceeded: "state-exceeded", undecided: "state-undecided" };
 const tab = (name) => page.getByRole("tab", { name, exact: true }).click();
 
 /** The row of an area in the snapshot of a run time. */
@@ -101,14 +99,15 @@ test("a tap says speed, limit, what governs, what each limit allows, where from 
   const at = await seek(0.3);
   await spot("24 right").click();
   const row = await rowOf(at, 24);
+  const figures = against(row.value, row.limit, "m/s", true);
   const text = await page.locator(".body-map").innerText();
   for (const said of [
     "Back of the hand (dominant)",
     "area 24",
-    `${row.value.toFixed(3)} of ${row.limit.toFixed(3)}`,
+    `${figures.value} of ${figures.limit} m/s`,
     "force, free, ur10/wrist_3_link",
     "allowed by pressure",
-    "1.00 m/s",
+    "1 m/s",
     "Table A.2 (2S)",
     "stated",
   ]) {
@@ -173,8 +172,80 @@ test("the manikin has the colours of the parts, or of the whole, or its own", as
   await page.waitForFunction((n) => window.seerob.tint(n) === null, right);
   await page.getByRole("button", { name: "Body parts" }).click();
   await page.waitForFunction((n) => window.seerob.tint(n) !== null, right);
-  await tab("Criteria");
+});
+
+test("the manikin keeps its colours on every panel, with a legend, and the choice is remembered", async () => {
+  const right = "operator/right upper arm";
+  const kept = await page.evaluate((n) => window.seerob.tint(n), right);
+  const legend = page.locator(".legend");
+  for (const name of ["Criteria", "Body"]) {
+    await tab(name);
+    assert.equal(await page.evaluate((n) => window.seerob.tint(n), right), kept);
+    assert.match(await legend.innerText(), /within[\s\S]*exceeded[\s\S]*undecided[\s\S]*by body part, best/);
+  }
+  await tab("Posture");
+  await page.getByRole("button", { name: "Verdicts" }).click();
   await page.waitForFunction((n) => window.seerob.tint(n) === null, right);
+  assert.doesNotMatch(await legend.innerText(), /best/);
+  const other = await browser.context.newPage();
+  await show(other, served.url);
+  await other.getByRole("tab", { name: "Posture" }).click();
+  const chosen = other.getByRole("button", { name: "Verdicts" });
+  assert.equal(await chosen.getAttribute("aria-pressed"), "true");
+  await other.close();
+  await page.getByRole("button", { name: "Body parts" }).click();
+  await page.waitForFunction((n) => window.seerob.tint(n) !== null, right);
+});
+
+test("arrows go from tab to tab without moving time", async () => {
+  const t = await settled(page);
+  const shown = () => page.locator('.tabs [aria-selected="true"]').evaluate((one) => one.id);
+  await page.getByRole("tab", { name: "Posture" }).focus();
+  await page.keyboard.press("ArrowLeft");
+  assert.equal(await shown(), "tab-body");
+  await page.keyboard.press("Home");
+  assert.equal(await shown(), "tab-criteria");
+  await page.keyboard.press("ArrowLeft");
+  assert.equal(await shown(), "tab-findings");
+  assert.equal(await page.evaluate(() => document.activeElement.id), "tab-findings");
+  assert.equal(await page.evaluate(() => window.seerob.t), t);
+});
+
+test("a criterion's row and the key W lead to its worst instant too", async () => {
+  await tab("Criteria");
+  await seek(9);
+  const twist = page.locator('tr[data-criterion="separation"] .twist');
+  await twist.click();
+  await page.locator('[data-worst="separation"]').click();
+  const worst = await settled(page);
+  const { results } = await served.tell(`snapshot ${worst}`);
+  const { value, limit } = results.find((r) => r.name === "separation");
+  for (let k = 0; k <= 1200; k += 25) {
+    const one = (await served.tell(`snapshot ${k / 100}`)).results.find((r) => r.name === "separation");
+    assert.ok(value - limit <= one.value - one.limit + 1e-6, `${k / 100} s is worse`);
+  }
+  await seek(9);
+  await page.locator(".room canvas").evaluate((canvas) => canvas.focus());
+  await page.keyboard.press("w");
+  await page.waitForFunction((t) => Math.abs(window.seerob.t - t) < 0.006, worst);
+  await twist.click();
+});
+
+test("the legend says of every criterion what it draws and in which state it is", async () => {
+  await page.getByRole("button", { name: "Overlays" }).click();
+  const list = page.locator(".overlay-list");
+  const { results } = await served.tell(`snapshot ${await settled(page)}`);
+  for (const { name, markers, verdict } of results) {
+    const entry = list.locator("label").filter({ has: page.getByText(name, { exact: true }) });
+    assert.equal(await entry.locator("svg").count(), new Set(markers.map((m) => m.type)).size, name);
+    assert.match(
+      await entry.locator(".badge").getAttribute("class"),
+      verdict ? RegExp(STATES[verdict]) : /none/,
+    );
+  }
+  await list.locator("input").first().focus();
+  await page.keyboard.press("Escape");
+  assert.equal(await list.count(), 0);
   await tab("Posture");
 });
 

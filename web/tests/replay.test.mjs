@@ -2,25 +2,21 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { openBrowser } from "./browser.mjs";
-import { assertShown, settled, show } from "./expect.mjs";
-import { serve } from "./served.mjs";
+import { assertShown, open, settled, show } from "./expect.mjs";
+import { load } from "./source.mjs";
 
+const { against, steady } = await load("figures");
+let opened;
 let served;
 let browser;
 let page;
 
 before(async () => {
-  served = await serve("--mode", "replay", "--seconds", "20");
-  browser = await openBrowser();
-  page = browser.page;
-  await show(page, served.url);
+  opened = await open(["--mode", "replay", "--seconds", "20"]);
+  ({ served, browser, page } = opened);
 });
 
-after(async () => {
-  await browser?.close();
-  await served?.close();
-});
+after(() => opened?.close());
 
 const reaches = (t) => page.waitForFunction((to) => Math.abs(window.seerob.t - to) < 0.006, t);
 
@@ -30,10 +26,10 @@ test("a click on the strip moves the cursor, the room and the numbers", async ()
   await page.waitForFunction(() => Math.abs(window.seerob.t - 10) < 0.1);
   const t = await settled(page);
   const told = await assertShown(page, served, t);
-  const value = told.results.find((r) => r.name === "separation").value;
+  const { value, limit } = told.results.find((r) => r.name === "separation");
   await page.waitForFunction(
     (text) => document.querySelector('tr[data-criterion="separation"] .value').textContent === text,
-    value.toFixed(3),
+    steady(against(value, limit, "m", false).value, "m"),
   );
   assert.equal(await page.locator(".strip").getAttribute("aria-valuenow"), String(t));
 });

@@ -84,3 +84,10 @@ test("a plot's window shows every extremum and leaves gaps where there was no va
     Array.from({ length: 12 }, (_, i) => 99 + i),
   );
 });
+
+test("what never was within only informs", () => {
+  const nothing = [0, 1, Number.NaN, 255];
+  const undecided = [1, 1, Number.NaN, 2];
+  assert.deepEqual([traceOf([nothing, undecided]).kept, traceOf([nothing, undecided]).judged], [false, true]);
+  assert.equal(traceOf([nothing, undecided, [2, 1, Number.NaN, 0]]).kept, true);
+});

@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { load } from "./source.mjs";
 
 const { margin, stateOf, worstState, STATE_WORDS, STATE_ICONS, VERDICT_TEXT } = await load("verdicts");
-const { formatFixed, formatNumber, formatTime, formatPercent, formatQuantity } = await load("format");
+const { formatFixed, formatNumber, formatTime, formatQuantity } = await load("format");
 
 test("numbers have three digits, a true minus, and the limit's decimals", () => {
   assert.equal(formatNumber(0.12345), "0.123");
@@ -17,8 +17,6 @@ test("numbers have three digits, a true minus, and the limit's decimals", () => 
   assert.equal(formatFixed(-12.5, 1), "−12.5");
   assert.equal(formatNumber(null), "–");
   assert.equal(formatQuantity(0.61, "m"), "0.610\u00a0m");
-  assert.equal(formatPercent(-0.123), "−12\u00a0%");
-  assert.equal(formatPercent(-0.0021), "−0.2\u00a0%");
   assert.equal(formatTime(83.456), "1:23.46");
   assert.equal(formatTime(59.999), "1:00.00");
 });

@@ -5,11 +5,18 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from seerob.commands import line
 from seerob.commands.measure import add_person, measured, person_table, reader
 from seerob.errors import InputError
 from seerob.workstation import FILE_NAME
+
+if TYPE_CHECKING:
+    from seerob.human.marker_stature import MarkerStature
+    from seerob.human.observing import Observer
+    from seerob.model_io.description import Description
+    from seerob.sources._capture_file import CaptureFile
 
 COMMAND = "seerob capture"
 HELP = "make a workstation of a recorded person, let the twin follow it, and export the motion and its scores"
@@ -95,19 +102,41 @@ def _person(options: argparse.Namespace, recording: Path) -> str:
     except InputError as error:
         if not any(p.key == "morphology" for p in error.problems):
             raise
-        if options.stature is None:
-            remedy = "give --stature: the person has the usual proportions then"
-            raise InputError.at(options.file, "", error.problems[0].what, remedy) from error
+        stature = options.stature
+        if stature is None:
+            told = _marker_stature(source, recording, options)
+            stature = told.stature
+            if not options.json:
+                line("assumed", told.finding(options.name).text, "yellow")
         if not options.json:
             text = (
                 f"the bones of {options.name} are not measured ({error.problems[0].what}): usual proportions"
             )
             line("assumed", text, "yellow")
-        return person_table(options, options.stature, {})
+        return person_table(options, stature, {})
     if not options.json:
         for finding in (*findings, *found.findings):
             line(finding.level, finding.text, "" if finding.level == "note" else "yellow")
     return person_table(options, found.stature, found.lengths)
+
+
+def _marker_stature(source: CaptureFile, recording: Path, options: argparse.Namespace) -> MarkerStature:
+    """The stature that markers tell.
+
+    Raises:
+        InputError: They do not tell it.
+    """
+    from seerob.human import manikin
+    from seerob.human.marker_stature import marker_stature
+    from seerob.sources._capture_options import observer
+
+    captured = source.read(recording)
+
+    def bound(stature: float) -> tuple[Description, Observer]:
+        person = manikin.build(name=options.name, stature=stature, mass=options.mass, sex=options.sex)
+        return person, observer(source, captured.layout, person, file=recording.name)[0]
+
+    return marker_stature(captured, bound, name=options.name)
 
 
 def _path(recording: Path, folder: Path) -> str:

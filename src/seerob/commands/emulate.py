@@ -50,7 +50,8 @@ def run(options: argparse.Namespace) -> int:
     try:
         line("emulates", what, "bold")
         port = getattr(server, "port", None)
-        where = where if port is None else f"{options.host}:{port}"
+        if port is not None and getattr(server, "to", None) is None:
+            where = f"{getattr(server, 'host', options.host)}:{port}"
         line("listens", f"{options.kind} at {where}  (Ctrl-C ends)")
         end = time.monotonic() + (options.seconds if options.seconds is not None else float("inf"))
         while not stopped() and time.monotonic() < end:

@@ -62,6 +62,13 @@ def run(options: argparse.Namespace) -> int:
         raise InputError.at(folder, "", what, "give a folder that may be written") from error
     tell((*plant.findings, *made.findings))
     line("found", f"{made.parts} parts with a shape, {made.robots} robots, {len(made.variables)} variables")
+    if not (made.parts or made.robots or made.variables):
+        count = sum(1 for _ in plant.walk())
+        text = (
+            f"{count} elements, none of which has a geometry file (COLLADAInterface), the role Robot or a "
+            f"variable ({', '.join(sorted(VARIABLES))}): the folder is an empty workstation"
+        )
+        line("warning", text, "yellow")
     line(
         "next",
         f"choose the robots' models and give the variables their units, then seerob check-file {folder}",

@@ -8,11 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from seerob.commands import Exit, add_workstation, compiled, describe, line, seconds
+from seerob.commands.planned_around import OTHERS, STILL, around, others
+from seerob.commands.progress import spinner
+from seerob.commands.whole_folder import whole_folder
 from seerob.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from seerob.planning.plan import Plan
     from seerob.station import Station
 
 HELP = "plan a robot's path through postures that keeps a distance from everything"
@@ -38,6 +42,14 @@ def distance(text: str) -> float:
     return value
 
 
+def edge(text: str) -> float:
+    """Edge of a voxel [m]."""
+    value = distance(text)
+    if not 0.005 <= value <= 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no edge of 0.005 m to 1 m")
+    return value
+
+
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     add_workstation(sub)
@@ -59,6 +71,13 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--margin", type=distance, default=0.02, help="least distance to anything [m] (default: 0.02)"
     )
+    sub.add_argument(
+        "--keep-out", action="append", default=[], metavar="AREA", help="area to keep away from, repeatable"
+    )
+    sub.add_argument("--others", type=others, default=STILL, metavar="HOW", help=OTHERS)
+    sub.add_argument(
+        "--voxel", type=edge, default=0.05, help="of what others sweep [m] (default: 0.05; at most 1)"
+    )
     sub.add_argument("--seed", type=int, default=1, help="the same seed gives the same path (default: 1)")
     sub.add_argument("--seconds", type=seconds, default=60.0, help="longest time per posture (default: 60)")
     sub.add_argument(
@@ -72,8 +91,7 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         InputError: A posture that cannot be, or a file that exists already.
     """
-    if options.output.exists():
-        raise InputError.at(options.output, "", "exists already", "give another file with -o")
+    _refuse_existing(options.output)
     if not options.output.parent.is_dir():
         raise InputError.at(options.output, "", "its folder does not exist", "make it, or give another place")
     station = compiled(options.workstation, sources=False)
@@ -85,36 +103,63 @@ def run(options: argparse.Namespace) -> int:
     if options.robot is None and len(names) != 1:
         what = f"there are {len(names)} robots"
         raise InputError.at(options.workstation, "--robot", what, f"name one of {', '.join(names) or 'none'}")
+    robot = options.robot or names[0]
+    asked = Asked()
     describe(station)
     goals: list[ArrayLike] = [*options.to, *([math.radians(x) for x in goal] for goal in options.to_deg)]
+    given = None
     if options.waypoints is not None:
-        goals += _goals(station, options.robot or names[0], options.waypoints, options.start)
-    asked = Asked()
+        given = _Given(station, robot, options.waypoints)
+        goals += given.goals(options.start)
     try:
-        found = plan(
-            station.model,
-            options.robot or names[0],
-            goals,
-            start=options.start,
-            margin=options.margin,
-            seed=options.seed,
-            seconds=options.seconds,
-            say=lambda tried: asked(),
-        )
+        with spinner() as show:
+            place = around(
+                station,
+                robot,
+                options.others,
+                options.keep_out,
+                voxel=options.voxel,
+                stopped=asked,
+                say=show,
+            )
+
+            def say(tried: int) -> bool:
+                show(f"planning: {tried} postures tried")
+                return asked()
+
+            found = plan(
+                place.station.model,
+                robot,
+                goals,
+                start=options.start,
+                margin=options.margin,
+                seed=options.seed,
+                seconds=options.seconds,
+                keep_out=place.keep_out,
+                places=place.places,
+                swept=place.swept,
+                say=say,
+            )
     except (NoPath, Stopped) as error:
         line("no path", str(error), "yellow")
         return Exit.UNDECIDED
-    options.output.write_text(found.toml(), encoding="utf-8")
+    _refuse_existing(options.output)
+    with whole_folder(options.output.resolve().parent) as working:
+        (working / options.output.name).write_text(found.toml(), encoding="utf-8")
     text = (
-        f"{len(found.q)} postures; between them, with nobody else moving, nothing comes nearer than "
+        f"{len(found.q)} postures; between them nothing comes nearer than "
         f"{found.least:.3f} m to {found.robot} (margin {found.margin:g} m, {found.asked} postures looked at)"
     )
     line("planned", text)
+    if given is not None:
+        given.tell(found, first=1 + len(options.to) + len(options.to_deg))
     if found.nearest:
         line("nearest", found.nearest)
     for pair in found.left_out:
         line("assumed", f"{pair} touch at the start and are not watched", "yellow")
-    line("note", "areas, moving people and machines are not looked at; preliminary: nobody executed it")
+    for text in found.around:
+        line("others", text)
+    line("note", "preliminary: planned, and executed by nobody")
     line("wrote", str(options.output))
     line(
         "next",
@@ -123,33 +168,67 @@ def run(options: argparse.Namespace) -> int:
     return Exit.WITHIN
 
 
-def _goals(station: Station, robot: str, path: Path, start: list[float] | None) -> list[ArrayLike]:
-    """Joint positions of the waypoints of a file; of a pose every way of reaching it, the nearest first."""
-    import numpy as np
+def _refuse_existing(path: Path) -> None:
+    if path.exists():
+        raise InputError.at(path, "", "exists already", "give another file with -o")
 
-    from seerob.source import Target
-    from seerob.sources.waypoints import Waypoints
-    from seerob.transforms import rotation_from_wxyz
-    from seerob.waypoints.inverse import solutions
 
-    mechanism = station.model.robot(robot)
-    source = Waypoints(robot=robot, file=str(path))
-    program = source.program(path)
-    arm, said = source.arm(program, Target(name=robot, description=mechanism.description))
-    for text in said:
-        line("assumed", text, "yellow")
-    near = mechanism.home if start is None else np.array(start)
-    goals: list[ArrayLike] = []
-    for waypoint in program.waypoints:
-        if waypoint.move.of_tool:
-            what = f"{waypoint.shown} is reached by a {waypoint.move} move"
-            raise InputError.at(path, waypoint.place, what, "only joint moves are planned")
-        if waypoint.pose is None:
-            goals.append(waypoint.q or ())
-            continue
-        ways = solutions(arm, rotation_from_wxyz(waypoint.pose.wxyz), np.array(waypoint.pose.position), near)
-        if not ways:
-            what = "no joint positions within the limits bring the tool there"
-            raise InputError.at(path, waypoint.shown, what, "is the base or the tool point another one?")
-        goals.append(np.array([way.q for way in ways]))
-    return goals
+class _Given:
+    """Waypoints of a file as goals, and which way of reaching each was taken."""
+
+    def __init__(self, station: Station, robot: str, path: Path) -> None:
+        from seerob.source import Target
+        from seerob.sources.waypoints import Waypoints
+
+        self._mechanism = station.model.robot(robot)
+        self._path = path
+        source = Waypoints(robot=robot, file=str(path))
+        self._program = source.program(path)
+        target = Target(name=robot, description=self._mechanism.description)
+        self._arm, said = source.arm(self._program, target)
+        for text in said:
+            line("assumed", text, "yellow")
+        self._ways: dict[int, int] = {}
+
+    def goals(self, start: list[float] | None) -> list[ArrayLike]:
+        """Joint positions; of a pose every way of reaching it that was found, the nearest first."""
+        import numpy as np
+
+        from seerob.transforms import rotation_from_wxyz
+        from seerob.waypoints.inverse import solutions
+        from seerob.waypoints.unreachable import why_not
+
+        near = self._mechanism.home if start is None else np.array(start)
+        goals: list[ArrayLike] = []
+        for k, waypoint in enumerate(self._program.waypoints):
+            if waypoint.move.of_tool:
+                what = f"{waypoint.shown} is reached by a {waypoint.move} move"
+                raise InputError.at(self._path, waypoint.place, what, "only joint moves are planned")
+            if waypoint.pose is None:
+                goals.append(waypoint.q or ())
+                continue
+            pose = rotation_from_wxyz(waypoint.pose.wxyz), np.array(waypoint.pose.position)
+            ways = solutions(self._arm, *pose, near)
+            if not ways:
+                what = why_not(self._arm, *pose, near)
+                remedy = "is the base or the tool point another one?"
+                raise InputError.at(self._path, waypoint.shown, what, remedy)
+            self._ways[k] = len(ways)
+            goals.append(np.array([way.q for way in ways]))
+        return goals
+
+    def tell(self, plan: Plan, *, first: int) -> None:
+        """Say of every pose which way of reaching it the plan took; ``first`` is where goals begin."""
+        from seerob.waypoints.branches import branch, is_classic
+
+        classic, n = is_classic(self._arm), self._arm.n
+        for k, count in self._ways.items():
+            q = plan.q[plan.at[first + k]]
+            shown = self._program.waypoints[k].shown
+            if classic:
+                which = f"branch {branch(self._arm.posture(q))}, the first of {count} that is clear"
+            elif n > 6:
+                which = f"{n} joints for a pose of 6: of infinitely many ways the one nearest to the start"
+            else:
+                which = f"the first of {count} ways found that is clear"
+            line("reached", f"{shown}: {which}")

@@ -16,9 +16,12 @@ from seerob.errors import InputError, SeerobError
 if TYPE_CHECKING:
     from seerob.live import LiveSource
     from seerob.samples import Sample
+    from seerob.sources._variables import VariablesSource
 
 HELP = "connect to a controller and print what it says, how regularly, and what is missing"
 EXAMPLE = "seerob probe rtde 192.168.0.10"
+MOST_SHOWN = 40
+"""Variables."""
 ADDRESSES = ("host", "url", "address")
 """Options of live sources that say where the other end is; a source has one of them, or listens itself."""
 
@@ -69,6 +72,10 @@ def run(options: argparse.Namespace) -> int:
         raise InputError.at(where, "", because(error), remedy) from error
     for finding in findings:
         line(finding.level, finding.text, "" if finding.level == "note" else "yellow")
+    from seerob.sources._variables import VariablesSource
+
+    if isinstance(source, VariablesSource):
+        return _variables(source, options.kind, given)
     if options.calibration is not None:
         _save_calibration(source, options.calibration, where)
     newest: dict[str, Sample] = {}
@@ -98,6 +105,31 @@ def run(options: argparse.Namespace) -> int:
     for sample in newest.values():
         _tell(sample)
     OUT.print(_snippet(options.kind, given), markup=False)
+    return Exit.WITHIN
+
+
+def _variables(source: VariablesSource, kind: str, given: dict[str, Any]) -> int:
+    """Print what a device has; it is heard through a dictionary, for which this is the beginning."""
+    import asyncio
+
+    from seerob.commands.variables import nodes_of
+    from seerob.live import because
+
+    try:
+        nodes = asyncio.run(nodes_of(source))
+    except InputError as error:
+        line("note", "; ".join(f"{p.what}: {p.remedy}" for p in error.problems))
+        nodes = []
+    except (OSError, EOFError, SeerobError) as error:
+        raise InputError.at(kind, "", because(error), "is it switched on, is the address right?") from error
+    for node in nodes[:MOST_SHOWN]:
+        unit = f" [{node.unit}]" if node.unit else ""
+        line(node.type or "variable", f"{node.address} = {node.value}{unit}")
+    if len(nodes) > MOST_SHOWN:
+        line("", f"… {len(nodes) - MOST_SHOWN} more")
+    name = kind if source.name == "" else source.name
+    line("note", f"seerob variables my_cell --browse {name} writes a dictionary of them")
+    OUT.print(_snippet(kind, {"name": name} | given), markup=False)
     return Exit.WITHIN
 
 
@@ -174,7 +206,7 @@ def options_of(pairs: list[str], command: str = "seerob probe") -> dict[str, Any
         if not (equals and key.isidentifier()):
             raise InputError.at(command, "--set", f"{pair!r}", "write key=value")
         found[key] = text  # a bare word, which a shell takes the quotes of
-        with suppress(tomllib.TOMLDecodeError, RecursionError):
+        with suppress(ValueError, RecursionError):
             read = tomllib.loads(f"value = {text}")
             if len(read) == 1:
                 found[key] = read["value"]

@@ -123,7 +123,7 @@ def _browse(path: Path, name: str) -> int:
         raise InputError.at(path, "--browse", what, suggestion(name, sources))
     source = sources[name].beside(Path(found.head.folder))
     try:
-        nodes = asyncio.run(asyncio.wait_for(_nodes(source), WITHIN))
+        nodes = asyncio.run(asyncio.wait_for(nodes_of(source), WITHIN))
     except InputError:
         raise
     except (OSError, EOFError, SeerobError, NotImplementedError) as error:
@@ -132,7 +132,8 @@ def _browse(path: Path, name: str) -> int:
     return Exit.WITHIN
 
 
-async def _nodes(source: VariablesSource) -> list[Node]:
+async def nodes_of(source: VariablesSource) -> list[Node]:
+    """What a device says it has; raises as `VariablesSource.browse` does."""
     from contextlib import aclosing
 
     from seerob.variables.dictionary import MOST_VARIABLES

@@ -2,7 +2,8 @@
 
 People stand on z = 0 by definition, whether or not a part of the workstation is drawn there: unless told
 otherwise it is a surface, endless and horizontal. A body clamps against it where its lowest point is no
-higher than the body part is thick while any of its points comes down; see `seerob.contact.clamping`.
+higher than the body part is thick, or may be by the next instant at its present speed, while any of its points
+comes down; see `seerob.contact.clamping`.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from seerob.contact.clamping import STILL, Flags, robot_pinch_pairs
+from seerob.contact.clamping import AHEAD, STILL, Flags, robot_pinch_pairs
 from seerob.contact.closing_gaps import ClosingGaps
 from seerob.kernels.approach import lowest_and_falling
 from seerob.kernels.speed import stacked
@@ -41,6 +42,8 @@ class FloorGap:
         self._height, self._moving = height, np.array(moving, np.int64)
         self._corners = stacked([body.corners for body in bodies])
         self._radius = np.array([body.radius for body in bodies], float)
+        self._period = model.workstation.engine.tick
+        self._asked: tuple[float, float] | None = None
 
     def lowest_and_falling(self, state: State) -> Array:
         """Gap to the floor [m] and largest downward speed [m/s] of each moving body, shape (b, 2)."""
@@ -61,7 +64,17 @@ class FloorGap:
             wanted: Of which bodies and body parts that matters, shape (b, r).
         """
         gap, fall = self.lowest_and_falling(state).T
-        return np.asarray((fall > STILL)[:, None] & (gap[:, None] <= thickness) & wanted)
+        # As for other surfaces: it counts where it may be no wider by the next instant.
+        ahead = gap - np.clip(fall * self._until_next(state.t), 0.0, AHEAD)
+        return np.asarray((fall > STILL)[:, None] & (ahead[:, None] <= thickness) & wanted)
+
+    def _until_next(self, t: float) -> float:
+        """As long as it was since the instant before [s]; a tick at the first, or set back."""
+        if self._asked is None or t < self._asked[0]:
+            self._asked = t, self._period
+        elif t > self._asked[0]:
+            self._asked = t, t - self._asked[0]
+        return self._asked[1]
 
 
 class Clamping:

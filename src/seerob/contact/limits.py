@@ -163,6 +163,18 @@ class Judged:
         return self.v_r[:, None] + self.v_h
 
 
+def credited_input(largest: float, cap: float) -> Input:
+    """The area above which a contact is not credited [m²], and where it is from."""
+    own = largest != cap
+    return Input(
+        name="largest contact area",
+        value=largest,
+        unit="m²",
+        origin=Origin.GIVEN if own else Origin.STATED,
+        source="workstation file" if own else "k belongs to about 1 cm² (1S)",
+    )
+
+
 def contact_input(
     name: str, shape: ContactShape, *, radius: float | None = None, area: float | None = None
 ) -> Input:

@@ -49,7 +49,15 @@ class Person:
     for larynx, eyes and ears too.
     """
 
-    def __init__(self, model: Model, robot: Mechanism, human: str, *, horizon: float) -> None:
+    def __init__(
+        self,
+        model: Model,
+        robot: Mechanism,
+        human: str,
+        *,
+        horizon: float,
+        without: tuple[int, ...] = (),
+    ) -> None:
         """Bind.
 
         Args:
@@ -57,12 +65,14 @@ class Person:
             robot: A robot with moving bodies that have shapes.
             human: A human's name.
             horizon: Distance within which a part could hit a bone [m].
+            without: Bones that are left out, by index.
 
         Raises:
             UnknownName: No such human.
         """
-        self.bodies = model.human(human).bodies
+        self.bodies = tuple(i for i in model.human(human).bodies if i not in without)
         self._gap = model.gap(robot.moving, self.bodies)
+        self._asked = (*robot.moving, *self.bodies)
         # Not the gap's own query: that measures pairs however far they are.
         reach = float(np.nextafter(horizon + self._gap.deviation, np.inf))
         self._query = Query(model.shapes, robot.moving, self.bodies, cap=reach)
@@ -93,7 +103,7 @@ class Person:
         Returns:
             Per moving body and region, shape (b, len(REGIONS)), and bounds on the regions' speeds [m/s].
         """
-        state.require(*self._gap.carriers)
+        state.require_bodies(self._asked)
         found = state.distances(self._query, Per.WHETHER)
         close: NDArray[np.bool_] = np.asarray(found.reach == _WITHIN_CAP).reshape(self._shape)
         self._close = np.asarray(close.any(axis=0))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from seerob.emulators.background import Emulator
+from seerob.emulators.background import LoopEmulator
 
 if TYPE_CHECKING:
-    from websockets.sync.server import Server, ServerConnection
+    from websockets.asyncio.server import ServerConnection
 
 LATE = 0.5
 """Time that is not made up for when this machine was too slow [s]."""
@@ -19,8 +21,8 @@ Way = Callable[[bytes], Sequence[bytes]]
 """What a network does to a message: loses, doubles, damages it."""
 
 
-class MessageSender(Emulator):
-    """The sender, in threads of its own.
+class MessageSender(LoopEmulator):
+    """The sender, in a thread of its own.
 
     Args:
         to: Address and port that datagrams go to; None for a WebSocket that others connect to.
@@ -43,53 +45,61 @@ class MessageSender(Emulator):
         self.to, self.host, self.port, self.rate, self.way = to, host, port, rate, way
         self.sent = 0
         """Messages so far."""
-        self._server: Server | None = None
-
-    def begin(self) -> Callable[[], object]:
-        """Listen for whoever wants to hear, or connect.
-
-        Raises:
-            OSError: The address cannot be listened on, or is none.
-        """
-        if self.to is not None:
-            link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-            link.connect(self.to)
-            return lambda: self._send(link)
-        from websockets.sync.server import serve
-
-        server = self._server = serve(self._speak, self.host, self.port, compression=None)
-        self.port = server.socket.getsockname()[1]
-        return server.serve_forever
-
-    def stopping(self) -> None:
-        """Close the connections."""
-        if self._server is not None:
-            self._server.shutdown()
-            self._server = None
 
     def message(self, k: int) -> bytes:
         """The message number ``k``."""
         raise NotImplementedError
 
-    def _send(self, link: socket.socket) -> None:
-        with link:
-            self._play(link.send)
+    async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
+        """Send to whom it is told to, or listen for whoever wants to hear.
 
-    def _speak(self, connection: ServerConnection) -> None:
+        Raises:
+            OSError: The address cannot be listened on, or is none.
+        """
+        if self.to is not None:
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+                link.setblocking(False)
+                link.connect(self.to)
+
+                async def send(data: bytes) -> None:
+                    # Nobody listens yet, or the network is busy: a sender does not mind.
+                    with suppress(ConnectionRefusedError, BlockingIOError):
+                        link.send(data)
+
+                ready()
+                await self._until(over, self._play(send))
+            return
+        from websockets.asyncio.server import serve
+
+        listening = serve(self._speak, self.host, self.port, compression=None, close_timeout=0.2)
+        async with listening as server:
+            self.port = next(iter(server.sockets)).getsockname()[1]
+            ready()
+            await over.wait()
+
+    async def _until(self, over: asyncio.Event, work: Awaitable[None]) -> None:
+        task, ended = asyncio.ensure_future(work), asyncio.ensure_future(over.wait())
+        try:
+            await asyncio.wait({task, ended}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for each in (task, ended):
+                each.cancel()
+            await asyncio.gather(task, ended, return_exceptions=True)
+
+    async def _speak(self, connection: ServerConnection) -> None:
         """Until whoever listens has gone."""
-        self._play(lambda data: connection.send(data, text=True))
+        await self._play(lambda data: connection.send(data, text=True))
 
-    def _play(self, send: Callable[[bytes], object]) -> None:
+    async def _play(self, send: Callable[[bytes], Awaitable[None]]) -> None:
         from websockets.exceptions import ConnectionClosed
 
         begun, k = time.monotonic(), 0
-        while not self._over.wait(max(0.0, begun + k / self.rate - time.monotonic())):
+        while True:
+            await asyncio.sleep(max(0.0, begun + k / self.rate - time.monotonic()))
             message = self.message(k)
             try:
                 for data in (message,) if self.way is None else self.way(message):
-                    send(data)
-            except ConnectionRefusedError:
-                pass  # nobody listens yet: a sender does not mind
+                    await send(data)
             except (OSError, ConnectionClosed):
                 return
             self.sent += 1

@@ -48,6 +48,7 @@ class OpcuaServer(LoopEmulator):
         axis_unit: Unit of the axes that is stated; nothing is, where it is empty.
         certificate: Own certificate and key; then only protected sessions are taken.
         trusted: Certificates of clients that may come in; all may when empty.
+        outputs: Paths of bools that may be written; `written` keeps what was.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class OpcuaServer(LoopEmulator):
         axis_unit: str = "deg",
         certificate: tuple[Path, Path] | None = None,
         trusted: tuple[Path, ...] = (),
+        outputs: tuple[str, ...] = (),
     ) -> None:
         super().__init__()
         self.host, self.port, self.period, self.axis_unit = host, port, period, axis_unit
@@ -68,6 +70,7 @@ class OpcuaServer(LoopEmulator):
         self._certificate, self._trusted = certificate, trusted
         self.safety = {"EmergencyStop": False, "ProtectiveStop": False, "OperationalMode": 3}
         """May be changed while it runs."""
+        self.written: dict[str, list[bool]] = {path: [] for path in outputs}
         self.bad: set[str] = set()
         """Paths of variables that are called bad; may be changed while it runs."""
         self._made = time.monotonic()
@@ -164,6 +167,7 @@ class _Cell:
     def __init__(self, server: Any, emulator: OpcuaServer) -> None:
         self._server, self._emulator = server, emulator
         self._variables: dict[str, Node] = {}
+        self._outputs: dict[str, Node] = {}
         self._axes: dict[str, list[tuple[Node, Node]]] = {}
         self._safety: dict[str, Node] = {}
 
@@ -171,16 +175,21 @@ class _Cell:
         """Make the address space."""
         own = await self._server.register_namespace(URI)
         for path, variable in self._emulator.paths.items():
-            *folders, name = path.split("/")
-            node = self._server.nodes.objects
-            for folder in folders:
-                node = await self._below(node, own, folder)
-            value = variable.value(0.0)
-            made = await node.add_variable(f"ns={own};s={path}", f"{own}:{name}", value)
-            await self._state_unit(made, variable.unit)
-            self._variables[path] = made
+            self._variables[path] = await self._add(own, path, variable.value(0.0))
+            await self._state_unit(self._variables[path], variable.unit)
+        for path in self._emulator.written:
+            self._outputs[path] = await self._add(own, path, False)
+            await self._outputs[path].set_writable()
         if self._emulator.robots:
             await self._build_robots(own)
+
+    async def _add(self, own: int, path: str, value: Any) -> Node:
+        *folders, name = path.split("/")
+        node = self._server.nodes.objects
+        for folder in folders:
+            node = await self._below(node, own, folder)
+        made: Node = await node.add_variable(f"ns={own};s={path}", f"{own}:{name}", value)
+        return made
 
     async def _below(self, node: Node, own: int, name: str) -> Node:
         from asyncua.ua.uaerrors import UaError
@@ -250,6 +259,10 @@ class _Cell:
             if path in self._emulator.bad:
                 value = ua.DataValue(value.Value, ua.StatusCode(ua.UInt32(StatusCodes.BadSensorFailure)))
             await self._server.write_attribute_value(node.nodeid, value)
+        for path, node in self._outputs.items():
+            written, now = self._emulator.written[path], bool(await node.read_value())
+            if now != (written[-1] if written else False):
+                written.append(now)
         degrees = 180 / math.pi if self._emulator.axis_unit in ("deg", "") else 1.0
         for name, nodes in self._axes.items():
             for (position, speed), q, qd in zip(nodes, *self._emulator.motion(name)(t), strict=True):

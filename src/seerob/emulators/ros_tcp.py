@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from seerob.emulators.background import LoopEmulator
 from seerob.emulators.motions import Motion
@@ -13,12 +15,14 @@ from seerob.emulators.rosbridge import JOINT_STATES, Says, states_of
 from seerob.protocols import ProtocolError, ros_tcp
 from seerob.protocols.ros_messages import Content, ros1_name, same_type
 from seerob.protocols.ros_serialised import Edition, encode, store
-from seerob.protocols.ros_tcp import Splitter
+from seerob.protocols.ros_tcp import Frame, Splitter
 
 EPOCH = 1_700_000_000.0
 """What the robot's clock begins at [s]."""
 PAUSE = 0.02
 """Before Unity tries again to connect [s]."""
+KEPT = 10_000
+"""Frames that are kept of what others publish."""
 LATE = 0.5
 """Time that is not made up for when this machine was too slow [s]."""
 
@@ -70,7 +74,18 @@ class _Playing(LoopEmulator):
 
 
 class RosTcpEndpoint(_Playing):
-    """An endpoint beside a robot's ROS: sends what is subscribed."""
+    """An endpoint beside a robot's ROS: sends what is subscribed, keeps what is published to it.
+
+    Attributes:
+        received: The newest frames that were published, commands to publish included.
+    """
+
+    received: deque[Frame]
+
+    def __init__(self, motion: Motion, names: tuple[str, ...], **more: Any) -> None:
+        """As `_Playing`."""
+        super().__init__(motion, names, **more)
+        self.received = deque(maxlen=KEPT)
 
     async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
         """Listen, and serve whoever connects."""
@@ -95,6 +110,8 @@ class RosTcpEndpoint(_Playing):
                         types = [ros1_name(content.message_type) for content, _ in self.topics.values()]
                         said = {"topics": list(self.topics), "types": types}
                         writer.write(ros_tcp.command("topic_list", said))
+                    elif frame.destination == "__publish" or not frame.is_command:
+                        self.received.append(frame)
         except (OSError, ProtocolError, asyncio.CancelledError):
             pass  # the client left, or the server stops: asyncio would log what is no mistake
         finally:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import secrets
-import socket
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from seerob.emulators.background import Emulator
+from seerob.emulators.http import HttpEmulator
 from seerob.protocols import s7_web
 
 MOST_SESSIONS = 4
@@ -17,7 +15,7 @@ Program = Mapping[str, Callable[[float], Any]]
 """Variable → its value at a time since the start [s]."""
 
 
-class SiemensWebServer(Emulator):
+class SiemensWebServer(HttpEmulator):
     """A PLC with a web server, in a thread of its own.
 
     Args:
@@ -41,49 +39,21 @@ class SiemensWebServer(Emulator):
         certificate: tuple[Path, Path] | None = None,
         outputs: tuple[str, ...] = (),
     ) -> None:
-        super().__init__()
-        self.program, self.host, self.port = program, host, port
+        super().__init__(host, port, certificate)
+        self.program = program
         self.sessions: set[str] = set()
         self.written: dict[str, list[bool]] = {name: [] for name in outputs}
-        self._who, self._certificate = (user, password), certificate
-        self._begun = 0.0
-        self._server: Any = None
+        self._who = user, password
 
-    @property
-    def url(self) -> str:
-        """Where it is."""
-        return f"http{'s' if self._certificate else ''}://{self.host}:{self.port}"
-
-    def begin(self) -> Callable[[], object]:
-        """Listen.
-
-        Raises:
-            OSError: The port cannot be listened on.
-        """
-        import uvicorn
-        from starlette.applications import Starlette
+    def routes(self) -> Sequence[Any]:
+        """Its one address."""
         from starlette.routing import Route
 
-        listening = socket.create_server((self.host, self.port))
-        self.port = listening.getsockname()[1]
-        files: dict[str, Any] = {}
-        if self._certificate is not None:
-            files = {"ssl_certfile": self._certificate[0], "ssl_keyfile": self._certificate[1]}
-        app = Starlette(routes=[Route(s7_web.PATH, self._answer, methods=["POST"])])
-        config = uvicorn.Config(app, log_config=None, lifespan="off", timeout_graceful_shutdown=0, **files)
-        self._server = uvicorn.Server(config)
-        self._begun = time.monotonic()
-        run = self._server.run
-        return lambda: run([listening])
-
-    def started(self) -> None:
-        """Wait until clients can connect."""
-        while not self._server.started and self._thread is not None and self._thread.is_alive():
-            time.sleep(0.005)
+        return (Route(s7_web.PATH, self._answer, methods=["POST"]),)
 
     def stopping(self) -> None:
         """Its sessions are gone, too."""
-        self._server.should_exit = self._server.force_exit = True
+        super().stopping()
         self.sessions.clear()
 
     async def _answer(self, request: Any) -> Any:
@@ -118,7 +88,7 @@ class SiemensWebServer(Emulator):
             value = self.program.get(params["var"])
             if value is None:
                 return _error(200, "Address does not exist")
-            return {"result": value(time.monotonic() - self._begun)}
+            return {"result": value(self.now())}
         if method == "PlcProgram.Write":
             if params["var"] not in self.written:
                 return _error(200, "Address does not exist")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated
 
 from msgspec import Meta, Struct
 from msgspec.structs import asdict
@@ -15,7 +15,7 @@ from seerob.posture_rule import PostureRule
 from seerob.scoring import eaws_posture as method
 from seerob.scoring.basis import chosen, entered, posture_quality
 from seerob.scoring.eaws_screening import Points, Screening
-from seerob.scoring.phases import Period, Phase, Seconds, Stance, TaskPhase, phase_at, shared_phases
+from seerob.scoring.phases import Period, Phase, Seconds, Stance, phase_at, shared_phases
 from seerob.scoring.published import published
 from seerob.scoring.score_rows import total_row
 from seerob.snapshot import Basis, Highlight, Input, Origin, Result, Row, RowState, Verdict
@@ -32,18 +32,6 @@ class EawsPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How the legs are used; ``posture`` tells standing, crouching and kneeling apart."""
     back_supported: bool | None = None
     """The body or trunk is well supported: leaning, or a back rest."""
-
-    @classmethod
-    def from_task(cls, task: TaskPhase) -> Self:
-        """See `Phase.from_task`."""
-        return cls(
-            title=task.title,
-            start=task.start,
-            end=task.end,
-            cycle=task.cycle,
-            legs=task.legs,
-            back_supported=task.back_supported,
-        )
 
 
 class EawsEntered(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -132,8 +120,11 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
             reasons.append(f"the points lie between {ends[0]:.1f} and {ends[1]:.1f}")
         counting = not screening.complete
         if counting:
-            reasons.append(f"counting: {screening.heard:.1f} of {self.cycle:g} s")
-        verdict = None if counting and every else judge_interval(ends, self.limit)
+            reasons.append(f"counting: {screening.heard:.1f} of {self.cycle:g} s, judged after a whole cycle")
+        verdict = judge_interval(ends, self.limit)
+        # Points of a cycle only grow until it is whole: what is too much already stays so, the rest is open.
+        if counting and verdict is not Verdict.EXCEEDED:
+            verdict = None
         if self.limit is not None and (not every or screening.silent > 0):
             verdict = Verdict.UNDECIDED
         if every and known and not counting and screening.silent == 0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal, Self
+from typing import Any, Literal
 
 import numpy as np
 
@@ -50,16 +50,9 @@ class OwasPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How the legs are used; ``posture`` estimates it for somebody who stands or kneels."""
 
     @classmethod
-    def from_task(cls, task: TaskPhase) -> Self:
-        """See `Phase.from_task`."""
-        return cls(
-            title=task.title,
-            start=task.start,
-            end=task.end,
-            cycle=task.cycle,
-            load=task.load,
-            legs=next((code for code in method.Legs if code == task.legs), None),
-        )
+    def read(cls, task: TaskPhase) -> Mapping[str, Any]:
+        """See `Phase.read`."""
+        return {"legs": next((code for code in method.Legs if code == task.legs), None)}
 
 
 class Owas(PostureRule, frozen=True, kw_only=True):
@@ -209,8 +202,8 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         """See `Criterion.basis`."""
         return Basis(
             formula="action category of the code of back, arms, legs and load",
-            source="Karhu et al. 1977, categories of Louhevaara and Suurnäkki 1992; backs 3 and 4 from two "
-            "public sources that agree (2+), backs 1 and 2 from one and from memory (1 + M)",
+            source="Karhu et al. 1977, categories of Louhevaara and Suurnäkki 1992; each as at least three "
+            "of five public implementations have it (2+), the papers were not read",
             inputs=(
                 *provenance.motion(model, self.human),
                 *entered(self.entered(model), OwasPhase()),

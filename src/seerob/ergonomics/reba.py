@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal
 
-from seerob import provenance
 from seerob.human.angles import Angles
 from seerob.model import Model
 from seerob.posture_rule import ScoredPosture
 from seerob.scoring import reba as method
 from seerob.scoring.bands import reba_edges
-from seerob.scoring.basis import (
-    ACCURACY_NOTE,
-    PROJECTION_NOTE,
-    choices,
-    entered,
-    posture_quality,
-    watched,
-)
 from seerob.scoring.held_work import Watch, activity
 from seerob.scoring.judgement import Method
 from seerob.scoring.measured import Accuracy, Measured
@@ -62,22 +53,13 @@ class RebaPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Rapid large changes of posture, or an unstable base."""
 
     @classmethod
-    def from_task(cls, task: TaskPhase) -> Self:
-        """See `Phase.from_task`."""
-        return cls(
-            title=task.title,
-            start=task.start,
-            end=task.end,
-            cycle=task.cycle,
-            load=task.load,
-            shock=None if task.load_use is None else task.load_use == "shock",
-            coupling=None if task.coupling is None else method.Coupling(task.coupling),
-            supported_arms=task.supported_arms,
-            legs=_STANCES.get(task.legs),
-            static=task.static,
-            repeated=task.repeated,
-            rapid=task.rapid,
-        )
+    def read(cls, task: TaskPhase) -> Mapping[str, Any]:
+        """See `Phase.read`."""
+        return {
+            "shock": None if task.load_use is None else task.load_use == "shock",
+            "coupling": None if task.coupling is None else method.Coupling(task.coupling),
+            "legs": _STANCES.get(task.legs),
+        }
 
 
 def _final(scores: Mapping[str, Ints]) -> Ints:
@@ -94,10 +76,6 @@ METHOD = Method(
     actions=_TABLE["actions"],
     first_level=0,
 )
-STATIC = 60.0
-"""How long a part of the body is held to be static [s]."""
-REPEATED = 5
-"""Movements per minute from which on work is repeated: more than 4."""
 _BEARING: Mapping[str | None, Span] = {
     "bilateral": exactly(1),
     "walking": exactly(1),
@@ -112,15 +90,18 @@ class Reba(ScoredPosture, frozen=True, kw_only=True):
 
     METHOD: ClassVar[Method] = METHOD
     PHASE: ClassVar[type[RebaPhase]] = RebaPhase
+    REPEATED: ClassVar[int] = 5
+    """More than 4."""
 
     action_level: Literal[0, 1, 2, 3, 4] | None = None
     """Highest admissible action level; the limit is its highest score: 1, 3, 7, 10, 15."""
     phases: tuple[RebaPhase, ...] = ()
     """Phases of the task, each from its `start` on; without any, those of ``[[phases]]``."""
 
-    def watch(self) -> Watch | None:
-        """See `ScoredPosture.watch`."""
-        return None if self.detect is None else Watch(self.detect, hold=STATIC, count=REPEATED)
+    @property
+    def static(self) -> float:
+        """See `ScoredPosture.static`."""
+        return 60.0
 
     def components(
         self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: Watch | None = None
@@ -157,24 +138,15 @@ class Reba(ScoredPosture, frozen=True, kw_only=True):
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
-        return Basis(
+        return self.based(
+            model,
             formula="REBA: tables A, B and C of the components' scores, and the activity; the worse side",
             source="Hignett and McAtamney 2000, Applied Ergonomics 31; tables from five public sources that "
             "agree (2+)",
-            inputs=(
-                *provenance.motion(model, self.human),
-                *entered(self.entered(model), RebaPhase()),
-                *watched(self.detect, STATIC, REPEATED),
-                *choices(self.thresholds, self.arm),
-                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
-                *(() if self.limit is None else provenance.limit(self.limit, "")),
-            ),
             not_modelled=(
                 "static, repeated and rapid activity are entered, not detected"
                 if self.detect is None
                 else "rapid large changes of posture are entered, not detected",
                 "the coupling of both hands is the same",
-                PROJECTION_NOTE,
-                *((ACCURACY_NOTE,) if self.error() is not None else ()),
             ),
         )

@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal
 
-from seerob import provenance
 from seerob.human.angles import Angles
 from seerob.model import Model
 from seerob.posture_rule import ScoredPosture
 from seerob.scoring import rula as method
 from seerob.scoring.bands import rula_edges
-from seerob.scoring.basis import (
-    ACCURACY_NOTE,
-    PROJECTION_NOTE,
-    choices,
-    entered,
-    posture_quality,
-    watched,
-)
 from seerob.scoring.held_work import Watch, muscle_use
 from seerob.scoring.judgement import Method
 from seerob.scoring.measured import Accuracy
@@ -49,30 +40,19 @@ class RulaPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Legs and feet well supported and evenly loaded, or not; ``posture`` estimates it."""
 
     @classmethod
-    def from_task(cls, task: TaskPhase) -> Self:
-        """See `Phase.from_task`."""
-        legs: Literal["balanced", "unbalanced", "posture"] | None = None
+    def read(cls, task: TaskPhase) -> Mapping[str, Any]:
+        """See `Phase.read`."""
+        legs = "posture" if task.legs == "posture" else None
         if task.balanced is not None:
             legs = "balanced" if task.balanced else "unbalanced"
         elif task.legs in ("one_leg", "one_knee_bent"):
             legs = "unbalanced"
-        elif task.legs == "posture":
-            legs = "posture"
-        return cls(
-            title=task.title,
-            start=task.start,
-            end=task.end,
-            cycle=task.cycle,
-            load=task.load,
-            load_use=None if task.load_use is None else method.LoadUse(task.load_use),
-            hand=task.hand,
-            muscle_arms=task.muscle_arms,
-            muscle_body=task.muscle_body,
-            supported_arms=task.supported_arms,
+        return {
+            "load_use": None if task.load_use is None else method.LoadUse(task.load_use),
             # RULA's row is of somebody who sits; a trunk that leans while standing has none.
-            back_supported=task.back_supported if task.legs in ("sitting", None) else False,
-            legs=legs,
-        )
+            "back_supported": task.back_supported if task.legs in ("sitting", None) else False,
+            "legs": legs,
+        }
 
 
 def _grand(scores: Mapping[str, Ints]) -> Ints:
@@ -89,8 +69,6 @@ METHOD = Method(
     actions=_TABLE["actions"],
     first_level=1,
 )
-REPEATED = 4
-"""Movements per minute from which on work is repeated; the paper says more than 4, the worksheets 4."""
 _LEGS: Mapping[str | None, Span | None] = {
     "balanced": exactly(1),
     "unbalanced": exactly(2),
@@ -104,6 +82,8 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
 
     METHOD: ClassVar[Method] = METHOD
     PHASE: ClassVar[type[RulaPhase]] = RulaPhase
+    REPEATED: ClassVar[int] = 4
+    """The paper says more than 4, the worksheets 4."""
 
     profile: method.Profile = method.Profile.ORIGINAL_1993
     """Publication that decides where they differ: the force score above 10 kg, and how long is static."""
@@ -112,9 +92,10 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
     phases: tuple[RulaPhase, ...] = ()
     """Phases of the task, each from its `start` on; without any, those of ``[[phases]]``."""
 
-    def watch(self) -> Watch | None:
-        """See `ScoredPosture.watch`."""
-        return None if self.detect is None else Watch(self.detect, hold=self.profile.static, count=REPEATED)
+    @property
+    def static(self) -> float:
+        """See `ScoredPosture.static`."""
+        return self.profile.static
 
     def components(
         self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: Watch | None = None
@@ -149,23 +130,18 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
         usual = self.profile is method.Profile.ORIGINAL_1993
-        return Basis(
+        return self.based(
+            model,
             formula="RULA tables A, B and C of the components' scores; the worse side counts",
             source="McAtamney and Corlett 1993, Applied Ergonomics 24(2); tables from six or more public "
             "sources that agree (2+), the paper's table images were not seen",
-            inputs=(
-                *provenance.motion(model, self.human),
+            options=(
                 Input(
                     name="profile",
                     value=self.profile.value,
                     origin=Origin.CHOICE if usual else Origin.GIVEN,
                     source="option profile, original1993 when not given",
                 ),
-                *entered(self.entered(model), RulaPhase()),
-                *watched(self.detect, self.profile.static, REPEATED),
-                *choices(self.thresholds, self.arm),
-                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
-                *(() if self.limit is None else provenance.limit(self.limit, "")),
             ),
             not_modelled=(
                 "fingers, vibration, duration of the task: RULA does not ask",
@@ -179,7 +155,5 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
                 ),
                 "less than 2 kg, static or repeated, has no row in the method and counts as force 0",
                 "an extended trunk has no row in the method and counts as 2",
-                PROJECTION_NOTE,
-                *((ACCURACY_NOTE,) if self.error() is not None else ()),
             ),
         )

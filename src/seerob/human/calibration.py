@@ -20,7 +20,7 @@ import numpy as np
 
 from seerob.errors import InputError
 from seerob.human.captured import CaptureFrame, Seen
-from seerob.human.observing import Observer
+from seerob.human.observing import OWN_PLACE, Observer
 from seerob.human.posture import posture
 from seerob.human.skeleton import BONES, bone_poses
 from seerob.model_io.description import Description
@@ -84,6 +84,8 @@ class Calibrated:
     heading: float
     """Where the person faced in the device's world, about z from x [rad]."""
     findings: tuple[Finding, ...]
+    places: dict[str, Array]
+    """Name of what devices place as they like → where it is in the bone's frame [m], (3,)."""
 
 
 def calibrate(
@@ -123,14 +125,17 @@ def calibrate(
         [[np.cos(heading), -np.sin(heading), 0], [np.sin(heading), np.cos(heading), 0], [0, 0, 1]]
     )
     mounts: dict[int, tuple[Array, Array]] = {}
+    places: dict[str, Array] = {}
     residuals = []
     for k, row in enumerate(observer.rows):
         world_from_bone = turn @ rotations[bones[k]]
         segment, swayed = _mean_rotation(frames, row.index)
         away = found[k] - (turn @ expected[k] + shift)
         at = row.at
-        if seen is Seen.TRACKERS and np.isfinite(away).all():
+        if (seen is Seen.TRACKERS or row.fitted) and np.isfinite(away).all():
             at = row.at + world_from_bone.T @ away
+            if row.fitted and np.linalg.norm(away) <= OWN_PLACE:
+                places[row.name] = at
         angle, axis = np.nan, ""
         if segment is not None:
             mount = segment.T @ world_from_bone
@@ -141,7 +146,7 @@ def calibrate(
         off = float(np.linalg.norm(away))
         residuals.append(Residual(row.name, row.bone, moved, swayed, off, angle, axis))
     findings = (*told, *_tell(residuals, pose, heading, subject))
-    return Calibrated(mounts, tuple(residuals), heading, findings)
+    return Calibrated(mounts, tuple(residuals), heading, findings, places)
 
 
 def _mean(points: Array) -> Array:
@@ -172,7 +177,7 @@ def _stance(found: Array, expected: Array, observer: Observer) -> tuple[float, A
     """Heading [rad] and place [m] (3,) that bring the expected points to those found, least squares."""
     use = np.isfinite(found).all(axis=1)
     a, b = expected[use], found[use]
-    weight = np.array([max(row.position, 1e-6) for row in observer.rows])[use, None]
+    weight = np.array([1e-6 if row.fitted else max(row.position, 1e-6) for row in observer.rows])[use, None]
     weight = weight / weight.sum()
     ma, mb = (weight * a).sum(axis=0), (weight * b).sum(axis=0)
     da, db = a - ma, b - mb

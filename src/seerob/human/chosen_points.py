@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -12,13 +12,18 @@ BETTER = 1.25
 """By how much another device must count more for a bone before it takes it over: devices are offset."""
 
 
-def best(devices: Sequence[Sequence[BodyPoint]], chosen: dict[tuple[str, bool], int]) -> list[BodyPoint]:
+def best(
+    devices: Sequence[Sequence[BodyPoint]],
+    chosen: dict[tuple[str, bool], int],
+    barred: Collection[tuple[str, bool, int]] = (),
+) -> list[BodyPoint]:
     """Per bone the positions, and the orientations, of the device that counts most for it.
 
     Args:
         devices: What each of them sees.
         chosen: The choice of the instant before, which holds until another device counts clearly more;
             brought up to date.
+        barred: Bone, whether its orientation is meant, and a device that it is not taken from now.
     """
     if len(devices) == 1:
         return list(devices[0])
@@ -30,7 +35,9 @@ def best(devices: Sequence[Sequence[BodyPoint]], chosen: dict[tuple[str, bool], 
                 (True, p.wxyz, p.orientation_weight),
             ):
                 counts = weight * (BETTER if chosen.get((p.bone, turned)) == k else 1.0)
-                if value is not None and counts > best.get((p.bone, turned), (0.0, 0))[0]:
+                if value is None or (barred and (p.bone, turned, k) in barred):
+                    continue
+                if counts > best.get((p.bone, turned), (0.0, 0))[0]:
                     best[p.bone, turned] = counts, k
     chosen |= {key: k for key, (_, k) in best.items()}
     out = []

@@ -16,7 +16,7 @@ import numpy as np
 from seerob.human.calibration import SMALL, mounted_wrongly
 from seerob.human.captured import Captured, CaptureFrame, Seen
 from seerob.human.fitting import Fitter, Pulls, pulls
-from seerob.human.observing import Observer, with_places
+from seerob.human.observing import OWN_PLACE, Observer, with_places
 from seerob.model_io.description import Description
 from seerob.snapshot import Finding
 from seerob.transforms import Array, inverse
@@ -26,6 +26,8 @@ FRAMES = 40
 ROUNDS = 6
 FARTHEST = 0.12
 """A marker is moved by no more than this [m] from its nominal place."""
+NEXT_TO_NOTHING = 1e-9
+"""Weight of what is compared but pulls at nothing."""
 ODD = np.radians(15.0)
 """A median angle above it [rad] is looked into."""
 POOR = 0.05
@@ -99,8 +101,9 @@ def registered(
         subject: Whom findings are about.
     """
     frames, root_from_world = spread(captured), inverse(world_from_root)
+    observer, placed = _placed(frames, observer, description, root_from_world, subject)
     fit, found = look(frames, observer, description, root_from_world)
-    findings: list[Finding] = []
+    findings = [*placed]
     if captured.layout.seen is Seen.MARKERS:
         nominal = {row.name: row.at for row in observer.rows}
         first = fit
@@ -120,6 +123,34 @@ def registered(
     findings += _told(fit, subject)
     findings += _mounts(fit, frames, observer, description, root_from_world, subject)
     return observer, tuple(findings)
+
+
+def _placed(
+    frames: Iterable[CaptureFrame],
+    observer: Observer,
+    description: Description,
+    root_from_world: Array,
+    subject: str,
+) -> tuple[Observer, tuple[Finding, ...]]:
+    """The observer with joints that devices place as they like where all others show them to be."""
+    free = [row for row in observer.rows if row.fitted]
+    if not free:
+        return observer, ()
+    # They are looked at, but pull at nothing.
+    rows = tuple(replace(row, position=NEXT_TO_NOTHING) if row.fitted else row for row in observer.rows)
+    fit, found = look(frames, replace(observer, rows=rows), description, root_from_world)
+    near = {row.name: found[row.name] for row in free if fit.away.get(row.name, np.inf) <= OWN_PLACE}
+    shifts = ", ".join(
+        f"{row.name} {1e3 * float(np.linalg.norm(near[row.name] - row.at)):.0f} mm (on {row.bone})"
+        for row in free
+        if row.name in near
+    )
+    text = (
+        f"joints that this device places as it likes, moved on their bones to where the recording has them: "
+        f"{shifts}"
+    )
+    told = (Finding(level="assumed", subject=subject, text=text),) if near else ()
+    return with_places(observer, near), told
 
 
 def _in_bone(seen: Pulls, k: int, R: Array, p: Array) -> Array:
@@ -156,7 +187,9 @@ def _mounts(
     if not odd:
         return
     # They still are compared, but pull at nothing.
-    rows = tuple(replace(row, orientation=1e-9) if row.name in odd else row for row in observer.rows)
+    rows = tuple(
+        replace(row, orientation=NEXT_TO_NOTHING) if row.name in odd else row for row in observer.rows
+    )
     alone, _ = look(frames, replace(observer, rows=rows), description, root_from_world)
     bones = {row.name: row.bone for row in observer.rows}
     for name in sorted(odd):

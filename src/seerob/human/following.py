@@ -13,23 +13,23 @@ appears elsewhere is put there, not dragged. Whatever is left out or held says w
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from msgspec import structs
 
-from seerob.human.chosen_points import best, between
+from seerob.human.chosen_points import between
+from seerob.human.ends import ENDS, aimed, swing
 from seerob.human.estimated import in_doubt_with
 from seerob.human.fitting import Fitter, Pulls, pulls
+from seerob.human.handover import Handover
 from seerob.human.skeleton import AXES, BONES
+from seerob.human.smoothing import HIGHEST, LOWEST, POINT_SLACK, POINT_SPEED, Smoother
 from seerob.model_io.description import Description, JointKind
 from seerob.samples import BodyPoint, BodySample, Quality, Vec3
 from seerob.transforms import Array, inverse
 
-POINT_SPEED = 10.0
-"""No point of a person at work is faster [m/s]."""
-POINT_SLACK = 0.1
-"""What a position may jump by itself, as noise [m]."""
 SPEED = {"rad": 10.0, "m": 5.0}
 """No joint of a person at work is faster; the waist's translation [rad/s, m/s]."""
 FAR = 0.25
@@ -73,6 +73,9 @@ class Followed:
     """What it was made of, in the root's frame."""
     observed: frozenset[str] = frozenset()
     """Bones that some device sees, each within its hold time."""
+    unaimed: Mapping[str, float] = field(default_factory=dict)
+    """Hands, feet and heads of which nothing but the joint is seen: bone → bound on the angle between how
+    the twin's is turned and how the person's may be [rad]."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,9 @@ class _Device:
     """Bone → when it was last seen, or first told of without being seen."""
     observed: dict[str, float] = field(default_factory=dict)
     """Bone → when it was last seen indeed."""
+    aimed: dict[str, float] = field(default_factory=dict)
+    """Bone → when it was last seen how it is turned."""
+    smoother: Smoother = field(default_factory=Smoother)
 
     def forget(self, t: float) -> None:
         """Drop what is older than the last sample at or before ``t``."""
@@ -124,8 +130,7 @@ class Following:
         self._instants: list[float] = []
         self._last: Followed | None = None
         self._history: list[Followed] = []
-        self._chosen: dict[tuple[str, bool], int] = {}
-        """Bone and whether its orientation is meant → which device it was last taken from."""
+        self._handover = Handover()
         self._waits = False
         """Nothing was believed of late: where the person is now is not known."""
 
@@ -138,6 +143,11 @@ class Following:
             return False
         if len(sample.points) > MOST_POINTS or not 0 < sample.hold < LARGEST:
             return False
+        if sample.smoothing:
+            if not LOWEST <= sample.smoothing <= HIGHEST:
+                return False
+            smooth = device.smoother(sample.points, sample.t, sample.smoothing)
+            sample = structs.replace(sample, points=smooth)
         device.times.append(sample.t)
         device.samples.append(sample)
         k = bisect_right(self._instants, sample.t)
@@ -167,7 +177,7 @@ class Following:
         points = [each.points for each in told]
         reasons = [each.reason for each in told if each.reason]
         parts = [each.part for each in told if each.part is not None]
-        chosen, last = best(points, self._chosen), self._last
+        chosen, last = self._handover.choose(points, t), self._last
         if not chosen:
             if last is None or not any(each.jumped for each in told):
                 return None
@@ -183,7 +193,7 @@ class Following:
         lost = last is not None and (self._waits or t - last.t > hold)
         reach = np.inf if last is None or lost else self._speed * (t - last.t)
         before, since = (None, np.inf) if last is None or lost else (last.q, t - last.t)
-        q, error = self._fitter.fit(found, before, reach=reach, since=since)
+        q, error = self._fitter.fit(self._eased(found, before, t), before, reach=reach, since=since)
         moved = np.zeros(len(q)) if last is None else np.abs(q - last.q)
         anew = lost and bool(moved.max() > ELSEWHERE)
         self._waits = False
@@ -193,7 +203,18 @@ class Following:
         reasons += _residual(found, error)
         if anew:
             reasons.append("appeared elsewhere")
-        return Followed(t, q, "; ".join(reasons[:4]), tuple(parts), anew, found, self._observed(t))
+        observed = self._seen(t, lambda device: device.observed)
+        open_ends = ENDS & observed - self._seen(t, lambda device: device.aimed)
+        unaimed = {bone: swing(bone, q, self._fitter.lower, self._fitter.upper) for bone in open_ends}
+        reason = "; ".join(reasons[:4])
+        return Followed(t, q, reason, tuple(parts), anew, found, observed, unaimed)
+
+    def _eased(self, found: Pulls, before: Array | None, t: float) -> Pulls:
+        """What is seen, without a jump where another device has taken over."""
+        if before is None:
+            self._handover.forget()
+            return found
+        return self._handover.eased(found, t, *self._fitter.bones(before), self._root_from_world)
 
     def _device_at(self, device: _Device, name: str, t: float) -> _Told:
         """What a device sees at ``t``: between two samples, or the newest while it counts."""
@@ -238,6 +259,7 @@ class Following:
                 if _counts(point):
                     device.observed[point.bone] = t
                 out.append(point)
+        device.aimed |= dict.fromkeys(aimed(out), t)
         if not jumped:
             return _Told(out, reason)
         why = ", ".join(list(jumped)[:4]) + (" …" if len(jumped) > 4 else "") + " jumped"
@@ -246,13 +268,13 @@ class Following:
             return _Told([], "; ".join(filter(None, (reason, why))), jumped=True)
         return _Told(out, reason, (why, tuple(dict.fromkeys(jumped.values()))), jumped=True)
 
-    def _observed(self, t: float) -> frozenset[str]:
-        """Bones that some device sees, each within its hold time."""
+    def _seen(self, t: float, what: Callable[[_Device], dict[str, float]]) -> frozenset[str]:
+        """Bones of which some device sees something, each within its hold time."""
         return frozenset(
             bone
             for device in self._devices.values()
             if device.samples
-            for bone, seen in device.observed.items()
+            for bone, seen in what(device).items()
             if t - seen <= device.samples[-1].hold
         )
 

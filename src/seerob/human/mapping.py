@@ -51,6 +51,9 @@ class Place:
     """Weight of its orientation."""
     metres: bool = False
     """``at`` is in metres instead."""
+    fitted: bool = False
+    """Devices place it as they like: where it is on the bone follows from a recording or a calibration, and
+    without either its position is not used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,14 +96,16 @@ def read_conventions(path: Path, name: str) -> dict[str, Convention]:
         tables = tomllib.loads(raw.decode("utf-8"))
     except OSError as error:
         raise InputError.at(name, "", "no such file", "give a TOML file of tables of names") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError.at(name, "", f"is not TOML: {error}") from error
     merged: dict[str, Any] = {key: dict(value) for key, value in table("capture").items()}
     for key, value in tables.items():
         if not isinstance(value, dict):
             raise InputError.at(name, key, "is not a table", f"write [{key}] and names below")
-        before = merged.get(key, {})
-        merged[key] = {**before, **value, "names": {**before.get("names", {}), **value.get("names", {})}}
+        before, names = merged.get(key, {}), value.get("names", {})
+        if not isinstance(names, dict):
+            raise InputError.at(name, f"{key}.names", "is not a table", 'write names = { "theirs" = "ours" }')
+        merged[key] = {**before, **value, "names": {**before.get("names", {}), **names}}
     return _conventions(merged, name)
 
 
@@ -177,7 +182,10 @@ def _conventions(tables: Mapping[str, Any], file: str) -> dict[str, Convention]:
 
 def _convention(name: str, entry: Mapping[str, Any], file: str, problems: list[Problem]) -> Convention:
     every: dict[str, Place] = {}
-    weights = float(entry.get("position", 1.0)), float(entry.get("orientation", 0.0))
+    weights = tuple(
+        _weight(entry.get(key, usual), f"{name}.{key}", file, problems)
+        for key, usual in (("position", 1.0), ("orientation", 0.0))
+    )
     for pattern, value in entry.get("names", {}).items():
         given = {"bone": value} if isinstance(value, str) else value
         for side in SIDES if "{side}" in pattern else ("",):
@@ -190,7 +198,8 @@ def _convention(name: str, entry: Mapping[str, Any], file: str, problems: list[P
                 every[plain(pattern.replace("{side}", spelling))] = place
     axes = np.eye(3)
     if "axes" in entry:
-        columns = [_direction(entry["axes"].get(axis)) for axis in "xyz"]
+        given_axes = entry["axes"] if isinstance(entry["axes"], dict) else {}
+        columns = [_direction(given_axes.get(axis)) for axis in "xyz"]
         if any(column is None for column in columns) or abs(np.linalg.det(np.array(columns)) - 1) > 1e-9:
             what = f"{entry['axes']!r} is not a right-handed frame"
             problems.append(
@@ -198,22 +207,36 @@ def _convention(name: str, entry: Mapping[str, Any], file: str, problems: list[P
             )
         else:
             axes = np.array(columns, float).T
-    return Convention(name, every, entry.get("rest"), axes, str(entry.get("source", file)))
+    rest = entry.get("rest")
+    if not (rest is None or isinstance(rest, str)):
+        problems.append(Problem(file, f"{name}.rest", f"{rest!r} is no posture", "give the name of one"))
+        rest = None
+    return Convention(name, every, rest, axes, str(entry.get("source", file)))
 
 
-def _place(given: Any, side: str, weights: tuple[float, float]) -> Place | None:
+def _weight(value: Any, where: str, file: str, problems: list[Problem]) -> float:
+    if isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < np.inf:
+        return float(value)
+    problems.append(Problem(file, where, f"{str(value)[:40]} is no weight", "give a number from 0 on"))
+    return 0.0
+
+
+def _place(given: Any, side: str, weights: tuple[float, ...]) -> Place | None:
     try:
         bone = given["bone"].replace("{side}", side)
         at = np.array(given.get("at", (0.0, 0.0, 0.0)), float)
         weight = float(given.get("position", weights[0])), float(given.get("orientation", weights[1]))
-    except (TypeError, KeyError, ValueError, AttributeError):
+    except (TypeError, KeyError, ValueError, AttributeError, OverflowError):
         return None
-    if bone not in BONES or at.shape != (3,) or not np.isfinite(at).all() or min(weight) < 0:
+    if bone not in BONES or at.shape != (3,) or not np.isfinite([*at, *weight]).all() or min(weight) < 0:
         return None
-    return Place(bone, at * (1.0, 1.0, -1.0 if side == "left" else 1.0), *weight)
+    fitted = given.get("fitted") is True
+    return Place(bone, at * (1.0, 1.0, -1.0 if side == "left" else 1.0), *weight, fitted=fitted)
 
 
 def _direction(name: Any) -> Array | None:
+    if not isinstance(name, str):
+        return None
     if name in OPPOSITES:
         return -DIRECTIONS[OPPOSITES[name]]
     return DIRECTIONS.get(name)

@@ -19,6 +19,8 @@ LARGEST = 1e3
 """No person is farther from the origin of a device's world [m]."""
 UNIT = 0.1
 """By how much the length of a quaternion may differ from 1."""
+OWN_PLACE = 0.2
+"""No device places a joint farther from ours [m]: about the length of a clavicle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +39,8 @@ class Row:
     """Weight of its position."""
     orientation: float
     """Weight of its orientation."""
+    fitted: bool = False
+    """Its place on the bone is still to be found: see `seerob.human.mapping.Place`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +133,7 @@ def bind(
                 else convention.axes.T @ rested[BONES.index(place.bone)],
                 position=weights[0],
                 orientation=weights[1],
+                fitted=place.fitted and weights[0] > 0,
             )
         )
     world = np.eye(4) if world_from_capture is None else world_from_capture
@@ -153,8 +158,18 @@ def with_mounts(observer: Observer, mounts: Mapping[int, tuple[Array, Array]]) -
 
 def with_places(observer: Observer, places: Mapping[str, Array]) -> Observer:
     """The same with things elsewhere on their bones: by the device's name, in the bone's frame [m], (3,)."""
-    rows = tuple(replace(row, at=places[row.name]) if row.name in places else row for row in observer.rows)
+    rows = tuple(
+        replace(row, at=places[row.name], fitted=False) if row.name in places else row
+        for row in observer.rows
+    )
     return replace(observer, rows=rows)
+
+
+def without_unplaced(observer: Observer) -> tuple[Observer, tuple[str, ...]]:
+    """The same without positions of which nobody knows where on the bone they are, and their names."""
+    rows = tuple(replace(row, position=0.0, fitted=False) if row.fitted else row for row in observer.rows)
+    names = tuple(row.name for row in observer.rows if row.fitted)
+    return replace(observer, rows=tuple(row for row in rows if row.position or row.orientation)), names
 
 
 def stature(description: Description) -> float:

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from seerob.kernels.fields import Cells
-from seerob.kernels.voxels import HALF_DIAGONAL, MARGIN, TOP
+from seerob.kernels.voxels import MARGIN, TOP
 from seerob.transforms import Array
 
 Sums = NDArray[np.int64]
@@ -17,7 +17,14 @@ Sums = NDArray[np.int64]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def profile(
-    radii: Array, heights: Array, edges: Array, share: float, fine: float, rim: float, height: float
+    radii: Array,
+    heights: Array,
+    edges: Array,
+    share: float,
+    wide: float,
+    fine: float,
+    rim: float,
+    height: float,
 ) -> Sums:
     """Cells of the half-plane that any of some voxels meets while it turns, summed up over both axes.
 
@@ -26,6 +33,7 @@ def profile(
         heights: Likewise along it, 0 and more [m].
         edges: Edge of each voxel [m], shape (n,).
         share: Half of a voxel's extent along the axis [edges].
+        wide: Farthest that a point of it is from its centre, seen along the axis [edges].
         fine: Edge of a cell of the half-plane [m].
         rim: Radius that none passes [m].
         height: Likewise.
@@ -37,7 +45,7 @@ def profile(
     nz = int(height / fine) + 2
     met = np.zeros((nr, nz), np.bool_)
     for n in range(len(radii)):
-        across = HALF_DIAGONAL * edges[n] + MARGIN
+        across = wide * edges[n] + MARGIN
         half = share * edges[n]
         r0 = max(0, int(np.floor((radii[n] - across) / fine)))
         r1 = min(nr - 1, int(np.floor((radii[n] + across) / fine)))
@@ -65,6 +73,7 @@ def revolve(
     axis: Array,
     low: float,
     half: float,
+    across: float,
 ) -> int:
     """Mark every voxel that meets the turned profile; returns how many.
 
@@ -79,10 +88,10 @@ def revolve(
         axis: Unit, shape (3,).
         low: Height at which the profile begins [m].
         half: Half of a voxel's extent along the axis [m].
+        across: Farthest that a point of it is from its centre, seen along the axis [m].
     """
     nr = sums.shape[0] - 1
     nz = sums.shape[1] - 1
-    across = HALF_DIAGONAL * pitch
     marked = 0
     for i in range(cells.shape[0]):
         for j in range(cells.shape[1]):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seerob.machines.tables import AtEnd, Belt, Motion, Slide, Turn, Vehicle
+from seerob.machines.tables import AtEnd, Belt, Grip, Motion, Route, Slide, Turn, Vehicle
 from seerob.samples import SignalSample
 from seerob.transforms import Array
 from seerob.variables.dictionary import Value
@@ -107,9 +107,13 @@ class _Follower:
 def follow(motion: Motion) -> Follow:
     """How a motion follows its variables, from its begin on."""
     if isinstance(motion, Belt):
-        return _Carried(motion)
+        return _Carried(motion, length=motion.length, at_end=motion.at_end)
     if isinstance(motion, Vehicle):
         return _Driven(motion)
+    if isinstance(motion, Route):
+        return _Routed(motion)
+    if isinstance(motion, Grip):
+        return _Gripping(motion)
     if motion.open is not None:
         return _Ends(motion, motion.open)
     if isinstance(motion, Slide):
@@ -146,6 +150,42 @@ class _Driven:
         return Place(np.array([_number(values, m.x), _number(values, m.y), self._heading]))
 
 
+class _Gripping:
+    """Two fingers, of which each goes half the way."""
+
+    def __init__(self, motion: Grip) -> None:
+        self._ends = None if motion.open is None else _Ends(motion, motion.open)
+        self._opening = motion.opening
+
+    def __call__(self, t: float, values: Mapping[str, Value]) -> Place:
+        if self._ends is None:
+            return Place(np.array([0.5 * _number(values, self._opening)]))
+        place = self._ends(t, values)
+        return place._replace(q=0.5 * place.q)
+
+
+class _Routed:
+    """A pose on the floor from a way along a track."""
+
+    def __init__(self, motion: Route) -> None:
+        self._track = motion.track
+        at_end = AtEnd.LOOP if motion.closed else AtEnd.STOP
+        self._way = _Carried(motion, length=self._track.length, at_end=at_end)
+        self._heading: float | None = None
+
+    def lose(self, reason: str) -> None:
+        """Not heard."""
+        self._way.lose(reason)
+
+    def __call__(self, t: float, values: Mapping[str, Value]) -> Place:
+        way = self._way(t, values)
+        q, per_metre = self._track.at(float(way.q[0]))
+        self._heading = q[2] = nearest_turn(float(q[2]), self._heading)
+        # Once around is no jump.
+        anew = way.anew and self._way.was_placed
+        return Place(q, None if way.qd is None else per_metre * way.qd[0], way.doubt, anew)
+
+
 def nearest_turn(angle: float, last: float | None) -> float:
     """The angle [rad] plus that many turns which brings it nearest to the last one."""
     return angle if last is None else angle + math.tau * round((last - angle) / math.tau)
@@ -154,7 +194,7 @@ def nearest_turn(angle: float, last: float | None) -> float:
 class _Ends:
     """One of two ends; on the way it is shown where it would be at an even speed, and not relied on."""
 
-    def __init__(self, motion: Slide | Turn, name: str) -> None:
+    def __init__(self, motion: Slide | Turn | Grip, name: str) -> None:
         assert motion.lower is not None
         assert motion.upper is not None
         assert motion.travel is not None
@@ -174,10 +214,10 @@ class _Ends:
 
 
 class _Carried:
-    """On a belt: by how far the belt has run, or by its speed summed up."""
+    """On a belt or a track: by how far that is told, or by its speed summed up."""
 
-    def __init__(self, motion: Belt) -> None:
-        self._motion = motion
+    def __init__(self, motion: Belt | Route, *, length: float, at_end: AtEnd) -> None:
+        self._motion, self._length, self._at_end = motion, length, at_end
         self._way = motion.start
         """Of the part since it first lay at the begin of the belt [m], ends not counted."""
         self._zero = -motion.start
@@ -186,13 +226,15 @@ class _Carried:
         self._speed = 0.0
         """Of the belt, told last [m/s]."""
         self._placed = False
+        self.was_placed = False
+        """Whether it was put to its start just now."""
         self._lost = ""
 
     def __call__(self, t: float, values: Mapping[str, Value]) -> Place:
         m, last = self._motion, self._way
         placed = m.placed is not None and bool(values[m.placed])
         anew = placed and not self._placed
-        self._placed = placed
+        self._placed, self.was_placed = placed, anew
         speed = None if m.speed is None else np.array([_number(values, m.speed)])
         summed = None if speed is None else self._sum(t, float(speed[0]))
         if m.position is not None:
@@ -204,12 +246,12 @@ class _Carried:
         elif summed is not None:
             self._way = summed
         self._t = t
-        q = carried(self._way, m.length, m.at_end)
-        if m.at_end is AtEnd.STOP and q != self._way:
+        q = carried(self._way, self._length, self._at_end)
+        if self._at_end is AtEnd.STOP and q != self._way:
             # It lies at the end; when the belt turns back, it is taken along from there.
             self._zero += self._way - q
             self._way, speed = q, None if speed is None else np.zeros(1)
-        around = self._way // m.length != last // m.length and m.at_end is AtEnd.LOOP
+        around = self._way // self._length != last // self._length and self._at_end is AtEnd.LOOP
         return Place(np.array([q]), speed, self._lost, anew or around)
 
     def _sum(self, t: float, speed: float) -> float | None:
@@ -225,7 +267,7 @@ class _Carried:
     def lose(self, reason: str) -> None:
         """Not heard: a count goes on where it is, a sum does not."""
         if self._motion.position is None and math.isfinite(self._t):
-            self._lost = f"its place on the belt is not known since: {reason}; placed tells it anew"
+            self._lost = f"its place on the way is not known since: {reason}; placed tells it anew"
 
 
 def nearing(told: float, summed: float | None, step: float) -> float:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from seerob.machines.tables import Belt, Motion, Slide, Turn
-from seerob.model_io.description import Description, Joint, JointKind, Link
+from seerob.machines.tables import Belt, Grip, Motion, Route, Slide, Turn
+from seerob.model_io.description import Description, Joint, JointKind, Link, Mimic
 from seerob.mounting.things import Color, LoadedThing, load_thing
 from seerob.transforms import Array
 from seerob.workstation import Machine
 
 MACHINE_COLOR: Color = (0.47, 0.55, 0.50, 1.0)
 BODY = "body"
-"""The one link of a machine: ``gate/body``."""
+"""What moves of a machine: ``gate/body``; of a gripper what holds its fingers."""
+FINGERS = ("left", "right")
 
 
 def loaded(machine: Machine, folder: Path, *, file: str) -> tuple[Description, LoadedThing]:
@@ -30,7 +32,7 @@ def loaded(machine: Machine, folder: Path, *, file: str) -> tuple[Description, L
         InputError: Its mesh cannot be read, or no body of this shape has the given mass properties.
     """
     thing = load_thing(machine, folder, MACHINE_COLOR, needs_mass=True, file=file)
-    link = Link(
+    body = Link(
         BODY,
         None,
         np.eye(4),
@@ -39,7 +41,32 @@ def loaded(machine: Machine, folder: Path, *, file: str) -> tuple[Description, L
         visual=tuple(mesh for piece in thing.pieces for mesh in piece.visual),
         solids=tuple(solid for piece in thing.pieces for solid in piece.solids),
     )
-    return Description(machine.name, (link,), BODY, "workstation file", thing.findings), thing
+    links = fingers(body) if isinstance(machine.motion, Grip) else (body,)
+    return Description(machine.name, links, BODY, "workstation file", thing.findings), thing
+
+
+def fingers(finger: Link) -> tuple[Link, ...]:
+    """What holds them, a finger, and the same on the other side.
+
+    Args:
+        finger: As the file gives it, on the side to which its joint moves it.
+    """
+    turned = np.diag([-1.0, -1.0, 1.0, 1.0])
+    (joint,) = finger.joints
+    places = zip(FINGERS, (np.eye(4), turned), (None, Mimic(FINGERS[0])), strict=True)
+    return (
+        Link(BODY, None, np.eye(4)),
+        *(
+            replace(
+                finger,
+                name=name,
+                parent=BODY,
+                parent_from_link=pose,
+                joints=(replace(joint, name=name, mimic=mimic),),
+            )
+            for name, pose, mimic in places
+        ),
+    )
 
 
 def joints(motion: Motion) -> tuple[Joint, ...]:
@@ -52,6 +79,10 @@ def joints(motion: Motion) -> tuple[Joint, ...]:
         return (Joint("turn", JointKind.REVOLUTE, axis, lower=motion.lower, upper=motion.upper),)
     if isinstance(motion, Belt):
         return (Joint("belt", JointKind.PRISMATIC, _unit(motion.along), lower=0.0, upper=motion.length),)
+    if isinstance(motion, Grip):
+        ends = (None if end is None else end / 2 for end in (motion.lower, motion.upper))
+        lower, upper = ends
+        return (Joint(FINGERS[0], JointKind.PRISMATIC, _unit(motion.along), lower=lower, upper=upper),)
     x, y, z = np.eye(3)
     return (
         Joint("x", JointKind.PRISMATIC, x),
@@ -68,7 +99,9 @@ def home(motion: Motion) -> Array:
         low = -np.inf if motion.lower is None else motion.lower
         high = np.inf if motion.upper is None else motion.upper
         return np.array([min(max(0.0, low), high)])
-    return np.zeros(3)
+    if isinstance(motion, Grip):
+        return np.array([0.5 * max(0.0, motion.lower or 0.0)])
+    return motion.track.at(motion.start)[0] if isinstance(motion, Route) else np.zeros(3)
 
 
 def _unit(axis: tuple[float, float, float]) -> Array:

@@ -9,7 +9,8 @@ import math
 from enum import StrEnum
 from typing import Annotated
 
-from seerob.quantities import Length, Seconds, Table, unit
+from seerob.machines.track import Track
+from seerob.quantities import Corner, Length, Seconds, Table, unit
 
 Travel = Annotated[float, unit("m", ge=-1000, le=1000)]
 Turned = Annotated[float, unit("rad", ge=-1000, le=1000)]
@@ -17,6 +18,7 @@ Direction = tuple[float, float, float]
 
 UP: Direction = (0.0, 0.0, 1.0)
 FORTH: Direction = (1.0, 0.0, 0.0)
+ACROSS: Direction = (0.0, 1.0, 0.0)
 YES = "bool"
 """What a variable must be that says yes or no, where others must have a unit."""
 
@@ -150,7 +152,76 @@ class Vehicle(Table, frozen=True, kw_only=True):
         return _given({self.x: "m", self.y: "m", self.heading: "rad"})
 
 
-Motion = Slide | Turn | Belt | Vehicle
+class Route(Table, frozen=True, kw_only=True):
+    """Along a drawn way on the floor: an AGV that tells how far it has come, or how fast it is."""
+
+    points: Annotated[tuple[Corner, ...], unit("m", min_length=2, max_length=1000)]
+    """Corners (x, y) of the way in the frame that ``at`` gives [m]; it looks along it."""
+    radius: Annotated[float, unit("m", ge=0, le=100)] = 0.0
+    """Corners are rounded by arcs of this radius [m]; a way of more than two points needs one."""
+    closed: bool = False
+    """The last point is followed by the first again."""
+    start: Annotated[float, unit("m", ge=0, le=1e5)] = 0.0
+    """Where on the way it stands first [m]."""
+    position: str | None = None
+    """Variable that tells how far along the way it is, a length."""
+    speed: str | None = None
+    """Variable of its speed along the way. Beside ``position`` it smooths what arrives unevenly; alone it is
+    summed up: after a silence nobody knows where it is, until ``placed`` says so."""
+    placed: str | None = None
+    """Variable, a bool: when it turns true, it is at ``start``."""
+
+    def __post_init__(self) -> None:
+        track = self.track
+        if self.start > track.length:
+            raise ValueError(f"start = {self.start:g} m lies behind the end of the way, {track.length:g} m")
+        if self.placed is not None and self.speed is None and self.position is None:
+            raise ValueError("placed needs position or speed beside it")
+
+    @property
+    def track(self) -> Track:
+        """The way, corners rounded."""
+        return Track.rounded(self.points, self.radius, closed=self.closed)
+
+    def variables(self) -> dict[str, str]:
+        """Variables and the SI unit that each must have."""
+        return _given({self.position: "m", self.speed: "m/s", self.placed: YES})
+
+
+class Grip(Table, frozen=True, kw_only=True):
+    """Two fingers that open and close evenly: a parallel gripper.
+
+    The table's shape and mass are those of one finger, as it stands with the gripper shut: on the side of
+    ``along``, its inner face in the middle. The other is the same, turned by half a turn about z.
+    """
+
+    along: Direction = ACROSS
+    """Direction in which it opens in its own frame, at right angles to z."""
+    opening: str | None = None
+    """Variable that tells how far the fingers are apart, a length."""
+    open: str | None = None
+    """Instead: variable, a bool, that tells at which end it is; between them it is undecided."""
+    lower: Travel | None = None
+    """Least opening [m]; shut, where ``open`` is told."""
+    upper: Travel | None = None
+    """Largest opening [m]; open."""
+    travel: Seconds | None = None
+    """Time from one end to the other [s], where ``open`` is told."""
+
+    def __post_init__(self) -> None:
+        _direction("along", self.along)
+        if abs(self.along[2]) > 1e-6 * math.hypot(*self.along):
+            raise ValueError(
+                f"along = {list(self.along)} is not at right angles to z, which fingers turn about"
+            )
+        _ends(self.opening, self.open, (self.lower, self.upper), self.travel)
+
+    def variables(self) -> dict[str, str]:
+        """Variables and the SI unit that each must have."""
+        return _given({self.opening: "m", self.open: YES})
+
+
+Motion = Slide | Turn | Belt | Vehicle | Route | Grip
 
 
 def _given(needs: dict[str | None, str]) -> dict[str, str]:

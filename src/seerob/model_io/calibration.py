@@ -100,7 +100,7 @@ def read_calibration(content: bytes, file: str) -> Calibration:
         raise InputError.at(file, "", f"more than {LARGEST} bytes are no calibration", remedy)
     try:
         found = msgspec.convert(tomllib.loads(content.decode()), Calibration)
-    except (ValueError, msgspec.ValidationError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError.at(file, "", f"no calibration: {error}", remedy) from error
     if not np.isfinite([found.theta, found.a, found.d, found.alpha]).all():
         raise InputError.at(file, "", "values that are not finite", remedy)

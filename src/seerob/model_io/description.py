@@ -11,6 +11,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from seerob.errors import Problem
 from seerob.geometry import Mesh, Solid
 from seerob.snapshot import Finding, Origin
 from seerob.transforms import Array
@@ -98,6 +99,8 @@ class Link:
     """Several are applied in this order, each in the frame that the ones before it left."""
     inertial: Inertial | None = None
     """None: nobody gave one. Frames without shape or mass are such links too."""
+    impossible_mass: Problem | None = None
+    """What its file says of its mass that no body has, where that cannot be overlooked."""
     visual: tuple[Mesh, ...] = ()
     """For display, in the link's frame."""
     solids: tuple[Solid, ...] = ()

@@ -12,8 +12,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from seerob.errors import Problem
 from seerob.geometry import Solid
 from seerob.model_io.description import Description, Inertial, Joint, JointKind, Link
+from seerob.model_io.mesh_bodies import is_closed
 from seerob.model_io.rigid import groups
 from seerob.model_io.xml_values import Reader
 from seerob.snapshot import Origin
@@ -28,6 +30,8 @@ LIKELY = (0.01, 10.0)
 """Within these a unit is worth proposing [m]."""
 MAX_MASS = 1e4
 """Of one thing [kg]."""
+NOTHING = 1e-9
+"""Up to this a mass is none [kg]."""
 DENSITIES = (10.0, 25_000.0)
 """From foam to the heaviest metals [kg/m³]."""
 REPAIRABLE = 0.02
@@ -44,6 +48,7 @@ TIPS = (
     "flange",
 )
 """Endings of names that point out the link a tool is mounted on, the best first."""
+OPEN = "mesh is open: distances are to its surface, and what counts as inside goes by the winding number"
 ROTOR = (
     "rotor inertia unknown, nobody published it: mass matrix and effective mass are those of the links alone"
 )
@@ -79,7 +84,7 @@ def plausible_inertial(inertial: Inertial, *, moves: bool) -> tuple[Inertial | N
         moves: Whether a joint moves this link, which then needs a rotational inertia too.
     """
     mass, inertia = inertial.mass, inertial.inertia
-    if mass <= 1e-9:
+    if mass <= NOTHING:
         if not moves and not inertia.any():
             return None, "", ""
         return None, "warning", f"mass is {mass:g} kg, expected more than 0: mass and inertia unknown"
@@ -102,6 +107,17 @@ def plausible_inertial(inertial: Inertial, *, moves: bool) -> tuple[Inertial | N
     mended = np.trace(second) * np.eye(3) - second
     text = f"principal moments {shown} kg·m² break A + B ≥ C by {max(violation, 0):.2%}: rounding, mended"
     return replace(inertial, inertia=0.5 * (mended + mended.T)), "note", text
+
+
+def no_mass(mass: float, *, file: str, key: str, moves: bool) -> Problem | None:
+    """What is wrong with a link to which its file gives no mass [kg]; None when it has one, or stands still.
+
+    Only a figure that rests on it needs a better one, see `seerob.model.Mechanism.require_masses`: a frame
+    between two joints weighs nothing either.
+    """
+    if not moves or mass > NOTHING:
+        return None
+    return Problem(file, key, f"is {mass:g} kg, and it moves", "a mass is greater than 0")
 
 
 def impossible_inertia(inertia: Array) -> str:
@@ -202,6 +218,7 @@ def _findings(description: Description) -> Iterator[tuple[str, str, str]]:
         if unknown:
             yield "warning", "", f"{which} limit unknown: {', '.join(unknown)}"
     yield from massless(description)
+    yield from open_meshes(description)
     for link in description.links:
         if link.solids:
             text = odd_extent(float(np.subtract(*box(link.solids)[::-1]).max()))
@@ -237,6 +254,17 @@ def massless(description: Description) -> Iterator[tuple[str, str, str]]:
     for group in groups(description.links):
         if group[0].joints and not any(link.inertial for link in group):
             yield "warning", group[0].name, "moved by a joint, but mass and inertia unknown"
+
+
+def open_meshes(description: Description) -> Iterator[tuple[str, str, str]]:
+    """A finding with the links whose surface has a hole, so that what is inside of them is a convention."""
+    found = [
+        link.name
+        for link in description.links
+        if any(solid.mesh is not None and not is_closed(solid.mesh) for solid in link.solids)
+    ]
+    if found:
+        yield "note", "", f"{', '.join(found)}: {OPEN}"
 
 
 def misplaced_mass(link: Link) -> Iterator[tuple[str, str, str]]:

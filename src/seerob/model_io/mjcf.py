@@ -47,9 +47,8 @@ def read_mjcf(path: Path, *, resolver: Resolver, name: str = "robot") -> Descrip
         spec.compiler.discardvisual = False
         model = spec.compile()
     except ValueError as error:
-        raise InputError.at(
-            resolver.file, "", f"MuJoCo cannot read it: {' '.join(str(error).split())}"
-        ) from None
+        said = " ".join(str(error).split())
+        raise InputError.at(resolver.file, "", f"MuJoCo cannot read it: {said}", _remedy(said)) from None
     _remarks(reader, spec, model)
     names = _body_names(reader, model)
     links = [_link(reader, spec, model, body, names) for body in range(model.nbody)]
@@ -62,6 +61,13 @@ def read_mjcf(path: Path, *, resolver: Resolver, name: str = "robot") -> Descrip
         name=name, links=made, tip=lint.guessed_tip(made), source=resolver.file, files=files
     )
     return lint.checked(description, reader)
+
+
+def _remedy(said: str) -> str:
+    """What would be right, where MuJoCo only says what is wrong."""
+    if "mass" not in said:
+        return ""
+    return "give every moving body a mass greater than 0: <inertial>, or mass or density of its geoms"
 
 
 def _remarks(reader: Reader, spec: Any, model: Any) -> None:

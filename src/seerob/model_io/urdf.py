@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from seerob.errors import InputError, suggestion
+from seerob.errors import InputError, Problem, suggestion
 from seerob.model_io import lint
 from seerob.model_io.description import Description, Inertial, Joint, JointKind, Link, Mimic, Quantity
 from seerob.model_io.mimic import flattened
@@ -142,12 +142,14 @@ def _link(
         reader.finding(
             "note", name, "no collision shape in the file: distances and contacts use the visual one"
         )
+    inertial, impossible = _inertial(reader, name, element, moves=bool(joint))
     return Link(
         name=name,
         parent=parent[0] if parent else None,
         parent_from_link=parent_from_link,
         joints=joint,
-        inertial=_inertial(reader, name, element, moves=bool(joint)),
+        inertial=inertial,
+        impossible_mass=impossible,
         visual=visual,
         solids=geometry.solids(element, name, tag),
     )
@@ -236,23 +238,26 @@ def _mimic(reader: Reader, element: Element, key: str) -> Mimic | None:
     return Mimic(mimic.get("joint", ""), multiplier, offset)
 
 
-def _inertial(reader: Reader, name: str, link: Element, *, moves: bool) -> Inertial | None:
+def _inertial(
+    reader: Reader, name: str, link: Element, *, moves: bool
+) -> tuple[Inertial | None, Problem | None]:
+    """Mass properties that can be used, and what is wrong with a mass that cannot."""
     element, key = link.find("inertial"), f"link[{name}].inertial"
     if element is None:
-        return None
+        return None, None
     before = len(reader.problems)
     link_from_inertial = reader.origin(element, key)
     mass, inertia = element.find("mass"), element.find("inertia")
     if mass is None or mass.get("value") is None:
         reader.finding("warning", name, "inertial without a mass: unknown")
-        return None
+        return None, None
     kilograms = float(reader.numbers(mass, "value", f"{key}.mass", (0.0,))[0])
     names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     xx, yy, zz, xy, xz, yz = (float(reader.numbers(inertia, n, f"{key}.inertia", (0.0,))[0]) for n in names)
     if kilograms < 0:
         reader.problem(f"{key}.mass.value", f"is {kilograms:g} kg", "a mass is greater than 0")
     if len(reader.problems) > before:
-        return None
+        return None, None
     rotation = link_from_inertial[:3, :3]
     matrix = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
     made = Inertial(
@@ -265,4 +270,4 @@ def _inertial(reader: Reader, name: str, link: Element, *, moves: bool) -> Inert
     kept, level, text = lint.plausible_inertial(made, moves=moves)
     if text:
         reader.finding(level, name, text)
-    return kept
+    return kept, lint.no_mass(kilograms, file=reader.file, key=f"{key}.mass.value", moves=moves)

@@ -17,6 +17,8 @@ MAX_VALUES = 1 << 26
 """Numbers that one recording may hold: half a GiB, some two hours of a depth camera."""
 FAR = 100.0
 """No point of a person is further from the origin of a capture [m]."""
+VAST = 1e100
+"""As far as infinity, and still a number [m]."""
 LATEST = 1e12
 """No time stamp is as late [s]."""
 SHORTEST = 1e-5
@@ -73,7 +75,9 @@ class FrameArrays:
             world_from_capture: Rigid transform, shape (4, 4).
         """
         rotation = world_from_capture[:3, :3]
-        positions = self.positions @ rotation.T + world_from_capture[:3, 3]
+        # What is infinite would turn into what is not seen, and nobody would hear of it.
+        near = np.clip(self.positions, -VAST, VAST)
+        positions = near @ rotation.T + world_from_capture[:3, 3]
         orientations = self.orientations
         if orientations is not None:
             orientations = turned(rotation, orientations)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from seerob.by_hand import by_hand, home
-from seerob.chains import assumed, couple, payload, placeholder, unknown_masses
+from seerob.chains import assumed, payload, placeholder
 from seerob.distances.least import Shapes
 from seerob.errors import InputError, Problem, UnknownName
 from seerob.filing import filed
@@ -21,11 +21,12 @@ from seerob.human import posture
 from seerob.machines import mounting as machine_mounting
 from seerob.model import Body, Frame, Mechanism, Model
 from seerob.model_io.calibration import calibrated_by
-from seerob.model_io.description import Description, Link, Quantity
+from seerob.model_io.description import Link, Quantity
 from seerob.model_io.loader import load_robot
 from seerob.mounting.areas import mount_sensor, mount_swept
 from seerob.mounting.body_list import listed
 from seerob.mounting.contacts import add_contacts
+from seerob.mounting.mechanisms import Chain, Riders, mechanism
 from seerob.mounting.people import describe
 from seerob.mounting.specification import Mounting
 from seerob.mounting.specification import pose_matrix as pose_matrix  # noqa: PLC0414
@@ -59,17 +60,6 @@ def compile_workstation(
     return _Compiler(station, cache, progress, made).run()
 
 
-@dataclass
-class _Chain:
-    """A robot or human on its way to a `Mechanism`."""
-
-    description: Description
-    role: str
-    home: Array
-    home_given: bool
-    tip: Frame | None = None
-
-
 class _Compiler:
     def __init__(
         self, station: Workstation, cache: Path | None, progress: Progress, made: Mapping[str, MadeArea]
@@ -80,7 +70,7 @@ class _Compiler:
         self.folder = Path(station.folder)
         self.mounting = Mounting()
         self.problems: list[Problem] = []
-        self.chains: dict[str, _Chain] = {}
+        self.chains: dict[str, Chain] = {}
         self.carriers: dict[str, str] = {}
         self.file = next(iter(station.files), "workstation")
         self.bound = Bound({}, {}, ())
@@ -89,13 +79,15 @@ class _Compiler:
         self.mounting.option(timestep=self.station.engine.timestep, gravity=self.station.engine.gravity)
         self._try("", self._variables, None)
         for i, robot in enumerate(self.station.robots):
-            self._try(f"robots[{i}]", self._robot, robot)
+            if robot.on is None:
+                self._try(f"robots[{i}]", self._robot, robot)
         for i, human in enumerate(self.station.humans):
             self._try(f"humans[{i}]", self._human, human)
         for i, part in enumerate(self.station.parts):
             self._try(f"parts[{i}]", self._part, part)
         for i, machine in enumerate(self.station.machines):
-            self._try(f"machines[{i}]", self._machine, machine)
+            if machine.on is None:
+                self._try(f"machines[{i}]", self._machine, machine)
         if not self.problems:
             self._mount_all()
         if not self.problems:
@@ -149,7 +141,9 @@ class _Compiler:
         if robot.calibration is not None:
             description = calibrated_by(description, robot.calibration, self.folder)
         q = home(description, robot, self.file)
-        self._chain(robot.name, description, "robot", pose_matrix(robot.base), q, robot.q is not None)
+        on = self._above(robot.on, "on", ("machine",))
+        chain = Chain(description, "robot", q, robot.q is not None, on=on)
+        self._chain(robot.name, chain, pose_matrix(robot.base))
         self.mounting.files |= filed(
             robot.name,
             description.files,
@@ -176,20 +170,20 @@ class _Compiler:
         description, said = describe(human, touches=bool(self.station.contacts))
         self.mounting.findings += said
         q = posture.posture(description, human.posture, joints=human.joints, file=f"{human.name}.joints")
-        self._chain(human.name, description, "human", pose_matrix(human.at), q, True)
+        self._chain(human.name, Chain(description, "human", q, True), pose_matrix(human.at))
 
-    def _chain(
-        self, name: str, description: Description, role: str, world_from_base: Array, home: Array, given: bool
-    ) -> None:
-        self.chains[name] = _Chain(description, role, home, given)
-        self.mounting.findings += description.findings
-        for link in description.links:
-            self._link(name, role, link, world_from_base)
+    def _chain(self, name: str, chain: Chain, above_from_base: Array) -> None:
+        self.chains[name] = chain
+        self.mounting.findings += chain.description.findings
+        for link in chain.description.links:
+            self._link(name, chain, link, above_from_base)
 
-    def _link(self, owner: str, role: str, link: Link, world_from_base: Array) -> None:
+    def _link(self, owner: str, chain: Chain, link: Link, above_from_base: Array) -> None:
         full = f"{owner}/{link.name}"
-        parent = None if link.parent is None else f"{owner}/{link.parent}"
-        pose = link.parent_from_link if parent is not None else world_from_base @ link.parent_from_link
+        if link.parent is None:
+            parent, pose = chain.on or None, above_from_base @ link.parent_from_link
+        else:
+            parent, pose = f"{owner}/{link.parent}", link.parent_from_link
         body = self.mounting.body(full, parent, pose)
         self.carriers[full] = owner
         for joint in link.joints:
@@ -204,7 +198,13 @@ class _Compiler:
             self.mounting.massless(body)
         if link.solids or link.visual:
             self.mounting.shape(
-                full, role=role, owner=owner, carrier=owner, solids=link.solids, visual=link.visual, mass=mass
+                full,
+                role=chain.role,
+                owner=owner,
+                carrier=owner,
+                solids=link.solids,
+                visual=link.visual,
+                mass=mass,
             )
 
     # -- things -----------------------------------------------------------------------------
@@ -215,47 +215,77 @@ class _Compiler:
     def _machine(self, machine: Machine) -> None:
         description, thing = machine_mounting.loaded(machine, self.folder, file=self.file)
         start = machine_mounting.home(machine.motion)
-        self._chain(machine.name, description, "machine", pose_matrix(machine.at), start, True)
+        on = self._above(machine.on, "on", ("robot", "machine"))
+        chain = Chain(description, "machine", start, True, on=on)
+        self._chain(machine.name, chain, pose_matrix(machine.at))
         self.mounting.files |= filed(
             machine.name, thing.files, folder=self.folder, references=(machine.mesh,)
         )
 
     def _area(self, area: Area) -> None:
-        if area.on is not None and not self.mounting.has(area.on):
-            raise UnknownName("link, tool or bone", area.on, self.carriers)
+        on = None if area.on is None else self._body(area.on)
+        if on is not None and not self.mounting.has(on):
+            raise UnknownName("link, tool or bone", area.on or "", self.carriers)
         if area.swept is not None:
             mount_swept(self.mounting, area, self.made, file=self.file)
         else:
-            self._thing(area, "area", area.on, pose_matrix(area.at), AREA_COLOR)
+            self._thing(area, "area", on, pose_matrix(area.at), AREA_COLOR)
 
     def _mount_all(self) -> None:
-        """Mount tools and workpieces; what they are mounted on may come later in the file."""
-        waiting: list[tuple[str, str, Mounted]] = [
-            *((f"tools[{i}]", "tool", t) for i, t in enumerate(self.station.tools)),
-            *((f"workpieces[{i}]", "workpiece", w) for i, w in enumerate(self.station.workpieces)),
+        """Mount what is on something else; what that is may come later in the file."""
+        mounted: tuple[tuple[str, Callable[[Any], None], Any], ...] = (
+            *((f"robots[{i}]", self._robot, robot) for i, robot in enumerate(self.station.robots)),
+            *((f"machines[{i}]", self._machine, machine) for i, machine in enumerate(self.station.machines)),
+        )
+        waiting: list[tuple[str, Callable[[Any], None], Any]] = [
+            *(entry for entry in mounted if entry[2].on is not None),
+            *((f"tools[{i}]", partial(self._mount, "tool"), t) for i, t in enumerate(self.station.tools)),
+            *(
+                (f"workpieces[{i}]", partial(self._mount, "workpiece"), w)
+                for i, w in enumerate(self.station.workpieces)
+            ),
         ]
         while waiting:
-            ready = [entry for entry in waiting if self.mounting.has(entry[2].on)]
+            ready = [entry for entry in waiting if self.mounting.has(self._body(entry[2].on))]
             if not ready:
-                for key, _, thing in waiting:
-                    known = list(self.carriers)
-                    self.problems.append(
-                        Problem(self.file, f"{key}.on", str(UnknownName("link or tool", thing.on, known)))
-                    )
+                known = list(self.carriers)
+                self.problems += [
+                    Problem(self.file, f"{key}.on", str(UnknownName("link or tool", thing.on, known)))
+                    for key, _, thing in waiting
+                ]
                 return
             for entry in ready:
                 waiting.remove(entry)
-                self._try(entry[0], lambda table, role=entry[1]: self._mount(role, table), entry[2])  # type: ignore[misc]
+                self._try(*entry)
+
+    def _body(self, on: str) -> str:
+        """Full name of the body that ``on`` means: a machine's name means what moves of it."""
+        machine = on in self.chains and self.chains[on].role == "machine"
+        return f"{on}/{machine_mounting.BODY}" if machine else on
+
+    def _above(self, on: str | None, key: str, roles: tuple[str, ...]) -> str:
+        """The same of what carries a chain of joints; empty for the world.
+
+        Raises:
+            InputError: It is carried by what cannot carry it.
+        """
+        if on is None:
+            return ""
+        carrier = self.carriers.get(self._body(on), "")
+        if not carrier or self.chains[carrier].role not in roles:
+            what = f"{on} carries no joints"
+            raise InputError.at(self.file, key, what, f"name what moves: a {' or a '.join(roles)}")
+        return self._body(on)
 
     def _mount(self, role: str, thing: Mounted) -> None:
         color = TOOL_COLOR if role == "tool" else WORKPIECE_COLOR
-        self._thing(thing, role, thing.on, pose_matrix(thing.at), color)
-        carrier = self.carriers[thing.on]
+        on = self._body(thing.on)
+        self._thing(thing, role, on, pose_matrix(thing.at), color)
         if isinstance(thing, Tool):
-            chain = self.chains[carrier]
-            robot = next(r for r in self.station.robots if r.name == carrier)
-            if thing.tcp is not None and robot.tool in (None, thing.name):
-                chain.tip = Frame(thing.name, -1, pose_matrix(thing.tcp))
+            carrier = self.carriers[on]
+            wanted = next((r.tool for r in self.station.robots if r.name == carrier), None)
+            if thing.tcp is not None and wanted in (None, thing.name):
+                self.chains[carrier].tip = Frame(thing.name, -1, pose_matrix(thing.tcp))
 
     def _thing(
         self,
@@ -315,7 +345,11 @@ class _Compiler:
         }
         self.progress("building distance trees")
         shapes = Shapes.build([(body.name, body.solids) for body in numbered], cache=self.cache)
-        mechanisms = {name: self._mechanism(mj, name, numbered) for name in self.chains}
+        riders = self._riders()
+        mechanisms = {
+            name: mechanism(mj, name, chain, riders, self.carriers, numbered)
+            for name, chain in self.chains.items()
+        }
         return Model(
             workstation=self.station,
             mj=mj,
@@ -332,61 +366,13 @@ class _Compiler:
             dictionary=self.bound.variables,
         )
 
-    def _mechanism(self, mj: Any, name: str, bodies: tuple[Body, ...]) -> Mechanism:
-        chain = self.chains[name]
-        every = [joint for link in chain.description.links for joint in link.joints]
-        commanded = [joint for joint in every if joint.mimic is None]
-        coupling, offset = couple(every, commanded)
-        ids = [mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_JOINT, f"{name}/{joint.name}") for joint in every]
-        own = {full for full, carrier in self.carriers.items() if carrier == name}
-        mj_bodies = np.array(
-            sorted(i for i in (_body_id(mj, full) for full in own) if mj.body_weldid[i] != 0), np.int64
-        )
-        moving_ids = set(mj_bodies.tolist())
-        own_bodies = [b for b in bodies if b.carrier == name and b.role != "area"]
-        tip = chain.tip if chain.tip is not None else Frame(f"{name}/{chain.description.tip}", -1, np.eye(4))
-        tip = replace(tip, mj=_body_id(mj, tip.name))
-        return Mechanism(
-            name=name,
-            role=chain.role,
-            description=chain.description,
-            joints=tuple(commanded),
-            q_address=np.array([mj.jnt_qposadr[i] for i in ids], np.int64),
-            v_address=np.array([mj.jnt_dofadr[i] for i in ids], np.int64),
-            coupling=coupling,
-            offset=offset,
-            own=np.array([i for i, joint in enumerate(every) if joint.mimic is None], np.int64),
-            home=chain.home,
-            home_given=chain.home_given,
-            tip=tip,
-            bodies=tuple(b.index for b in bodies if b.owner == name),
-            carried=tuple(b.index for b in own_bodies if b.owner != name),
-            moving=tuple(b.index for b in own_bodies if b.mj in moving_ids),
-            mj_bodies=mj_bodies,
-            unknown_masses=self._unknown_masses(name),
-            velocity_limits=tuple(joint.velocity for joint in commanded),
-            effort_limits=tuple(joint.effort for joint in commanded),
-            rotor_inertia_known=all(joint.armature is not None for joint in commanded),
-        )
+    def _riders(self) -> Riders:
+        mounted = [self._body(thing.on) for thing in (*self.station.tools, *self.station.workpieces)]
+        return Riders(self.chains, self.carriers, self.mounting.entries, mounted)
 
     def _about(self, robot: Robot, mechanism: Mechanism) -> list[Finding]:
         given = self.chains[robot.name].tip is not None or robot.model.startswith("library:")
-        return [*assumed(mechanism, tip_given=given), *payload(robot.name, self._carried(robot.name))]
-
-    def _carried(self, name: str) -> dict[str, float | None]:
-        """Mass [kg] of each tool and workpiece on a robot; None when nobody gave one."""
-        things: dict[str, float | None] = {}
-        for entry in self.mounting.entries:
-            if entry.carrier == name and entry.role in ("tool", "workpiece"):
-                known = things.get(entry.owner)
-                things[entry.owner] = known if entry.mass is None else entry.mass.value
-        return things
-
-    def _unknown_masses(self, name: str) -> tuple[str, ...]:
-        mounted = {thing.on for thing in (*self.station.tools, *self.station.workpieces)}
-        on = {full.partition("/")[2] for full in mounted if full.startswith(f"{name}/")}
-        things = {thing: mass is not None for thing, mass in self._carried(name).items()}
-        return unknown_masses(name, self.chains[name].description, loaded=on, things=things)
+        return [*assumed(mechanism, tip_given=given), *payload(robot.name, self._riders().things(robot.name))]
 
 
 def _body_id(mj: Any, name: str) -> int:

@@ -10,11 +10,24 @@ that with a larger mass of any body
 - :math:`M/2 + m_L` is larger.
 
 All three are monotone in every mass, whatever the others are: their ends are at the ends of the masses.
+
+A density that is off is a mass that is off. A centre of mass that is off by d, in any direction, changes
+:math:`J_c` by no more than :math:`\delta = |d|` times :math:`J_\omega`, so that for every
+:math:`0 < \epsilon < 1`, in the order of Loewner,
+
+.. math:: (1-\epsilon) J_c^T J_c - (1/\epsilon - 1)\,\delta^2 J_\omega^T J_\omega
+    \le J_{c+d}^T J_{c+d} \le (1+\epsilon) J_c^T J_c + (1 + 1/\epsilon)\,\delta^2 J_\omega^T J_\omega
+
+(Young's inequality). Both sides are bounds, not ends: ε is chosen by the present motion, for which the
+larger one is then reached where :math:`d \perp v`. The lesser is no less than a body that weighs nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -36,26 +49,28 @@ class MassTolerances:
     def __init__(self, model: Model, robot: Mechanism) -> None:
         self.robot = robot
         names = {int(i): str(model.mj.body(int(i)).name) for i in robot.mj_bodies}
-        links = [i for i, name in names.items() if name.startswith(f"{robot.name}/")]
         station = model.workstation
-        own = {table.name: table.mass_tolerance for table in station.robots}.get(robot.name)
-        found: list[tuple[str, float, list[int], bool]] = []
-        if own:
-            found.append((f"mass_tolerance of {robot.name}", own, links, True))
+        found: list[_Off] = []
+        for table in station.robots:
+            if table.name == robot.name:
+                links = [i for i, name in names.items() if name.startswith(f"{robot.name}/")]
+                found += _offs(table.name, links, 2, mass=table.mass_tolerance, com=table.com_tolerance)
         for thing in (*station.tools, *station.workpieces):
             bodies = [i for i, name in names.items() if name == thing.name]
-            if thing.mass_tolerance and bodies:
-                found.append((f"mass_tolerance of {thing.name}", thing.mass_tolerance, bodies, False))
-        self.tolerances = tuple(Tolerance(name, 100 * share, "%") for name, share, _, _ in found)
-        self._shares = np.array([share for _, share, _, _ in found])
-        self._bodies = [bodies for _, _, bodies, _ in found]
+            found += _offs(
+                thing.name,
+                bodies,
+                1,
+                mass=thing.mass_tolerance,
+                density=thing.density_tolerance,
+                com=thing.com_tolerance,
+            )
+        self.tolerances = tuple(off.tolerance for off in found)
+        self._offs = found
         masses = model.mj.body_mass
-        # Of M/2 + m_L: links by half, what is mounted in full.
+        # Of M/2 + m_L: links by half, what is mounted in full. A centre of mass changes nothing in it.
         self._simplified = np.array(
-            [
-                share * sum(float(masses[i]) for i in bodies) / (2 if half else 1)
-                for _, share, bodies, half in found
-            ]
+            [off.share * sum(float(masses[i]) for i in off.bodies) / off.divisor for off in found]
         )
 
     def __len__(self) -> int:
@@ -78,35 +93,127 @@ class MassTolerances:
             Undecided: Not heard, or a mass that nobody gave.
         """
         M = state.mass_matrix(self.robot)
-        parts = [
-            share * self._part(state, bodies)
-            for share, bodies in zip(self._shares, self._bodies, strict=True)
-        ]
+        qd = state.qd(self.robot)
+        parts = [off.parts(state, self.robot, qd) for off in self._offs]
         return Matrices(M, parts)
 
-    def _part(self, state: State, bodies: Sequence[int]) -> Array:
-        """What bodies make of the mass matrix, shape (n, n)."""
-        mj, data, robot = state.model.mj, state.data, self.robot
+
+class _Bounds(NamedTuple):
+    """What one input makes of a mass matrix at its ends, shape (n, n) each."""
+
+    lost: Array
+    lost_at_most: Array
+    """Never more than a body has: another bound, which leaves the matrix one that can be inverted."""
+    gained: Array
+
+
+@dataclass(frozen=True)
+class _Off:
+    """One input of some bodies that may be off."""
+
+    tolerance: Tolerance
+    bodies: tuple[int, ...]
+    """Of `mujoco`."""
+    divisor: int
+    """Of M/2 + m_L."""
+    share: float = 0.0
+    """Of their masses."""
+    way: float = 0.0
+    """Of their centres of mass [m]."""
+    lighter: float = 1.0
+    """Least factor on the masses whose centres may be off."""
+    heavier: float = 1.0
+    """Largest one."""
+
+    def parts(self, state: State, robot: Mechanism, qd: Array) -> _Bounds:
+        """What it makes of the mass matrix at its ends."""
         n = len(robot.joints)
-        found, linear, angular = np.zeros((n, n)), np.zeros((3, mj.nv)), np.zeros((3, mj.nv))
-        for body in bodies:
-            mujoco.mj_jacBodyCom(mj, data, linear, angular, body)
-            J_c, J_w = (rows[:, robot.v_address] @ robot.coupling for rows in (linear, angular))
-            turn = data.ximat[body].reshape(3, 3)
-            inertia = turn @ np.diag(mj.body_inertia[body]) @ turn.T
-            found += mj.body_mass[body] * J_c.T @ J_c + J_w.T @ inertia @ J_w
-        return found
+        found = [np.zeros((n, n)) for _ in range(3)]
+        for body in self.bodies:
+            part = _Part.of(state, robot, body)
+            each = part.shifted(self, qd) if self.way else (self.share * part.matrix,) * 3
+            found = [a + b for a, b in zip(found, each, strict=True)]
+        return _Bounds(*found)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What one body makes of the mass matrix."""
+
+    m: float
+    J_c: Array
+    J_w: Array
+    inertia: Array
+    """In world axes (3, 3) [kg·m²]."""
+
+    @classmethod
+    def of(cls, state: State, robot: Mechanism, body: int) -> _Part:
+        """Of a body of `mujoco`."""
+        mj, data = state.model.mj, state.data
+        linear, angular = np.zeros((3, mj.nv)), np.zeros((3, mj.nv))
+        mujoco.mj_jacBodyCom(mj, data, linear, angular, body)
+        J_c, J_w = (rows[:, robot.v_address] @ robot.coupling for rows in (linear, angular))
+        turn = data.ximat[body].reshape(3, 3)
+        return cls(float(mj.body_mass[body]), J_c, J_w, turn @ np.diag(mj.body_inertia[body]) @ turn.T)
+
+    @property
+    def matrix(self) -> Array:
+        """Shape (n, n)."""
+        return np.asarray(self.m * self.J_c.T @ self.J_c + self.J_w.T @ self.inertia @ self.J_w)
+
+    def shifted(self, off: _Off, qd: Array) -> tuple[Array, Array, Array]:
+        """What is lost at most where the centre of mass is off, the same in any case, what is gained."""
+        moved, turned = self.J_c.T @ self.J_c, off.way**2 * self.J_w.T @ self.J_w
+        v, w = (math.sqrt(max(float(qd @ A @ qd), 0.0)) for A in (moved, turned))
+        if not (v > 0 and w > 0):
+            v, w = (math.sqrt(float(np.trace(A))) for A in (moved, turned))
+        # All that moves a body along may be lost; what turns it stays.
+        all_of_it = off.lighter * self.m * moved
+        if not (v > 0 and w > 0):
+            return all_of_it, all_of_it, off.heavier * self.m * turned
+        eps = w / v
+        more = off.heavier * self.m * (eps * moved + (1 + 1 / eps) * turned)
+        less = off.lighter * self.m * (eps * moved + (1 / eps - 1) * turned) if eps < 1 else all_of_it
+        return less, all_of_it, more
+
+
+def _offs(
+    name: str,
+    bodies: Sequence[int],
+    divisor: int,
+    *,
+    mass: float | None = None,
+    density: float | None = None,
+    com: float | None = None,
+) -> Iterator[_Off]:
+    """What of a robot, tool or workpiece is said to be off."""
+    if not bodies:
+        return
+    for key, share in (("mass_tolerance", mass), ("density_tolerance", density)):
+        if share:
+            yield _Off(Tolerance(f"{key} of {name}", 100 * share, "%"), tuple(bodies), divisor, share=share)
+    if com:
+        either = (mass or 0.0) + (density or 0.0)
+        tolerance = Tolerance(f"com_tolerance of {name}", com, "m")
+        lighter, heavier = max(1 - either, 0.0), 1 + either
+        yield _Off(tolerance, tuple(bodies), divisor, way=com, lighter=lighter, heavier=heavier)
 
 
 class Matrices:
-    """Mass matrices of one state."""
+    """Mass matrices of one state at the ends of what may be off."""
 
-    def __init__(self, M: Array, parts: Sequence[Array]) -> None:
+    def __init__(self, M: Array, parts: Sequence[_Bounds]) -> None:
         self.M, self.parts = M, parts
 
     def at(self, shifts: Shifts) -> Array:
-        """M at shifted masses, shape (n, n)."""
+        """M at shifted inputs, shape (n, n): no less than it can be with 1, no more with −1."""
+        found = self._at(shifts, 0)
+        if any(p.lost is not p.lost_at_most for p in self.parts) and np.linalg.eigvalsh(found)[0] <= 0:
+            found = self._at(shifts, 1)
+        return found
+
+    def _at(self, shifts: Shifts, bound: int) -> Array:
         found = self.M
         for shift, part in zip(shifts, self.parts, strict=True):
-            found = found + shift * part
+            found = found + (shift * part.gained if shift > 0 else shift * part[bound])
         return np.asarray(found)

@@ -225,8 +225,7 @@ def _holes(thing: Thing, meshes: Sequence[Mesh], path: Path) -> tuple[Finding, .
             "the mesh is open: nothing can be said to be inside of it",
             "close it, or give a shape",
         )
-    text = "mesh is open: distances are to its surface, and what counts as inside goes by the winding number"
-    return (Finding(level="note", subject=thing.name, text=text),)
+    return (Finding(level="note", subject=thing.name, text=lint.OPEN),)
 
 
 def _odd(thing: Thing, solids: tuple[Solid, ...], meshes: list[Mesh]) -> tuple[Finding, ...]:

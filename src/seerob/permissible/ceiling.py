@@ -44,11 +44,13 @@ class Ceiling:
     surface: str = ""
     """Part of the robot that governs."""
     contact: str = ""
-    """``free`` or ``clamped``; empty without contact."""
+    """``free``, ``clamped`` or ``clamped on the floor``; empty without contact."""
     governs: str = ""
     """``force``, ``pressure``, ``energy``, ``separation`` …"""
     reason: str = ""
     """Why it cannot be told, or why no speed is permitted."""
+    asked: bool = True
+    """False where its variable says that it does not apply there: it permits nothing and forbids nothing."""
     method: Method = Method.OWN
     limit: Figure | None = None
     """The figure that governs, such as a pressure; None where it has none of its own."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 from seerob.criterion import Criterion
@@ -44,14 +45,36 @@ def ceilings_of(criterion: Criterion, model: Model, robot: str, *, anywhere: boo
         return None
     inner = ask
 
+    def muted(state: State) -> bool:
+        return criterion.active is not None and not state.signal(criterion.active)
+
     def decided(state: State) -> tuple[Ceiling, ...]:
         try:
-            found = inner(state)
+            found = inner(state) if not muted(state) else (_not_asked(criterion),)
         except Undecided as why:
             found = (Ceiling(criterion.name, math.nan, reason=str(why)),)
         return tuple(replace(ceiling, method=method) for ceiling in found)
 
-    return Ask(decided, method, look)
+    return Ask(decided, method, None if look is None else _unless(muted, look))
+
+
+def _not_asked(criterion: Criterion) -> Ceiling:
+    reason = f"not asked: {criterion.active} is false"
+    return Ceiling(criterion.name, math.inf, reason=reason, asked=False)
+
+
+def _unless(muted: Callable[[State], bool], look: Look) -> Look:
+    """Shown only the places at which the criterion is asked; where nobody knows, it is shown too."""
+
+    def shown(state: State) -> None:
+        try:
+            if muted(state):
+                return
+        except Undecided:
+            pass
+        look(state)
+
+    return shown
 
 
 def _power(criterion: Criterion, model: Model, robot: str, limit: float, power: int) -> Answer | None:
@@ -68,6 +91,9 @@ def _power(criterion: Criterion, model: Model, robot: str, limit: float, power: 
     def ask(state: State) -> tuple[Ceiling, ...]:
         result = evaluate(state)
         value = 0.0 if result.value is None else result.value
+        if result.interval is not None:
+            # What may be off counts in full, as in the criterion's own verdict.
+            value = result.interval[1]
         share = math.inf if value <= 0 else (limit / value) ** (1 / power)
         speed = limit if power == 1 else math.nan
         governs = "speed" if power == 1 else "kinetic energy"

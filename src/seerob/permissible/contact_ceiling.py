@@ -70,6 +70,8 @@ def _of_region(contacts: Contacts, judged: Judged, k: int) -> Ceiling | None:
     i = int(open_rows.argmax()) if open_rows.any() else int(shares.argmin())
     row = int(rows[i])
     how = "clamped" if judged.clamped[row, column] else "free"
+    if judged.on_floor is not None and judged.on_floor[row, column]:
+        how = "clamped on the floor"
     if open_rows.any():
         why = f"contact pressure of {bodies[i]} ({how}): {contacts.unknown[row]}"
         return Ceiling(spec.name, math.nan, math.nan, name, bodies[i], how, reason=why)

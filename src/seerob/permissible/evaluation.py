@@ -22,7 +22,7 @@ from seerob.permissible.survey import SPACING, Survey
 from seerob.permissible.verification import Verified, verify
 from seerob.permissible.witness import Clock, Witness
 from seerob.results import ResultLog
-from seerob.run import Bound, Feed, Judge, Summary, pump, ticks
+from seerob.run import Bound, Feed, Judge, Summary, coarse, pump, signal_timeouts, ticks
 from seerob.samples import JointSample, PoseSample, Sample
 from seerob.series import worst_verdict
 from seerob.snapshot import CriterionInfo, Finding, Snapshot, Verdict
@@ -106,6 +106,9 @@ def given_motion(model: Model, sources: Sources, robot: str) -> tuple[GivenMotio
         InputError: Not exactly one source drives it, or it gives neither joint positions nor poses, or a
             pose is out of reach.
     """
+    if on := model.robot(robot).on:
+        remedy = "the map is of a robot that stands; judge its motion with seerob assess"
+        raise InputError.at("permissible speed", robot, f"it is carried by {on}", remedy)
     driving = [opened for source, opened in sources if source.target() == robot]
     if len(driving) != 1:
         what = f"{len(driving)} sources drive {robot}"
@@ -133,7 +136,11 @@ def witness(
     driven = {s.target(): s.timeout for s, _ in sources if s.target()}
     seen, log = Witness(Judge(bound)), ResultLog(infos)
     duration = max((opened.duration for _, opened in sources), default=0.0)
-    engine = Engine(model, driven=driven)
+    # Silence of a controller, and of the machines that follow it, shows as in any run.
+    signals, following = signal_timeouts(model)
+    engine = Engine(model, driven={**following, **driven}, signals=signals)
+    for name, why in coarse(model).items():
+        engine.state.hearings[name].coarse = why
     first: Snapshot | None = None
     for out, _ in ticks(engine, seen, pump(sources, model.workstation.engine.tick)):
         first = first or out

@@ -66,8 +66,9 @@ EITHER_NEEDS = (
 
 def governing(ceilings: Sequence[Ceiling], by: By, *, below: float = 1.0) -> Ceiling | None:
     """What governs at a place: what cannot be told, else the least share; None when none is below a share."""
-    counted = [c for c in ceilings if by.counts(c.method)]
-    if by is By.EITHER:
+    counted = [c for c in ceilings if by.counts(c.method) and c.asked]
+    # What is not asked there protects nobody, and no method is enough without it.
+    if by is By.EITHER and all(c.asked or c.method is Method.OWN for c in ceilings):
         own = [c for c in counted if c.method is Method.OWN]
         ssm, pfl = (_least([c for c in counted if c.method is m]) for m in (Method.SSM, Method.PFL))
         # Who permits everything needs no help of the other.

@@ -22,6 +22,7 @@ from seerob.model import Model
 from seerob.permissible.ceiling import Answer, Ceiling, Look
 from seerob.safety.separation import Separation
 from seerob.state import State
+from seerob.tracking_error import TrackingError
 from seerob.transforms import Array
 
 
@@ -33,22 +34,29 @@ def separation(criterion: Separation, model: Model, robot: str) -> tuple[Answer,
         model: The compiled workstation.
         robot: Whose speed is asked about.
     """
-    unknown, inverse = criterion.unknown(model), criterion.inverse(model)
+    unknown = criterion.unknown(model)
+    inverse = criterion.at_worst(model).inverse(model)
     human = next(name for name in criterion.between if name != robot)
     gap = model.gap(model.select(human), model.robot(robot).moving)
     names = [model.bodies[i].name for i in gap.b]
+    off = TrackingError(model, gap.a)
     least = np.full(len(gap.b), np.inf)
     fixed = criterion.mode == "fixed"
+
+    def distances(state: State) -> Array:
+        # As the criterion has them: less how far the twin's person is from where devices see them.
+        found = np.asarray(state.closest_per_body(gap).distance)
+        return np.asarray(found - off.at(state).max(initial=0.0))
 
     def look(state: State) -> None:
         # Where somebody's place is not known the map has no number either.
         with suppress(Undecided):
-            np.minimum(least, state.closest_per_body(gap).distance, out=least)
+            np.minimum(least, distances(state), out=least)
 
     def ask(state: State) -> tuple[Ceiling, ...]:
         if unknown:
             raise Undecided(unknown)
-        distance: Array = np.asarray(state.closest_per_body(gap).distance)
+        distance = distances(state)
         if fixed:
             distance = np.minimum(distance, least)
         S_p, (speed, share) = inverse(state, distance)

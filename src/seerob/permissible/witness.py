@@ -8,10 +8,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from seerob.errors import Undecided
 from seerob.model import Mechanism, Model
 from seerob.snapshot import Result
 from seerob.state import Hearing, State
 from seerob.transforms import Array
+from seerob.variables.dictionary import Value
+
+Bones = dict[str, tuple[float | None, float | None]]
 
 
 class Witness:
@@ -27,6 +31,8 @@ class Witness:
         self._qpos: list[Array] = []
         self._qvel: list[Array] = []
         self._doubts: list[dict[str, str]] = []
+        self._heard: list[dict[str, Value | Undecided]] = []
+        self._bones: list[dict[str, Bones]] = []
 
     def __call__(self, state: State) -> tuple[Result, ...]:
         """Take one tick; what the judge says goes on."""
@@ -34,6 +40,9 @@ class Witness:
         self._qpos.append(np.array(state.data.qpos))
         self._qvel.append(np.array(state.data.qvel))
         self._doubts.append({name: state.doubt(name) for name in state.hearings})
+        asked = {c.active for c in state.model.workstation.safety if c.active is not None}
+        self._heard.append({name: _heard(state, name) for name in asked})
+        self._bones.append({name: dict(h.bones) for name, h in state.hearings.items() if h.bones})
         return self._judge(state)
 
     def _tick(self, t: float) -> int:
@@ -48,10 +57,25 @@ class Witness:
         k = self._tick(t)
         return self._qpos[k], self._qvel[k], self._doubts[k]
 
+    def heard(self, t: float) -> tuple[dict[str, Value | Undecided], dict[str, Bones]]:
+        """What switches criteria, as machines said it at the tick that is nearest to ``t`` [s], or why not.
+
+        Also how far bones of people were from where devices saw them, see `seerob.hearing.Hearing.bones`.
+        """
+        k = self._tick(t)
+        return self._heard[k], self._bones[k]
+
     def moves(self, mechanism: Mechanism) -> bool:
         """Whether somebody ever moved."""
         q = np.array(self._qpos)[:, mechanism.q_address]
         return bool((np.ptp(q, axis=0) > 1e-3).any()) if len(q) else False
+
+
+def _heard(state: State, name: str) -> Value | Undecided:
+    try:
+        return state.signals.value(name, state.t)
+    except Undecided as why:
+        return why
 
 
 class Posed(State):
@@ -65,6 +89,7 @@ class Posed(State):
         self._robot, self._witness = robot, witness
         self.doubts: dict[str, str] = {}
         """Why somebody's place may not be relied on, by name; empty when it may."""
+        self._said: dict[str, Value | Undecided] = {}
 
     def place(self, t: float, others_at: float, q: Array, qd: Array, own_doubt: str = "") -> None:
         """Put everybody where they are.
@@ -82,12 +107,22 @@ class Posed(State):
         self.data.qpos[robot.q_address] = robot.coupling @ q + robot.offset
         self.data.qvel[robot.v_address] = robot.coupling @ qd
         self.doubts = {**doubts, robot.name: own_doubt}
+        self._said, bones = self._witness.heard(others_at)
+        for name, hearing in self.hearings.items():
+            hearing.bones = bones.get(name, {})
         self.asked.clear()
         self.refresh(t)
 
-    def doubt(self, name: str) -> str:
-        """See `State.doubt`; of the others what the run knew of them then."""
+    def _doubt(self, name: str) -> str:
+        """See `State.doubt`; of the others what the run knew of them then, of any bone."""
         return self.doubts.get(name, "")
+
+    def signal(self, name: str) -> Value:
+        """See `State.signal`; what the run heard then, of variables that switch criteria."""
+        said = self._said[name]
+        if isinstance(said, Undecided):
+            raise said
+        return said
 
 
 Clock = Callable[[float], float]

@@ -10,14 +10,14 @@ clear. Distances are those of the twin's own shapes; what may be nearer by its n
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from seerob.distances.least import Per, Query, Survey
-from seerob.errors import InputError, Problem
+from seerob.errors import InputError, Problem, UnknownName
 from seerob.model import Mechanism, Model
 from seerob.permissible.moving_joints import Chain, chains_of
 from seerob.transforms import Array
@@ -27,7 +27,7 @@ RESOLUTION = 1e-3
 APART = 0.002
 """Of the robot's own bodies from each other, whatever the margin to others is [m]."""
 WATCHED = ("robot", "tool", "workpiece", "part", "machine", "human")
-"""Roles of bodies that are kept away from; areas are looked through."""
+"""Roles of bodies that are kept away from; areas are looked through unless they are named."""
 
 
 @dataclass(frozen=True)
@@ -63,36 +63,58 @@ class Clearance:
         model: The compiled workstation; everybody else is where the file puts them.
         robot: Who moves.
         start: Joint positions at which parts of the robot that touch each other are told [rad or m], (n,).
+        keep_out: Areas that are kept away from like everything else.
+        places: Joint positions of others, by name [rad or m], (n,) each, instead of those of the file.
+        swept: Names of others that are looked through: an area of ``keep_out`` is in their place.
 
     Raises:
-        InputError: Others of whom nobody said where they are, or nothing to keep away from.
+        UnknownName: No such area.
+        InputError: Others of whom nobody said where they are, an area that moves, or nothing to keep away
+            from.
     """
 
-    def __init__(self, model: Model, robot: Mechanism, start: Array) -> None:
+    def __init__(
+        self,
+        model: Model,
+        robot: Mechanism,
+        start: Array,
+        *,
+        keep_out: Sequence[str] = (),
+        places: Mapping[str, Array] | None = None,
+        swept: Collection[str] = (),
+    ) -> None:
         self._model, self.robot = model, robot
         self._data = mujoco.MjData(model.mj)
         self._ids = np.array([body.mj for body in model.bodies])
         self.asked = 0
         """Postures that were looked at."""
+        places = places or {}
+        there = [m for m in model.mechanisms.values() if m.name != robot.name and m.name not in swept]
         problems = [
             Problem("workstation", other.name, "nobody says where it stands", "give its q in the file")
-            for other in model.mechanisms.values()
-            if other.name != robot.name and not other.home_given
+            for other in there
+            if other.name not in places and not other.home_given
         ]
+        areas = tuple(_areas(model, keep_out, robot.name, swept, problems))
         if problems:
             raise InputError(problems)
         for other in model.mechanisms.values():
-            self._data.qpos[other.q_address] = other.coupling @ other.home + other.offset
+            at = places.get(other.name, other.home)
+            self._data.qpos[other.q_address] = other.coupling @ at + other.offset
         reach = np.zeros(model.mj.nv)
         span = np.where(np.isfinite(robot.upper - robot.lower), robot.upper - robot.lower, 0.0)
         reach[robot.v_address] = np.abs(robot.coupling) @ span
         self._mine = tuple(robot.moving)
         self._chains = dict(zip(self._mine, chains_of(model, self._mine, reach), strict=True))
         own = {*robot.bodies, *robot.carried}
-        others = tuple(b.index for b in model.bodies if b.index not in own and b.role in WATCHED)
+        others = tuple(
+            b.index
+            for b in model.bodies
+            if b.index not in own and b.role in WATCHED and b.carrier not in swept
+        )
         self._pairs: list[_Pairs] = []
-        if others and self._mine:
-            self._pairs.append(self._against(others))
+        if (others or areas) and self._mine:
+            self._pairs.append(self._against((*others, *areas)))
         self.left_out: tuple[str, ...] = ()
         """Pairs of the robot's own bodies that touch or overlap at the start and are not watched."""
         self._pairs += self._itself(own, start)
@@ -221,3 +243,18 @@ class Clearance:
     def _deviation(self, a: Iterable[int], b: Iterable[int]) -> float:
         bodies = self._model.bodies
         return sum(max((bodies[i].deviation for i in side), default=0.0) for side in (a, b))
+
+
+def _areas(
+    model: Model, names: Sequence[str], robot: str, swept: Collection[str], problems: list[Problem]
+) -> Iterator[int]:
+    """Indices of areas; those that cannot be kept away from are added to the problems."""
+    known = {b.name: b for b in model.bodies if b.role == "area"}
+    for name in dict.fromkeys(names):
+        if name not in known:
+            raise UnknownName("area", name, known)
+        carrier = known[name].carrier
+        if carrier == robot or carrier in swept:
+            what = f"moves with {carrier}"
+            problems.append(Problem("plan", f"area {name!r}", what, "keep out of areas that stand still"))
+        yield known[name].index

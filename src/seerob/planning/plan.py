@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -12,13 +12,15 @@ from numpy.typing import ArrayLike
 from seerob.errors import InputError, Problem
 from seerob.model import Mechanism, Model
 from seerob.planning.clearance import Clearance
-from seerob.planning.search import search
+from seerob.planning.others import made_for, movers
+from seerob.planning.search import NoPath, search
 from seerob.transforms import Array
 
 LIMIT = 1e-9
 """Beyond a limit by less is rounding [rad or m]."""
 MOST = 20_000
 """Postures tried per way."""
+PERSON = "; where people go is not known"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +42,23 @@ class Plan:
     """Postures whose distances were computed."""
     left_out: tuple[str, ...]
     """Pairs of the robot's own bodies that are not watched."""
+    at: tuple[int, ...] = ()
+    """Rows of ``q`` at which the start and each goal are."""
+    around: tuple[str, ...] = ()
+    """How everybody else was taken, one sentence each."""
+
+    @property
+    def others(self) -> str:
+        """That everything else stands, or that what is said of it follows."""
+        return "; of the others:" if self.around else ", while everything else stands."
 
     def toml(self) -> str:
         """A file of waypoints, for the source ``waypoints``."""
         head = [
             f"# Planned for {self.robot} with seed {self.seed}: straight joint moves between these postures",
-            f"# keep at least {self.margin:g} m from everything, by the twin's shapes, while nothing else",
-            "# moves. A blend would leave the proven way. Preliminary: not executed by any controller.",
+            f"# keep at least {self.margin:g} m from everything, by the twin's shapes{self.others}",
+            *(f"# - {text}" for text in self.around),
+            "# A blend would leave the proven way. Preliminary: not executed by any controller.",
             f"# joints: {', '.join(self.joints)}",
         ]
         rows = [f"[[waypoints]]\nq = [{', '.join(f'{x:.9f}' for x in q)}]" for q in self.q.tolist()]
@@ -62,12 +74,15 @@ def plan(
     margin: float = 0.02,
     seed: int = 1,
     seconds: float = 60.0,
+    keep_out: Sequence[str] = (),
+    places: Mapping[str, Array] | None = None,
+    swept: Collection[str] = (),
     say: Callable[[int], bool] = lambda tried: False,
 ) -> Plan:
     """A path from a start through goals that keeps a margin from everything, proven between postures too.
 
-    Everybody else stands where the workstation file puts them; areas and the motion of sources are not
-    looked at.
+    Everybody else stands where ``places`` or the workstation file puts them, unless an area that they sweep
+    is in their place. Areas are looked at only where ``keep_out`` names them.
 
     Args:
         model: The compiled workstation.
@@ -78,10 +93,13 @@ def plan(
         margin: Least distance from anything, itself included [m].
         seed: Same model, same seed, same path.
         seconds: Longest time per goal [s].
+        keep_out: Areas that are kept away from like everything else.
+        places: Joint positions of others by name [rad or m], (n,) each, instead of those of the file.
+        swept: Others that are looked through, as an area of ``keep_out`` is what they sweep.
         say: Told how many postures were tried; True stops the work.
 
     Raises:
-        UnknownName: No such robot.
+        UnknownName: No such robot or area.
         InputError: No start, a posture of another length, beyond a limit, or nearer than the margin.
         NoPath: None was found; that there is none is not known.
         Stopped: ``say`` said so.
@@ -105,7 +123,7 @@ def plan(
         problems += _wrong(mechanism, name, q)
     if problems:
         raise InputError(problems)
-    clearance = Clearance(model, mechanism, ways[0])
+    clearance = Clearance(model, mechanism, ways[0], keep_out=keep_out, places=places, swept=swept)
     ways = [_first_clear(clearance, q, margin) for q in ways]
     for name, q in zip(names, ways, strict=True):
         what = clearance.fault(q, margin)
@@ -113,9 +131,14 @@ def plan(
             problems.append(Problem("plan", name, what, "choose another posture or a smaller margin"))
     if problems:
         raise InputError(problems)
-    path = [ways[0]]
-    for a, b in pairwise(ways):
-        path += search(clearance, a, b, margin=margin, seed=seed, most=MOST, seconds=seconds, say=say)[1:]
+    path, at = [ways[0]], [0]
+    for (a, b), (first, second) in zip(pairwise(ways), pairwise(names), strict=True):
+        try:
+            path += search(clearance, a, b, margin=margin, seed=seed, most=MOST, seconds=seconds, say=say)[1:]
+        except NoPath as error:
+            remedy = "give a posture in between, more seconds, another seed, or a smaller margin"
+            raise NoPath(f"from {first} to {second}: {error}; {remedy}") from error
+        at.append(len(path) - 1)
     least = min((clearance.least(a, b) for a, b in pairwise(path)), default=np.inf)
     near = [found for q in path if (found := clearance.nearest(q)) is not None]
     return Plan(
@@ -128,7 +151,32 @@ def plan(
         seed=seed,
         asked=clearance.asked,
         left_out=clearance.left_out,
+        at=tuple(at),
+        around=_around(model, robot, keep_out, places or {}, swept),
     )
+
+
+def _around(
+    model: Model, robot: str, keep_out: Sequence[str], places: Mapping[str, Array], swept: Collection[str]
+) -> tuple[str, ...]:
+    moving = movers(model.workstation, robot)
+    said = []
+    for name, other in model.mechanisms.items():
+        if name == robot:
+            continue
+        if name in swept:
+            said.append(f"{name}: all that it sweeps while its source plays is kept away from")
+        elif name in places and name in moving:
+            said.append(f"{name}: stands where its source has it at the instant that was given")
+        elif name in moving:
+            said.append(f"{name}: stands where the file puts it, although a source moves it")
+        else:
+            said.append(f"{name}: stands where the file puts it" + PERSON * (other.role == "human"))
+    said += [f"area {name}: kept away from" for name in keep_out if name not in made_for(swept)]
+    looked_through = [a.name for a in model.workstation.areas if a.name not in keep_out]
+    if looked_through:
+        said.append(f"areas that are looked through: {', '.join(looked_through)}")
+    return tuple(said)
 
 
 def _first_clear(clearance: Clearance, ways: Array, margin: float) -> Array:

@@ -1,26 +1,29 @@
-"""RRT-Connect ([Kuffner2000]_) between two postures, and short cuts; the same seed gives the same path.
+"""A path between two postures by OMPL ([Sucan2012]_), every straight way of which is proven to be clear.
 
-Written here because OMPL's generator of random numbers can be seeded once in a process only: the second
-plan of a session would not be the one that another session finds. Tests compare with OMPL.
+RRT-Connect ([Kuffner2000]_) finds it, partial short cuts make it shorter. OMPL asks `Clearance` about whole
+ways, not about samples of them. Its generator of random numbers is one for the whole process: it is seeded
+anew for every search, so that the same seed gives the same path whatever was searched before.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from itertools import pairwise
+from threading import Lock
+from typing import Any
 
 import numpy as np
 
-from seerob.errors import SeerobError
+from seerob.errors import InputError, SeerobError
 from seerob.planning.clearance import Clearance
 from seerob.transforms import Array
 
 STRIDE = 0.6
 """Largest step of a tree in joint space [rad or m]."""
-SHORT_CUTS = 60
-STILL = 15
-"""Short cuts in a row that do not help, after which it is enough."""
+
+_ONE_AT_A_TIME = Lock()
 
 
 class NoPath(SeerobError):
@@ -29,28 +32,6 @@ class NoPath(SeerobError):
 
 class Stopped(SeerobError):
     """It was asked to stop."""
-
-
-class _Tree:
-    def __init__(self, root: Array) -> None:
-        self.q = root[None].copy()
-        self.parent = [-1]
-
-    def nearest(self, q: Array) -> int:
-        return int(np.argmin(((self.q - q) ** 2).sum(axis=1)))
-
-    def add(self, q: Array, parent: int) -> int:
-        self.q = np.vstack([self.q, q])
-        self.parent.append(parent)
-        return len(self.parent) - 1
-
-    def way(self, k: int) -> list[Array]:
-        """From the root to a node."""
-        found = []
-        while k >= 0:
-            found.append(self.q[k])
-            k = self.parent[k]
-        return found[::-1]
 
 
 def search(
@@ -77,88 +58,130 @@ def search(
         say: Told how many were tried; True stops the work.
 
     Raises:
+        InputError: OMPL is not installed.
         NoPath: None was found within ``most`` or ``seconds``.
         Stopped: ``say`` said so.
     """
+    base, geometric, util = _ompl()
     if clearance.clear(start, goal, margin):
         return [start, goal]
-    random = np.random.default_rng(seed)
-    low, high = _bounds(clearance, start, goal)
-    trees = _Tree(start), _Tree(goal)
-    end = time.monotonic() + seconds
-    for tried in range(most):
-        if say(tried):
-            raise Stopped(f"stopped after {tried} postures")
-        if time.monotonic() > end:
-            raise NoPath(
-                f"no path was found in {seconds:g} s ({tried} tried); that there is none is not known"
-            )
-        growing, other = trees[tried % 2], trees[1 - tried % 2]
-        wanted = random.uniform(low, high)
-        node = _grow(clearance, growing, wanted, margin)
-        if node is None:
-            continue
-        reached = _connect(clearance, other, growing.q[node], margin)
-        if reached is not None:
-            there, back = growing.way(node), other.way(reached)
-            way = there + back[-2::-1] if tried % 2 == 0 else back + there[-2::-1]
-            return _shortened(clearance, way, margin, random, end, say)
-    raise NoPath(f"no path was found with {most} postures tried; that there is none is not known")
+    patience = _Patience(most, seconds, say)
+    with _ONE_AT_A_TIME, _quiet(util):
+        util.RNG.setSeed(seed % (2**32 - 1) + 1)
+        space = _space(base, clearance, start, goal)
+        setup = geometric.SimpleSetup(space)
+        information = setup.getSpaceInformation()
+        setup.setStateValidityChecker(lambda state: not clearance.fault(_posture(state, len(start)), margin))
+        information.setMotionValidator(_validator(base, information, clearance, margin, patience))
+        setup.setStartAndGoalStates(_state(space, start), _state(space, goal))
+        planner = geometric.RRTConnect(information)
+        planner.setRange(STRIDE)
+        setup.setPlanner(planner)
+        setup.solve(base.PlannerTerminationCondition(patience))
+        if not setup.haveExactSolutionPath():
+            raise patience.end()
+        path = setup.getSolutionPath()
+        found = [_posture(state, len(start)) for state in path.getStates()]
+        if not patience.over():
+            simplifier = geometric.PathSimplifier(information)
+            simplifier.ropeShortcutPath(path)
+            simplifier.partialShortcutPath(path, 60, 30)
+            simplifier.reduceVertices(path)
+            shorter = [_posture(state, len(start)) for state in path.getStates()]
+            found = _plain(clearance, shorter, margin)
+    if patience.stopped:
+        raise patience.end()
+    if not all(clearance.clear(a, b, margin) for a, b in pairwise(found)):
+        raise NoPath("the path that was found could not be proven")
+    return found
 
 
-def _bounds(clearance: Clearance, start: Array, goal: Array) -> tuple[Array, Array]:
+class _Patience:
+    """Tells OMPL when to give up, and then why."""
+
+    def __init__(self, most: int, seconds: float, say: Callable[[int], bool]) -> None:
+        self._most, self._seconds, self._say = most, seconds, say
+        self._until = time.monotonic() + seconds
+        self._tried = 0
+        self._stopped = False
+
+    def __call__(self) -> bool:
+        self._tried += 1
+        return self.over() or self._tried > self._most
+
+    def over(self) -> bool:
+        """Whether there is no more time, or nobody wants to wait."""
+        self._stopped = self._stopped or self._say(self._tried)
+        return self._stopped or time.monotonic() > self._until
+
+    @property
+    def stopped(self) -> bool:
+        """Whether nobody wants to wait."""
+        return self._stopped
+
+    def end(self) -> SeerobError:
+        if self._stopped:
+            return Stopped(f"stopped after {self._tried} postures")
+        spent = f"in {self._seconds:g} s ({self._tried} postures tried)"
+        if self._tried > self._most:
+            spent = f"with {self._most} postures tried"
+        return NoPath(f"no path was found {spent}; that there is none is not known")
+
+
+def _ompl() -> tuple[Any, Any, Any]:
+    try:
+        from ompl import base, geometric, util
+    except ImportError as error:
+        remedy = 'pip install "seerob[plan]" (it exists for Linux and macOS)'
+        raise InputError.at("plan", "", f"the package ompl cannot be imported ({error})", remedy) from error
+    return base, geometric, util
+
+
+@contextmanager
+def _quiet(util: Any) -> Iterator[None]:
+    """Without what OMPL writes to the terminal: that it is seeded anew, too."""
+    before = util.getLogLevel()
+    util.setLogLevel(util.LOG_NONE)
+    try:
+        yield
+    finally:
+        util.setLogLevel(before)
+
+
+def _space(base: Any, clearance: Clearance, start: Array, goal: Array) -> Any:
     """Where postures are tried: within the limits, and where there are none half a turn around both ends."""
     robot = clearance.robot
-    low, high = np.minimum(start, goal) - np.pi, np.maximum(start, goal) + np.pi
-    return np.maximum(robot.lower, low), np.minimum(robot.upper, high)
+    least, most = np.minimum(start, goal), np.maximum(start, goal)
+    low = np.minimum(np.maximum(robot.lower, least - np.pi), least)
+    high = np.maximum(np.minimum(robot.upper, most + np.pi), most)
+    space, bounds = base.RealVectorStateSpace(len(start)), base.RealVectorBounds(len(start))
+    for i, (a, b) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
+        bounds.setLow(i, a)
+        bounds.setHigh(i, b)
+    space.setBounds(bounds)
+    return space
 
 
-def _grow(clearance: Clearance, tree: _Tree, towards: Array, margin: float) -> int | None:
-    k = tree.nearest(towards)
-    step = towards - tree.q[k]
-    length = float(np.linalg.norm(step))
-    new = tree.q[k] + step * min(1.0, STRIDE / max(length, 1e-12))
-    return tree.add(new, k) if clearance.clear(tree.q[k], new, margin) else None
+def _validator(base: Any, information: Any, clearance: Clearance, margin: float, patience: _Patience) -> Any:
+    n = len(clearance.robot.joints)
+
+    class Proven(base.MotionValidator):  # type: ignore[misc]
+        def checkMotion(self, a: Any, b: Any) -> bool:
+            # OMPL asks whether to end between its steps only, each of which may be long.
+            return not patience.over() and clearance.clear(_posture(a, n), _posture(b, n), margin)
+
+    return Proven(information)
 
 
-def _connect(clearance: Clearance, tree: _Tree, goal: Array, margin: float) -> int | None:
-    while True:
-        node = _grow(clearance, tree, goal, margin)
-        if node is None:
-            return None
-        if np.abs(tree.q[node] - goal).max() < 1e-12:
-            return node
-        if tree.nearest(goal) != node:
-            return None
+def _posture(state: Any, n: int) -> Array:
+    return np.array([state[i] for i in range(n)])
 
 
-def _shortened(
-    clearance: Clearance,
-    way: list[Array],
-    margin: float,
-    random: np.random.Generator,
-    end: float,
-    say: Callable[[int], bool],
-) -> list[Array]:
-    useless = 0
-    for _ in range(SHORT_CUTS):
-        if len(way) < 3 or useless > STILL or time.monotonic() > end or say(-1):
-            break
-        places = np.sort(random.uniform(0, len(way) - 1, 2))
-        i, j = int(places[0]), int(places[1])
-        if i == j:
-            useless += 1
-            continue
-        a = way[i] + (places[0] - i) * (way[i + 1] - way[i])
-        b = way[j] + (places[1] - j) * (way[min(j + 1, len(way) - 1)] - way[j])
-        before = [a, *way[i + 1 : j + 1], b]
-        shorter = float(np.linalg.norm(b - a)) < _length(before) - 1e-6
-        if shorter and clearance.clear(a, b, margin):
-            way = [*way[: i + 1], a, b, *way[j + 1 :]]
-            useless = 0
-        else:
-            useless += 1
-    return _plain(clearance, way, margin)
+def _state(space: Any, q: Array) -> Any:
+    state = space.allocState()
+    for i, value in enumerate(q.tolist()):
+        state[i] = value
+    return state
 
 
 def _plain(clearance: Clearance, way: list[Array], margin: float) -> list[Array]:
@@ -171,7 +194,3 @@ def _plain(clearance: Clearance, way: list[Array], margin: float) -> list[Array]
         else:
             k += 1
     return way
-
-
-def _length(way: list[Array]) -> float:
-    return float(sum(np.linalg.norm(b - a) for a, b in pairwise(way)))

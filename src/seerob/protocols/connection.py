@@ -5,14 +5,23 @@ from __future__ import annotations
 import asyncio
 import socket
 import time
+from collections import deque
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 
 from seerob.protocols.reception import Received, Reception
 
+CHUNK = 1 << 16
+"""Read at once [byte]."""
+MOST = 1 << 20
+"""Bytes that wait for whoever reads; after that the other end waits."""
+
 
 class Connection:
     """One that is made.
+
+    It is read as soon as something comes, in one system call: after each a thread has to wait for the
+    interpreter's lock anew, which another one holds that computes.
 
     Args:
         link: The connected socket, which does not block.
@@ -21,6 +30,14 @@ class Connection:
     def __init__(self, link: socket.socket) -> None:
         self._link, self._reception = link, Reception(link)
         self._loop = asyncio.get_running_loop()
+        self._waiting: deque[Received] = deque()
+        self._bytes = 0
+        self._arrived = asyncio.Event()
+        self._error: OSError | None = None
+        self._ended = self._listens = False
+        self._tells = True
+        """Whether the loop says when there is something to read; that of Windows does not."""
+        self._listen()
 
     async def write(self, data: bytes) -> None:
         """Send.
@@ -30,50 +47,78 @@ class Connection:
         """
         await self._loop.sock_sendall(self._link, data)
 
-    async def read(self, size: int, patience: float) -> Received:
+    async def read(self, patience: float) -> Received:
         """What has come; no bytes when the other end has closed.
 
         Args:
-            size: Most bytes at once.
             patience: Longest pause [s].
 
         Raises:
             TimeoutError: Nothing for so long.
             OSError: The other end is gone.
         """
+        if not self._waiting and not self._ended:
+            self._arrived.clear()
+            try:
+                async with asyncio.timeout(patience):
+                    await self._more()
+            except TimeoutError as error:
+                # On a busy machine this thread may have slept, with data waiting: look again.
+                self._read()
+                if not self._waiting and self._error is None:
+                    raise TimeoutError(f"connected, but silent for {patience:g} s") from error
+        if self._waiting:
+            received = self._waiting.popleft()
+            self._bytes -= len(received.data)
+            self._listen()
+            return received
+        if self._error is not None:
+            raise self._error
+        return Received(time.monotonic(), b"", None)
+
+    def close(self) -> None:
+        """Read no more; the socket stays."""
+        self._ended = True
+        self._deafen()
+
+    async def _more(self) -> None:
+        if self._tells:
+            if self._error is None:
+                await self._arrived.wait()
+            return
+        data = await self._loop.sock_recv(self._link, CHUNK)
+        self._take(Received(time.monotonic(), data, None))
+
+    def _take(self, received: Received) -> None:
+        self._waiting.append(received)
+        self._bytes += len(received.data)
+        self._ended = self._ended or not received.data
+        self._arrived.set()
+
+    def _read(self) -> None:
         try:
-            return self._reception.read(size)
+            self._take(self._reception.read(CHUNK))
         except BlockingIOError:
-            pass
-        try:
-            async with asyncio.timeout(patience):
-                data = await self._readable(size)
-        except TimeoutError:
-            data = None  # on a busy machine this thread may have slept, with data waiting: look again
-        if data is not None:
-            return Received(time.monotonic(), data, None)
-        try:
-            return self._reception.read(size)
-        except BlockingIOError as error:
-            raise TimeoutError(f"connected, but silent for {patience:g} s") from error
+            return
+        except OSError as error:
+            self._error = error
+            self._arrived.set()
+        if self._ended or self._error is not None or self._bytes > MOST:
+            self._deafen()
 
-    async def _readable(self, size: int) -> bytes | None:
-        """Wait until something can be read; what was, with a loop that does not say when."""
-        readable: asyncio.Future[None] = self._loop.create_future()
-        try:
-            self._loop.add_reader(self._link, _resolve, readable)
-        except NotImplementedError:  # a loop of Windows
-            return await self._loop.sock_recv(self._link, size)
-        try:
-            await readable
-        finally:
+    def _listen(self) -> None:
+        if self._tells and not (self._listens or self._ended or self._error or self._bytes > MOST):
+            try:
+                self._loop.add_reader(self._link, self._read)
+            except NotImplementedError:
+                self._tells = False
+            else:
+                self._listens = True
+
+    def _deafen(self) -> None:
+        if self._listens:
             self._loop.remove_reader(self._link)
-        return None
-
-
-def _resolve(readable: asyncio.Future[None]) -> None:
-    if not readable.done():
-        readable.set_result(None)
+            self._listens = False
 
 
 @asynccontextmanager
@@ -91,9 +136,11 @@ async def connected(host: str, port: int, patience: float) -> AsyncGenerator[Con
     """
     async with asyncio.timeout(patience):
         link = await _link(host, port)
+    connection = Connection(link)
     try:
-        yield Connection(link)
+        yield connection
     finally:
+        connection.close()
         link.close()
 
 

@@ -44,6 +44,7 @@ class Datagrams(asyncio.DatagramProtocol):
 
     def __init__(self, sender: str | None, answer: Answer | None) -> None:
         self._sender, self._answer = sender, answer
+        self._loop = asyncio.get_running_loop()
         self._waiting: deque[Datagram] = deque(maxlen=WAITING)
         self._arrived = asyncio.Event()
         self._error: OSError | None = None
@@ -59,7 +60,7 @@ class Datagrams(asyncio.DatagramProtocol):
 
     def attach(self, link: socket.socket) -> Callable[[], None]:
         """Call back for a loop that says when the socket can be read."""
-        reception = Reception(link)
+        reception, loop = Reception(link), self._loop
         self.port = link.getsockname()[1]
 
         def send(data: bytes, to: Any) -> None:
@@ -67,13 +68,15 @@ class Datagrams(asyncio.DatagramProtocol):
             with contextlib.suppress(OSError):
                 link.sendto(data, to)
 
-        def read() -> None:
-            for _ in range(AT_ONCE):
-                try:
-                    arrived, data, sender = reception.read(LARGEST)
-                except OSError:  # all was read, or an answer was refused
-                    return
-                self._take(arrived, data, sender)
+        def read(left: int = AT_ONCE) -> None:
+            try:
+                arrived, data, sender = reception.read(LARGEST)
+            except OSError:  # all was read, or an answer was refused
+                return
+            self._take(arrived, data, sender)
+            if left > 1:
+                # Whoever waits for it has it first: each look at the socket lets other threads go ahead.
+                loop.call_soon(read, left - 1)
 
         self._send = send
         return read
@@ -86,11 +89,15 @@ class Datagrams(asyncio.DatagramProtocol):
         if self._sender is not None and sender[0] != self._sender:
             self.strangers += 1
             return
-        if self._answer is not None and (reply := self._answer(data)) is not None:
-            self._send(reply, sender)
         self.dropped += len(self._waiting) == WAITING
         self._waiting.append(Datagram(arrived, data))
         self._arrived.set()
+        if self._answer is not None:
+            self._loop.call_soon(self._reply, data, sender)
+
+    def _reply(self, data: bytes, sender: Any) -> None:
+        if self._answer is not None and (reply := self._answer(data)) is not None:
+            self._send(reply, sender)
 
     def send(self, data: bytes, to: tuple[str, int]) -> None:
         """Send a datagram from this port."""

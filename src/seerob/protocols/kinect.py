@@ -116,6 +116,8 @@ class LiveObject(FrameObject, kw_only=True):
     """``kinect/1``."""
 
 
+VAST = 1e100
+"""As far as infinity, and still a number [m]."""
 VERSION = "kinect/1"
 
 
@@ -218,6 +220,8 @@ def camera_body(body_id: int, positions: Array, wxyz: Array | None, levels: Arra
     """
     # A tracker that knows nothing of a joint leaves zeros: the camera itself.
     unknown = (positions == 0).all(axis=1)
+    # Infinity stays far when it is turned, and does not become a joint that is not seen.
+    positions = np.clip(positions, -VAST, VAST)
     return Body(
         id=body_id,
         positions=np.where(unknown[:, None], np.nan, positions @ BODY_FROM_OPTICAL.T),

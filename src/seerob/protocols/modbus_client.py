@@ -1,4 +1,4 @@
-"""A Modbus TCP client that only reads: a connection, and answers to blocks of registers."""
+"""A Modbus TCP client: a connection, answers to blocks of registers, and the coils of triggers."""
 
 from __future__ import annotations
 
@@ -76,6 +76,23 @@ class Device:
         if len(found) < block.count:
             raise ProtocolError(f"{len(found)} values where {block.count} were asked for")
         return found
+
+    async def write_coil(self, at: int, value: bool) -> None:
+        """Write one coil (function 5).
+
+        Raises:
+            Refused: The device does not let it be written.
+            TimeoutError: No answer in time.
+        """
+        from pymodbus.exceptions import ModbusException
+
+        try:
+            answer = await self._client.write_coil(at, value, device_id=self._number)
+        except ModbusException as error:
+            raise TimeoutError(f"no answer in {PATIENCE:g} s") from error
+        if answer.isError():
+            code = int(getattr(answer, "exception_code", 0))
+            raise Refused(EXCEPTIONS.get(code, f"exception {code}"))
 
     async def read(self, wanted: dict[str, Place]) -> dict[str, int | float | bool | Refused]:
         """Values by name; where the device refuses one, why.

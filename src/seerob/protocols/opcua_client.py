@@ -33,8 +33,12 @@ PATIENCE = 2.0
 SESSION = 60_000
 """Time-out of a session [ms]: some servers lose shorter ones in storms."""
 BEAT = 0.5
-"""The connection is looked at so often [s]."""
+"""A server of which nothing was heard is asked so often whether it is there [s]."""
 SILENT = ("asyncua", "asyncua.client.ua_client", "asyncua.common.subscription")
+
+
+STATE = 2259
+"""Number of Server_ServerStatus_State, which every server has (OPC 10000-6, NodeIds)."""
 
 
 class Security(StrEnum):
@@ -232,12 +236,44 @@ async def stated_unit(node: Node) -> str:
     return unit(getattr(found, "UnitId", 0) or 0)
 
 
+async def said_unit(node: Node) -> str:
+    """The same, but in the server's own words where the dictionary has no spelling for it."""
+    from asyncua.ua.uaerrors import UaError
+
+    try:
+        found = await (await node.get_child("0:EngineeringUnits")).read_value()
+    except (UaError, ValueError):
+        return ""
+    number = getattr(found, "UnitId", 0) or 0
+    shown = getattr(getattr(found, "DisplayName", None), "Text", None)
+    return unit(number) or str(shown or "")[:40] or (f"number {number}" if number else "")
+
+
+async def write_bool(node: Node, value: bool) -> None:
+    """Write a bool to a node that is one.
+
+    Raises:
+        ProtocolError: It is no bool, or the server refuses.
+    """
+    from asyncua import ua
+    from asyncua.ua.uaerrors import UaError
+
+    try:
+        kind = await node.read_data_type_as_variant_type()
+        if kind is not ua.VariantType.Boolean:
+            raise ProtocolError(f"a {kind.name}: only a Boolean is written")
+        # Without stamps: many controllers refuse a writing that brings its own.
+        await node.write_value(ua.DataValue(ua.Variant(value, ua.VariantType.Boolean)))
+    except UaError as error:
+        raise ProtocolError(f"the server refuses: {_text(error)}") from error
+
+
 class Changes:
     """Changes of nodes as they come: of each node only the newest waits."""
 
     def __init__(self) -> None:
         self._waiting: dict[str, Said] = {}
-        self._names: dict[Any, str] = {}
+        self._names: dict[Any, list[str]] = {}
         self._arrived = asyncio.Event()
         self.revised: float | None = None
         """Publishing interval that the server grants [s]."""
@@ -250,40 +286,58 @@ class Changes:
         """
         from asyncua.ua.uaerrors import UaError
 
-        self._names = {node.nodeid: name for name, node in nodes.items()}
+        self._names = {}
+        for name, node in nodes.items():
+            self._names.setdefault(node.nodeid, []).append(name)
         subscription = await client.create_subscription(1e3 * interval, self)
         self.revised = 1e-3 * float(subscription.parameters.RequestedPublishingInterval)
-        refused = {}
+        refused: dict[str, str] = {}
         sampling: Any = 1e3 * interval
-        for name, node in nodes.items():
+        for names in self._names.values():
+            node = nodes[names[0]]
             try:
                 await subscription.subscribe_data_change(node, queuesize=1, sampling_interval=sampling)
             except UaError as error:
-                refused[name] = _text(error)
+                refused |= dict.fromkeys(names, _text(error))
         return refused
 
     def datachange_notification(self, node: Node, value: Any, data: Any) -> None:
         """Called by asyncua, in the loop."""
-        name = self._names.get(node.nodeid)
-        if name is not None:
+        for name in self._names.get(node.nodeid, ()):
             self._waiting[name] = said(data.monitored_item.Value)
             self._arrived.set()
 
-    async def heard(self, client: Client) -> AsyncGenerator[dict[str, Said], None]:
-        """What has changed, as long as there is a connection; nothing, now and then, while nothing does.
+    async def heard(self, client: Client, pulse: float = BEAT) -> AsyncGenerator[dict[str, Said], None]:
+        """What has changed; nothing, when nothing does and the server has just shown that it is there.
+
+        Args:
+            client: Connected.
+            pulse: After so long without a change the server is asked whether it is there [s].
 
         Raises:
-            OSError: The connection is gone.
+            OSError: The connection is gone, or the server does not answer.
         """
         while True:
             changed, self._waiting = self._waiting, {}
             self._arrived.clear()
             yield changed
             try:
-                async with asyncio.timeout(BEAT):
+                async with asyncio.timeout(pulse):
                     await self._arrived.wait()
             except TimeoutError:
-                await client.check_connection()
+                await self._answered(client, pulse)
+
+    async def _answered(self, client: Client, within: float) -> None:
+        """Ask until there is an answer in time: a late one says nothing of now."""
+        from asyncua import ua
+
+        state = client.get_node(ua.NodeId(ua.Int32(STATE)))
+        while not self._waiting:
+            await client.check_connection()
+            asked = time.monotonic()
+            await state.read_value()
+            if time.monotonic() - asked <= within:
+                return
 
 
 def said(value: Any) -> Said:

@@ -11,8 +11,9 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from seerob.protocols import ProtocolError
+from seerob.protocols import ProtocolError, opcua_units
 from seerob.protocols.opcua_client import stated_unit
+from seerob.variables.units import unit
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client
@@ -122,9 +123,22 @@ async def _load(node: Node | None, own: int) -> dict[str, float]:
         found["mass"] = value
     center = await _child(node, own, "CenterOfMass")
     point = getattr(None if center is None else await _value(center), "CartesianCoordinates", None)
-    if point is not None:
-        found |= {axis: float(getattr(point, axis.upper())) for axis in ("x", "y", "z")}
+    known = None if point is None or center is None else await _length_unit(center)
+    if known is not None:
+        found |= {axis: known * float(getattr(point, axis.upper())) for axis in ("x", "y", "z")}
     return found
+
+
+async def _length_unit(frame: Node) -> float | None:
+    """What a length of a frame is in metres; None where the server does not say it: it is never guessed."""
+    for owner in (await _child(frame, 0, "CartesianCoordinates"), frame):
+        said = None if owner is None else await _child(owner, 0, "LengthUnit")
+        stated = (
+            None if said is None else unit(opcua_units.unit(getattr(await _value(said), "UnitId", 0) or 0))
+        )
+        if stated is not None and stated.si == "m":
+            return stated.factor
+    return None
 
 
 async def _safety(system: Node, own: int, di: int) -> dict[str, Node]:

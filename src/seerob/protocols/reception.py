@@ -41,6 +41,7 @@ class Reception:
 
     def __init__(self, link: socket.socket) -> None:
         self._link = link
+        self._stream = link.type == socket.SOCK_STREAM
         self._empty = time.monotonic()
         """Nothing that is read from now on arrived before this [s]."""
         if _NANOSECONDS is not None:
@@ -67,7 +68,10 @@ class Reception:
             self._empty = before
             raise
         now = time.monotonic()
-        return Received(instant(stamp(said), now=now, wall=time.time_ns(), empty=self._empty), data, sender)
+        arrived = instant(stamp(said), now=now, wall=time.time_ns(), empty=self._empty)
+        if self._stream and len(data) < size:
+            self._empty = before  # nothing of it was left
+        return Received(arrived, data, sender)
 
 
 def stamp(said: Iterable[tuple[int, int, bytes]]) -> int | None:

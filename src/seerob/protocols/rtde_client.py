@@ -35,7 +35,6 @@ ANSWER_WITHIN = 2.0
 """Of each request [s]."""
 SILENCE = 1.0
 """Longest pause in the data before the connection is taken for dead [s]."""
-CHUNK = 1 << 16
 TALK = 64
 """Packages that may come before an answer: text messages, data of another recipe."""
 
@@ -120,7 +119,7 @@ class _Stream:
 
     async def read(self, patience: float) -> bool:
         """Wait for more; False when the other end has closed."""
-        self.arrived, data, _ = await self.connection.read(CHUNK, patience)
+        self.arrived, data, _ = await self.connection.read(patience)
         self._waiting += self._splitter.feed(data)
         return bool(data)
 

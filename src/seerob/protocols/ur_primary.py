@@ -116,7 +116,7 @@ async def read_kinematics(host: str, port: int, patience: float) -> Kinematics:
     try:
         async with asyncio.timeout(patience), connected(host, port, patience) as connection:
             while heard < ENOUGH:
-                data = (await connection.read(LARGEST, patience)).data
+                data = (await connection.read(patience)).data
                 if not data:
                     raise ProtocolError("closed the connection before it said its kinematics")
                 waiting, heard, done = waiting + data, heard + len(data), 0

@@ -5,13 +5,17 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import deque
-from collections.abc import AsyncGenerator, Sequence
+from collections.abc import AsyncGenerator, Mapping, Sequence
 from contextlib import asynccontextmanager
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
 
 from seerob.protocols import ProtocolError
 
 if TYPE_CHECKING:
+    from ssl import SSLContext
+
     from websockets.asyncio.client import ClientConnection
 
 CONNECT_WITHIN = 2.0
@@ -104,13 +108,52 @@ async def linked(
         TimeoutError: It does not answer.
         ProtocolError: No such server is there.
     """
+    shown = f"[{host}]" if ":" in host else host
+    url = f"ws{'s' if tls else ''}://{shown}:{port}/"
+    async with linked_to(url, largest=largest, what=what, protocols=protocols) as link:
+        yield link
+
+
+@asynccontextmanager
+async def linked_to(
+    url: str,
+    *,
+    largest: int,
+    what: str,
+    protocols: Sequence[str] = (),
+    headers: Mapping[str, str] = MappingProxyType({}),
+    tls: SSLContext | None = None,
+) -> AsyncGenerator[Link, None]:
+    """Connect to a URL; redirections are not followed.
+
+    Args:
+        url: ``ws://…`` or ``wss://…``.
+        largest: Message that is read [byte].
+        what: The server, for messages.
+        protocols: Subprotocols that are spoken.
+        headers: Of the request, beside its own.
+        tls: Which certificates are trusted, with ``wss``; those of the system when not given.
+
+    Raises:
+        OSError: There is no connection.
+        TimeoutError: It does not answer.
+        ProtocolError: No such server is there.
+    """
     from websockets.asyncio.client import connect
     from websockets.exceptions import InvalidHandshake, InvalidURI
     from websockets.typing import Subprotocol
 
-    shown = f"[{host}]" if ":" in host else host
-    opening = connect(
-        f"ws{'s' if tls else ''}://{shown}:{port}/",
+    class Straight(connect):
+        """Goes nowhere else: what is sent along may be a secret."""
+
+        def process_redirect(self, exc: Exception) -> Exception | str:
+            return exc
+
+    at = urlsplit(url).netloc
+    own: dict[str, Any] = {} if tls is None else {"ssl": tls}
+    opening = Straight(
+        url,
+        additional_headers=dict(headers),
         max_size=largest,
         open_timeout=CONNECT_WITHIN,
         close_timeout=0.2,
@@ -119,14 +162,15 @@ async def linked(
         compression=None,
         proxy=None,
         subprotocols=[Subprotocol(name) for name in protocols] or None,
+        **own,
     )
     try:
         socket = await opening
     except (InvalidHandshake, InvalidURI) as error:
-        raise ProtocolError(f"no {what} answers at {host}:{port}: {error}") from error
+        raise ProtocolError(f"no {what} answers at {at}: {error}") from error
     async with socket:
         if protocols and socket.subprotocol is None:
-            raise ProtocolError(f"{host}:{port} speaks none of {', '.join(protocols)}")
+            raise ProtocolError(f"{at} speaks none of {', '.join(protocols)}")
         link = Link(socket)
         try:
             yield link

@@ -14,7 +14,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from msgspec import Meta
 
-from seerob import provenance
+from seerob import figures, provenance
 from seerob.criterion import Criterion, Evaluate, judge
 from seerob.errors import InputError, Undecided, UnknownName
 from seerob.kernels.floor import bodies_to_border
@@ -110,10 +110,11 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
             verdict = judge(value - deviation, S, at_most=False)
             if verdict is not judge(value, S, at_most=False):
                 verdict = Verdict.UNDECIDED
+            shown = figures.against(value, S, self.unit, at_most=False)
             line = Segment(
                 start=tuple(ends[0].tolist()),
                 end=tuple(ends[1].tolist()),
-                label=f"{value:.2f} m, S {S:.2f} m",
+                label=f"{shown.value} m, S {shown.limit} m",
                 verdict=verdict,
             )
             return Result(

@@ -8,13 +8,14 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from msgspec import Meta
 
-from seerob import provenance
+from seerob import figures, provenance
 from seerob.answers import Answers
 from seerob.contact.impact_mass import simplified_mass
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
 from seerob.kernels.axes import mobility, principal_axes, reciprocals
 from seerob.model import Mechanism, Model
 from seerob.mounting.mass_tolerances import MassTolerances, Matrices
+from seerob.moving_base import velocity_of
 from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Ellipsoid, Result, Verdict
 from seerob.state import State
@@ -42,10 +43,8 @@ def inverse_effective_mass(J_v: Array, M: Array) -> Array:
         Symmetric matrix, shape (..., 3, 3) [1/kg]; singular where the point cannot be pushed.
     """
     J_v, M = np.asarray(J_v, float), np.asarray(M, float)
-    batch, (rows, n) = (), J_v.shape[-2:]
-    if J_v.ndim > 2 or M.ndim > 2:
-        batch = np.broadcast_shapes(J_v.shape[:-2], M.shape[:-2])
-    if batch:
+    rows, n = J_v.shape[-2:]
+    if batch := np.broadcast_shapes(J_v.shape[:-2], M.shape[:-2]):
         J_v, M = np.broadcast_to(J_v, (*batch, rows, n)), np.broadcast_to(M, (*batch, n, n))
     points, masses = np.array(J_v).reshape(-1, rows, n), np.array(M).reshape(-1, n, n)
     found = np.empty((len(points), rows, rows))
@@ -105,6 +104,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         """See `Criterion.bind`."""
         frame = model.frame(self.at)
         robot = model.carrier(frame)
+        robot.require_masses(self.name)
         offset = np.array(self.offset)
         gap = None if self.toward is None else model.gap(robot.moving, model.select(self.toward))
         tolerances = MassTolerances(model, robot)
@@ -120,7 +120,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                 return line / length, ""
             if self.along == "worst":
                 return axes[:, -1], ""
-            v = J_v @ state.qd(robot)
+            v = velocity_of(state, frame, robot, offset)[:3]
             speed = math.sqrt(float(v @ v))
             return (v / speed, "") if speed > STANDSTILL else (None, "stands still: no direction of motion")
 
@@ -154,7 +154,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                     Arrow(
                         origin=tuple(center.tolist()),
                         vector=tuple((length * u).tolist()),
-                        label=f"{mass:.1f} kg",
+                        label=figures.told(mass, self.limit, self.unit, at_most=True),
                         verdict=verdict,
                     ),
                 )
@@ -200,10 +200,10 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         return Result(name="M/2 + m_L", value=mass, unit="kg", interval=interval)
 
     def batch(self, model: Model) -> EvaluateMany | None:
-        """See `Criterion.batch`; where no mass has a tolerance."""
+        """See `Criterion.batch`; where no mass has a tolerance and nothing else moves it."""
         frame, offset = model.frame(self.at), np.array(self.offset)
         robot = model.carrier(frame)
-        if len(MassTolerances(model, robot)):
+        if len(MassTolerances(model, robot)) or not robot.alone:
             return None
         gap = None if self.toward is None else model.gap(robot.moving, model.select(self.toward))
 

@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from msgspec import Meta
 
-from seerob import joint_torques, provenance
+from seerob import figures, joint_torques, provenance
 from seerob.answers import Answers
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge
 from seerob.errors import InputError, Undecided
@@ -69,6 +69,8 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
         """See `Criterion.bind`."""
         frame = model.frame(self.at)
         robot = model.carrier(frame)
+        if self.load != "none":
+            robot.require_masses(self.name)
         offset = np.array(self.offset)
         lower, upper, unknown = self._torques(model, robot)
 
@@ -171,9 +173,9 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             )
         if self.limit is not None:
             radius = min(DRAWN * self.limit, LARGEST_DRAWN)
-            markers.append(Sphere(center=center, radius=radius, label=f"{self.limit:g} N"))
+            markers.append(Sphere(center=center, radius=radius, label=f"limit {self.limit:g} N"))
         length = LARGEST_DRAWN if value is None else min(DRAWN * value, LARGEST_DRAWN)
-        label = "unbounded" if value is None else f"{value:.0f} N"
+        label = "unbounded" if value is None else figures.told(value, self.limit, self.unit, at_most=True)
         arrow = tuple((length * direction).tolist())
         markers.append(Arrow(origin=center, vector=arrow, label=label, verdict=verdict))
         return tuple(markers)

@@ -7,11 +7,13 @@ from typing import Annotated, ClassVar
 import numpy as np
 from msgspec import Meta
 
-from seerob import provenance
+from seerob import figures, provenance
 from seerob.answers import Answers
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
+from seerob.errors import Undecided
 from seerob.model import Model
 from seerob.mounting.mass_tolerances import MassTolerances
+from seerob.moving_base import energy_of
 from seerob.snapshot import Basis, Result, Sphere, Verdict
 from seerob.state import State
 from seerob.states import States
@@ -51,12 +53,21 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         robot = model.robot(self.robot)
+        robot.require_masses(self.name)
         masses = MassTolerances(model, robot)
 
         def evaluate(state: State) -> Result:
             qd = state.qd(robot)
-            energy = float(kinetic_energy(state.mass_matrix(robot), qd))
+            energy = (
+                float(kinetic_energy(state.mass_matrix(robot), qd))
+                if robot.alone
+                else energy_of(state, robot)
+            )
             verdict, interval, reason = judge(energy, self.limit), None, ""
+            if len(masses) and not robot.alone:
+                raise Undecided(
+                    f"{robot.name}: mass_tolerance is not followed on what moves it: leave it out here"
+                )
             if len(masses):
                 matrices = masses.matrices(state)
                 ends = spread(lambda shifts: kinetic_energy(matrices.at(shifts), qd), len(masses))
@@ -67,7 +78,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
             sphere = Sphere(
                 center=tuple(position.tolist()),
                 radius=DRAWN * max(energy, 0.0) ** (1 / 3),
-                label=f"{energy:.2f} J",
+                label=figures.told(energy, self.limit, self.unit, at_most=True),
                 verdict=verdict,
             )
             return Result(
@@ -84,9 +95,9 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def batch(self, model: Model) -> EvaluateMany | None:
-        """See `Criterion.batch`; where no mass has a tolerance."""
+        """See `Criterion.batch`; where no mass has a tolerance and nothing else moves it."""
         robot = model.robot(self.robot)
-        if len(MassTolerances(model, robot)):
+        if len(MassTolerances(model, robot)) or not robot.alone:
             return None
 
         def evaluate(states: States) -> Answers:
@@ -99,7 +110,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         """See `Criterion.basis`."""
         robot = model.robot(self.robot)
         return Basis(
-            formula="E = ½ q̇ᵀ M(q) q̇, whole robot",
+            formula="E = ½ q̇ᵀ M(q) q̇, whole robot" if robot.alone else "E = ½ Σ (m v² + ωᵀ I ω), whole robot",
             source="Weistroffer et al. 2022, Eq. 5",
             inputs=provenance.motion(model, robot.name)
             + provenance.masses(model, robot)

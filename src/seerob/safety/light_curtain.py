@@ -19,6 +19,7 @@ from seerob.sensors.sensing import (
     carriers_of,
     names_of,
     others,
+    seen_in_field,
     sensor_of,
 )
 from seerob.sensors.tables import Sensor
@@ -52,7 +53,7 @@ class LightCurtain(Criterion, frozen=True, kw_only=True):
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         curtain = self._curtain(model)
-        return lambda state: curtain.judge(self.name, state)
+        return seen_in_field(self.name, curtain.presence, lambda state: curtain.judge(self.name, state))
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

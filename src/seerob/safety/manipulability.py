@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from msgspec import Meta
 
-from seerob import provenance
+from seerob import figures, provenance
 from seerob.answers import Answers
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge
 from seerob.kernels.axes import principal_axes
@@ -108,7 +108,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
                 center=tuple((position + rotation @ offset).tolist()),
                 wxyz=tuple(wxyz_from_rotation(axes).tolist()),
                 radii=tuple((DRAWN * sigma).tolist()),
-                label=f"σ₃ {smallest:.3f}",
+                label=f"σ₃ {figures.told(smallest, self.limit, self.unit, at_most=False)}",
                 verdict=verdict,
             )
             parts = (

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from msgspec import Meta
 
-from seerob import provenance
+from seerob import figures, provenance
 from seerob.answers import Answers
 from seerob.body_place import BodyPlaces
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge_interval
@@ -73,7 +73,7 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
             segment = Segment(
                 start=tuple(closest.point_a.tolist()),
                 end=tuple(closest.point_b.tolist()),
-                label=f"{distance * 1e3:.0f} mm",
+                label=figures.told(distance, self.limit, self.unit, at_most=False),
                 verdict=verdict,
             )
             return Result(

@@ -29,8 +29,9 @@ from seerob.model import Frame, Model
 from seerob.norms import body_limits
 from seerob.norms.crushing_gaps import NOT_VERIFIED, gap_inputs
 from seerob.norms.limit_inputs import excluded_input, limit_inputs, table_input
+from seerob.partly_seen import seen_first
 from seerob.quantities import Coordinate, Tolerance
-from seerob.snapshot import Arrow, Basis, Highlight, Input, Origin, Result, Verdict
+from seerob.snapshot import Arrow, Basis, Highlight, Input, Result, Verdict
 from seerob.state import State
 from seerob.tolerances import Spread, deciding
 from seerob.transforms import Array
@@ -94,7 +95,9 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
 
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
-        return Contacts(self, model).evaluate
+        contacts = Contacts(self, model)
+        bones = () if contacts.people is None else contacts.people.bodies
+        return seen_first(bones, contacts.evaluate, contacts.without)
 
     def table(self, model: Model) -> body_limits.BodyLimits:
         """The limits that apply."""
@@ -161,15 +164,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
                 *self._given(model),
                 table,
                 *limit_inputs(limits, own=self.limits is not None, multiplier=self.multiplier),
-                Input(
-                    name="largest contact area",
-                    value=self.largest_area,
-                    unit="m²",
-                    origin=Origin.STATED if self.largest_area == CAP else Origin.GIVEN,
-                    source="k belongs to about 1 cm² (1S)"
-                    if self.largest_area == CAP
-                    else "workstation file",
-                ),
+                contact_limits.credited_input(self.largest_area, CAP),
                 *gap_inputs(self.thickness, [r.name for r in limits.regions.values() if r.permitted]),
                 floor_input(self.floor_height if self.floor else None),
                 *(excluded_input(region) for region in self.excluded),
@@ -224,6 +219,7 @@ class Contacts:
     def __init__(self, spec: PowerAndForce, model: Model) -> None:
         self.spec, self.model = spec, model
         self.robot = model.robot(spec.robot)
+        self.robot.require_masses(spec.name)
         self.moving = self.robot.moving
         self.frames = [Frame(model.bodies[i].name, model.bodies[i].mj, np.eye(4)) for i in self.moving]
         for key, names in (("excluded", spec.excluded), ("thickness", spec.thickness)):
@@ -262,8 +258,14 @@ class Contacts:
         hand = {human.name: human.hand for human in model.workstation.humans}.get(spec.human or "")
         self.rows = ContactRows(self, hand=hand)
 
-    def judge(self, state: State) -> Judged:
-        """Every part of the robot against every body region.
+    def without(self, lost: tuple[int, ...]) -> Evaluate:
+        """The same about the other bones of the person."""
+        spec, human = self.spec, self.spec.human or ""
+        rest = Person(self.model, self.robot, human, horizon=spec.horizon, without=lost)
+        return lambda state: self.evaluate(state, rest)
+
+    def judge(self, state: State, people: Person | None = None) -> Judged:
+        """Every part of the robot against every body region; of ``people`` instead of the whole person.
 
         Raises:
             Undecided: Not heard, or a mass that nobody gave.
@@ -274,11 +276,12 @@ class Contacts:
         projected = masses_along_motion(state, robot, self.moving, standstill=STANDSTILL)
         v_r = state.fastest_points(self.moving)[0]
         masses = robot_masses(spec.mass, self.simplified, projected)
-        if self.people is None:
+        people = people or self.people
+        if people is None:
             near: NDArray[np.bool_] = np.ones((len(v_r), len(REGIONS)), bool)
             v_h = np.full(len(REGIONS), spec.person_speed or 0.0)
         else:
-            near, v_h = self.people.near(state, spec.person_speed)
+            near, v_h = people.near(state, spec.person_speed)
         near &= (v_r > STANDSTILL)[:, None]
         clamped, on_floor = self.clamping.at(state, near[:, self.in_regions])
         speeds = self.arrays.speeds(masses, self.least, clamped)
@@ -288,9 +291,10 @@ class Contacts:
         governing = self._governing(v_r[:, None] + v_h, near, speeds, ends)
         return Judged(v_r, v_h, near, projected, speeds, clamped, *governing, ends, on_floor)
 
-    def evaluate(self, state: State) -> Result:
-        """The result at a state."""
-        spec, judged = self.spec, self.judge(state)
+    def evaluate(self, state: State, people: Person | None = None) -> Result:
+        """The result at a state; see `judge`."""
+        people = people or self.people
+        spec, judged = self.spec, self.judge(state, people)
         near, projected = judged.near, judged.projected
         found = [self._region(int(k), judged) for k in np.flatnonzero(near.any(axis=0))]
         known = projected[np.isfinite(projected)]
@@ -326,7 +330,7 @@ class Contacts:
             interval=part.interval,
             parts=(*(part for part, _ in found), *mass_parts),
             markers=(arrow, Highlight(body=body.name, verdict=verdict)),
-            rows=self.rows.of(found, judged, (lambda _: ()) if self.people is None else self.people.hit),
+            rows=self.rows.of(found, judged, (lambda _: ()) if people is None else people.hit),
         )
 
     def _governing(

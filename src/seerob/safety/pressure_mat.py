@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from seerob.criterion import Criterion, Evaluate
 from seerob.model import Model
-from seerob.sensors.sensing import Names, Presence, Seen, Sight, bodies_of, names_of, sensor_of
+from seerob.sensors.sensing import Names, Presence, Seen, Sight, bodies_of, names_of, seen_in_field, sensor_of
 from seerob.snapshot import Basis, Result
 from seerob.state import State
 
@@ -40,7 +40,7 @@ class PressureMat(Criterion, frozen=True, kw_only=True):
             sights = {i: Sight(Seen.DETECTED) for k, i in enumerate(presence.bodies) if inside[k]}
             return presence.result(self.name, state, sights)
 
-        return evaluate
+        return seen_in_field(self.name, presence, evaluate)
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

@@ -16,8 +16,10 @@ from seerob.distances.depth import Depth, Depths
 from seerob.distances.least import Closests
 from seerob.errors import InputError, UnknownName
 from seerob.model import Gap, Model
+from seerob.partly_seen import seen_first
 from seerob.snapshot import Basis, Highlight, Marker, Result, Segment, Verdict
 from seerob.state import State
+from seerob.tracking_error import TrackingError
 from seerob.transforms import Array
 
 CELLS, FEWEST = 130, 5
@@ -49,20 +51,37 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         watched = self._watched(model)
-        several = len(_names(self.area)) > 1
         depths = Depths(model.shapes, tolerance=self.tolerance, cells=CELLS, fewest=FEWEST)
 
+        def without(lost: tuple[int, ...]) -> Evaluate | None:
+            rest = [
+                _Watched(each.area, model.gap(each.gap.a, kept))
+                for each in watched
+                if (kept := tuple(i for i in each.gap.b if i not in lost))
+            ]
+            return self._bound(model, tuple(rest), depths) if rest else None
+
+        bodies = tuple(dict.fromkeys(i for each in watched for i in each.gap.b))
+        return seen_first(bodies, self._bound(model, watched, depths), without)
+
+    def _bound(self, model: Model, watched: tuple[_Watched, ...], depths: Depths) -> Evaluate:
+        several = len(_names(self.area)) > 1
+        offs = [TrackingError(model, each.gap.b) for each in watched]
+
         def evaluate(state: State) -> Result:
-            outside = (np.inf, "", 0.0)
+            nearest, perhaps = (np.inf, ""), (np.inf, "", 0.0)
             parts: list[Result] = []
             lit: list[Marker] = []
             asked = [state.closest_per_body(each.gap) for each in watched]
             entered: list[tuple[_Watched, Closests, int]] = []
-            for each, found in zip(watched, asked, strict=True):
-                nearest = int(found.distance.argmin())
-                room = float(found.distance[nearest])
-                if room < outside[0]:
-                    outside = room, _where(model, each, nearest, several), each.gap.deviation
+            for each, found, off in zip(watched, asked, offs, strict=True):
+                may = off.at(state) + each.gap.deviation
+                i = int(found.distance.argmin())
+                nearest = min(nearest, (float(found.distance[i]), _where(model, each, i, several)))
+                # Another may be nearer than it, shapes and devices being what they are.
+                room = found.distance - may
+                i = int(room.argmin())
+                perhaps = min(perhaps, (float(room[i]), _where(model, each, i, several), float(may[i])))
                 entered += [(each, found, i) for i in np.flatnonzero(found.distance <= 0).tolist()]
             pairs = [(int(found.body_a[i]), each.gap.b[i]) for each, found, i in entered]
             deeps = depths.ask(state.rotations, state.positions, pairs) if pairs else []
@@ -80,28 +99,31 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
                 )
                 lit.append(Highlight(body=model.bodies[each.gap.b[i]].name, verdict=Verdict.EXCEEDED))
                 lit += _line(deep, found.point_a[i])
-            return self._result(outside, parts, deeps, lit)
+            return self._result(nearest, perhaps, parts, deeps, lit)
 
         return evaluate
 
     def _result(
         self,
-        outside: tuple[float, str, float],
+        nearest: tuple[float, str],
+        perhaps: tuple[float, str, float],
         parts: list[Result],
         deeps: Sequence[Depth],
         lit: list[Marker],
     ) -> Result:
-        room, who, deviation = outside
+        room, who = nearest
         if parts:
             deepest = max(deeps, key=lambda deep: deep.at_least)
             verdict, reason = Verdict.EXCEEDED, ", ".join(part.name for part in parts)
             room, interval = -deepest.at_least, (-deepest.at_most, -deepest.at_least)
         else:
-            # The real surface may stick out of the shape: nearly inside is not outside.
-            close = room - deviation <= 0
-            verdict = Verdict.UNDECIDED if close else Verdict.WITHIN
+            # The real surface may stick out of the shape, a bone be elsewhere: nearly inside is not outside.
+            least, close, deviation = perhaps
+            verdict = Verdict.UNDECIDED if least <= 0 else Verdict.WITHIN
             reason = (
-                f"{who} is within {deviation * 1e3:.1f} mm, what its shape may be off by" if close else who
+                f"{close} is within {deviation * 1e3:.1f} mm, what its shape and its place may be off by"
+                if least <= 0
+                else who
             )
             interval = None
         areas = [Highlight(body=name, verdict=verdict) for name in _names(self.area)]

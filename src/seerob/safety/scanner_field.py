@@ -24,6 +24,7 @@ from seerob.sensors.sensing import (
     carriers_of,
     names_of,
     others,
+    seen_in_field,
     sensor_of,
 )
 from seerob.sensors.tables import MonitoredField as Field
@@ -67,7 +68,7 @@ class ScannerField(Criterion, frozen=True, kw_only=True):
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         scan = self._scan(model)
-        return lambda state: scan.judge(self.name, state)
+        return seen_in_field(self.name, scan.presence, lambda state: scan.judge(self.name, state))
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

@@ -12,29 +12,25 @@ from msgspec.structs import replace
 from seerob import figures, provenance
 from seerob.body_place import BodyPlaces
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge_interval, worst
-from seerob.errors import InputError, Undecided
+from seerob.errors import InputError
 from seerob.model import Gap, Model
 from seerob.norms import iso_13855
-from seerob.norms.iso_13855 import WALKING
 from seerob.partly_seen import partly_seen
 from seerob.sensors.detection import Detection, device_of
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.state import State
+from seerob.stopping.inputs import approach_speed, intrusion
 from seerob.stopping.largest import LargestSeparation
 from seerob.stopping.many_instants import separations
 from seerob.stopping.models import MOVING, Stop, StopModel, bind_stop
-from seerob.stopping.terms import At, Course, largest_scale, separation_distance, way_of_person
-from seerob.stopping.tolerances import SIMULATED, SeparationEnds, intervals, tolerances
-from seerob.tolerances import deciding
+from seerob.stopping.search import TOP, factor_by_search
+from seerob.stopping.terms import At, Course, separation_distance, way_of_person
+from seerob.stopping.tolerances import SIMULATED, SeparationEnds, intervals, shifted, tolerances
+from seerob.tolerances import Shifts, Tolerance, deciding
 from seerob.tracking_error import TrackingError, tracking
 from seerob.transforms import Array
 
 __all__ = ["Detection", "Separation", "Stop", "separation_bound"]
-
-TOP = 10.0
-"""Factor on the present speeds beyond which a larger permissible speed is not searched for."""
-HALVINGS, COSTLY_HALVINGS = 14, 6
-"""Of the search for the largest permissible speed."""
 
 
 def separation_bound(v_r: Array, v_h: float, T_r: float, T_s: float, xi: float) -> Array:
@@ -80,10 +76,49 @@ class Separation(Criterion, frozen=True, kw_only=True):
     """Z_d: uncertainty of the person's position [m]."""
     robot_uncertainty: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
     """Z_r: uncertainty of the robot's position [m]."""
+    human_speed_tolerance: Annotated[float, Meta(ge=0, extra={"unit": "m/s"})] = 0.0
+    """How far `human_speed` may be off, either way [m/s]."""
+    intrusion_tolerance: Annotated[float, Meta(ge=0, extra={"unit": "m"})] = 0.0
+    """How far C may be off, given or from a device, either way [m]; C is never below 0."""
 
     def __post_init__(self) -> None:
+        if self.human_speed_tolerance and self.human_speed_tolerance >= (self.human_speed or 0.0):
+            raise ValueError("human_speed_tolerance is of a human_speed that is larger: give that")
+        if self.intrusion_tolerance and not any((self.intrusion is not None, self.detection, self.sensor)):
+            raise ValueError("intrusion_tolerance is of a C that is not given: give intrusion or detection")
         if self.intrusion is not None and self.detection is not None:
             raise ValueError("give either intrusion or detection")
+
+    def _tolerances(self) -> tuple[Tolerance, ...]:
+        own = (
+            Tolerance("human_speed", self.human_speed_tolerance, "m/s"),
+            Tolerance("intrusion", self.intrusion_tolerance, "m"),
+        )
+        return (*tolerances(self.stop), *(tolerance for tolerance in own if tolerance.half))
+
+    def _shifted(self, shifts: Shifts) -> Separation:
+        """The same without tolerances, with its inputs at an end: 1 where S_p is largest; with no sensor."""
+        n = len(tolerances(self.stop))
+        sides = dict(zip((t.name for t in self._tolerances()[n:]), shifts[n:], strict=True))
+        v_h, C = self.human_speed, self._intrusion()[0]
+        if v_h is not None:
+            v_h += sides.get("human_speed", 0) * self.human_speed_tolerance
+        if "intrusion" in sides:
+            C = max((C or 0.0) + sides["intrusion"] * self.intrusion_tolerance, 0.0)
+        return replace(
+            self,
+            stop=shifted(self.stop, shifts[:n]),
+            human_speed=v_h,
+            **({"intrusion": C, "detection": None} if "intrusion" in sides else {}),
+            human_speed_tolerance=0.0,
+            intrusion_tolerance=0.0,
+        )
+
+    def at_worst(self, model: Model) -> Separation:
+        """The same without tolerances, with every input where S_p is largest."""
+        own, _, _ = self._by_device(model)
+        inputs = len(own._tolerances())
+        return own._shifted((1,) * inputs) if inputs else self
 
     def subjects(self) -> tuple[str, ...]:
         """The robot and the human."""
@@ -150,8 +185,12 @@ class Separation(Criterion, frozen=True, kw_only=True):
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         own, _, _ = self._by_device(model)
+        if self.stop.model == "simulated":
+            model.robot(self._sides(model)[0]).require_masses(self.name)
         ends = SeparationEnds(
-            own.stop, lambda new: replace(own, stop=new).required(model), remembers=own.mode == "fixed"
+            own._tolerances(),
+            lambda shifts: own._shifted(shifts).required(model),
+            remembers=own.mode == "fixed",
         )
         rest = self.unknown(model), LargestSeparation(), ends
         return partly_seen(model, own._gap(model), lambda gap: own._bound(model, gap, *rest))
@@ -241,7 +280,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         own, _, _ = self._by_device(model)
         gap = own._gap(model)
         K = sum(own._terms()[0]) + gap.deviation
-        if self.mode == "fixed":
+        if self.mode == "fixed" or own._tolerances():
             return None
         incomplete = bool(self.unknown(model))
         return separations(own.stop, gap, lambda now: own._distance(now, K), incomplete=incomplete)
@@ -282,7 +321,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             v_h = iso_13855.speed_at(distance) if given is None else np.full(len(distance), given)
             speed, factor = stop.inverse(now.v_r, distance, v_h, K)
         elif now.v_r.max() > MOVING:
-            factor = _factor(lambda s: self._distance(course(s), K), distance, stop.costly)
+            factor = factor_by_search(lambda s: self._distance(course(s), K), distance, stop.costly)
             speed = factor * float(now.v_r.max())
             reason = "or more" if factor == (1.0 if stop.costly else TOP) else ""
         else:
@@ -316,12 +355,13 @@ class Separation(Criterion, frozen=True, kw_only=True):
             *provenance.motion(model, robot, human),
             *provenance.shapes(self._gap(model)),
             provenance.given("T_r", self.stop.reaction, "s"),
-            *(provenance.given(f"tolerance of {t.name}", t.half, t.unit) for t in tolerances(self.stop)),
+            *(provenance.given(f"tolerance of {t.name}", t.half, t.unit) for t in self._tolerances()),
             *stop.inputs,
         ]
         if self.stop.model == "simulated":
             inputs += provenance.masses(model, model.robot(robot))
-        inputs += [self._approach_speed(), self._intrusion_input()]
+        stated = None if self.detection is None else self.detection.stated()
+        inputs += [approach_speed(self.human_speed), stated or intrusion(self.intrusion)]
         for name, value in (("Z_d", self.human_uncertainty), ("Z_r", self.robot_uncertainty)):
             inputs.append(
                 Input(name=name, unit="m", origin=Origin.MISSING)
@@ -352,43 +392,3 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 "a person whose own speed exceeds v_h",
             ),
         )
-
-    def _approach_speed(self) -> Input:
-        if self.human_speed is None:
-            return Input(
-                name="v_h",
-                value=f"{WALKING} m/s, {iso_13855.REACHING:g} m/s up to S_p = {iso_13855.ARM_REACH} m",
-                unit="",
-                origin=Origin.STATED,
-                source="ISO/TS 15066:2016 5.5.4.2.3 and ISO 13855, from public sources that agree (2S); "
-                f"that S_p with {WALKING} m/s is not below {iso_13855.ARM_REACH} m is from memory (M)",
-            )
-        if self.human_speed == WALKING:
-            return Input(
-                name="v_h",
-                value=self.human_speed,
-                unit="m/s",
-                origin=Origin.STATED,
-                source="ISO/TS 15066:2016 5.5.4.2.3, from public sources that agree (2S)",
-            )
-        return provenance.given("v_h", self.human_speed, "m/s")
-
-    def _intrusion_input(self) -> Input:
-        if self.detection is not None:
-            return self.detection.stated()
-        C = self.intrusion
-        return (
-            Input(name="C", unit="m", origin=Origin.MISSING) if C is None else provenance.given("C", C, "m")
-        )
-
-
-def _factor(S_p: Callable[[float], Array], distance: Array, costly: bool) -> float:
-    """Largest factor of all speeds, found by search, for which no part is nearer than its S_p."""
-
-    def holds(factor: float) -> bool:
-        try:
-            return bool(np.all(S_p(factor) <= distance))
-        except Undecided:
-            return False
-
-    return largest_scale(holds, 1.0, COSTLY_HALVINGS) if costly else largest_scale(holds, TOP, HALVINGS)

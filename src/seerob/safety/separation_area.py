@@ -20,9 +20,11 @@ from seerob.criterion import Criterion, Evaluate
 from seerob.distances.least import Per
 from seerob.errors import InputError, UnknownName
 from seerob.model import Model
+from seerob.partly_seen import seen_first
 from seerob.sensors.sensing import Names, bodies_of, names_of
 from seerob.snapshot import Basis, Highlight, Hull, Marker, Result, Segment, Verdict
 from seerob.state import State
+from seerob.tracking_error import TrackingError
 from seerob.transforms import Array
 from seerob.volumes.offset_shell import offset_shell
 
@@ -64,19 +66,38 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         criterion = self._criterion(model)
         moving, outside = self._sides(model)
         required: Callable[[State], Array] = criterion.required(model)
-        unknown: str = criterion.unknown(model)
+
+        def bound(outside: tuple[int, ...]) -> Evaluate:
+            return self._bound(model, moving, outside, required, criterion.unknown(model))
+
+        def without(lost: tuple[int, ...]) -> Evaluate | None:
+            rest = tuple(i for i in outside if i not in lost)
+            return bound(rest) if rest else None
+
+        return seen_first(outside, bound(outside), without)
+
+    def _bound(
+        self,
+        model: Model,
+        moving: tuple[int, ...],
+        outside: tuple[int, ...],
+        required: Callable[[State], Array],
+        unknown: str,
+    ) -> Evaluate:
         gap = model.gap(moving, outside)
+        off = TrackingError(model, outside)
         drawn: list[tuple[float, tuple[Hull, ...]]] = []
 
         def evaluate(state: State) -> Result:
-            state.require(*gap.carriers)
+            state.require_bodies((*moving, *outside))
             S_p = required(state)
             found = state.distances(gap.query, Per.PAIR)
             room = found.distance.reshape(len(moving), len(outside)) - S_p[:, None]
             nearest = room.argmin(axis=0)
             least = room[nearest, np.arange(len(outside))]
-            k = int(least.argmin())
-            doubt = self._doubt(model, outside[k], float(least[k]), gap.deviation, unknown)
+            may = off.at(state) + gap.deviation
+            k, perhaps = int(least.argmin()), int((least - may).argmin())
+            doubt = self._doubt(model, outside[perhaps], float(least[perhaps]), float(may[perhaps]), unknown)
             verdict = Verdict.EXCEEDED if least[k] <= 0 else Verdict.UNDECIDED if doubt else Verdict.WITHIN
             parts: list[Result] = []
             lit: list[Marker] = []
@@ -125,7 +146,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
             return f"{unknown}; the area is at least what is drawn"
         if room - deviation <= 0:
             name = model.bodies[body].name
-            return f"{name} is within {deviation * 1e3:.1f} mm, what shapes may be off by"
+            return f"{name} is within {deviation * 1e3:.1f} mm, what shapes and places may be off by"
         return ""
 
     def basis(self, model: Model) -> Basis:

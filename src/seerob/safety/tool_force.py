@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 import numpy as np
 from msgspec import Meta
 
-from seerob import joint_torques, provenance
+from seerob import figures, joint_torques, provenance
 from seerob.criterion import Criterion, Evaluate, judge, judge_interval
 from seerob.errors import InputError, Undecided
 from seerob.model import Mechanism, Model
@@ -120,6 +120,8 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
         """See `Criterion.bind`."""
         frame = model.frame(self.at)
         robot = model.carrier(frame)
+        if self.torques == "measured":
+            robot.require_masses(self.name)
         offset = np.array(self.offset)
         uncertainty = self._uncertainty(model, robot)
         rows = 3 if self.contact == "zero_moment" else 6
@@ -132,6 +134,10 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
             tau = state.measured_torques(robot)
             if self.torques == "external":
                 return tau
+            if not robot.alone:
+                raise Undecided(
+                    f"{robot.name} is moved, or moves others: what that accelerates is in the measured torques too"
+                )
             before = (state.t, state.qd(robot).copy())
             elapsed = np.nan if last is None else state.t - last[0]
             if last is None or not 0 < elapsed <= LONGEST:
@@ -204,11 +210,12 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
     def _markers(self, force: Array, size: float, at: Array, verdict: Verdict | None) -> tuple[Marker, ...]:
         center = tuple(at.tolist())
         drawn = DRAWN * force * min(1.0, LARGEST_DRAWN / max(DRAWN * size, 1e-12))
-        arrow = Arrow(origin=center, vector=tuple(drawn.tolist()), label=f"{size:.0f} N", verdict=verdict)
+        shown = figures.told(size, self.limit, self.unit, at_most=True)
+        arrow = Arrow(origin=center, vector=tuple(drawn.tolist()), label=shown, verdict=verdict)
         if self.limit is None:
             return (arrow,)
         radius = min(DRAWN * self.limit, LARGEST_DRAWN)
-        return (arrow, Sphere(center=center, radius=radius, label=f"{self.limit:g} N"))
+        return (arrow, Sphere(center=center, radius=radius, label=f"limit {self.limit:g} N"))
 
     def _uncertainty(self, model: Model, robot: Mechanism) -> Array | None:
         if self.torque_uncertainty is None:

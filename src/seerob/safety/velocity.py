@@ -8,11 +8,12 @@ from typing import Annotated, ClassVar
 import numpy as np
 from msgspec import Meta
 
-from seerob import provenance
+from seerob import figures, provenance
 from seerob.answers import Answers
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge
 from seerob.errors import InputError
 from seerob.model import Model
+from seerob.moving_base import velocity_of
 from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Input, Result
 from seerob.state import State
@@ -68,7 +69,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         offset = np.array(self.offset)
 
         def evaluate(state: State) -> Result:
-            v = point_velocity(state.jacobian(frame, mechanism, offset), state.qd(mechanism))[:3]
+            v = velocity_of(state, frame, mechanism, offset)[:3]
             rotation, position = state.pose(frame)
             return self._result(math.sqrt(float(v @ v)), position + rotation @ offset, v)
 
@@ -95,7 +96,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         arrow = Arrow(
             origin=tuple(point.tolist()),
             vector=tuple((DRAWN * v).tolist()),
-            label=f"{speed:.2f} m/s",
+            label=figures.told(speed, self.limit, self.unit, at_most=True),
             verdict=verdict,
         )
         return Result(
@@ -108,13 +109,15 @@ class Velocity(Criterion, frozen=True, kw_only=True):
             markers=(arrow,),
         )
 
-    def batch(self, model: Model) -> EvaluateMany:
-        """See `Criterion.batch`."""
+    def batch(self, model: Model) -> EvaluateMany | None:
+        """See `Criterion.batch`; of a point, where nothing moves that carries its robot."""
         if self.at is None:
             bodies = self._bodies(model)
             return lambda states: self._answers(states.fastest_points(bodies)[0].max(axis=1))
         frame, offset = model.frame(self.at), np.array(self.offset)
         mechanism = model.carrier(frame)
+        if not mechanism.alone:
+            return None
 
         def evaluate(states: States) -> Answers:
             v = point_velocity(states.jacobian(frame, mechanism, offset), states.qd(mechanism))[:, :3]

@@ -95,11 +95,17 @@ def judged(
     verdict = _verdict((low, high), limit, complete=not missing)
     known = int(measured.low.max()) == int(measured.high.max())
     value = float(measured.high.max()) if known else None
-    # By what is known at least: what is not assessed drives nothing.
-    side = int(measured.low.argmax())
-    drivers = _drivers(method, {key: span.low for key, span in sides.items()}, side)
-    reason = _reason(method, sides, drivers, side, value, (low, high), missing, verdict)
-    bones = [bone.format(side=SIDES[side]) for key in drivers for bone in BONES_OF.get(key, ())]
+    # By what is known at least: what is not assessed drives nothing. Sides that are as bad both count.
+    worst = np.flatnonzero(measured.low == measured.low.max()).tolist()
+    known_least = {key: span.low for key, span in sides.items()}
+    drivers = {side: _drivers(method, known_least, side) for side in worst}
+    reason = _reason(method, sides, drivers, value, (low, high), missing, verdict)
+    bones = [
+        bone.format(side=SIDES[side])
+        for side, keys in drivers.items()
+        for key in keys
+        for bone in BONES_OF.get(key, ())
+    ]
     shown = None if spread is None and not missing else (float(low), float(high))
     return Result(
         name=name,
@@ -198,8 +204,7 @@ def _drivers(method: Method, scores: Mapping[str, Ints], side: int) -> list[str]
 def _reason(
     method: Method,
     sides: Mapping[str, Span],
-    drivers: Sequence[str],
-    side: int,
+    drivers: Mapping[int, Sequence[str]],
     value: float | None,
     ends: tuple[int, int],
     missing: Sequence[str],
@@ -210,9 +215,13 @@ def _reason(
         parts.append(f"not assessed: {', '.join(missing)}; {whatever_is_missing('score', *ends)}")
     elif verdict is Verdict.UNDECIDED:
         parts.append(f"the accuracy leaves it open: the score lies between {ends[0]} and {ends[1]}")
-    if drivers:
-        scores = {key: sides[key].low[side % len(sides[key].low)] for key in drivers}
-        parts.append(f"{SIDES[side]} side: " + ", ".join(f"{key} {score}" for key, score in scores.items()))
+    said: dict[str, list[str]] = {}
+    for side, keys in drivers.items():
+        scores = ", ".join(f"{key} {sides[key].low[side % len(sides[key].low)]}" for key in keys)
+        if scores:
+            said.setdefault(scores, []).append(SIDES[side])
+    for scores, whose in said.items():
+        parts.append(f"{whose[0]} side: {scores}" if len(whose) == 1 else f"both sides: {scores}")
     if value is not None:
         parts.append(method.level(value))
     return "; ".join(parts)

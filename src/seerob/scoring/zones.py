@@ -94,7 +94,9 @@ def mistakes(row: ZoneRow) -> list[tuple[str, str, str]]:
     """What cannot be in a row: column, what is wrong, what would be right."""
     found = []
     if row.angle not in MEASURES:
-        found.append(("angle", str(UnknownName("angle", row.angle, MEASURES)), ""))
+        found.append(
+            ("angle", str(UnknownName("angle", row.angle, MEASURES)), "docs/ergonomics.md lists all of them")
+        )
     elif row.side is not None and not sided(row.angle):
         found.append(("side", f"{row.angle} has no side", "leave it empty"))
     if row.low is not None and row.high is not None and row.high <= row.low:

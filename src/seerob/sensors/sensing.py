@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob import provenance
+from seerob.criterion import Evaluate
 from seerob.distances.least import Closests
 from seerob.errors import InputError, UnknownName
 from seerob.model import Gap, Model
+from seerob.partly_seen import seen_first
 from seerob.sensors.tables import Sensor
 from seerob.snapshot import Highlight, Input, Label, Marker, Origin, Result, Verdict
 from seerob.state import State
+from seerob.tracking_error import TrackingError
 from seerob.transforms import Array
 
 Names = str | tuple[str, ...]
@@ -91,6 +94,7 @@ class Presence:
             )
         self.model, self.sensor, self.bodies = model, sensor, bodies
         self.gap: Gap = model.gap((field,), bodies)
+        self._off = TrackingError(model, bodies)
         self._last: tuple[float, Array] | None = None
         self._since: float | None = None
         self.unseen = 0.0
@@ -147,7 +151,8 @@ class Presence:
         found, inside = self.inside(state)
         triggered = any(sight.seen is not Seen.MISSED for sight in sights.values())
         self.follow(state, inside, triggered)
-        nearest = int(found.distance.argmin())
+        may = self._off.at(state) + self.gap.deviation
+        nearest, perhaps = int(found.distance.argmin()), int((found.distance - may).argmin())
         entered = dict(zip(self.bodies, found.distance.tolist(), strict=True))
         each = tuple(
             Result(
@@ -161,12 +166,12 @@ class Presence:
             )
             for i, sight in sights.items()
         )
-        deviation = self.gap.deviation
         if sights:
             verdict, reason = Verdict.EXCEEDED, self._told(sights)
-        elif found.distance[nearest] - deviation <= 0:
+        elif found.distance[perhaps] - may[perhaps] <= 0:
             verdict = Verdict.UNDECIDED
-            reason = f"{self._name(nearest)} is within {deviation * 1e3:.1f} mm, what its shape may be off by"
+            mm = f"{may[perhaps] * 1e3:.1f} mm"
+            reason = f"{self._name(perhaps)} is within {mm}, what its shape and its place may be off by"
         elif doubts:
             verdict, reason = Verdict.UNDECIDED, "; ".join(doubts)
         else:
@@ -240,3 +245,32 @@ class Presence:
                 )
             )
         return (*provenance.motion(self.model, *self.gap.carriers), *provenance.shapes(self.gap), *given)
+
+
+def seen_in_field(name: str, presence: Presence, judge: Evaluate) -> Evaluate:
+    """Of people of whom a part is seen: who is in the field with that part is in it.
+
+    What the device makes of it stays open, since a bone that nobody sees may shade another.
+
+    Args:
+        name: Of the criterion.
+        presence: Of the whole question.
+        judge: It.
+    """
+    model, (field,) = presence.model, presence.gap.a
+
+    def without(lost: tuple[int, ...]) -> Evaluate | None:
+        bodies = tuple(i for i in presence.bodies if i not in lost)
+        if not bodies:
+            return None
+        rest = Presence(model, presence.sensor, field, bodies)
+
+        def evaluate(state: State) -> Result:
+            _, inside = rest.inside(state)
+            why = "whether the device sees it is open"
+            sights = {i: Sight(Seen.MAYBE, why) for i, there in zip(bodies, inside, strict=True) if there}
+            return rest.result(name, state, sights)
+
+        return evaluate
+
+    return seen_first(presence.bodies, judge, without)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.ear_cutting import cut_ears
 from seerob.sinks._canvas import Canvas
 from seerob.sinks._palette import DARK, FILL, MARK
 from seerob.snapshot import (
@@ -24,6 +23,7 @@ from seerob.snapshot import (
     Vec3,
 )
 from seerob.transforms import Array, rotation_from_wxyz
+from seerob.volumes.ear_cutting import cut_ears
 
 _VEIL = 0.38
 _CUBE = np.array(

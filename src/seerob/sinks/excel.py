@@ -20,8 +20,9 @@ from seerob.sinks._at_end import AtEndWithResults
 from seerob.sinks._bone_errors import HEAD as ERRORS
 from seerob.sinks._bone_errors import bone_rows
 from seerob.sinks._motion_sheets import MotionSheets
-from seerob.sinks._sheets import Cell, Sheets
+from seerob.sinks._sheets import Sheets
 from seerob.sinks._time_shares import HEAD, time_rows
+from seerob.sinks._xlsx import Cell, Workbook
 from seerob.snapshot import Basis, Scene, Snapshot
 
 _VERDICT_OF = {code: verdict for verdict, code in CODES.items()}
@@ -110,11 +111,8 @@ class ExcelWriter(AtEndWithResults):
             raise InputError.at(self.path, "", what, "close it in Excel, or give another folder") from error
 
     def _fill(self, path: Path) -> None:
-        from openpyxl import Workbook
-
-        book = Workbook(write_only=True)
-        sheets = Sheets(book)
-        try:
+        with Workbook(path) as book:
+            sheets = Sheets(book)
             steps = len(self.log) + len(self._motion) + 1
             sheets.add("Summary", _SUMMARY, list(self._summary()), fit=True)
             for k, series in enumerate(self.log.values()):
@@ -134,10 +132,6 @@ class ExcelWriter(AtEndWithResults):
             sheets.add("Inputs", _INPUTS, list(self._inputs()), fit=True)
             found = [[f.level, f.subject, f.text] for f in self._scene.findings]
             sheets.add("Findings", ["level", "about", "text"], found, fit=True)
-        finally:
-            # A sheet that is left open complains when it is collected.
-            sheets.close()
-        book.save(path)
         self._tell(steps, steps)
 
     def _summary(self) -> Iterator[list[Cell]]:

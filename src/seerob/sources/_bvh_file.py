@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.errors import InputError
-from seerob.tables.orientation import about, product
+from seerob.tables.orientation import about, cross, product
 from seerob.transforms import Array
 
 MOST_JOINTS = 1000
@@ -88,10 +88,8 @@ class Bvh:
                 positions[k], turns[k] = offset, turn
             else:
                 base = turns[joint.parent]
-                arm = 2 * np.cross(base[:, 1:], offset)
-                positions[k] = (
-                    positions[joint.parent] + offset + base[:, :1] * arm + np.cross(base[:, 1:], arm)
-                )
+                arm = 2 * cross(base[:, 1:], offset)
+                positions[k] = positions[joint.parent] + offset + base[:, :1] * arm + cross(base[:, 1:], arm)
                 turns[k] = product(base, turn)
         for k, joint in enumerate(self.joints):
             if joint.end:

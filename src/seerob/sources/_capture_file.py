@@ -16,12 +16,14 @@ from seerob.human.calibration import CalibrationPose
 from seerob.human.captured import Captured, CaptureFrame
 from seerob.human.mapping import read_conventions
 from seerob.human.observing import Observer
+from seerob.human.smoothing import group_delay
 from seerob.quantities import Pose
 from seerob.samples import BodySample, Quality
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
 from seerob.sources._capture_options import (
     Calibration,
+    CutOff,
     Instant,
     Mapped,
     Seconds,
@@ -29,6 +31,7 @@ from seerob.sources._capture_options import (
     calibrated,
     observer,
     person,
+    placed_only,
 )
 
 MOST_FRAMES = 5_000_000
@@ -52,6 +55,8 @@ class CaptureFile(Source, frozen=True, kw_only=True):
     """How much later than the motion its time stamps are, against other devices [s]."""
     hold: Seconds = 0.5
     """Age at which a bone that is no longer seen does not count any more [s]."""
+    smoothing: CutOff | None = None
+    """Cut-off frequency of a low-pass filter against the device's noise [Hz]; no filter when not given."""
     weights: Weights = Weights()
     """How much it counts beside other devices."""
     convention: str = ""
@@ -103,7 +108,8 @@ class CaptureFile(Source, frozen=True, kw_only=True):
             findings = (*findings, *found.findings)
         world_from_root = np.eye(4) if target is None else np.array(target.world_from_base or np.eye(4))
         bound, fit = registered(captured, bound, description, world_from_root, subject)
-        findings = (*findings, *fit)
+        bound, left_out = placed_only(bound, subject, "no frame shows where")
+        findings = (*findings, *fit, *left_out)
         samples = BodySamples(self, captured, bound)
         return Opened(samples=samples, duration=duration, findings=(*captured.findings, *findings, *checked))
 
@@ -136,9 +142,10 @@ class BodySamples:
         source = self.source
         first: float | None = None
         last, seq = -1e-9, 0
+        late = source.latency + group_delay(source.smoothing or 0.0)
         for frame in self.captured.frames:
             first = frame.t if first is None else first
-            t = frame.t - first - source.latency
+            t = frame.t - first - late
             if not t > last:  # also what is not a number
                 continue
             points = self.observer.points(frame)
@@ -153,8 +160,9 @@ class BodySamples:
                 t_device=frame.t,
                 points=points,
                 subject=frame.subject,
-                latency=source.latency,
+                latency=late,
                 hold=source.hold,
+                smoothing=source.smoothing or 0.0,
                 quality=Quality.GOOD,
             )
             seq += 1
@@ -201,4 +209,6 @@ def _check(samples: BodySamples, rows: int, subject: str, file: str) -> tuple[fl
         shown = ", ".join(f"{name or 'nameless'} ({n})" for name, n in people.most_common(4))
         notes.append(("warning", f"the device changed its name of the person: {shown}"))
     found = (Finding(level=level, subject=subject, text=f"{file}: {text}") for level, text in notes)
-    return max(last - samples.source.latency, 0.0), tuple(found)
+    return max(last - samples.source.latency - group_delay(samples.source.smoothing or 0.0), 0.0), tuple(
+        found
+    )

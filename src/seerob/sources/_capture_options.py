@@ -13,8 +13,9 @@ from seerob.human import mapping as names
 from seerob.human.calibration import Calibrated, CalibrationPose, calibrate
 from seerob.human.captured import CaptureFrame, Layout
 from seerob.human.estimated import estimated as without_neighbours
-from seerob.human.observing import Observer, bind, with_mounts
+from seerob.human.observing import Observer, bind, with_mounts, with_places, without_unplaced
 from seerob.human.skeleton import BONES
+from seerob.human.smoothing import HIGHEST, LOWEST
 from seerob.model_io.description import Description
 from seerob.quantities import Pose
 from seerob.snapshot import Finding
@@ -60,6 +61,12 @@ class Calibration(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Begin of that time, from the first frame [s]."""
     duration: Seconds = 1.0
     """Its length [s]."""
+
+
+CutOff = Annotated[
+    float, Meta(ge=LOWEST, le=HIGHEST, extra={"unit": "Hz"}, extra_json_schema={"x-unit": "Hz"})
+]
+"""Of the low-pass filter through which the twin sees a device."""
 
 
 class Options(Protocol):
@@ -148,7 +155,25 @@ def calibrated(
     found = calibrate(
         list(frames), bound, description, options.calibration.pose, seen=layout.seen, subject=options.human
     )
-    return with_mounts(bound, found.mounts), found
+    placed = with_places(with_mounts(bound, found.mounts), found.places)
+    return placed, found
+
+
+def placed_only(bound: Observer, subject: str, remedy: str) -> tuple[Observer, tuple[Finding, ...]]:
+    """The same without what devices place as they like and nothing has told the place of.
+
+    Args:
+        bound: From `observer` or `calibrated`.
+        subject: Whom findings are about.
+        remedy: How its place could be found.
+    """
+    bound, names = without_unplaced(bound)
+    if not names:
+        return bound, ()
+    text = (
+        f"positions of {', '.join(names)} are not used: every device places this joint as it likes; {remedy}"
+    )
+    return bound, (Finding(level="note", subject=subject, text=text),)
 
 
 def placement(at: Pose) -> Array:

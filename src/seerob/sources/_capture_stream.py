@@ -15,7 +15,8 @@ from seerob.human import manikin
 from seerob.human.calibration import Calibrated, CalibrationPose
 from seerob.human.captured import CaptureFrame, Layout
 from seerob.human.observing import Observer
-from seerob.live import LiveSource
+from seerob.human.smoothing import group_delay
+from seerob.live import LiveSource, say_once
 from seerob.model_io.description import Description
 from seerob.quantities import Pose
 from seerob.samples import BodyPoint, BodySample, Quality, Sample, SignalSample
@@ -23,6 +24,7 @@ from seerob.snapshot import Finding
 from seerob.source import Target
 from seerob.sources._capture_options import (
     Calibration,
+    CutOff,
     Instant,
     Mapped,
     Seconds,
@@ -30,6 +32,7 @@ from seerob.sources._capture_options import (
     calibrated,
     observer,
     person,
+    placed_only,
 )
 
 _log = logging.getLogger(__name__)
@@ -54,6 +57,8 @@ class CaptureStream(LiveSource, frozen=True, kw_only=True):
     """Time from the motion to the arrival of what the device says of it [s]."""
     hold: Seconds = 0.5
     """Age at which a bone that is no longer seen does not count any more [s]."""
+    smoothing: CutOff | None = None
+    """Cut-off frequency of a low-pass filter against the device's noise [Hz]; no filter when not given."""
     weights: Weights = Weights()
     """How much it counts beside other devices."""
     convention: str = ""
@@ -68,8 +73,9 @@ class CaptureStream(LiveSource, frozen=True, kw_only=True):
         return self.human
 
     def behind(self) -> float:
-        """Delay behind the world that it needs [s]; its latency comes on top of the period."""
-        return super().behind() + (self.latency if self.delay is None else 0.0)
+        """Delay behind the world that it needs [s]; latency and filter come on top of the period."""
+        late = self.latency + group_delay(self.smoothing or 0.0)
+        return super().behind() + (late if self.delay is None else 0.0)
 
     def frames(self) -> AsyncGenerator[tuple[Layout, CaptureFrame], None]:
         """Connect, and yield every frame of every person until the connection ends.
@@ -119,16 +125,18 @@ class _Hearing:
         if not self._calibrated:
             return self._calibrate(layout, frame, now)
         points = bound.points(frame)
+        late = self._source.latency + group_delay(self._source.smoothing or 0.0)
         return BodySample(
             source=self._source.name,
             target=self._source.human,
             seq=0,
-            t=now - self._source.latency,
+            t=now - late,
             t_device=frame.t if np.isfinite(frame.t) else None,
             points=points,
             subject=frame.subject,
-            latency=self._source.latency,
+            latency=late,
             hold=self._source.hold,
+            smoothing=self._source.smoothing or 0.0,
             quality=_quality(points, changed),
         )
 
@@ -142,7 +150,15 @@ class _Hearing:
                     source, layout, self._description, file=source.name or "stream"
                 )
                 _say(findings)
+                if self._calibrated:
+                    self._drop_unplaced()
         return self._observer
+
+    def _drop_unplaced(self) -> None:
+        assert self._observer is not None  # bound before
+        remedy = 'a calibration with pose = "npose" finds out where'
+        self._observer, findings = placed_only(self._observer, self._source.human, remedy)
+        _say(findings)
 
     def _follows(self, frame: CaptureFrame, now: float) -> tuple[bool, bool]:
         """Whether the frame is of the person who is followed, and whether that has another name now."""
@@ -188,6 +204,7 @@ class _Hearing:
             self._source, self._window, layout, self._observer, self._description
         )
         _say(found.findings)
+        self._drop_unplaced()
         self._window, self._calibrated = [], True
         return SignalSample(source=self._source.name, seq=0, t=now, values=_residuals(found))
 
@@ -205,7 +222,7 @@ def _residuals(found: Calibrated) -> dict[str, float | bool | str]:
 def _say(findings: tuple[Finding, ...]) -> None:
     for finding in findings:
         level = logging.WARNING if finding.level == "warning" else logging.INFO
-        _log.log(level, "%s: %s", finding.subject, finding.text)
+        say_once(_log, level, f"{finding.subject}: {finding.text}")
 
 
 def _quality(points: tuple[BodyPoint, ...], changed: bool) -> Quality:

@@ -14,6 +14,7 @@ from enum import StrEnum
 import numpy as np
 
 from seerob.human.captured import CaptureFrame, Layout, Seen
+from seerob.live import say_once
 from seerob.protocols import ProtocolError
 from seerob.protocols.mvn import Items, Kind, Scale, Tags, decode
 from seerob.protocols.mvn_assembly import Assembly
@@ -197,7 +198,8 @@ class Frames:
     def _tell(self, about: str, text: str) -> None:
         if about not in self._told:
             self._told.add(about)
-            _log.log(logging.INFO if text.endswith("trunk") else logging.WARNING, "%s: %s", self._who, text)
+            level = logging.INFO if text.endswith("trunk") else logging.WARNING
+            say_once(_log, level, f"{self._who}: {text}")
 
 
 def _scale(who: Character, scale: Scale) -> None:

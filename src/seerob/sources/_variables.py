@@ -16,14 +16,20 @@ from typing import ClassVar, NamedTuple, Self
 
 from msgspec.structs import replace
 
-from seerob.live import LiveSource
+from seerob.errors import SeerobError
+from seerob.live import ASK_WITHIN, LiveSource, because
 from seerob.quantities import Seconds
 from seerob.samples import Sample, SignalSample
+from seerob.snapshot import Finding
 from seerob.source import Target
 from seerob.variables.dictionary import BadValue, Value, Variable
 
+COVER_WITHIN = 1.0
+"""How long a device is listened to for what it has of the dictionary, at start [s]."""
 BEAT = 0.05
 """A sample is sent at least this often while there is a connection [s]: no news is news, too."""
+PULSES = 4
+"""A device that says nothing is asked so often within its source's time-out whether it is there."""
 
 
 FILES = ("ca", "certificate", "key", "server_certificate")
@@ -76,10 +82,50 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
         named = {key: getattr(self, key, None) for key in FILES}
         return replace(self, **{key: str(folder / path) for key, path in named.items() if path is not None})
 
+    def patience(self) -> float:
+        """How long a run waits for the answer at start [s]."""
+        return ASK_WITHIN + COVER_WITHIN
+
+    async def inquire(self, folder: Path, target: Target | None) -> tuple[Finding, ...]:
+        """What the device says of itself, and what of the dictionary it does not have."""
+        found = await self.ask()
+        read = tuple(v for v in (() if target is None else target.variables) if not v.write)
+        return (*found, *(await self._covered(read, folder))) if read else found
+
+    async def _covered(self, variables: tuple[Variable, ...], folder: Path) -> tuple[Finding, ...]:
+        """Each variable once: heard and believable, in doubt, or not heard in time."""
+        picture, clock = Picture(variables, by_exception=True), asyncio.get_running_loop()
+        end, waiting, ended = clock.time() + COVER_WITHIN, {v.name for v in variables}, ""
+        try:
+            async with aclosing(self.changes(variables, folder)) as said, asyncio.timeout_at(end):
+                async for changes in said:
+                    picture.take(changes, time.monotonic())
+                    waiting -= {change.name for change in changes}
+                    if not waiting:
+                        break
+        except TimeoutError:
+            pass
+        except (OSError, EOFError, SeerobError) as error:
+            ended = because(error)
+        doubts = picture.sample(time.monotonic()).doubts
+        unheard = f"not heard within {COVER_WITHIN:g} s" + (f": {ended}" if ended else "")
+        texts = {name: unheard if name in waiting else doubts[name] for name in doubts}
+        heard = f"{len(variables) - len(texts)} of {len(variables)} variables are heard at start"
+        return (
+            Finding(level="note", subject=self.name, text=heard),
+            *(
+                Finding(level="warning", subject=name, text=text.removeprefix(f"{name}: "))
+                for name, text in texts.items()
+            ),
+        )
+
     def changes(
         self, variables: tuple[Variable, ...], folder: Path
     ) -> AsyncGenerator[tuple[Change, ...], None]:
         """Connect, and yield what the device says of the variables until the connection ends.
+
+        Each time it yields, the device was there at that moment: what stands is as new as that. A device
+        that only speaks of changes has to be asked now and then, and nothing is a fine thing to yield.
 
         Args:
             variables: Those to read.
@@ -107,12 +153,16 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
         picture = Picture(variables, by_exception=self.by_exception)
         folder = Path("" if target is None else target.folder)
         read = tuple(v for v in variables if not v.write)
-        async with aclosing(self.changes(read, folder)) as said:
-            async for changes in _beating(said):
+        alive = time.monotonic()
+        async with aclosing(self.changes(read, folder)) as said, aclosing(_beating(said)) as beats:
+            async for changes in beats:
                 now = time.monotonic()
-                picture.take(changes, now)
+                if changes is not None:
+                    alive = now
+                    picture.take(changes, now)
                 if picture.begun:
-                    yield picture.sample(now)
+                    # Silence is no news: what stood when the device was last heard is as old as that.
+                    yield replace(picture.sample(now), t=alive)
 
 
 class Picture:
@@ -168,8 +218,10 @@ class Picture:
         return SignalSample(source="", seq=0, t=now, values=dict(self._values), doubts=doubts)
 
 
-async def _beating(said: AsyncIterator[tuple[Change, ...]]) -> AsyncGenerator[tuple[Change, ...], None]:
-    """What is said, and nothing every `BEAT` in which nothing is."""
+async def _beating(
+    said: AsyncIterator[tuple[Change, ...]],
+) -> AsyncGenerator[tuple[Change, ...] | None, None]:
+    """What is said, and None every `BEAT` in which nothing is."""
     waiting: asyncio.Task[tuple[Change, ...]] | None = None
     try:
         while True:
@@ -177,7 +229,7 @@ async def _beating(said: AsyncIterator[tuple[Change, ...]]) -> AsyncGenerator[tu
                 waiting = asyncio.ensure_future(anext(said))
             done, _ = await asyncio.wait({waiting}, timeout=BEAT)
             if not done:
-                yield ()
+                yield None
                 continue
             heard, waiting = waiting, None
             try:

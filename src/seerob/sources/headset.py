@@ -21,6 +21,7 @@ from msgspec import Meta
 from seerob.headset_offers import OFFERS, Offer
 from seerob.human.captured import CaptureFrame, Layout, Seen
 from seerob.human.mapping import conventions, plain
+from seerob.live import say_once
 from seerob.protocols.xr_axes import world_positions, world_turns
 from seerob.snapshot import Finding
 from seerob.sources._capture_stream import CaptureStream
@@ -83,7 +84,7 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
     def _tell(self, layout: Layout) -> None:
         if BODY not in layout.names:
             text = "head and hands only: legs, pelvis and spine are estimated, not measured"
-            _log.warning("%s: %s", self.name or f"headset {self.human}", text)
+            say_once(_log, logging.WARNING, f"{self.name or f'headset {self.human}'}: {text}")
 
     async def _offers(self) -> AsyncGenerator[Offer, None]:
         loop = asyncio.get_running_loop()

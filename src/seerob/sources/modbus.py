@@ -12,7 +12,7 @@ from msgspec import Meta
 
 from seerob.errors import InputError, Problem
 from seerob.protocols import modbus
-from seerob.protocols.modbus import Place
+from seerob.protocols.modbus import Place, Table
 from seerob.protocols.modbus_client import Refused, connect
 from seerob.quantities import Seconds
 from seerob.snapshot import Finding
@@ -47,7 +47,10 @@ class Modbus(VariablesSource, frozen=True, kw_only=True):
         problems = []
         for variable in () if target is None else target.variables:
             try:
-                msgspec.convert(variable.address, Place)
+                place = msgspec.convert(variable.address, Place)
+                if variable.write and place.table is not Table.COIL:
+                    what = f'table = "{place.table}": a trigger is written to a coil alone'
+                    problems.append(Problem(f"modbus {self.host}", f"{variable.name}.address", what))
             except msgspec.ValidationError as error:
                 remedy = 'write { table = "holding", at = 128, type = "i16" }'
                 problems.append(
@@ -82,6 +85,12 @@ class Modbus(VariablesSource, frozen=True, kw_only=True):
                 # What was asked late is not made up for.
                 due = max(due + self.every, clock.time())
                 await asyncio.sleep(due - clock.time())
+
+    async def write(self, variable: Variable, raw: bool, folder: Path) -> None:
+        """Write one coil; called by `seerob.writing.triggers` alone."""
+        place = msgspec.convert(variable.address, Place)
+        async with connect(self.host, self.port, self.device) as device:
+            await device.write_coil(place.at, raw)
 
     async def browse(self) -> AsyncGenerator[Node, None]:
         """Nothing: the protocol has no names.

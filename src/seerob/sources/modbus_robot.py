@@ -61,7 +61,7 @@ class ModbusRobot(LiveSource, frozen=True, kw_only=True):
         """Interval between samples that is expected [s]."""
         return self.every
 
-    def coarse(self) -> str:
+    def coarse(self, folder: Path) -> str:
         """Energies and forces are undecided with what it says."""
         return COARSE
 

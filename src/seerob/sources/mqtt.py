@@ -6,8 +6,7 @@ import asyncio
 import os
 import time
 from collections.abc import AsyncGenerator, Iterator
-from contextlib import asynccontextmanager
-from datetime import UTC, datetime
+from contextlib import aclosing, asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -16,10 +15,12 @@ from msgspec import Meta
 
 from seerob.errors import InputError, Problem, SeerobError
 from seerob.protocols import ProtocolError, sparkplug
-from seerob.protocols.json_pointer import at, document, parts
+from seerob.protocols.broker_pulse import Pulse, known_end
+from seerob.protocols.json_pointer import document, parts
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
-from seerob.sources._variables import BEAT, Change, Node, VariablesSource
+from seerob.sources._json_values import told
+from seerob.sources._variables import BEAT, PULSES, Change, Node, VariablesSource
 from seerob.variables.dictionary import Variable
 
 if TYPE_CHECKING:
@@ -31,8 +32,6 @@ KEEP_ALIVE = 5
 """[s]"""
 PATIENCE = 2.0
 """With the broker's answers [s]."""
-MILLISECONDS = 1e11
-"""A time above it is in milliseconds since 1970, below in seconds."""
 WAITING = 4096
 """Messages that wait to be read."""
 
@@ -101,9 +100,9 @@ def plain_change(name: str, where: Plain, payload: bytes, *, retained: bool, now
             if where.pointer or where.time:
                 raise
             value = payload.decode("utf-8", "replace")
-        raw = at(value, parts(where.pointer))
+        raw, age = told(value, where.pointer, where.time, now=now)
         if where.time is not None:
-            return Change(name, raw, age=max(0.0, now - _instant(at(value, parts(where.time)))))
+            return Change(name, raw, age=age)
     except (ProtocolError, ValueError) as error:
         return Change(name, None, doubt=f"{where.topic}: {error}")
     except KeyError as error:
@@ -111,16 +110,6 @@ def plain_change(name: str, where: Plain, payload: bytes, *, retained: bool, now
     if retained:
         return Change(name, raw, doubt=f"{where.topic}: kept by the broker, nobody says how old it is")
     return Change(name, raw)
-
-
-def _instant(value: Any) -> float:
-    """Seconds since 1970."""
-    if isinstance(value, str):
-        stamp = datetime.fromisoformat(value)
-        return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{str(value)[:40]!r} is no time")
-    return 1e-3 * value if abs(value) > MILLISECONDS else float(value)
 
 
 class Mqtt(VariablesSource, frozen=True, kw_only=True):
@@ -149,7 +138,9 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
         problems = []
         for variable in () if target is None else target.variables:
             try:
-                address(variable)
+                where = address(variable)
+                if variable.write and not (isinstance(where, Plain) and where == Plain(where.topic)):
+                    raise ValueError('a trigger is true or false on a topic of its own: write "a/topic"')
             except (ValueError, msgspec.ValidationError) as error:
                 problems.append(Problem(f"mqtt {self.host}", f"{variable.name}.address", str(error)))
         if self.password_env is not None and self.password_env not in os.environ:
@@ -180,28 +171,40 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
                 plain.setdefault(where.topic, []).append((name, where))
             else:
                 metrics[where.node] = sparkplug.Node()
-        async with self._client(folder) as client:
+        async with self._client(folder) as client, aclosing(_messages(client)) as messages:
             for text in (*plain, *(t for node in metrics for t in _topics(node))):
                 await client.subscribe(text, qos=0, timeout=PATIENCE)
             yield _standing(wanted, metrics)
-            async for message in _messages(client):
-                if message is not None and (topic := str(message.topic)) in plain:
-                    payload, now = _bytes(message.payload), time.time()
-                    yield tuple(
-                        plain_change(name, where, payload, retained=bool(message.retain), now=now)
-                        for name, where in plain[topic]
-                    )
-                    continue
-                if message is not None:
-                    _hear(metrics, str(message.topic), _bytes(message.payload))
-                yield _standing(wanted, metrics)
+            within = min([self.timeout, *(v.timeout for v in variables)]) / PULSES
+            async with aclosing(Pulse(client, within)) as pulse:
+                async for message in messages:
+                    if not pulse.shown(spoke=message is not None):
+                        continue
+                    if message is not None and (topic := str(message.topic)) in plain:
+                        payload, now = _bytes(message.payload), time.time()
+                        yield tuple(
+                            plain_change(name, where, payload, retained=bool(message.retain), now=now)
+                            for name, where in plain[topic]
+                        )
+                        continue
+                    if message is not None:
+                        _hear(metrics, str(message.topic), _bytes(message.payload))
+                    yield _standing(wanted, metrics)
+
+    async def write(self, variable: Variable, raw: bool, folder: Path) -> None:
+        """Publish ``true`` or ``false``; called by `seerob.writing.triggers` alone."""
+        where = address(variable)
+        if not isinstance(where, Plain):
+            raise ProtocolError("a metric of Sparkplug is not written")
+        async with self._client(folder) as client:
+            await client.publish(where.topic, str(raw).lower(), qos=1, timeout=PATIENCE)
 
     async def browse(self) -> AsyncGenerator[Node, None]:
         """What is published within three seconds, Sparkplug births by their metrics."""
-        async with self._client() as client:
+        async with self._client() as client, aclosing(_messages(client)) as messages:
             await client.subscribe("#", qos=0, timeout=PATIENCE)
             end, seen = time.monotonic() + LISTEN, set()
-            async for message in _messages(client):
+            async for message in messages:
                 if time.monotonic() > end:
                     return
                 for node in () if message is None else _nodes(str(message.topic), _bytes(message.payload)):
@@ -232,7 +235,7 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
             max_queued_incoming_messages=WAITING,
         )
         try:
-            async with client:
+            async with known_end(client), client:
                 yield client
         except aiomqtt.MqttError as error:
             raise ConnectionError(str(error)) from error

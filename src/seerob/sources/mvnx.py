@@ -84,8 +84,8 @@ class _File:
         except (KeyError, ValueError):
             return None
         p, q = p[self.rows], q[self.rows]
-        length = np.linalg.norm(q, axis=1)
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
+            length = np.linalg.norm(q, axis=1)
             q = np.where(
                 (np.abs(length - 1) < 0.05)[:, None], q / np.where(length == 0, 1, length)[:, None], np.nan
             )

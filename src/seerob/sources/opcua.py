@@ -19,14 +19,17 @@ from seerob.protocols.opcua_client import (
     connect,
     find,
     needed,
+    said_unit,
     stated_unit,
+    write_bool,
 )
 from seerob.quantities import Seconds
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.sources._opcua_files import at_home, missing
-from seerob.sources._variables import Change, Node, VariablesSource
+from seerob.sources._variables import PULSES, Change, Node, VariablesSource
 from seerob.variables.dictionary import Kind, Variable
+from seerob.variables.units import unit
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client
@@ -106,12 +109,17 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
             changes = Changes()
             lost |= await changes.watch(client, nodes, self.interval)
             yield tuple(Change(name, None, doubt=why) for name, why in lost.items())
-            async for changed in changes.heard(client):
+            async for changed in changes.heard(client, self.timeout / PULSES):
                 yield tuple(
                     # A value that stands is as new as the connection, however long ago it changed.
                     Change(name, found.value, doubt=found.doubt)
                     for name, found in changed.items()
                 )
+
+    async def write(self, variable: Variable, raw: bool, folder: Path) -> None:
+        """Write one bool; called by `seerob.writing.triggers` alone."""
+        async with connect(self.way(), folder) as client:
+            await write_bool(await find(client, address(variable.address)), raw)
 
     async def browse(self) -> AsyncGenerator[Node, None]:
         """The variables below Objects, without the server's own, by addresses that last."""
@@ -136,12 +144,17 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
 
 async def _disagreement(variable: Variable, node: Found) -> str:
     """Why a variable is not what the dictionary says; empty when nothing speaks against it."""
-    if variable.type is not Kind.NUMBER:
+    if variable.type is not Kind.NUMBER or variable.unit is None:
         return ""
-    stated = await stated_unit(node)
-    if stated and variable.scale == 1 and stated != variable.unit:
-        return f"the server states the unit {stated}, the dictionary {variable.unit}"
-    return ""
+    said = await said_unit(node)
+    stated, given = unit(said), unit(variable.unit)
+    if not said or stated == given:
+        return ""
+    # With a scale or an offset the user has said what the raw numbers are; not of another quantity, though.
+    scaled = variable.scale != 1 or variable.offset != 0
+    if scaled and (stated is None or given is None or stated.si == given.si):
+        return ""
+    return f"the server states the unit {said}, the dictionary {variable.unit}"
 
 
 async def _described(client: Client, node: Found, uris: list[str]) -> Node:

@@ -21,6 +21,7 @@ from seerob.samples import JointSample, Quality, Sample, SignalSample
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.sources._opcua_files import at_home, missing
+from seerob.sources._variables import PULSES
 from seerob.trajectory import MotionOrigin, origin_finding
 from seerob.variables.units import unit
 
@@ -115,7 +116,7 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
             return (origin, *(Finding(level="note", subject=self.robot, text=t) for t in said))
 
     async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
-        """Joint samples whenever an axis changes, and the states of safety as signals."""
+        """Joint samples whenever an axis changes or the server shows that none has, and signals."""
         async with connect(self.way(), Path("" if target is None else target.folder)) as client:
             found = self._chosen(await robots(client))
             positions, speeds = self._factors(found)
@@ -129,17 +130,19 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
             newest: dict[str, Said] = {}
             signals: dict[str, float | bool | str] = {}
             due = 0.0
-            async for changed in changes.heard(client):
+            async for changed in changes.heard(client, min(self.timeout / PULSES, SIGNAL_PERIOD)):
                 newest |= changed
                 now = time.monotonic()
                 states = _states(newest)
                 if states and (states != signals or now >= due):
                     signals, due = states, now + SIGNAL_PERIOD
                     yield SignalSample(source="", seq=0, t=now, values=states | _load(found))
-                if any(name[0] in "qv" and name[1:].isdecimal() for name in changed):
+                moved = any(name[0] in "qv" and name[1:].isdecimal() for name in changed)
+                if moved or not changed:
                     sample = joint_sample(newest, positions, speeds, target=self.robot, arrived=now)
                     if sample is not None:
-                        yield sample
+                        # Of a robot that stands still a server says nothing but that it is there.
+                        yield sample if moved else msgspec.structs.replace(sample, t_device=None)
 
     def _chosen(self, found: tuple[Robot, ...]) -> Robot:
         where = f"opcua_robot {self.url}"
@@ -162,6 +165,14 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
         positions, problems = [], []
         for axis in robot.axes:
             known = unit(axis.unit or self.position_unit or "?")
+            if axis.unit and self.position_unit is not None and known != unit(self.position_unit):
+                what = f"{axis.name} states {axis.unit}, and position_unit is {self.position_unit!r}"
+                problems.append(
+                    Problem(
+                        f"opcua_robot {self.url}", "position_unit", what, "leave it out: the server says it"
+                    )
+                )
+                continue
             if known is None or known.si not in ("rad", "m"):
                 what = f"{axis.name} states no unit of length or angle"
                 problems.append(

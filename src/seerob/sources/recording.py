@@ -45,6 +45,16 @@ class RecordedMotion(Source, frozen=True, kw_only=True):
         """The robot or human."""
         return self.drives
 
+    def coarse(self, folder: Path) -> str:
+        """What was too coarse when it was recorded is so now."""
+        from seerob.recording import Recording
+
+        path, recorded = folder / self.file, self.recorded or self.drives
+        if not path.is_file():
+            return ""  # `open` says so
+        mechanisms = Recording.open(path).scene.mechanisms
+        return next((m.coarse for m in mechanisms if m.name == recorded), "")
+
     def open(self, folder: Path, target: Target | None) -> Opened:
         """Read the recording once, check its motion, and hand out its samples.
 

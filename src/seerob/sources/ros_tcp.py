@@ -111,7 +111,7 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
     async def _frames(self, connection: Connection) -> AsyncGenerator[tuple[float, Frame], None]:
         splitter = Splitter()
         while True:
-            arrived, data, _ = await connection.read(CHUNK, self.silence() or PATIENT)
+            arrived, data, _ = await connection.read(self.silence() or PATIENT)
             if not data:
                 return
             for frame in splitter.feed(data):

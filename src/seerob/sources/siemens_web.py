@@ -7,7 +7,6 @@ import contextlib
 import os
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
-from ipaddress import ip_address
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from urllib.parse import urlsplit
@@ -17,6 +16,7 @@ from msgspec.structs import replace
 
 from seerob.errors import InputError, Problem
 from seerob.protocols import ProtocolError, s7_web
+from seerob.protocols.http_answer import answer, is_here
 from seerob.quantities import Seconds
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 PATIENCE = 2.0
 """With each answer [s]."""
-LARGEST = 1 << 20
-"""Answer [byte]."""
 DEEPEST = 4
 """Levels that `browse` goes down."""
 
@@ -53,7 +51,7 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         parts = urlsplit(self.url)
-        if parts.scheme == "http" and not _is_here(parts.hostname or ""):
+        if parts.scheme == "http" and not is_here(parts.hostname or ""):
             raise ValueError(f"url = {self.url!r} would send a password unencrypted: write https://")
 
     def period(self) -> float:
@@ -164,29 +162,5 @@ class _Session:
             OSError: There is none.
             ProtocolError: It is too large, or no success.
         """
-        import httpx
-
         headers = {"Content-Type": "application/json"} | ({s7_web.TOKEN: self.token} if self.token else {})
-        try:
-            async with self._client.stream("POST", self._url, content=data, headers=headers) as answer:
-                if answer.status_code != httpx.codes.OK:
-                    raise ProtocolError(f"the PLC answers with HTTP {answer.status_code}")
-                found = bytearray()
-                async for chunk in answer.aiter_bytes():
-                    found += chunk
-                    if len(found) > LARGEST:
-                        raise ProtocolError(f"an answer of more than {LARGEST >> 20} MiB")
-                return bytes(found)
-        except httpx.TimeoutException as error:
-            raise TimeoutError("no answer in time") from error
-        except (httpx.HTTPError, httpx.InvalidURL) as error:
-            raise ConnectionError(str(error) or type(error).__name__) from error
-
-
-def _is_here(host: str) -> bool:
-    if host == "localhost":
-        return True
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return False
+        return await answer(self._client, "POST", self._url, who="the PLC", headers=headers, content=data)

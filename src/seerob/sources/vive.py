@@ -22,6 +22,7 @@ from msgspec.structs import replace as changed
 from seerob.errors import InputError
 from seerob.human.calibration import CalibrationPose
 from seerob.human.captured import CaptureFrame, Layout
+from seerob.live import say_once
 from seerob.protocols.live_messages import Sieve, from_datagrams, from_websocket
 from seerob.protocols.vive import PORT, Device, Devices, decode
 from seerob.snapshot import Finding
@@ -118,16 +119,13 @@ class Vive(CaptureStream, frozen=True, kw_only=True):
                     rows = {serial: row for row, serial in enumerate(names.of)}
                     told = {d.serial: d for d in instant.devices}
                     for finding in remarks(names, told.values(), self.human):
-                        _log.log(
-                            logging.WARNING if finding.level == "warning" else logging.INFO,
-                            "%s: %s",
-                            who,
-                            finding.text,
-                        )
+                        level = logging.WARNING if finding.level == "warning" else logging.INFO
+                        say_once(_log, level, f"{who}: {finding.text}")
                 for device in instant.devices:
                     if device.serial not in rows and device.serial not in late:
                         late.add(device.serial)
-                        _log.warning("%s: %s appeared late and is not used", who, device.serial)
+                        text = f"{who}: {device.serial} appeared late and is not used"
+                        say_once(_log, logging.WARNING, text)
                 known = watch.moved_at
                 if not watch.trusted(instant):
                     if known is None:

@@ -16,6 +16,7 @@ import numpy as np
 from msgspec import Meta, field
 
 from seerob.human.captured import CaptureFrame, Layout, Seen
+from seerob.live import say_once
 from seerob.motion_io.upright import Up, world_from_file
 from seerob.protocols import ProtocolError, vrpn
 from seerob.protocols.vrpn import TrackerPose
@@ -85,7 +86,8 @@ class Vrpn(CaptureStream, frozen=True, kw_only=True):
                 if key not in rows:
                     if key not in late and len(late) < vrpn.MOST_NAMES:
                         late.add(key)
-                        _log.warning("%s: %s/%d appeared late and is not used", self.name, *key)
+                        text = f"{self.name}: {key[0]}/{key[1]} appeared late and is not used"
+                        say_once(_log, logging.WARNING, text)
                     continue
                 first = min((p.t for p in pending.values()), default=pose.t)
                 if key in pending or abs(pose.t - first) > 0.5 * self.period():

@@ -12,6 +12,7 @@ from seerob.errors import InputError, Problem, suggestion
 from seerob.quantities import Pose, Radians, unit
 from seerob.snapshot import Finding
 from seerob.source import Target
+from seerob.sources._logged_program import log_kind, logged_program
 from seerob.sources._trajectory_file import TrajectoryFile, notes
 from seerob.trajectory import MotionOrigin, Trajectory
 from seerob.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
@@ -27,10 +28,13 @@ BY_HAND = "points"
 
 
 class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
-    """A robot's motion through waypoints, timed here: URScript, .urp, CSV, Excel, TOML, YAML, or by hand."""
+    """A robot's motion through waypoints, timed here: URScript, .urp, tables, TOML, YAML, logs, by hand."""
 
     file: str = ""
     """Path, from the folder of the workstation file; its ending says what it is. Without it ``points``."""
+    tolerance: Annotated[Annotated[float, Meta(gt=0, le=1)] | None, unit("rad")] = None
+    """Of a log (RoboDK, KUKA): how far in any joint the moves between waypoints may be from what was logged
+    [rad or m]; needed with a log."""
     points: tuple[Point, ...] = ()
     """Waypoints by hand instead of a file; their keys are below."""
     origin: MotionOrigin = MotionOrigin.PLANNED
@@ -118,6 +122,8 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
         Raises:
             InputError: The file is wrong.
         """
+        if self.file and (kind := log_kind(path)) is not None:
+            return logged_program(kind, path, self.file, self.robot, self.tolerance)
         if self.file:
             return read_program(path, self.file)
         return Program(BY_HAND, tuple(p.waypoint(f"points[{i}]") for i, p in enumerate(self.points)))

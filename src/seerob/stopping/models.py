@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -153,9 +153,14 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         InputError: Options that do not fit the robot.
         UnknownName: No such table.
     """
-    if stop.model == "table":
-        return _tabulated(stop, model, robot, gap)
-    return _simulated(stop, model, robot, gap) if stop.model == "simulated" else _timed(stop, gap)
+    if stop.model not in ("table", "simulated"):
+        return _timed(stop, gap)
+    bind = _tabulated if stop.model == "table" else _simulated
+    found = bind(stop, model, robot, gap)
+    if not robot.on:
+        return found
+    doubt = f"{robot.on}, which carries {robot.name}, has a way to stop of its own that is not in it"
+    return replace(found, doubts=(*found.doubts, doubt))
 
 
 def _given(name: str, value: float, unit: str) -> Input:

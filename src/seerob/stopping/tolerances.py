@@ -1,10 +1,11 @@
-"""Tolerances of how a robot stops, and S_p at their ends.
+"""Tolerances of how a robot stops and of what else S_p is made from, and S_p at their ends.
 
-S_p rises with T_r and T_s, whose coefficients v_h + v_r and v_h + v_r (or v_h + v_r/2) are never negative,
-and falls with a constant deceleration a, which only occurs as v/a and v²/2a; with the approach speeds of
-ISO 13855 it is made of such figures by taking the larger and the lesser, which keeps that. So its ends are
-at the ends of the inputs. With a simulated stop the pose in which braking begins depends on T_r too: there
-the ends are two samples, and nothing is proved of what lies between.
+S_p rises with C, and with the approach speed v_h, whose coefficient is T_r + T_s. It rises with T_r and T_s,
+whose coefficients v_h + v_r and v_h + v_r (or v_h + v_r/2) are never negative, and falls with a constant
+deceleration a, which only occurs as v/a and v²/2a; with the approach speeds of ISO 13855 it is made of such
+figures by taking the larger and the lesser, which keeps that. So its ends are at the ends of the inputs. With
+a simulated stop the pose in which braking begins depends on T_r too: there the ends are two samples, and
+nothing is proved of what lies between.
 """
 
 from __future__ import annotations
@@ -42,19 +43,23 @@ def shifted(stop: Stop, shifts: Shifts) -> Stop:
 
 
 class SeparationEnds:
-    """S_p of every moving part [m] at the ends of a stop's tolerances.
+    """S_p of every moving part [m] at the ends of what it is made from.
 
     Args:
-        stop: With its tolerances.
-        required: S_p of every part at a state, for a stop without any.
+        tolerances: The inputs that may be off.
+        required: S_p of every part at a state, for shifted inputs.
         remembers: Whether S_p depends on what was before, so that every end is to be asked at every tick.
     """
 
     def __init__(
-        self, stop: Stop, required: Callable[[Stop], Callable[[State], Array]], *, remembers: bool
+        self,
+        tolerances: tuple[Tolerance, ...],
+        required: Callable[[Shifts], Callable[[State], Array]],
+        *,
+        remembers: bool,
     ) -> None:
-        self.tolerances = tolerances(stop)
-        self._stop, self._required, self._remembers = stop, required, remembers
+        self.tolerances = tolerances
+        self._required, self._remembers = required, remembers
         self._bound: dict[Shifts, Callable[[State], Array]] = {}
 
     def at(self, state: State) -> Spread:
@@ -62,7 +67,7 @@ class SeparationEnds:
 
         def figure(shifts: Shifts) -> Array:
             if shifts not in self._bound:
-                self._bound[shifts] = self._required(shifted(self._stop, shifts))
+                self._bound[shifts] = self._required(shifts)
             return self._bound[shifts](state)
 
         found = spread(figure, len(self.tolerances))

@@ -82,4 +82,10 @@ def product(p: Array, q: Array) -> Array:
     """Hamilton product of quaternions (n, 4), row by row."""
     pw, pv, qw, qv = p[:, :1], p[:, 1:], q[:, :1], q[:, 1:]
     w = pw * qw - np.sum(pv * qv, axis=1, keepdims=True)
-    return np.hstack([w, pw * qv + qw * pv + np.cross(pv, qv)])
+    return np.hstack([w, pw * qv + qw * pv + cross(pv, qv)])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Vector product (n, 3), row by row: for a few rows several times faster than `numpy.cross`."""
+    (a0, a1, a2), (b0, b1, b2) = a.T, b.T
+    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 import zipfile
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -62,8 +63,7 @@ class SheetGrid:
 
     def rows(self) -> Iterator[Sequence[Cell]]:
         """Rows as tuples of cells."""
-        book = _open(self.path, self.file)
-        try:
+        with _opened(self.path, self.file) as book:
             sheet = book[self.sheet]
             # The stated extent may be wrong by any amount; what is there counts.
             sheet.reset_dimensions()
@@ -75,19 +75,24 @@ class SheetGrid:
                     what = f"{len(row)} columns, more than {MAX_COLUMNS}"
                     raise InputError.at(self.file, f"sheet {self.sheet!r}", what)
                 yield row
-        finally:
-            book.close()
 
 
-def _open(path: Path, name: str) -> Any:
+@contextmanager
+def _opened(path: Path, name: str) -> Iterator[Any]:
     from openpyxl import load_workbook
 
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return load_workbook(path, read_only=True, data_only=True)
-    except Exception as error:  # openpyxl raises whatever a broken part makes it raise
-        raise InputError.at(name, "", f"not a workbook: {error}", SAVE_AS) from error
+    # A file of its own: openpyxl leaves the one that it opens open when a part is broken.
+    with path.open("rb") as file:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                book = load_workbook(file, read_only=True, data_only=True)
+        except Exception as error:  # openpyxl raises whatever a broken part makes it raise
+            raise InputError.at(name, "", f"not a workbook: {error}", SAVE_AS) from error
+        try:
+            yield book
+        finally:
+            book.close()
 
 
 def _parsed(rows: Iterator[Sequence[Cell]], name: str, sheet: str) -> Iterator[Sequence[Cell]]:
@@ -110,8 +115,8 @@ def _parsed(rows: Iterator[Sequence[Cell]], name: str, sheet: str) -> Iterator[S
 def sheets(path: Path, name: str) -> tuple[SheetGrid, ...]:
     """The sheets with cells, in order; InputError when the file is no workbook."""
     check_workbook(path, name)
-    book = _open(path, name)
-    try:
-        return tuple(SheetGrid(path, name, sheet.title) for sheet in book.worksheets)
-    finally:
-        book.close()
+    with _opened(path, name) as book:
+        found = tuple(SheetGrid(path, name, sheet.title) for sheet in book.worksheets)
+    if not found:
+        raise InputError.at(name, "", "a workbook without a sheet of cells", SAVE_AS)
+    return found

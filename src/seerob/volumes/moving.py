@@ -10,11 +10,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.errors import InputError
+from seerob.errors import InputError, Problem
 from seerob.geometry import Mesh, Solid
 from seerob.kernels.fields import Field, mesh_field
 from seerob.kernels.tree_file import tree_of
 from seerob.model import Model
+from seerob.model_io.mesh_bodies import is_closed, joined
 from seerob.transforms import Array
 
 Indices = NDArray[np.int64]
@@ -134,6 +135,7 @@ class Moving:
     def __init__(self, model: Model, bodies: Sequence[int]) -> None:
         """Of a compiled workstation, and indices in `Model.bodies`."""
         self.model, self.bodies = model, tuple(bodies)
+        _refuse_open(model, self.bodies)
         self.cores = tuple(core_of(i, solid) for i in self.bodies for solid in model.bodies[i].solids)
         self.joints = Joints.of(model.mj)
         chains = {i: chain_of(model, i) for i in self.bodies}
@@ -261,3 +263,25 @@ def posed(model: Model, motion: Mapping[str, Array]) -> Array:
     for name in motion:
         model.mechanism(name)
     return out
+
+
+def _refuse_open(model: Model, bodies: Sequence[int]) -> None:
+    """Refuse tools, workpieces and parts of which nobody can say what volume they take.
+
+    Links are told about only (`seerob.model_io.lint.open_meshes`): nobody can give them another shape.
+
+    Raises:
+        InputError: With each that has an open mesh.
+    """
+    station = model.workstation
+    file = next(iter(station.files), "workstation")
+    problems = []
+    for group in ("tools", "workpieces", "parts"):
+        for i, thing in enumerate(getattr(station, group)):
+            own = [model.bodies[k].solids for k in bodies if model.bodies[k].owner == thing.name]
+            meshes = [solid.mesh for solids in own for solid in solids if solid.mesh is not None]
+            if meshes and not all(map(is_closed, meshes)) and not is_closed(joined(meshes)[0]):
+                what = f"the mesh of {thing.name} is open: the volume that it sweeps cannot be told"
+                problems.append(Problem(file, f"{group}[{i}].mesh", what, "close it, or give a shape"))
+    if problems:
+        raise InputError(problems)

@@ -33,7 +33,7 @@ from seerob.volumes.moving import Core, Moving, Progress, reach_box, with_field
 from seerob.volumes.swept import SLACK, SPACING, Swept
 from seerob.volumes.voxels import VoxelGrid, check_room
 
-CELLS = 6e6
+CELLS = 2e7
 """Voxels that the sweep of one joint may take, about, when they are made finer than asked."""
 FINEST = 8
 """Parts of a voxel's edge in the sweep of a joint, at most; a power of 2."""
@@ -124,10 +124,16 @@ def reachable_volume(
 
 @dataclass(frozen=True, eq=False)
 class _Set:
-    """Voxels, and how far any point of theirs can be from the set that they stand for [m]."""
+    """Voxels, and how far they can be from the set that they stand for."""
 
     grid: VoxelGrid
-    excess: float
+    centre: float
+    """Largest distance of a voxel's centre from that set [m]."""
+
+    @property
+    def excess(self) -> float:
+        """The same of any point of theirs [m]."""
+        return float(self.centre + HALF_DIAGONAL * self.grid.pitch)
 
 
 class _Work:
@@ -156,7 +162,7 @@ class _Work:
             found = self._turned(screw, [_Set(grid, excess), *beyond], grid.pitch)
             if found is None:
                 return None
-            grid, excess = found.grid, found.excess
+            grid, excess = found.grid, found.centre
         else:
             for voxels in beyond:
                 core = _core_of(voxels.grid, grid.pitch * EXACT)
@@ -186,15 +192,16 @@ class _Work:
             for i, layer in enumerate(each.grid.cells, int(each.grid.first[0])):
                 j, k = ((np.argwhere(layer) + each.grid.first[1:]) // factor - grid.first[1:]).T
                 grid.cells[i // factor - grid.first[0], j, k] = 1
-            # A point of a voxel, and one of the finer voxels in it.
-            excess = max(excess, each.excess + (0.0 if factor == 1 else 2 * HALF_DIAGONAL * self.voxel))
+            # From the centre of a voxel to that of one of the finer voxels in it.
+            apart = HALF_DIAGONAL * (self.voxel - each.grid.pitch)
+            excess = max(excess, each.centre + apart)
         grid.count = int(grid.cells.sum(dtype=np.int64))
         return _Set(grid, excess)
 
     def _stamped(
         self, grid: VoxelGrid, screw: _Screw, core: Core, rotation: Array, position: Array
     ) -> float | None:
-        """What was added to the set at most [m]; None when stopped."""
+        """How far the centre of a voxel that was marked can be from the set [m]; None when stopped."""
         pitch = grid.pitch
         core = with_field(core, spacing=pitch * SPACING, band=EXACT * pitch)
         corners = core.corners @ rotation.T + position
@@ -239,16 +246,15 @@ class _Work:
         turned.cover(ends.min(axis=0) - side, ends.max(axis=0) + side)
         fine = pitch / 4
         share = float(np.abs(screw.axis).sum()) / 2
-        plane = profile(radii, heights - low, edges, share, fine, rim, high - low)
+        wide = _seen_along(screw.axis)
+        plane = profile(radii, heights - low, edges, share, wide, fine, rim, high - low)
         turned.count = revolve(
             turned.cells, turned.full, turned.origin, pitch, plane, fine, screw.anchor, screw.axis, low,
-            share * pitch,
+            share * pitch, wide * pitch,
         )  # fmt: skip
-        # Both voxels meet one cell of the half-plane; then to the farthest point of the new voxel.
+        # Both voxels meet one cell of the half-plane: so far are their centres from each other at most.
         excess = max(
-            each.excess
-            + float(np.hypot(HALF_DIAGONAL * both + fine, share * both + fine))
-            + HALF_DIAGONAL * pitch
+            each.centre + float(np.hypot(wide * both + fine, share * both + fine))
             for each in sets
             for both in [pitch + each.grid.pitch]
         )
@@ -263,15 +269,21 @@ def _finer(voxel: float, radius: float) -> float:
     return voxel / parts
 
 
+def _seen_along(axis: Array) -> float:
+    """Farthest that a point of a cube is from its centre, seen along an axis [edges]."""
+    signs = np.array([[1, a, b] for a in (-1, 1) for b in (-1, 1)], float)
+    return float(np.sqrt(3 - (signs @ axis) ** 2).max() / 2)
+
+
 def _stamped_excess(core: Core, bound: float, pitch: float) -> float:
-    r"""How far a point of a voxel that was marked can be from the set itself [m].
+    r"""How far the centre of a voxel that was marked can be from the set itself [m].
 
     Interpolated squares give away at most :math:`3 h^2 / 4`, and since distances are 1-Lipschitz the
     interpolation itself no more than :math:`\sqrt3 h / 2` of the distance, see `seerob.kernels.fields`.
     """
     gap = HALF_DIAGONAL * core.spacing if core.nodes.size else 0.0
     near = gap + float(np.hypot(bound + core.radius + 0.5 * pitch, gap)) - core.radius
-    return float(near + 2 * HALF_DIAGONAL * pitch)
+    return float(near + HALF_DIAGONAL * pitch)
 
 
 def _balls(

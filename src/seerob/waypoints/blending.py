@@ -1,21 +1,31 @@
-"""Moves that do not stop: how a corner is rounded off, and the speeds at which it is passed.
+r"""Moves that do not stop: how a corner is rounded off, and how fast it is passed.
 
-A rounding is passed at a steady speed in joint space, at which neither the speed nor the acceleration of
-either of its moves is exceeded; where a move is too short to get to that speed or to brake from it, it is
-passed slower.
+A rounding is a quintic :math:`q(u)`, :math:`u = \rho t`, of which speeds grow with the rate :math:`\rho`,
+accelerations with its square and jerks with its cube. It is passed at the largest rate at which none of the
+three is exceeded that either of its moves has, nor a speed limit of a joint; where a move is too short to get
+to that speed or to brake from it, it is passed slower. Of slopes that a rounding may have at its ends the
+one that is passed in the shortest time is taken.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from seerob.transforms import Array
 from seerob.waypoints.arm import Arm
-from seerob.waypoints.pieces import Piece, rounding
+from seerob.waypoints.pieces import Piece, Rounding, rounding
 from seerob.waypoints.timing import Limits, reachable
 from seerob.waypoints.waypoint import Program
+
+SLOPES = (1.2, 1.4, 1.6, 1.8, 2.0, 2.2)
+"""Of a rounding at its ends, per way that is cut off; up to 2.5 it stays within the corner's triangle."""
+FINE = 64
+"""Places at which a rounding is looked at."""
+SHARE = 0.99
+"""Of what the limits allow at those places, for what is between them."""
 
 
 @dataclass(eq=False)
@@ -34,17 +44,18 @@ class Leg:
     v1: float = 0.0
     blend: bool = False
     """Whether it does not stop at its end."""
-    steady: bool = False
-    """Whether it is a rounding."""
+    rounding: Rounding | None = None
+    """What it is, when it is a rounding; its speeds are rates then."""
 
 
-def rounded(legs: list[Leg], program: Program, arm: Arm, doubts: list[str]) -> list[Leg]:
+def rounded(legs: list[Leg], program: Program, arm: Arm, speed_limits: Array, doubts: list[str]) -> list[Leg]:
     """The legs with roundings between those that do not stop.
 
     Args:
         legs: Moves; cut where they are rounded off.
         program: Whose blend radii count.
         arm: The robot.
+        speed_limits: Of the joints [rad/s or m/s], infinite where unknown, shape (n,).
         doubts: What is done otherwise than asked is added.
     """
     radius = {w.shown: w.blend for w in program.waypoints}
@@ -59,7 +70,11 @@ def rounded(legs: list[Leg], program: Program, arm: Arm, doubts: list[str]) -> l
         if not leg.blend:
             continue
         r = radius[leg.place]
-        corner = arm.posture(leg.piece.q[-1]).position
+        if math.isinf(r):
+            half = min(leg.piece.length, legs[k + 1].piece.length) / 2
+            cuts[k][1], cuts[k + 1][0] = leg.piece.length - half, half
+            continue
+        corner = arm.posture(leg.piece.last).position
         first, found_before = _distance_cut(arm, leg.piece, corner, r, from_end=True)
         second, found_after = _distance_cut(arm, legs[k + 1].piece, corner, r, from_end=False)
         if not (found_before and found_after):
@@ -72,9 +87,11 @@ def rounded(legs: list[Leg], program: Program, arm: Arm, doubts: list[str]) -> l
         found.append(leg)
         if leg.blend:
             nxt = legs[k + 1]
-            curve = rounding(whole, nxt.piece, cuts[k][1], cuts[k + 1][0])
-            v = _blend_speed(arm, curve, leg, nxt)
-            found.append(Leg(curve, leg.limits, leg.place, v0=v, v1=v, steady=True))
+            each = [rounding(whole, nxt.piece, cuts[k][1], cuts[k + 1][0], slope) for slope in SLOPES]
+            rates = [_rate(arm, curve, leg, nxt, speed_limits) for curve in each]
+            best = int(np.argmax(rates))
+            curve, v = each[best], rates[best]
+            found.append(Leg(curve.piece, leg.limits, leg.place, v0=v, v1=v, rounding=curve))
     return found
 
 
@@ -82,7 +99,7 @@ def _distance_cut(arm: Arm, piece: Piece, corner: Array, r: float, *, from_end: 
     """Place of a piece that is ``r`` from the corner, at most half way; and whether it was found."""
     share = np.linspace(0.0, 0.5, 201) * piece.length
     s = piece.length - share if from_end else share
-    away = np.linalg.norm(arm.posture(piece.at(s)[0]).position - corner, axis=1)
+    away = np.linalg.norm(arm.posture(piece.derivative(s, 0)).position - corner, axis=1)
     far = np.flatnonzero(away >= r)
     if not far.size:
         return float(s[-1]), False
@@ -91,47 +108,48 @@ def _distance_cut(arm: Arm, piece: Piece, corner: Array, r: float, *, from_end: 
     return float(s[k - 1] + x * (s[k] - s[k - 1]) if k else s[0]), True
 
 
-def _blend_speed(arm: Arm, curve: Piece, before: Leg, after: Leg) -> float:
-    """Speed in joint space of a rounding, within the speeds and accelerations of both sides."""
-    h = np.diff(curve.s)
-    bend = np.abs(np.diff(curve.dq, axis=0)) / h[:, None]
-    posture = arm.posture(curve.q)
-    tip = np.diff(posture.position, axis=0) / h[:, None]
-    tip_bend = np.linalg.norm(np.diff(tip, axis=0), axis=1) / h[1:]
-    options = []
+def _rate(arm: Arm, curve: Rounding, before: Leg, after: Leg, speed_limits: Array) -> float:
+    """Largest rate of a rounding, within the limits of both sides."""
+    u = np.linspace(0.0, 1.0, FINE + 1)
+    joints = [np.abs(curve.piece.derivative(u, order)).max(axis=0) for order in (1, 2, 3)]
+    options = [float(np.min(speed_limits / np.maximum(joints[0], 1e-12)))]
     for leg in (before, after):
+        limits, tool = leg.limits, leg.piece.tool and not leg.piece.turning
         scale = 1.0 if leg.piece.tool else leg.piece.leading
-        v, a = leg.limits.speed * scale, leg.limits.acceleration * scale
-        if leg.piece.tool and not leg.piece.turning:
-            options += [v / max(float(np.linalg.norm(tip, axis=1).max()), 1e-12)]
-            options += [np.sqrt(a / max(float(tip_bend.max()), 1e-12))]
-        else:
-            options += [v / max(float(np.abs(curve.dq).max()), 1e-12)]
-            options += [np.sqrt(a / max(float(bend.max()), 1e-12))]
-    return float(min(options))
+        sizes = _of_tool(arm, curve.piece) if tool else [float(each.max()) for each in joints]
+        for size, limit, order in zip(
+            sizes, (limits.speed, limits.acceleration, limits.jerk), (1, 2, 3), strict=True
+        ):
+            options.append((limit * scale / max(size, 1e-12)) ** (1 / order))
+    return SHARE * min(options)
+
+
+def _of_tool(arm: Arm, piece: Piece) -> list[float]:
+    """Largest derivatives of the tool point by the parameter of a rounding, first to third [m]."""
+    h = 1.0 / FINE
+    u = np.arange(-2, FINE + 3) * h  # a little beyond its ends, where the quintic goes on
+    p = arm.posture(piece.curve(u)).position
+    differences = ((p[2:] - p[:-2]) / (2 * h), np.diff(p, 2, axis=0) / h**2, np.diff(p, 3, axis=0) / h**3)
+    return [float(np.linalg.norm(d, axis=1).max()) for d in differences]
 
 
 def meet(legs: list[Leg]) -> None:
     """Speeds where legs meet: those of the roundings, less where a leg is too short to get there."""
-    curves = [k for k, leg in enumerate(legs) if leg.steady]
-    size = {
-        k: (np.linalg.norm(legs[k - 1].piece.dq[-1]), np.linalg.norm(legs[k + 1].piece.dq[0])) for k in curves
-    }
-    speed = {k: legs[k].v0 for k in curves}
-    for k in curves:
-        for other, at in ((legs[k - 1], size[k][0]), (legs[k + 1], size[k][1])):
-            speed[k] = min(speed[k], other.limits.speed * float(at))
-    for k in curves:  # what the leg before allows from its begin
+    curves = {k: leg.rounding for k, leg in enumerate(legs) if leg.rounding is not None}
+    rate = {k: legs[k].v0 for k in curves}
+    for k, curve in curves.items():
+        rate[k] = min(rate[k], legs[k - 1].limits.speed / curve.enter, legs[k + 1].limits.speed / curve.leave)
+    for k, curve in curves.items():  # what the leg before allows from its begin
         before = legs[k - 1]
-        begin = speed[k - 2] / float(size[k - 2][1]) if k - 2 in speed else 0.0
-        end = reachable(begin, speed[k] / float(size[k][0]), before.piece.length, before.limits)
-        speed[k] = min(speed[k], end * float(size[k][0]))
-    for k in reversed(curves):  # and the leg after it to its end
+        begin = rate[k - 2] * curves[k - 2].leave if k - 2 in curves else 0.0
+        end = reachable(begin, rate[k] * curve.enter, before.piece.length, before.limits)
+        rate[k] = min(rate[k], end / curve.enter)
+    for k, curve in reversed(curves.items()):  # and the leg after it to its end
         after = legs[k + 1]
-        end = speed[k + 2] / float(size[k + 2][0]) if k + 2 in speed else 0.0
-        begin = reachable(end, speed[k] / float(size[k][1]), after.piece.length, after.limits)
-        speed[k] = min(speed[k], begin * float(size[k][1]))
-    for k in curves:
-        legs[k].v0 = legs[k].v1 = speed[k]
-        legs[k - 1].v1 = speed[k] / float(size[k][0])
-        legs[k + 1].v0 = speed[k] / float(size[k][1])
+        end = rate[k + 2] * curves[k + 2].enter if k + 2 in curves else 0.0
+        begin = reachable(end, rate[k] * curve.leave, after.piece.length, after.limits)
+        rate[k] = min(rate[k], begin / curve.leave)
+    for k, curve in curves.items():
+        legs[k].v0 = legs[k].v1 = rate[k]
+        legs[k - 1].v1 = rate[k] * curve.enter
+        legs[k + 1].v0 = rate[k] * curve.leave

@@ -86,7 +86,7 @@ def continuous(
             else:
                 rests += waypoint.pause
             continue
-        goals.reached(piece.q[-1])
+        goals.reached(piece.last)
         leg = Leg(piece, _limits(waypoint, wish, piece), waypoint.shown, waypoint.duration, waypoint.pause)
         _slowed(leg, limits, wish.tool_turn, doubts)
         if piece.least < SINGULAR:
@@ -103,9 +103,11 @@ def continuous(
             )
         legs.append(leg)
         leg.blend = waypoint.blend > NO_BLEND and k + 1 < len(program.waypoints)
-    legs = rounded(legs, program, arm, doubts)
+    legs = rounded(legs, program, arm, limits, doubts)
     meet(legs)
     trajectory = _sampled(legs, program.file, wish.period, goals.first, rests)
+    if any(leg.piece.tool for leg in legs):
+        remarks.append(_of_joints(trajectory, arm))
     remarks += goals.remarks
     return Continuous(trajectory, tuple(goals.found), tuple(remarks), (*goals.doubts, *doubts))
 
@@ -156,8 +158,7 @@ def _piece(program: Program, arm: Arm, before: Array, waypoint: Waypoint, q: Arr
 
 def _slowed(leg: Leg, limits: Array, tool_turn: float | None, doubts: list[str]) -> None:
     """A move whose joints or tool would be faster than they may is slowed as a whole."""
-    fastest = np.abs(leg.piece.dq).max(axis=0)
-    possible = float(np.min(limits / np.maximum(fastest, 1e-12)))
+    possible = float(np.min(limits / np.maximum(leg.piece.fastest(), 1e-12)))
     if tool_turn is not None and leg.piece.turn > 0:
         possible = min(possible, tool_turn / leg.piece.turn)
     if possible < leg.limits.speed:
@@ -170,8 +171,21 @@ def _slowed(leg: Leg, limits: Array, tool_turn: float | None, doubts: list[str])
         leg.limits = Limits(possible, leg.limits.acceleration, leg.limits.jerk)
 
 
+def _of_joints(motion: Trajectory, arm: Arm) -> str:
+    """What the joints do, which linear and circular moves do not limit, by differences over the period."""
+    period = float(motion.t[1] - motion.t[0])
+    said = []
+    for order, what in ((2, "acceleration"), (3, "jerk")):
+        # The last sample is no whole period after the one before.
+        size = np.abs(np.diff(motion.q[:-1], order, axis=0)).max(axis=0, initial=0.0) / period**order
+        i = int(np.argmax(size))
+        unit = f"{'m' if arm.slides[i] else 'rad'}/s{'²' if order == 2 else '³'}"
+        said.append(f"{what} of {size[i]:.3g} {unit} ({arm.joints[i].name})")
+    return f"joints reach, over {period:g} s, at most an {' and a '.join(said)}: tool moves do not limit them"
+
+
 def _timing(leg: Leg, file: str) -> Profile:
-    if not leg.steady:
+    if leg.rounding is None:
         return profile(
             leg.piece.length, leg.v0, leg.v1, leg.limits, duration=leg.duration, file=file, place=leg.place
         )
@@ -198,8 +212,8 @@ def _sampled(legs: list[Leg], file: str, period: float, first: Array, rests: flo
         inside = np.flatnonzero((times >= begin) & (times <= begin + timing.duration))
         if inside.size:
             states = np.array([timing.at(x) for x in (times[inside] - begin).tolist()])
-            q[inside], tangent = leg.piece.at(states[:, 0])
-            qd[inside] = tangent * states[:, 1:]
+            q[inside] = leg.piece.derivative(states[:, 0], 0)
+            qd[inside] = leg.piece.derivative(states[:, 0], 1) * states[:, 1:]
         later = times > begin + timing.duration
-        q[later], qd[later] = leg.piece.q[-1], 0.0
+        q[later], qd[later] = leg.piece.last, 0.0
     return Trajectory(file=file, t=times, q=q, qd=qd)

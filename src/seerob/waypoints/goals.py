@@ -11,6 +11,7 @@ from seerob.transforms import Array, rotation_from_wxyz
 from seerob.waypoints.arm import Arm
 from seerob.waypoints.branches import Branch, branch, is_classic
 from seerob.waypoints.inverse import solutions
+from seerob.waypoints.unreachable import why_not
 from seerob.waypoints.waypoint import Program, Waypoint
 
 
@@ -87,10 +88,8 @@ class Goals:
         rotation, position = rotation_from_wxyz(pose.wxyz), np.array(pose.position)
         ways = solutions(self._arm, rotation, position, self._here)
         if not ways:
-            what = (
-                f"no joint positions within the limits bring the tool to {np.round(position, 4).tolist()} m"
-            )
-            remedy = "is it out of reach, is the base or the tool point another one?"
+            what = why_not(self._arm, rotation, position, self._here)
+            remedy = "is the base or the tool point another one?"
             raise InputError.at(self._program.file, waypoint.shown, what, remedy)
         fitting = [w for w in ways if self._wanted in (None, w.branch)]
         if not fitting:

@@ -68,7 +68,7 @@ def solutions(arm: Arm, rotation: Array, position: Array, near: Array) -> tuple[
     """Ways of reaching a pose, the one nearest to a posture first.
 
     Every joint that turns is brought as near to ``near`` as whole turns within its limits allow; what is
-    beyond a limit is left out.
+    beyond a limit is left out. Of an arm with more than six joints there is one at most.
 
     Args:
         arm: The arm.
@@ -76,15 +76,28 @@ def solutions(arm: Arm, rotation: Array, position: Array, near: Array) -> tuple[
         position: Of the tool point in the base [m], shape (3,).
         near: Joint positions, shape (n,) [rad or m].
     """
-    random = np.random.default_rng(7)
+    classic = is_classic(arm)
+    if arm.n <= 6:
+        return _distinct(arm, reach_from_around(arm, rotation, position, near), near, classic=classic)
+    # Of infinitely many only the nearest means something.
+    found = _distinct(arm, reach(arm, rotation, position, near[None]), near, classic=classic)
+    if not found:
+        found = _distinct(arm, reach_from_around(arm, rotation, position, near), near, classic=classic)
+    return found[:1]
+
+
+def reach_from_around(arm: Arm, rotation: Array, position: Array, near: Array) -> tuple[Array, Array]:
+    """`reach` from a posture and from many others around it; see there."""
     low = np.maximum(np.where(np.isfinite(arm.lower), arm.lower, -np.pi), near - np.pi)
     high = np.minimum(np.where(np.isfinite(arm.upper), arm.upper, np.pi), near + np.pi)
     low, high = np.minimum(low, high), np.maximum(low, high)
-    # With more than six joints there are infinitely many: only the nearest means something.
-    more = SEEDS if arm.n <= 6 else 0
-    starts = np.vstack([near, random.uniform(low, high, (more, arm.n))])
-    q, error = reach(arm, rotation, position, starts)
-    classic = is_classic(arm)
+    starts = np.random.default_rng(7).uniform(low, high, (SEEDS, arm.n))
+    return reach(arm, rotation, position, np.vstack([near, starts]))
+
+
+def _distinct(arm: Arm, reached: tuple[Array, Array], near: Array, *, classic: bool) -> tuple[Solution, ...]:
+    """Solutions within the limits, each once, the nearest first."""
+    q, error = reached
     found: list[Solution] = []
     for row in q[error < 1e3 * EXACT]:
         turned = _nearest_turn(arm, row, near)

@@ -47,24 +47,23 @@ def _toml(text: str, file: str) -> Mapping[str, Any]:
 
     try:
         return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
+        # Also what tomllib lets through: a number of 10 000 digits.
         raise InputError.at(file, "", f"is not TOML: {error}") from error
 
 
 def _yaml(text: str, file: str) -> Mapping[str, Any]:
-    try:
-        from ruamel.yaml import YAML
-        from ruamel.yaml.error import YAMLError
-        from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
-    except ImportError as error:
-        raise InputError.at(
-            file, "", "YAML needs the package ruamel.yaml", "install it, or use TOML"
-        ) from error
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+    from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
+
     try:
         depth = 0
         for event in YAML(typ="safe", pure=True).parse(text):
             depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
-            if isinstance(event, AliasEvent) or depth > MAX_DEPTH:
+            # An anchor is what an alias refers to; a second one of the name is only warned of.
+            named = isinstance(event, AliasEvent) or getattr(event, "anchor", None) is not None
+            if named or depth > MAX_DEPTH:
                 what = "holds aliases" if depth <= MAX_DEPTH else f"is nested deeper than {MAX_DEPTH}"
                 raise InputError.at(file, "", what, "write every waypoint out")
         table = YAML(typ="safe", pure=True).load(text)
@@ -73,4 +72,17 @@ def _yaml(text: str, file: str) -> Mapping[str, Any]:
         raise InputError.at(file, "", f"is not YAML: {first}") from error
     if not isinstance(table, Mapping):
         raise InputError.at(file, "", "is no table", "write a list `waypoints`")
+    _check_keys(table, file)
     return table
+
+
+def _check_keys(value: Any, file: str) -> None:
+    """Only texts may be keys: YAML also has numbers, lists and nothing for one."""
+    if isinstance(value, Mapping):
+        for key, below in value.items():
+            if not isinstance(key, str):
+                raise InputError.at(file, "", f"{str(key)[:40]} is no key", "write texts for keys")
+            _check_keys(below, file)
+    elif isinstance(value, list):
+        for below in value:
+            _check_keys(below, file)

@@ -120,6 +120,8 @@ class _Tree:
                 self.problems.append(
                     Problem(self.file, f"after waypoint {len(self.waypoints)}", what, REMEDY)
                 )
+            elif str(element.tag).rpartition("}")[2] == "children":
+                self.left_out.add(tag)  # a node of the program; elsewhere it is a property of one
 
     def _waypoint(self, element: Element, move: Element | None) -> None:
         name = element.get("name", "")

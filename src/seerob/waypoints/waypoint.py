@@ -59,7 +59,8 @@ class Waypoint:
     duration: float | None = None
     """Time of the move instead of speed and acceleration [s]."""
     blend: float = 0.0
-    """Distance of the tool point from the waypoint at which the path leaves for the next one [m]."""
+    """Distance of the tool point from the waypoint at which the path leaves for the next one [m]; infinite
+    for half of the shorter of both moves."""
     pause: float = 0.0
     """Time that the robot stands there [s]."""
 

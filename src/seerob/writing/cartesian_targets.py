@@ -1,4 +1,4 @@
-"""Cartesian targets out to ROS, over rosbridge. Off unless file and command line both allow it.
+"""Cartesian targets out to ROS, over rosbridge or ROS-TCP. Off unless file and command line both allow it.
 
 What a source says of where a tool is to be is published when the twin gets there, in the frame that the
 controller wants. A thread of its own publishes, so a slow network never slows the loop; of what waits, only
@@ -22,15 +22,13 @@ import numpy as np
 from seerob.errors import InputError, SeerobError, UnknownName
 from seerob.live import because
 from seerob.model import Model
-from seerob.protocols import rosbridge
-from seerob.protocols.rosbridge import Status
-from seerob.protocols.websocket_link import Link, linked
 from seerob.run import target
 from seerob.samples import PoseSample, Quality, Sample
 from seerob.snapshot import Snapshot
 from seerob.sources.tool_path import fixed_links
 from seerob.transforms import Array, inverse, rotation_from_wxyz, transform, wxyz_from_rotation
 from seerob.writing.target_table import CartesianTarget, TargetMessage
+from seerob.writing.target_wires import Wire, wired
 
 _log = logging.getLogger(__name__)
 
@@ -157,44 +155,28 @@ class CartesianTargets:
         table, failing = way.table, False
         while not self._over.is_set():
             try:
-                async with linked(
-                    table.host,
-                    table.port,
-                    largest=rosbridge.MAX_MESSAGE,
-                    what="rosbridge server",
-                    tls=table.tls,
-                ) as link:
+                async with wired(table) as wire:
                     _log.info("%s: targets of %s are published", table.topic, table.at)
                     failing = False
-                    await self._session(way, link)
+                    await self._session(way, wire)
             except (OSError, EOFError, SeerobError) as error:
                 if not failing:
                     _log.warning("%s: cannot be published: %s", table.topic, because(error))
                 failing = True
                 await asyncio.to_thread(self._over.wait, PAUSE)
 
-    async def _session(self, way: _Way, link: Link) -> None:
-        table, reader, due = way.table, rosbridge.Reader(), 0.0
-        kind = str(table.message) if table.ros == 1 else str(table.message).replace("/", "/msg/")
-        await link.send(rosbridge.advertise(table.topic, kind))
+    async def _session(self, way: _Way, wire: Wire) -> None:
+        table, due = way.table, 0.0
         way.take()  # what was meant before there was a connection is no longer meant
         while not self._over.is_set():
             now = time.monotonic()
             said = way.take() if now >= due else None
             if said is not None:
-                await link.send(rosbridge.publish(table.topic, said))
+                await wire.publish(said)
                 way.published += 1
                 due = now + table.every
-            try:
-                heard = await link.receive(min(BEAT, table.every))
-            except TimeoutError:
-                continue
-            if heard is None:
-                raise ConnectionError("the server closed the connection")
-            status = reader.take(heard[1])
-            if isinstance(status, Status) and status.level == "error":
-                raise ConnectionError(f"the server says: {status.text[:300]}")
-        await link.send(rosbridge.unadvertise(table.topic))
+            await wire.listen(min(BEAT, table.every))
+        await wire.end()
 
 
 def _standing(model: Model, link: str) -> Array:

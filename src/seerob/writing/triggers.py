@@ -168,6 +168,7 @@ def _writer(sources: Mapping[str, object], variable: Variable) -> Writes:
     source = sources[variable.source]
     if not hasattr(source, "write"):
         what = f"{variable.source}, a source of this kind, writes nothing"
-        raise InputError.at("triggers", variable.name, what, "take a kind that can, such as siemens_web")
+        remedy = "take one that can: modbus, mqtt, opcua, siemens_web"
+        raise InputError.at("triggers", variable.name, what, remedy)
     found: Writes = source
     return found

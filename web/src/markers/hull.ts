@@ -1,12 +1,10 @@
 // A translucent closed surface given by its triangles.
 
-import { BufferGeometry, EdgesGeometry, Float32BufferAttribute, Vector3 } from "three";
+import { BufferGeometry, Float32BufferAttribute, Vector3 } from "three";
+import { featureEdges } from "../scene/feature_edges";
 import type { Hull } from "../wire";
 import type { Drawn } from "./drawn";
 import { Surface } from "./surface";
-
-/** Edges that bend less than this are not drawn [deg]. */
-const FLAT_DEG = 12;
 
 export class HullDrawn implements Drawn<Hull> {
   private readonly surface = new Surface(new BufferGeometry(), new BufferGeometry());
@@ -15,14 +13,19 @@ export class HullDrawn implements Drawn<Hull> {
   private drawn: Hull | null = null;
 
   update(marker: Hull): void {
-    this.surface.color(marker.verdict);
-    if (this.drawn && sameShape(this.drawn, marker)) return;
+    if (this.drawn && sameShape(this.drawn, marker)) {
+      this.surface.color(marker.verdict);
+      return;
+    }
     this.drawn = marker;
     const fill = new BufferGeometry();
     fill.setAttribute("position", new Float32BufferAttribute(marker.vertices.flat(), 3));
     fill.setIndex(marker.faces.flat());
     fill.computeBoundingSphere();
-    this.surface.reshape(fill, new EdgesGeometry(fill, FLAT_DEG));
+    fill.computeVertexNormals();
+    const { lines, smooth } = featureEdges(fill);
+    this.surface.reshape(fill, lines, smooth);
+    this.surface.color(marker.verdict);
     if (fill.boundingSphere) this.anchor.copy(fill.boundingSphere.center);
   }
 

@@ -70,11 +70,15 @@ export class MarkerLayer {
     const slots = this.slots.get(name) ?? [];
     this.slots.set(name, slots);
     let used = 0;
+    // Figures without the name of what they are of would be riddles.
+    let owner = `${name}: `;
     for (const marker of markers) {
       const slot = this.slotFor(slots, used, marker);
       if (!slot) continue;
       slot.drawn.update(marker);
-      this.write(slot, marker, captioned);
+      const label = captioned && "label" in marker ? marker.label : "";
+      this.write(slot, label === "" || label.startsWith(name) ? label : owner + label, marker.verdict);
+      if (label !== "") owner = "";
       if (marker.type === "highlight") paintWorst(this.painted, marker.body, marker.verdict);
       used += 1;
     }
@@ -93,8 +97,7 @@ export class MarkerLayer {
     return slot;
   }
 
-  private write(slot: Slot, marker: Marker, captioned: boolean): void {
-    const text = captioned && "label" in marker ? marker.label : "";
+  private write(slot: Slot, text: string, verdict: Verdict | null): void {
     if (text === "") {
       if (slot.caption) slot.caption.object.visible = false;
       return;
@@ -105,7 +108,7 @@ export class MarkerLayer {
     }
     slot.caption.object.visible = true;
     slot.caption.object.position.copy(slot.drawn.anchor);
-    slot.caption.update(text, marker.verdict);
+    slot.caption.update(text, verdict);
   }
 
   private drop(name: string, from: number): void {

@@ -2,12 +2,14 @@
 
 import { type BufferGeometry, Group, LineSegments, Mesh } from "three";
 import { lineMaterial, markerMaterial } from "../scene/materials";
+import { veilMaterial } from "../scene/veil";
 import type { Verdict } from "../wire";
 
 export class Surface {
   readonly object = new Group();
   private readonly fill: Mesh;
   private readonly lines: LineSegments;
+  private smooth = false;
 
   constructor(fill: BufferGeometry, lines: BufferGeometry) {
     this.fill = new Mesh(fill);
@@ -17,13 +19,18 @@ export class Surface {
   }
 
   color(verdict: Verdict | null): void {
-    this.fill.material = markerMaterial("fill", verdict);
+    this.fill.material = this.smooth ? veilMaterial(verdict) : markerMaterial("fill", verdict);
     this.lines.material = lineMaterial(verdict);
   }
 
-  /** Replace both shapes; the old ones are freed. */
-  reshape(fill: BufferGeometry, lines: BufferGeometry): void {
+  /**
+   * Replace both shapes; the old ones are freed. Followed by `color`.
+   *
+   * @param smooth Whether the lines leave the shape open: then its rim shows it, and it needs normals.
+   */
+  reshape(fill: BufferGeometry, lines: BufferGeometry, smooth = false): void {
     this.free();
+    this.smooth = smooth;
     this.fill.geometry = fill;
     this.lines.geometry = lines;
   }

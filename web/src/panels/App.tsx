@@ -4,6 +4,7 @@ import { effect, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { scene } from "../page_state";
 import { VisitedInstant } from "./ElsewhereNote";
+import { Legend } from "./Legend";
 import { Plots } from "./Plots";
 import { Properties } from "./Properties";
 import { RightSide } from "./RightSide";
@@ -35,6 +36,7 @@ export function App({ room }: { room: (element: HTMLElement) => void }) {
       <main class="centre">
         <div class="room" ref={place} />
         <ViewTools />
+        <Legend />
         <VisitedInstant />
       </main>
       <RightSide />

@@ -15,7 +15,7 @@ import {
   worst,
 } from "../body_map/exposure";
 import { type Spot, spots } from "../body_map/figure";
-import { formatPercent } from "../format";
+import { percent } from "../figures";
 import { frame, scene, stale } from "../page_state";
 import { BodyFigure, type DrawnSpot } from "./BodyFigure";
 import { ContactDetails, ContactHead } from "./ContactCard";
@@ -141,7 +141,7 @@ function drawnSpot(spot: Spot, all: readonly Told[]): DrawnSpot {
   const share = told ? shareOf(told.row, aspect.value) : null;
   const name = told ? told.row.name : `area ${spot.area}`;
   const side = spot.side === "" ? "" : `${spot.side} `;
-  const amount = share === null ? "" : `, ${formatPercent(share)} of the permissible speed`;
+  const amount = share === null ? "" : `, ${percent(share, "up")} of the permissible speed`;
   return {
     ...spot,
     key: `${spot.area} ${spot.side}`,

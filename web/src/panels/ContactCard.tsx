@@ -2,7 +2,8 @@
 
 import { type Aspect, inputsOf, LOOK_WORDS, lookOf, shareOf, type Told } from "../body_map/exposure";
 import type { Spot } from "../body_map/figure";
-import { formatNumber, formatPercent, formatQuantity } from "../format";
+import { against, atLeast, figure, percent, withUnit } from "../figures";
+import { formatNumber } from "../format";
 import type { Input, Scene } from "../wire";
 import { StateBadge } from "./StateBadge";
 
@@ -21,6 +22,7 @@ export function ContactHead(props: { spot: Spot | undefined; told: Told | undefi
   const look = lookOf(row, aspect);
   const side = row.side || (spot?.side ?? "");
   const share = shareOf(row, aspect);
+  const figures = against(row.value ?? null, row.limit ?? null, row.unit ?? "", true);
   return (
     <div class={`contact-head card-${look}`}>
       <h3>
@@ -35,10 +37,10 @@ export function ContactHead(props: { spot: Spot | undefined; told: Told | undefi
         {row.verdict && row.state !== "forbidden" ? <StateBadge state={row.verdict} /> : LOOK_WORDS[look]}
         {row.limit != null && (
           <span>
-            {formatNumber(row.value ?? null, row.limit)} of {formatQuantity(row.limit, row.unit ?? "")}
+            {figures.value} of {withUnit(figures.limit, row.unit ?? "")}
           </span>
         )}
-        {share !== null && <span>{formatPercent(share)}</span>}
+        {share !== null && <span>{percent(share, "up")}</span>}
       </p>
       <p class="reason">{row.reason}</p>
     </div>
@@ -52,11 +54,11 @@ export function ContactDetails({ run, told }: { run: Scene; told: Told }) {
     <div class="contact-details">
       <dl>
         <dt>Speed now</dt>
-        <dd>{quantity(row.value, row.unit)}</dd>
+        <dd>{known(row.value, row.unit, figure)}</dd>
         <dt>Permissible speed</dt>
-        <dd>{row.limit == null ? LOOK_WORDS[lookOf(row, "worst")] : quantity(row.limit, row.unit)}</dd>
+        <dd>{row.limit == null ? LOOK_WORDS[lookOf(row, "worst")] : known(row.limit, row.unit, atLeast)}</dd>
         {(row.aspects ?? []).map((one) => (
-          <AspectRow key={one.name} name={one.name} text={one.band || quantity(one.value, one.unit)} />
+          <AspectRow key={one.name} name={one.name} text={one.band || known(one.value, one.unit, atLeast)} />
         ))}
         <dt>Criterion</dt>
         <dd>{criterion}</dd>
@@ -100,6 +102,6 @@ function LimitRow({ input, group }: { input: Input; group: string }) {
   );
 }
 
-function quantity(value: number | null | undefined, unit: string | undefined): string {
-  return value == null ? "not known" : formatQuantity(value, unit ?? "");
+function known(value: number | null | undefined, unit: string | undefined, written: typeof figure): string {
+  return value == null ? "not known" : withUnit(written(value, unit ?? ""), unit ?? "");
 }

@@ -2,13 +2,17 @@
 
 import { useSignal } from "@preact/signals";
 import { Fragment } from "preact";
-import { formatNumber, formatPercent, formatQuantity, formatTime } from "../format";
+import { against, between, gap, percent, steady, withUnit } from "../figures";
+import { formatTime } from "../format";
 import { mutedCriteria, type Row, scene, select, selection, stale, toggleMuted } from "../page_state";
+import { worstOf } from "../posture/instants";
 import { orderedRows } from "../row_order";
 import { margin } from "../verdicts";
-import type { Result } from "../wire";
+import type { CriterionInfo, Result } from "../wire";
 import { BasisView } from "./BasisView";
 import { Icon } from "./Icon";
+import { Instants } from "./Instants";
+import { Parts } from "./Parts";
 import { StateBadge } from "./StateBadge";
 
 const COLUMNS = 4;
@@ -75,6 +79,7 @@ function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onTogg
   const muted = mutedCriteria.value.has(info.name);
   const limit = result ? result.limit : info.limit;
   const unit = result?.unit ?? info.unit;
+  const figures = against(result?.value ?? null, limit, unit, info.at_most);
   const reason = result?.reason ?? (state === "missing" ? "nothing was said about it in this snapshot" : "");
   const shown = stale.value && state !== "missing" ? "off" : state;
   const look = `row-${shown} ${chosen ? "selected" : ""}`;
@@ -100,8 +105,7 @@ function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onTogg
           </button>
         </th>
         <td class="number">
-          <span class="value">{formatNumber(result?.value ?? null, limit)}</span>{" "}
-          <span class="unit">{unit}</span>
+          <span class="value">{steady(figures.value, unit)}</span> <span class="unit">{unit}</span>
           {result && <Usage result={result} />}
         </td>
         <td class="number limit">
@@ -112,7 +116,7 @@ function CriterionRow({ row, open, onToggle }: { row: Row; open: boolean; onTogg
               <span class="bound" title={info.at_most ? "at most" : "at least"}>
                 {info.at_most ? "≤" : "≥"}
               </span>{" "}
-              {formatNumber(limit)} <span class="unit">{unit}</span>
+              {figures.limit} <span class="unit">{unit}</span>
             </>
           )}
           {result && limit !== null && (
@@ -156,9 +160,19 @@ function Usage({ result }: { result: Result }) {
 // A share of the limit; of a limit that is zero there is none, so the difference itself.
 function leftOf(result: Result): string {
   const share = margin(result);
-  if (share !== null || result.value === null || result.limit === null) return formatPercent(share);
-  const left = result.at_most ? result.limit - result.value : result.value - result.limit;
-  return formatQuantity(left, result.unit, result.value);
+  if (share !== null || result.value === null || result.limit === null) return percent(share);
+  return withUnit(gap(result.value, result.limit, result.unit, result.at_most), result.unit);
+}
+
+function WorstInstants({ info }: { info: CriterionInfo }) {
+  const instants = worstOf(info);
+  if (instants.length === 0) return null;
+  return (
+    <div class="instant-row">
+      <span class="unit">Worst instants</span>
+      <Instants info={info} instants={instants} />
+    </div>
+  );
 }
 
 function hint({ info }: Row): string {
@@ -172,34 +186,11 @@ function Details({ row }: { row: Row }) {
     <div class="details-body">
       <p class="lead">{info.title}</p>
       {result?.interval && (
-        <p>
-          True value between {formatQuantity(result.interval[0], result.unit)} and{" "}
-          {formatQuantity(result.interval[1], result.unit)}, given the tolerances of the inputs.
-        </p>
+        <p>True value between {between(result.interval, result.unit)}, given the tolerances of the inputs.</p>
       )}
+      <WorstInstants info={info} />
       {result && result.parts.length > 0 && <Parts parts={result.parts} />}
       {info.basis ? <BasisView basis={info.basis} /> : <p class="unknown">No basis was stated.</p>}
     </div>
-  );
-}
-
-function Parts({ parts }: { parts: readonly Result[] }) {
-  return (
-    <table class="parts">
-      <caption>Parts</caption>
-      <tbody>
-        {parts.map((part) => (
-          <tr key={part.name}>
-            <th scope="row">
-              {part.name}
-              {part.reason !== "" && <span class="reason">{part.reason}</span>}
-            </th>
-            <td class="number">{formatQuantity(part.value, part.unit, part.limit)}</td>
-            <td class="number">{part.limit === null ? "–" : formatQuantity(part.limit, part.unit)}</td>
-            <td>{part.verdict && <StateBadge state={part.verdict} />}</td>
-          </tr>
-        ))}
-      </tbody>
-    </table>
   );
 }

@@ -2,7 +2,8 @@
 
 import { signal } from "@preact/signals";
 import { ago, type Elsewhere } from "../elsewhere";
-import { formatNumber, formatQuantity, formatTime } from "../format";
+import { against, withUnit } from "../figures";
+import { formatTime } from "../format";
 import { isLive, lookingAt, now, scene, traces } from "../page_state";
 import { STATE_ICONS, STATE_WORDS } from "../verdicts";
 import { type Instant, worstWith } from "../worst_instant";
@@ -11,7 +12,7 @@ import { useActions } from "./app_context";
 interface Visited {
   name: string;
   unit: string;
-  bound: string;
+  atMost: boolean;
   instant: Instant;
   /** Whether it could be shown; a live run only keeps the last minutes. */
   shown: boolean;
@@ -31,7 +32,7 @@ export function ElsewhereNote({ other }: { other: Elsewhere }) {
     const instant = worstWith(trace, info.at_most, verdict);
     if (!instant) return;
     const shown = time.visit(instant.t);
-    visited.value = { name, unit: info.unit, bound: info.at_most ? "≤" : "≥", instant, shown };
+    visited.value = { name, unit: info.unit, atMost: info.at_most, instant, shown };
   };
   const more = criteria.length > 1 ? ` +${criteria.length - 1}` : "";
   return (
@@ -56,12 +57,15 @@ export function VisitedInstant() {
   const { time } = useActions();
   const seen = visited.value;
   if (!seen) return null;
-  const { name, unit, bound, instant, shown } = seen;
-  const limit = Number.isNaN(instant.limit) ? "" : ` (${bound} ${formatQuantity(instant.limit, unit)})`;
+  const { name, unit, atMost, instant, shown } = seen;
+  const figures = against(instant.value, instant.limit, unit, atMost);
+  const limit = Number.isNaN(instant.limit)
+    ? ""
+    : ` (${atMost ? "≤" : "≥"} ${withUnit(figures.limit, unit)})`;
   return (
     <div class="visited" role="status">
       <span>
-        Worst of <strong>{name}</strong>: <strong>{formatNumber(instant.value)}</strong> {unit}
+        Worst of <strong>{name}</strong>: <strong>{withUnit(figures.value, unit)}</strong>
         {limit} at {formatTime(instant.t)}
         {!shown && <em> – older than what a live run keeps to look back at; the recording has it</em>}
       </span>

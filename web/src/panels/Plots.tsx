@@ -2,11 +2,12 @@
 
 import { effect, signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-import { formatQuantity } from "../format";
+import { against, steady, withUnit } from "../figures";
 import {
   isLive,
   lookingAt,
   now,
+  type Row,
   reach,
   rows,
   scene,
@@ -107,14 +108,17 @@ function Plot({ name }: { name: string }) {
         <button type="button" class="plot-name" onClick={() => select({ kind: "criterion", name })}>
           {name}
         </button>
-        <span class="plot-value">
-          {formatQuantity(row?.result?.value ?? null, row?.info.unit ?? "", row?.result?.limit ?? null)}
-        </span>
+        <span class="plot-value">{row && figureOf(row)}</span>
         {row && <StateBadge state={row.state} />}
       </figcaption>
       <div class="plot-area" ref={place} />
     </figure>
   );
+}
+
+function figureOf({ info, result }: Row): string {
+  const { value } = against(result?.value ?? null, result?.limit ?? null, info.unit, info.at_most);
+  return withUnit(steady(value, info.unit), info.unit);
 }
 
 // Live: the newest at the right edge. Looking back or replaying: the cursor in the middle, inside what there is.

@@ -1,8 +1,6 @@
 // What is said: verdicts, contacts on the body, posture, and what to know of the model.
 
 import { useSignal } from "@preact/signals";
-import { useEffect } from "preact/hooks";
-import { postureShown } from "../posture/coloring";
 import { BodyMap } from "./BodyMap";
 import { CriteriaTable } from "./CriteriaTable";
 import { allFindings, Findings } from "./Findings";
@@ -21,34 +19,54 @@ const TITLES: Record<Tab, string> = {
 export function RightSide() {
   const tab = useSignal<Tab>("criteria");
   const shown = tab.value;
-  useEffect(() => {
-    postureShown.value = shown === "posture";
-  }, [shown]);
+  const open = (name: Tab): void => {
+    tab.value = name;
+  };
   return (
     <aside class="right" aria-label="Results">
-      <div class="tabs" role="tablist">
+      <div class="tabs" role="tablist" aria-label="Results" onKeyDown={(event) => turn(event, shown, open)}>
         {TABS.map((name) => (
           <button
             key={name}
             type="button"
             role="tab"
+            id={`tab-${name}`}
             aria-selected={shown === name}
-            onClick={() => {
-              tab.value = name;
-            }}
+            aria-controls="results"
+            tabIndex={shown === name ? 0 : -1}
+            onClick={() => open(name)}
           >
             {TITLES[name]}
             {name === "findings" && <FindingCount />}
           </button>
         ))}
       </div>
-      {shown === "criteria" && <CriteriaTable />}
-      {shown === "body" && <BodyMap />}
-      {shown === "posture" && <Posture />}
-      {shown === "findings" && <Findings />}
+      <div class="tabpanel" id="results" role="tabpanel" aria-labelledby={`tab-${shown}`}>
+        {shown === "criteria" && <CriteriaTable />}
+        {shown === "body" && <BodyMap />}
+        {shown === "posture" && <Posture />}
+        {shown === "findings" && <Findings />}
+      </div>
       <p class="disclaimer">Evaluation of a model, to be confirmed by measurement.</p>
     </aside>
   );
+}
+
+// Arrows go from tab to tab while the focus is on one; everywhere else time has them.
+function turn(event: KeyboardEvent, shown: Tab, open: (name: Tab) => void): void {
+  const at = TABS.indexOf(shown);
+  const to: Record<string, number> = {
+    ArrowRight: (at + 1) % TABS.length,
+    ArrowLeft: (at + TABS.length - 1) % TABS.length,
+    Home: 0,
+    End: TABS.length - 1,
+  };
+  const next = to[event.key];
+  if (next === undefined) return;
+  open(TABS[next]!);
+  (event.currentTarget as HTMLElement).querySelectorAll<HTMLElement>("[role=tab]")[next]?.focus();
+  event.preventDefault();
+  event.stopPropagation();
 }
 
 function FindingCount() {

@@ -12,6 +12,7 @@ const ROLES: readonly [role: string, title: string][] = [
   ["tool", "Tools"],
   ["workpiece", "Workpieces"],
   ["part", "Parts"],
+  ["machine", "Machines"],
   ["area", "Areas"],
 ];
 

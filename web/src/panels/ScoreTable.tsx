@@ -1,6 +1,7 @@
 // Components of a score: left and right, each with its angles and the band that they fall into.
 
-import { formatFixed, formatNumber } from "../format";
+import { figure } from "../figures";
+import { formatFixed } from "../format";
 import { palette } from "../posture/coloring";
 import { type Component, cssColor, scaleColor, shareOfScale, TOTAL } from "../posture/scores";
 import type { Aspect, Row } from "../wire";
@@ -43,7 +44,7 @@ function ScoreCell({ row, span = 1 }: { row: Row | null; span?: number }) {
   return (
     <td colSpan={span} title={`${row.reason ?? ""}${scale}`}>
       <span class={share === null ? "chip chip-unknown" : "chip"} style={{ background: color }}>
-        {share === null ? "?" : formatNumber(row.value ?? null, 100)}
+        {share === null ? "?" : figure(row.value ?? null, "")}
         {worst !== null && share !== null && <small>/{worst}</small>}
       </span>
       <span class="angles">
@@ -63,7 +64,7 @@ function Angle({ aspect }: { aspect: Aspect }) {
       ? "not measured"
       : angular
         ? `${formatFixed((aspect.value * 180) / Math.PI, 0)}°`
-        : `${formatNumber(aspect.value)} ${aspect.unit ?? ""}`;
+        : `${figure(aspect.value, aspect.unit ?? "")} ${aspect.unit ?? ""}`;
   return (
     <span class="angle">
       {aspect.name} <b>{value}</b>

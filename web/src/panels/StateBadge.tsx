@@ -2,13 +2,14 @@
 
 import { STATE_ICONS, STATE_WORDS, type State } from "../verdicts";
 
-export function StateBadge({ state }: { state: State }) {
+/** @param brief Whether the word is only for those who hear it. */
+export function StateBadge({ state, brief = false }: { state: State; brief?: boolean }) {
   return (
-    <span class={`badge state-${state}`}>
+    <span class={`badge state-${state}`} title={brief ? STATE_WORDS[state] : undefined}>
       <span class="badge-icon" aria-hidden="true">
         {STATE_ICONS[state]}
       </span>
-      {STATE_WORDS[state]}
+      {brief ? <span class="visually-hidden">{STATE_WORDS[state]}</span> : STATE_WORDS[state]}
     </span>
   );
 }

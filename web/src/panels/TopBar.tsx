@@ -1,9 +1,10 @@
 // What is shown, from where, and the worst that is said about it.
 
-import { formatQuantity } from "../format";
+import { against, withUnit } from "../figures";
 import { elsewhere, frame, hello, isLive, link, lookingAt, overall, rows, scene, stale } from "../page_state";
 import { orderedRows } from "../row_order";
 import { STATE_ICONS, type State } from "../verdicts";
+import type { Result } from "../wire";
 import { ElsewhereNote } from "./ElsewhereNote";
 import { HeadsetOffer } from "./HeadsetOffer";
 
@@ -87,7 +88,7 @@ function StatusPill() {
       {detail && <span class="pill-detail">{detail}</span>}
       {worst?.result && detail && worst.result.value !== null && (
         <span class="pill-value" aria-hidden="true">
-          {formatQuantity(worst.result.value, worst.result.unit, worst.result.limit)}
+          {pillFigure(worst.result)}
         </span>
       )}
       {other && <ElsewhereNote other={other} />}
@@ -98,6 +99,10 @@ function StatusPill() {
       {lookingAt.value !== null && <span class="pill-more">looking back</span>}
     </output>
   );
+}
+
+function pillFigure({ value, limit, unit, at_most }: Result): string {
+  return withUnit(against(value, limit, unit, at_most).value, unit);
 }
 
 function judgedCount(): number {

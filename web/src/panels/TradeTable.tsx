@@ -1,15 +1,12 @@
 // Posture against separation: the worst instants of either, and what the other says at the same time.
 
-import { formatNumber, formatTime } from "../format";
+import { against } from "../figures";
+import { formatTime } from "../format";
 import { tradeColumns, tradeRows } from "../posture/instants";
 import { STATE_ICONS } from "../verdicts";
-import type { CriterionInfo, Verdict } from "../wire";
-import type { Instant } from "../worst_instant";
+import type { CriterionInfo } from "../wire";
+import { type Instant, verdictOf } from "../worst_instant";
 import { useActions } from "./app_context";
-
-/** A number without decimals: scores are whole. */
-const WHOLE = 100;
-const CODES: readonly Verdict[] = ["within", "exceeded", "undecided"];
 
 export function TradeTable() {
   const { time } = useActions();
@@ -58,13 +55,12 @@ export function TradeTable() {
 }
 
 function TradeCell({ cell, info, of }: { cell: Instant | null; info: CriterionInfo; of: string }) {
-  const verdict = cell ? CODES[cell.verdict] : undefined;
-  const value = cell && !Number.isNaN(cell.value) ? cell.value : null;
+  const verdict = cell && verdictOf(cell);
   return (
     <td class={`number ${verdict ? `state-${verdict}` : ""} ${info.name === of ? "own" : ""}`}>
       {verdict && <span aria-hidden="true">{STATE_ICONS[verdict]} </span>}
       {verdict && <span class="visually-hidden">{verdict} </span>}
-      {formatNumber(value, info.unit === "" ? WHOLE : null)}
+      {against(cell?.value ?? null, cell?.limit ?? null, info.unit, info.at_most).value}
     </td>
   );
 }

@@ -1,11 +1,11 @@
 // Over the room: viewpoints, and what is drawn in it.
 
 import { useSignal } from "@preact/signals";
-import { mutedCriteria, scene, toggleMuted } from "../page_state";
-import { showCaptions, showGrid } from "../scene/viewer";
+import { scene } from "../page_state";
 import type { Preset } from "../scene/viewpoint";
 import { useActions } from "./app_context";
 import { Icon } from "./Icon";
+import { OverlayList } from "./OverlayList";
 
 const PRESETS: readonly [Preset, string][] = [
   ["corner", "3D"],
@@ -37,10 +37,21 @@ export function ViewTools() {
           <Icon name="frame" />
         </button>
       </fieldset>
-      <div class="tools overlays">
+      <fieldset
+        class="tools overlays"
+        onKeyDown={(event) => {
+          if (event.key !== "Escape" || !open.value) return;
+          open.value = false;
+          event.currentTarget.querySelector("button")?.focus();
+          event.stopPropagation();
+        }}
+      >
+        <legend class="visually-hidden">Overlays</legend>
         <button
           type="button"
+          title="What is drawn by which criterion (1 to 9)"
           aria-expanded={open.value}
+          aria-controls="overlays"
           onClick={() => {
             open.value = !open.value;
           }}
@@ -48,46 +59,7 @@ export function ViewTools() {
           <Icon name="layers" /> Overlays
         </button>
         {open.value && <OverlayList />}
-      </div>
-    </div>
-  );
-}
-
-function OverlayList() {
-  return (
-    <div class="overlay-list">
-      {scene.value?.criteria.map(({ name }, i) => (
-        <label key={name}>
-          <input
-            type="checkbox"
-            checked={!mutedCriteria.value.has(name)}
-            onChange={() => toggleMuted(name)}
-          />
-          <span>{name}</span>
-          {i < 9 && <kbd>{i + 1}</kbd>}
-        </label>
-      ))}
-      <hr />
-      <label>
-        <input
-          type="checkbox"
-          checked={showCaptions.value}
-          onChange={() => {
-            showCaptions.value = !showCaptions.value;
-          }}
-        />
-        <span>Labels of the worst three</span>
-      </label>
-      <label>
-        <input
-          type="checkbox"
-          checked={showGrid.value}
-          onChange={() => {
-            showGrid.value = !showGrid.value;
-          }}
-        />
-        <span>Floor grid</span>
-      </label>
+      </fieldset>
     </div>
   );
 }

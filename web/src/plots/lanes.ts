@@ -40,7 +40,8 @@ export function drawLanes(
     const trace = traces.get(name);
     if (!trace || trace.length === 0) return;
     const from = Math.max(0, x(trace.t[0]!));
-    brush.fillStyle = "#17414a";
+    // What never was within only informs: it is grey where nothing was undecided.
+    brush.fillStyle = trace.kept ? "#17414a" : "#343f4e";
     brush.fillRect(from, top, Math.min(width, x(trace.t[trace.length - 1]!)) - from, tall);
     for (const verdict of ["undecided", "exceeded"] as const) {
       brush.fillStyle = verdict === "exceeded" ? css(VERDICT_COLORS.exceeded) : hatchPattern(brush);

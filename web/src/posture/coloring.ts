@@ -1,14 +1,17 @@
-// What the manikin's colours say, as signals for the panel and the room.
+// What the manikin's colours say, as signals for the panel, the legend and the room.
 
 import { computed, signal } from "@preact/signals";
-import { frame, stale } from "../page_state";
-import { type Coloring, type Palette, scored, tints } from "./scores";
+import { frame, scene, stale } from "../page_state";
+import { remembered } from "../remembered";
+import { COLORINGS, type Coloring, PALETTES, type Palette, scored, tints } from "./scores";
 
-/** Whether the posture panel is open: only then are bodies coloured by scores. */
-export const postureShown = signal(false);
-export const coloring = signal<Coloring>("parts");
-export const palette = signal<Palette>("green to red");
+/** What colours the manikin, whichever panel is open; kept for the next time. */
+export const coloring = remembered<Coloring>("seerob.coloring", COLORINGS, "parts");
+export const palette = remembered<Palette>("seerob.palette", PALETTES, "green to red");
 const chosenScore = signal<string | null>(null);
+
+/** Whether this run has a rule that scores postures. */
+export const hasScores = computed(() => scene.value?.criteria.some((c) => c.group === "ergonomics") ?? false);
 
 /** Criterion whose components are shown; the first with scores unless another was chosen. */
 export const shownScore = computed<string | null>(() => {
@@ -22,7 +25,7 @@ export function chooseScore(name: string): void {
 
 /** Colour per node; empty while bodies keep their own. */
 export const manikinTints = computed<ReadonlyMap<string, number>>(() => {
-  if (!postureShown.value || stale.value) return new Map();
+  if (stale.value) return new Map();
   const result = frame.value?.results.find((r) => r.name === shownScore.value);
   return tints(result, coloring.value, palette.value);
 });

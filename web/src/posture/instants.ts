@@ -7,7 +7,7 @@ import { heldAt, type Instant, worstInstants } from "../worst_instant";
 
 /** Searched at most this often: a live run adds points many times a second. */
 const SEARCH_MS = 1000;
-const PER_SCORE = 3;
+const PER_CRITERION = 3;
 const PER_SAFETY = 1;
 /** What a posture is traded against. */
 const SAFETY_KINDS: readonly string[] = ["separation", "minimum_distance", "power_and_force"];
@@ -44,9 +44,16 @@ effect(() => {
 
 /** Criteria of scores, with their worst instants. */
 export const worstScores = computed<WorstOf[]>(() => {
-  void searched.value;
-  return worstOf((info) => info.group === "ergonomics", PER_SCORE);
+  const scores = scene.value?.criteria.filter((info) => info.group === "ergonomics") ?? [];
+  return scores.map((info) => ({ info, instants: worstOf(info) }));
 });
+
+/** The worst instants of a criterion; read inside a component or an effect, they are kept up to date. */
+export function worstOf(info: CriterionInfo): Instant[] {
+  void searched.value;
+  const trace = traces.get(info.name);
+  return trace ? worstInstants(trace, info.at_most, PER_CRITERION) : [];
+}
 
 /** Columns of the trade-off: every score, and the first few of what says how near the robot is. */
 export const tradeColumns = computed<CriterionInfo[]>(() => {
@@ -74,10 +81,3 @@ export const tradeRows = computed<TradeRow[]>(() => {
   }
   return rows.sort((a, b) => a.t - b.t);
 });
-
-function worstOf(wanted: (info: CriterionInfo) => boolean, count: number): WorstOf[] {
-  return (scene.value?.criteria ?? []).filter(wanted).map((info) => {
-    const trace = traces.get(info.name);
-    return { info, instants: trace ? worstInstants(trace, info.at_most, count) : [] };
-  });
-}

@@ -76,7 +76,8 @@ export function cssColor(color: number): string {
 }
 
 /** What the manikin is coloured by. */
-export type Coloring = "verdict" | "parts" | "overall";
+export type Coloring = "parts" | "overall" | "verdict";
+export const COLORINGS: readonly Coloring[] = ["parts", "overall", "verdict"];
 
 /** Colour per node: each bone by the worst of its components, or all of them by the total. */
 export function tints(result: Result | undefined, by: Coloring, palette: Palette): Map<string, number> {

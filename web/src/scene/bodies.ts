@@ -2,7 +2,6 @@
 
 import {
   Box3,
-  EdgesGeometry,
   Group,
   LineSegments,
   type Material,
@@ -15,7 +14,9 @@ import {
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { FLOATS_PER_NODE } from "../poses";
 import type { Node, Scene, Snapshot, Verdict } from "../wire";
+import { featureEdges } from "./feature_edges";
 import { bodyMaterial, lineMaterial, markerMaterial, scoreMaterial } from "./materials";
+import { veilMaterial } from "./veil";
 
 /** Role of what is only room: a safety area. */
 const AREA = "area";
@@ -32,7 +33,7 @@ export class Body {
   /** Box around its mesh, in its own frame; empty until the mesh came. */
   readonly extent = new Box3();
   private dressed: { mesh: Mesh; own: Material | Material[] }[] = [];
-  private enclosed: { fill: Mesh; edges: LineSegments }[] = [];
+  private enclosed: { fill: Mesh; edges: LineSegments; smooth: boolean }[] = [];
   private painted: Verdict | null | undefined = undefined;
   /** Colour of a score; undefined while it has its own or a verdict's. */
   tint: number | undefined = undefined;
@@ -72,11 +73,13 @@ export class Body {
 
   // An area is room, not matter: one sees and clicks through it.
   private enclose(part: Mesh): void {
-    const edges = new LineSegments(new EdgesGeometry(part.geometry, 12));
+    const { lines, smooth } = featureEdges(part.geometry);
+    const edges = new LineSegments(lines);
+    if (smooth && !part.geometry.hasAttribute("normal")) part.geometry.computeVertexNormals();
     for (const shape of [part, edges]) shape.raycast = () => {};
     part.renderOrder = 2;
     part.add(edges);
-    this.enclosed.push({ fill: part, edges });
+    this.enclosed.push({ fill: part, edges, smooth });
   }
 
   /** Show it in the colour of a verdict; `undefined` for its own. */
@@ -108,9 +111,10 @@ export class Body {
   }
 
   private repaint(): void {
-    for (const { fill, edges } of this.enclosed) {
-      fill.material = markerMaterial("fill", this.painted ?? null);
-      edges.material = lineMaterial(this.painted ?? null);
+    for (const { fill, edges, smooth } of this.enclosed) {
+      const verdict = this.painted ?? null;
+      fill.material = smooth ? veilMaterial(verdict) : markerMaterial("fill", verdict);
+      edges.material = lineMaterial(verdict);
     }
     for (const { mesh, own } of this.dressed) {
       if (this.tint !== undefined) mesh.material = scoreMaterial(this.tint);

@@ -12,9 +12,10 @@ import {
 import { NEUTRAL_COLOR, VERDICT_COLORS } from "../verdicts";
 import type { Verdict } from "../wire";
 
-type Tone = Verdict | "none";
+export type Tone = Verdict | "none";
 
-function colorOf(tone: Tone): number {
+/** Colour of a verdict or of none, sRGB. */
+export function colorOf(tone: Tone): number {
   return tone === "none" ? NEUTRAL_COLOR : VERDICT_COLORS[tone];
 }
 
@@ -40,7 +41,8 @@ const LOOK: Record<Kind, { opacity: number; depthTest: boolean; depthWrite: bool
 
 const made = new Map<string, Material>();
 
-function once(key: string, make: () => Material): Material {
+/** A material that is made when it is first needed and shared from then on. */
+export function once(key: string, make: () => Material): Material {
   let material = made.get(key);
   if (!material) {
     material = make();
@@ -79,7 +81,9 @@ export function faintMaterial(verdict: Verdict | null): Material {
 function thin(verdict: Verdict | null, opacity: number): Material {
   const tone: Tone = verdict ?? "none";
   return once(`thin ${opacity} ${tone}`, () => {
-    return new LineBasicMaterial({ color: colorOf(tone), toneMapped: false, transparent: true, opacity });
+    // Seen through: what lies in the same plane, such as a field and its beams, must not flicker.
+    const look = { toneMapped: false, transparent: true, opacity, depthWrite: false };
+    return new LineBasicMaterial({ color: colorOf(tone), ...look });
   });
 }
 

@@ -15,6 +15,7 @@ import {
   ShadowMaterial,
   WebGLRenderer,
 } from "three";
+import { drawnBySoftware } from "./effort";
 import { makeGrid } from "./grid";
 
 const BACKGROUND = 0x10151c;
@@ -31,10 +32,11 @@ export class Stage {
   private dirty = true;
 
   constructor(readonly element: HTMLElement) {
-    this.renderer = new WebGLRenderer({ antialias: true });
-    this.renderer.setPixelRatio(Math.min(globalThis.devicePixelRatio, 2));
+    const light = drawnBySoftware();
+    this.renderer = new WebGLRenderer({ antialias: !light });
+    this.renderer.setPixelRatio(Math.min(globalThis.devicePixelRatio, light ? 1 : 2));
     this.renderer.toneMapping = NeutralToneMapping;
-    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.enabled = !light;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false;
     element.append(this.renderer.domElement);

@@ -126,9 +126,14 @@ export class Viewer {
       chosen?.kind === "criterion" ? chosen.name : null,
       showCaptions.peek(),
     );
-    this.bodies.paint(this.markers.painted);
+    this.paint();
     this.bodies.wear(this.frame?.looks ?? {});
     this.stage.invalidate();
+  }
+
+  // What may be out of date has no colour of a verdict.
+  private paint(): void {
+    this.bodies.paint(stale.peek() ? new Map() : this.markers.painted);
   }
 
   // A body is bracketed, a whole robot or person only lit; a criterion shows itself by its markers.
@@ -164,7 +169,7 @@ export class Viewer {
     });
     effect(() => {
       this.markers.root.visible = !stale.value;
-      this.bodies.paint(stale.value ? new Map() : this.markers.painted);
+      this.paint();
       this.stage.invalidate();
     });
   }

@@ -91,15 +91,16 @@ CALM = {
     "tool_speed": 0.1,
     "tool_acceleration": 0.5,
     "tool_jerk": 5.0,
+    "tolerance": 0.005,
 }
-"""What an emulated controller does where its waypoints do not say [rad/s, m/s and their derivatives]."""
+"""What an emulated controller does where its waypoints do not say [rad/s, m/s and their derivatives, rad]."""
 
 
 def add_motion(sub: argparse.ArgumentParser) -> None:
     """Arguments that say what it plays."""
     what = sub.add_mutually_exclusive_group()
     what.add_argument("--file", type=Path, help="motion to play: a table with joint columns (.csv, .xlsx)")
-    text = "waypoints to go through, timed here: .script, .urp, .toml, .yaml, .csv, .xlsx"
+    text = "waypoints to go through, timed here: .script, .urp, .toml, .yaml, .csv, .xlsx, RoboDK, KUKA log"
     what.add_argument("--waypoints", type=Path, help=text)
 
 
@@ -128,11 +129,10 @@ def _through(path: Path, target: Target, home: Sequence[float]) -> Motion:
     import msgspec
 
     from seerob.sources.waypoints import Waypoints
-    from seerob.waypoints.reading import read_program
 
-    program = read_program(path, path.name)
-    first = program.waypoints[0] if program.waypoints else None
-    start = tuple(home) if first is not None and first.q is None else None
-    given = {"robot": target.name, "file": path.name, "start": start, **CALM}
-    source = msgspec.convert({k: v for k, v in given.items() if v is not None}, Waypoints)
+    given = {"robot": target.name, "file": path.name, **CALM}
+    source = msgspec.convert(given, Waypoints)
+    program = source.program(path)
+    if program.waypoints and program.waypoints[0].q is None:
+        source = msgspec.structs.replace(source, start=tuple(home))
     return _played(source.open(path.parent, target))

@@ -10,6 +10,8 @@ from seerob.commands.emulating import Emulated
 HELP = "an OPC UA server: a PLC with a belt, a light curtain and a door, and a robot by OPC 40010"
 HOME = (0.0, -1.2, 1.4, -1.5, -1.5, 0.0)
 """What the robot swings about [rad]."""
+OUTPUT = "Twin/warning"
+"""A bool that a trigger may write."""
 
 
 def add(sub: argparse.ArgumentParser) -> None:
@@ -31,5 +33,8 @@ def emulated(options: argparse.Namespace) -> Emulated:
         "Curtain/clear": Variable(plc_cell.clear),
         "Door/open": Variable(plc_cell.door_open),
     }
-    server = OpcuaServer(variables, {"Robot": swing(HOME)}, host=options.host, port=options.port)
-    return Emulated(server, f"variables {', '.join(variables)}; one robot", f"{options.host}:{options.port}")
+    server = OpcuaServer(
+        variables, {"Robot": swing(HOME)}, host=options.host, port=options.port, outputs=(OUTPUT,)
+    )
+    what = f"variables {', '.join(variables)}; one robot; {OUTPUT} may be written"
+    return Emulated(server, what, f"{options.host}:{options.port}")

@@ -1,0 +1,143 @@
+"""From mounted chains to mechanisms: which joints and bodies are whose, and who rides on whom."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from seerob.chains import couple, unknown_masses, unweighed_links
+from seerob.model import Body, Frame, Mechanism
+from seerob.model_io.description import Description, Link
+from seerob.mounting.specification import Entry
+from seerob.transforms import Array
+
+THINGS = ("tool", "workpiece")
+
+
+@dataclass
+class Chain:
+    """A robot, a person or a machine on its way to a `Mechanism`."""
+
+    description: Description
+    role: str
+    home: Array
+    home_given: bool
+    tip: Frame | None = None
+    on: str = ""
+    """Full name of the body that carries it; empty when it stands in the world."""
+
+
+class Riders:
+    """Who is mounted on whom.
+
+    Args:
+        chains: By name.
+        carriers: Who carries each body, by the body's full name.
+        entries: Bodies with a shape.
+        mounted: Full names of bodies that a tool or a workpiece is mounted on.
+    """
+
+    def __init__(
+        self,
+        chains: Mapping[str, Chain],
+        carriers: Mapping[str, str],
+        entries: Sequence[Entry],
+        mounted: Sequence[str],
+    ) -> None:
+        self._chains, self._carriers, self._entries = chains, carriers, entries
+        self._on = {*mounted, *(chain.on for chain in chains.values())}
+
+    def above(self, name: str) -> str:
+        """Who carries a robot or machine; empty for the world."""
+        on = self._chains[name].on
+        return self._carriers[on] if on else ""
+
+    def of(self, name: str) -> tuple[str, ...]:
+        """Machines mounted on a robot or a machine, and on those; a robot is no part of what it is on."""
+        found: list[str] = []
+        for other, chain in self._chains.items():
+            if chain.role == "machine" and self.above(other) == name:
+                found += [other, *self.of(other)]
+        return tuple(found)
+
+    def things(self, name: str) -> dict[str, float | None]:
+        """Mass [kg] of each tool, workpiece and machine on a robot or machine; None when nobody gave one."""
+        riders = self.of(name)
+        things: dict[str, float | None] = {}
+        for entry in self._entries:
+            rides = entry.owner in riders
+            if rides or (entry.carrier in (name, *riders) and entry.role in THINGS):
+                mass = None if entry.mass is None else entry.mass.value
+                known = things.get(entry.owner)
+                if entry.owner not in things:
+                    things[entry.owner] = mass
+                elif rides:
+                    things[entry.owner] = None if known is None or mass is None else known + mass
+                elif mass is not None:
+                    things[entry.owner] = mass
+        return things
+
+    def unweighed(self, name: str) -> list[Link]:
+        """Links of a robot or machine that joints move and whose mass nobody gave."""
+        loaded = {full.partition("/")[2] for full in self._on if full.startswith(f"{name}/")}
+        return unweighed_links(self._chains[name].description, loaded=loaded)
+
+
+def mechanism(
+    mj: Any, name: str, chain: Chain, riders: Riders, carriers: Mapping[str, str], bodies: Sequence[Body]
+) -> Mechanism:
+    """A chain as the compiled model has it.
+
+    Args:
+        mj: The `mujoco.MjModel`.
+        name: Of the robot, person or machine.
+        chain: What was mounted.
+        riders: Who is mounted on whom.
+        carriers: Who carries each body, by the body's full name.
+        bodies: Of the workstation, numbered.
+    """
+    every = [joint for link in chain.description.links for joint in link.joints]
+    commanded = [joint for joint in every if joint.mimic is None]
+    coupling, offset = couple(every, commanded)
+    ids = [mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_JOINT, f"{name}/{joint.name}") for joint in every]
+    aboard = (name, *riders.of(name))
+    own = (_body_id(mj, full) for full, carrier in carriers.items() if carrier in aboard)
+    mj_bodies = np.array(sorted(i for i in own if mj.body_weldid[i] != 0), np.int64)
+    moving_ids = set(mj_bodies.tolist())
+    own_bodies = [b for b in bodies if b.carrier in aboard and b.role != "area"]
+    tip = chain.tip if chain.tip is not None else Frame(f"{name}/{chain.description.tip}", -1, np.eye(4))
+    unweighed = riders.unweighed(name)
+    weighed = {thing: mass is not None for thing, mass in riders.things(name).items()}
+    return Mechanism(
+        name=name,
+        role=chain.role,
+        description=chain.description,
+        joints=tuple(commanded),
+        q_address=np.array([mj.jnt_qposadr[i] for i in ids], np.int64),
+        v_address=np.array([mj.jnt_dofadr[i] for i in ids], np.int64),
+        coupling=coupling,
+        offset=offset,
+        own=np.array([i for i, joint in enumerate(every) if joint.mimic is None], np.int64),
+        home=chain.home,
+        home_given=chain.home_given,
+        tip=replace(tip, mj=_body_id(mj, tip.name)),
+        bodies=tuple(b.index for b in bodies if b.owner == name),
+        carried=tuple(b.index for b in own_bodies if b.owner != name),
+        moving=tuple(b.index for b in own_bodies if b.mj in moving_ids),
+        mj_bodies=mj_bodies,
+        unknown_masses=unknown_masses(name, unweighed, weighed),
+        impossible_masses=tuple(link.impossible_mass for link in unweighed if link.impossible_mass),
+        velocity_limits=tuple(joint.velocity for joint in commanded),
+        effort_limits=tuple(joint.effort for joint in commanded),
+        rotor_inertia_known=all(joint.armature is not None for joint in commanded),
+        on=riders.above(name),
+        riders=riders.of(name),
+    )
+
+
+def _body_id(mj: Any, name: str) -> int:
+    return int(mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name))

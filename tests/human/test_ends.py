@@ -1,0 +1,83 @@
+"""Where fingers, toes and crown are is bounded when nothing but the joint before them is seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_capture import PERSON, captured, frames_of, source, walking, workstation
+
+from seerob import run as road
+from seerob.engine import Engine
+from seerob.ergonomic_posture import bind_posture
+from seerob.human.ends import ENDS, aimed, swing
+from seerob.human.posture import posture
+from seerob.human.skeleton import AXES, BONES, bone_poses
+from seerob.samples import BodyPoint
+from seerob.station import Station
+from seerob.tracking_error import TrackingError
+
+LIMITS = PERSON.joints()
+LOWER = np.array([-np.inf if j.lower is None else j.lower for j in LIMITS])
+UPPER = np.array([np.inf if j.upper is None else j.upper for j in LIMITS])
+
+
+def seen(bone, *, at=(0.0, 0.0, 0.0), wxyz=None, weight=1.0):
+    return BodyPoint(
+        name=f"{bone}{at}", bone=bone, at=at, position=(0, 0, 0), wxyz=wxyz, position_weight=weight
+    )
+
+
+def test_an_orientation_a_second_place_or_the_toes_tell_how_an_end_is_turned():
+    assert aimed([seen(bone) for bone in ENDS]) == set()
+    assert aimed([seen("right_hand", wxyz=(1.0, 0, 0, 0))]) == {"right_hand"}
+    assert aimed([seen("right_hand"), seen("right_hand", at=(0.0, -0.08, 0.0))]) == {"right_hand"}
+    assert aimed([seen("right_hand"), seen("right_hand", at=(0.0, -0.08, 0.0), weight=0.0)]) == set()
+    assert aimed([seen("left_foot"), seen("left_toes")]) == {"left_foot"}
+    assert aimed([seen("left_forearm", wxyz=(1.0, 0, 0, 0))]) == set()
+
+
+@pytest.mark.parametrize("bone", sorted(ENDS))
+def test_no_posture_within_the_limits_turns_it_farther_than_the_bound(bone):
+    random, i = np.random.default_rng(3), BONES.index(bone)
+    q = posture(PERSON, "standing")
+    own = [k for k, axis in enumerate(AXES) if axis.bone == bone]
+    many = np.repeat(q[None], 300, axis=0)
+    many[:, own] = random.uniform(LOWER[own], UPPER[own], (300, len(own)))
+    many[:2, own] = LOWER[own], UPPER[own]
+    here, (there, _) = bone_poses(PERSON, q)[0][i], bone_poses(PERSON, many)
+    angle = np.arccos(np.clip((np.einsum("nij,ij->n", there[:, i], here) - 1) / 2, -1, 1))
+    bound = swing(bone, q, LOWER, UPPER)
+    assert angle.max() <= bound + 1e-9
+    assert bound <= np.pi
+
+
+def twin(turned):
+    frames = frames_of(*walking(0.3), turned=turned)
+    stage = Station(workstation(source(captured(frames))))
+    engine = Engine(stage.model, driven={"operator": 0.2})
+    for seq, samples in enumerate(road.pump(stage.sources, 0.01)):
+        engine.take(samples)
+        state = engine.tick() if seq else engine.start()
+        if seq == 5:
+            break
+    return stage.model, state
+
+
+def test_a_distance_to_a_hand_of_which_the_wrist_alone_is_seen_is_as_uncertain_as_the_hand_is_long():
+    model, state = twin(turned=False)
+    human = model.human("operator")
+    names = [model.bodies[i].name.removeprefix("operator/") for i in human.bodies]
+    off = dict(zip(names, TrackingError(model, list(human.bodies)).at(state), strict=True))
+    assert set(state.hearings["operator"].unaimed(state.t)) == {"head", "right_hand", "left_hand"}
+    assert 0.2 < off["right_hand"] < 0.5
+    assert off["head"] > 0.05
+    assert off["right_foot"] < 0.02  # its toes are seen
+    assert off["right_forearm"] < 0.02
+    lost = bind_posture(model, "operator")(state)
+    model, state = twin(turned=True)
+    assert state.hearings["operator"].unaimed(state.t) == {}
+    assert TrackingError(model, list(human.bodies)).at(state).max() < 0.02
+    told = bind_posture(model, "operator")(state)
+    unknown = {f for f in told.__dataclass_fields__ if np.isnan(np.asarray(getattr(lost, f), float)).any()}
+    assert any("wrist" in name for name in unknown)
+    assert not any(np.isnan(np.asarray(getattr(told, name), float)).any() for name in unknown)

@@ -1,0 +1,109 @@
+"""The map where criteria are muted or rest on inputs that may be off, and what clamps by name."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from test_methods_of_permission import maps
+from test_permissible_speed import KEPT_OUT, KNOWN, LIMITS, PERSON, PFL, SOURCE, cell, turn
+
+from made_cell import FLOATING, TWO_R, made, two_r
+from seerob.errors import Undecided
+from seerob.permissible.ceiling import Ceiling, Method
+from seerob.permissible.methods import By, governing
+from seerob.permissible.witness import Posed
+
+PLC = '[[sources]]\nkind = "signals_csv"\nname = "plc"\nfile = "s.csv"\ntime = "t"\ntime_unit = "s"\n'
+GATE = '[[variables]]\nname = "gate/open"\nsource = "plc"\naddress = "x"\ntype = "bool"\n'
+MUTED = KNOWN.replace('name = "S"', 'name = "S"\nactive = "gate/open"')
+
+
+def gated(folder, until, *, told=1.05):
+    """Asked up to an instant [s]; the gate is heard up to ``told`` [s]."""
+    head = 'variables = "v.toml"\n' + FLOATING + TWO_R + LIMITS + PERSON.format(x=3.2) + SOURCE
+    rows = [f"{0.05 * k:.2f},{int(0.05 * k <= until)}" for k in range(21) if 0.05 * k <= told]
+    signals = {"v.toml": GATE, "s.csv": "\n".join(["t,x", *rows])}
+    text = head + PLC + "timeout = 0.2\n" + MUTED
+    return made(folder, text, {**signals, "arm.urdf": two_r(), "motion.csv": turn()})
+
+
+def test_a_criterion_limits_nothing_where_it_is_muted_and_is_open_where_nobody_knows(tmp_path):
+    always = maps(cell(tmp_path / "always", KNOWN), By.ALL)[By.ALL]
+    some = maps(gated(tmp_path / "some", 0.5), By.ALL)[By.ALL]
+    lost = maps(gated(tmp_path / "lost", 2.0, told=0.5), By.ALL)[By.ALL]
+    early, late = some.t < 0.45, some.t > 0.75
+    assert (always.share[late] < 1).any()
+    np.testing.assert_allclose(some.share[early], always.share[early], rtol=1e-12)
+    assert (some.share[late] >= 1).all()
+    told = {c.reason for k in np.flatnonzero(late) for c in some.ceilings[k]}
+    assert told == {"not asked: gate/open is false"}
+    np.testing.assert_allclose(lost.share[early], always.share[early], rtol=1e-12)
+    assert np.isnan(lost.share[late]).all()
+
+
+@pytest.mark.parametrize(("by", "expected"), [(By.ALL, 0.3), (By.EITHER, 0.3), (By.SSM, 1.0), (By.PFL, 0.3)])
+def test_a_method_that_is_not_asked_is_not_enough_by_itself(by, expected):
+    ceilings = [
+        Ceiling("S", math.inf, method=Method.SSM, asked=False),
+        Ceiling("F", 0.3, method=Method.PFL),
+    ]
+    found = governing(ceilings, by)
+    assert (1.0 if found is None else found.share) == expected
+
+
+def test_what_a_stop_may_be_off_by_counts_in_full(tmp_path):
+    """The map with tolerances is that of the longest times."""
+    off = KNOWN.replace("stopping = 0.3 ", "stopping = 0.3, tolerance = { reaction = 0.02, stopping = 0.05 } ")
+    longest = KNOWN.replace("reaction = 0.1, stopping = 0.3", "reaction = 0.12, stopping = 0.35")
+    tolerant, worst, nominal = (
+        maps(cell(tmp_path / str(i), text), By.ALL)[By.ALL].permissible
+        for i, text in enumerate((off, longest, KNOWN))
+    )
+    np.testing.assert_allclose(tolerant, worst, rtol=1e-12)
+    assert (tolerant < nominal).any()
+
+
+def test_what_masses_may_be_off_by_counts_in_full(tmp_path):
+    """E = ½ M q̇² with masses 20 % larger: the share falls by √1.2."""
+    energy = '[[safety]]\nkind = "kinetic_energy"\nname = "E"\nrobot = "arm"\nlimit = 0.5\n'
+    given = maps(cell(tmp_path / "a", energy), By.ALL)[By.ALL].share
+    off = "mass_tolerance = 0.2\n" + LIMITS
+    tolerant = maps(cell(tmp_path / "b", energy, limits=off), By.ALL)[By.ALL].share
+    limited = tolerant < 1
+    assert limited.any()
+    np.testing.assert_allclose(tolerant[limited], (given / np.sqrt(1.2))[limited], rtol=1e-9)
+
+
+@pytest.mark.parametrize("floor", [True, False])
+def test_what_clamps_on_the_floor_says_so(tmp_path, floor):
+    """An arm that comes down onto the floor from 5 cm above it, and the same one without a floor."""
+    turned = two_r().replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"')
+    text = FLOATING + TWO_R + LIMITS + "base = { position = [0, 0, 0.5] }\n" + SOURCE + PFL + KEPT_OUT
+    text += f"floor = {str(floor).lower()}\n"
+    station = made(tmp_path, text, {"arm.urdf": turned, "motion.csv": turn(angle=0.2)})
+    (found,) = maps(station, By.ALL).values()
+    contacts = {c.contact for each in found.ceilings for c in each}
+    assert ("clamped on the floor" in contacts) == floor
+    if floor:
+        words = {c.words() for each in found.ceilings for c in each if c.region == "Chest"}
+        assert any(word.startswith("F: Chest, clamped on the floor, ") for word in words)
+
+
+def test_where_somebody_is_is_as_sure_as_in_the_run(tmp_path):
+    """A person that the run had doubts of is in doubt for every question, also for that of each bone."""
+    model = cell(tmp_path, KNOWN).model
+
+    class Doubtful:
+        def others(self, t):
+            return np.zeros(model.mj.nq), np.zeros(model.mj.nv), {"op": "op: not heard"}
+
+        def heard(self, t):
+            return {}, {}
+
+    state = Posed(model, model.robot("arm"), Doubtful())
+    state.place(0.0, 0.0, np.zeros(2), np.zeros(2))
+    gap = model.gap(model.select("op"), model.robot("arm").moving)
+    with pytest.raises(Undecided, match="op: not heard"):
+        state.closest_per_body(gap)

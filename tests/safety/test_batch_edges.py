@@ -1,0 +1,79 @@
+"""Verdicts in arrays at the edges of what they rest on, instant by instant those of one instant."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, results_at, two_r
+from seerob.safety.effective_mass import EffectiveMass
+from seerob.safety.kinetic_energy import KineticEnergy
+from seerob.safety.velocity import Velocity
+from seerob.series import CODES, NO_VERDICT
+
+WALL = '[[parts]]\nname = "wall"\nshape = {{ box = [0.1, 9, 9] }}\nat = {{ position = [{x}, 0, 0] }}\n'
+MASS = '[[safety]]\nkind = "effective_mass"\nname = "m"\nat = "arm"\nlimit = 1.5\n'
+SLOW = "engine = { gravity = [0, 0, 0], physics = false }\n"
+
+
+def both(folder, text, motion):
+    """Value and verdict of each instant by itself, and of all at once."""
+    station = made(folder, text, {"arm.urdf": two_r()})
+    alone = [results_at(station, arm=each)["m"] for each in motion]
+    q, qd = (np.array([each[k] for each in motion]) for k in (0, 1))
+    answers = station.batch({"arm": q}, {"arm": qd})["m"].answers
+    values = [np.nan if r.value is None else r.value for r in alone]
+    codes = [NO_VERDICT if r.verdict is None else CODES[r.verdict] for r in alone]
+    return values, codes, answers
+
+
+def test_a_mass_along_the_motion_begins_with_the_motion(tmp_path):
+    """Of an arm bent by 90°, at 0.99 and 1.01 mm/s of its tip, √2 m from its base."""
+    motion = [((0.0, np.pi / 2), (v / np.sqrt(2), 0.0)) for v in (0.0, 0.99e-3, 1.01e-3, 1.0)]
+    values, codes, answers = both(tmp_path, SLOW + TWO_R + MASS, motion)
+    assert np.isnan(values).tolist() == [True, True, False, False]
+    np.testing.assert_allclose(answers.value, values, rtol=1e-9)
+    assert answers.verdict.tolist() == codes
+    assert codes[:2] == [NO_VERDICT] * 2
+
+
+@pytest.mark.parametrize("gap", [0.0005, 0.1])
+def test_a_line_of_half_a_millimetre_has_a_direction(tmp_path, gap):
+    """Toward a wall across x, half a millimetre and more before the arm at (-1, 1.05)."""
+    text = SLOW + TWO_R + WALL.format(x=-1.05 - 0.05 - gap) + MASS + 'toward = "wall"\n'
+    values, codes, answers = both(tmp_path, text, [((np.pi / 2, np.pi / 2), (0.0, 0.0))] * 2)
+    assert np.isfinite(values).all()
+    np.testing.assert_allclose(answers.value, values, rtol=1e-9)
+    assert answers.verdict.tolist() == codes
+
+
+def test_who_touches_has_no_direction_and_is_undecided(tmp_path):
+    text = SLOW + TWO_R + WALL.format(x=0) + MASS + 'toward = "wall"\n'
+    values, codes, answers = both(tmp_path, text, [((0.0, 0.5), (1.0, 0.0))] * 2)
+    assert np.isnan(values).all()
+    assert np.isnan(answers.value).all()
+    assert answers.verdict.tolist() == codes == [CODES["undecided"]] * 2
+
+
+CARRIED = FLOATING + TWO_R + TWO_R.replace('"arm"', '"upper"') + 'on = "arm/tip"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "batched"),
+    [
+        (FLOATING + TWO_R, (True, True, True)),
+        # A tolerance makes an interval, which the arrays do not know of energies and masses.
+        (FLOATING + TWO_R + "mass_tolerance = 0.1\n", (True, False, False)),
+        (CARRIED, (False, False, False)),
+    ],
+    ids=["alone", "tolerance", "carried"],
+)
+def test_what_the_arrays_do_not_know_is_left_to_the_road(tmp_path, text, batched):
+    model = made(tmp_path, text, {"arm.urdf": two_r()}).model
+    on = "upper" if text is CARRIED else "arm"
+    asked = (
+        Velocity(name="v", at=on).batch(model),
+        KineticEnergy(name="E", robot=on).batch(model),
+        EffectiveMass(name="m", at=on).batch(model),
+    )
+    assert tuple(each is not None for each in asked) == batched

@@ -1,0 +1,91 @@
+"""What a foreign reader finds in the workbook is what was written, and the same cells are the same bytes."""
+
+from __future__ import annotations
+
+import io
+import math
+
+import numpy as np
+import openpyxl
+import pytest
+from openpyxl.utils import get_column_letter
+from openpyxl.utils.escape import unescape
+
+from seerob.sinks import _xlsx as xlsx
+from seerob.sinks._sheets import Sheets
+from seerob.sinks._xlsx import MOST_COLUMNS, Workbook, letters
+
+
+def written(head, rows, **options):
+    out = io.BytesIO()
+    with Workbook(out) as book:
+        Sheets(book).add("sheet", head, rows, **options)
+    return out
+
+
+def read(out):
+    return openpyxl.load_workbook(out)["sheet"]
+
+
+def cells(out):
+    return [list(row) for row in read(out).iter_rows(min_row=2, values_only=True)]
+
+
+def test_numbers_keep_every_bit():
+    random = np.random.default_rng(5)
+    rows = (random.normal(size=(40, 6)) * 10.0 ** random.integers(-300, 300, (40, 6))).tolist()
+    rows += [[0.1 + 0.2, -0.0, 5e-324, 1.7976931348623157e308, 1e22, -1.0]]
+    found = [
+        [float(cell.value) for cell in row]
+        for row in read(written(list("abcdef"), rows)).iter_rows(min_row=2)
+    ]
+    assert found == rows
+
+
+def test_rows_of_everything_are_read_as_they_are():
+    rows = [[1.5, None, "x", 3, True, math.nan, math.inf, np.float64(0.25)], [2.5], [], ["<&\">'\t\n", 2.0]]
+    found = [
+        list(row) for row in read(written(list("abcdefgh"), rows)).iter_rows(min_row=2, values_only=True)
+    ]
+    assert found[0] == [1.5, None, "x", 3, True, None, "inf", 0.25]
+    assert found[1] == [2.5, *[None] * 7]
+    assert found[2] == [None] * 8
+    assert found[3][:2] == ["<&\">'\t\n", 2.0]
+
+
+@pytest.mark.parametrize("text", ["_x0041_", "a_x000D_b", "_x", "__x0041_", "\r\n"])
+def test_text_that_looks_escaped_is_what_it_was(text):
+    assert unescape(read(written(["a"], [[text]]))["A2"].value) == text
+
+
+def test_columns_have_their_names():
+    for k in (0, 25, 26, 51, 52, 701, 702, MOST_COLUMNS - 1):
+        assert letters(k) == get_column_letter(k + 1)
+
+
+def test_a_sheet_is_no_wider_than_excel_takes_and_says_so():
+    titles = [f"c{k}" for k in range(MOST_COLUMNS + 5)]
+    sheet = read(written(titles, [[float(k) for k in range(len(titles))]]))
+    assert sheet.max_column == MOST_COLUMNS
+    assert "6 columns" in sheet.cell(1, MOST_COLUMNS).value
+    assert sheet.cell(2, MOST_COLUMNS).value is None
+    assert sheet.cell(2, MOST_COLUMNS - 1).value == MOST_COLUMNS - 2
+
+
+def test_a_sheet_that_is_full_goes_on_in_another(monkeypatch):
+    monkeypatch.setattr(xlsx, "FULL", 5_000)
+    out = written(["a", "b"], ([float(k), 1.0] for k in range(200)))
+    book = openpyxl.load_workbook(out)
+    assert len(book.sheetnames) > 1
+    values = [row[0] for sheet in book for row in sheet.iter_rows(min_row=2, values_only=True)]
+    assert values == list(range(200))
+
+
+def test_the_same_cells_are_the_same_bytes():
+    rows = [[0.5, "exceeded", None], [1.5, "within", 2.0]]
+    assert written(["a [m]", "b", "c"], rows).getvalue() == written(["a [m]", "b", "c"], rows).getvalue()
+
+
+def test_whoever_fails_leaves_nothing_open(tmp_path):
+    with pytest.raises(ZeroDivisionError), Workbook(tmp_path / "x.xlsx") as book:
+        Sheets(book).add("sheet", ["a"], ([1 / k] for k in (1.0, 0.0)))

@@ -1,0 +1,263 @@
+"""Every kind of live source beside a device that can be stopped and started again, on this machine."""
+
+from __future__ import annotations
+
+import socket
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from seerob.emulators.background import Emulator
+from seerob.emulators.motions import swing
+from seerob.headset_offers import OFFERS, read
+from seerob.live import LiveSource
+from seerob.page_messages import Tracking
+from seerob.source import Target
+from seerob.variables.dictionary import Variable
+from soak.elsewhere import Elsewhere
+from sources.listening import free_port
+
+SILENCE = 0.2
+"""After which a sender of datagrams counts as gone here [s]: an hour less for a thousand of them."""
+SIX, SEVEN = (0.0, -1.2, 1.4, -1.5, -1.5, 0.0), (0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0)
+HERE = "127.0.0.1"
+
+
+class Made(NamedTuple):
+    """A device, and who listens to it."""
+
+    server: Emulator | Elsewhere
+    source: LiveSource
+    target: Target | None = None
+
+
+def target(name, address, unit="mm/s", **more):
+    """What a source of variables is asked for."""
+    return Target(variables=(Variable(name=name, source="plc", address=address, unit=unit, **more),))
+
+
+def person():
+    from seerob.emulators.mvn_person import animated
+
+    return animated("library:reach")
+
+
+# -- controllers --------------------------------------------------------------------------------
+
+
+def rtde(_):
+    from seerob.emulators.rtde import RtdeServer
+    from seerob.sources.rtde import Rtde
+
+    server = RtdeServer(swing(SIX)).start()
+    return Made(server, Rtde(robot="arm", host=HERE, port=server.port))
+
+
+def fri(patch):
+    from seerob.emulators.fri import FriServer
+    from seerob.sources.fri import Fri
+
+    patch.setattr("seerob.sources.fri.SILENCE", SILENCE)
+    port = free_port()
+    return Made(FriServer(swing(SEVEN), to=(HERE, port)).start(), Fri(robot="arm", host=HERE, port=port))
+
+
+def drfl(patch):
+    from seerob.emulators.drfl import DrflSender
+    from seerob.sources.drfl import Drfl
+
+    patch.setattr("seerob.sources.drfl.SILENCE", SILENCE)
+    port = free_port()
+    return Made(DrflSender(swing(SIX), to=(HERE, port)).start(), Drfl(robot="arm", port=port))
+
+
+def modbus_robot(_):
+    from seerob.emulators.modbus import ModbusServer
+    from seerob.emulators.modbus_robot import program
+    from seerob.protocols.modbus_map import load
+    from seerob.sources.modbus_robot import ModbusRobot
+
+    played = program(load("doosan", Path()), swing(SIX), {"robot_state": "moving", "servo_on": True})
+    server = ModbusServer(played).start()
+    return Made(server, ModbusRobot(robot="arm", host=HERE, port=server.port, every=0.02))
+
+
+def opcua_robot(_):
+    from seerob.sources.opcua_robot import OpcuaRobot
+
+    server = Elsewhere("opcua_robot").start()
+    return Made(server, OpcuaRobot(robot="arm", url=f"opc.tcp://{HERE}:{server.port}"))
+
+
+# -- ROS ----------------------------------------------------------------------------------------
+
+
+def rosbridge(_):
+    from seerob.emulators.rosbridge import RosbridgeServer
+    from seerob.sources.rosbridge import Rosbridge
+
+    server = RosbridgeServer(swing((0.0, 0.0)), ("a", "b"), rate=250.0).start()
+    return Made(server, Rosbridge(robot="arm", host=HERE, port=server.port))
+
+
+def ros_tcp(_):
+    from seerob.emulators.ros_tcp import RosTcpEndpoint
+    from seerob.sources.ros_tcp import RosTcp
+
+    server = RosTcpEndpoint(swing((0.0, 0.0)), ("a", "b"), rate=250.0).start()
+    return Made(server, RosTcp(robot="arm", host=HERE, port=server.port))
+
+
+def ros_tcp_endpoint(patch):
+    """The other side of it: Unity connects."""
+    from seerob.emulators.ros_tcp import UnityProject
+    from seerob.sources.ros_tcp import RosTcp, Side
+
+    patch.setattr("seerob.sources._ros.SILENCE", SILENCE)
+    port = free_port(socket.SOCK_STREAM)
+    server = UnityProject(swing((0.0, 0.0)), ("a", "b"), port=port, rate=250.0).start()
+    return Made(server, RosTcp(robot="arm", side=Side.ENDPOINT, port=port))
+
+
+def foxglove(_):
+    from seerob.sources.foxglove import Foxglove
+
+    server = Elsewhere("foxglove").start()
+    return Made(server, Foxglove(robot="arm", host=HERE, port=server.port))
+
+
+# -- machines -----------------------------------------------------------------------------------
+
+
+def modbus(_):
+    from seerob.emulators.modbus import ModbusServer
+    from seerob.protocols.modbus import Place, Table, Type
+    from seerob.sources.modbus import Modbus
+
+    place = {"table": "holding", "at": 128, "type": "i16"}
+    server = ModbusServer({Place(table=Table.HOLDING, at=128, type=Type.I16): lambda t: 250.0}).start()
+    source = Modbus(name="plc", host=HERE, port=server.port, every=0.02)
+    return Made(server, source, target("speed", place))
+
+
+def siemens_web(patch):
+    from seerob.emulators.siemens_web import SiemensWebServer
+    from seerob.sources.siemens_web import SiemensWeb
+
+    patch.setenv("PLC_PASSWORD", "secret")
+    server = SiemensWebServer({"speed": lambda t: 250.0}, user="twin", password="secret").start()
+    options = {"user": "twin", "password_env": "PLC_PASSWORD", "every": 0.02}
+    return Made(server, SiemensWeb(name="plc", url=server.url, **options), target("speed", "speed"))
+
+
+def opcua(_):
+    from seerob.emulators.opcua import URI
+    from seerob.sources.opcua import Opcua
+
+    server = Elsewhere("opcua").start()
+    source = Opcua(name="plc", url=f"opc.tcp://{HERE}:{server.port}")
+    return Made(server, source, target("position", f"nsu={URI};s=Belt/position", "mm"))
+
+
+def mqtt(_):
+    from seerob.sources.mqtt import Mqtt
+
+    server = Elsewhere("mqtt").start()
+    return Made(server, Mqtt(name="plc", host=HERE, port=server.port), target("speed", "belt"))
+
+
+# -- people -------------------------------------------------------------------------------------
+
+
+def natnet(patch):
+    from seerob.emulators.natnet import NatnetServer
+    from seerob.sources.natnet import Natnet, Transmission
+
+    patch.setattr("seerob.protocols.natnet_session.SILENCE", SILENCE)
+    patch.setattr("seerob.protocols.natnet_session.ASK_AGAIN", 0.02)
+    server = NatnetServer({"Anna": person()}, port=0).start()
+    options = {"human": "anna", "timeout": 1.0, "transmission": Transmission.UNICAST}
+    return Made(server, Natnet(host=HERE, port=server.port, **options))
+
+
+def vrpn(patch):
+    from seerob.emulators.vive import FIVE, WORN
+    from seerob.emulators.vrpn import VrpnServer
+    from seerob.sources.vrpn import Vrpn
+
+    patch.setattr("seerob.sources.vrpn.GATHER", 0.02)
+    server = VrpnServer(person(), {role: WORN[role] for role in FIVE}, port=0).start()
+    return Made(server, Vrpn(host=HERE, port=server.port, human="anna", timeout=1.0))
+
+
+def mvn(patch):
+    from seerob.emulators.mvn import MvnSender
+    from seerob.sources.mvn import Mvn
+
+    patch.setattr("seerob.sources.mvn.SILENCE", SILENCE)
+    port = free_port()
+    return Made(MvnSender({0: person()}, to=(HERE, port)).start(), Mvn(human="anna", port=port, timeout=1.0))
+
+
+def rokoko(patch):
+    from seerob.emulators.rokoko import RokokoSender
+    from seerob.sources.rokoko import Rokoko
+
+    patch.setattr("seerob.sources.rokoko.SILENCE", SILENCE)
+    port = free_port()
+    server = RokokoSender({"Anna": person()}, to=(HERE, port)).start()
+    return Made(server, Rokoko(human="anna", bind=HERE, port=port, timeout=1.0))
+
+
+def vive(patch):
+    from seerob.emulators.vive import ViveSender, worn
+    from seerob.sources.vive import Link, Vive
+
+    patch.setattr("seerob.sources.vive.GATHER", 0.02)
+    server = ViveSender(worn(person()), to=None, port=0).start()
+    return Made(server, Vive(human="anna", link=Link.WEBSOCKET, host=HERE, port=server.port, timeout=1.0))
+
+
+def kinect(_):
+    from seerob.emulators.kinect import KinectSender
+    from seerob.emulators.kinect_person import animated
+    from seerob.sources.kinect import Kinect, Link
+
+    server = KinectSender(animated("library:reach"), to=None, port=0, rate=60.0).start()
+    return Made(server, Kinect(human="anna", link=Link.WEBSOCKET, host=HERE, port=server.port, timeout=1.0))
+
+
+class Page(Emulator):
+    """The page that a headset shows: offers what it sees, seventy times a second, until it is closed."""
+
+    def begin(self):
+        """Offer."""
+        return self._offer
+
+    def _offer(self):
+        poses = np.tile(np.array([0, 1.7, 0, 1, 0, 0, 0], "<f4"), (3, 1)).tobytes()
+        said = Tracking(human="anna", t=0.0, names=("viewer", "left-grip", "right-grip"), poses=poses)
+        while not self._over.wait(1 / 72):
+            now = time.monotonic()
+            OFFERS.offer("anna", self, read(msgspec.structs.replace(said, t=now), now))
+        OFFERS.gone(self)
+
+
+def headset(patch):
+    from seerob.sources.headset import Headset
+
+    patch.setattr("seerob.sources.headset.SILENCE", SILENCE)
+    patch.setattr("seerob.sources.headset.GATHER", 0.02)
+    return Made(Page().start(), Headset(human="anna", timeout=1.0))
+
+
+FOREIGN = (opcua, opcua_robot, mqtt, foxglove)
+"""Their servers are processes of their own, which are killed with SIGKILL."""
+OWN = (
+    *(rtde, fri, drfl, modbus_robot, rosbridge, ros_tcp, ros_tcp_endpoint, modbus, siemens_web),
+    *(natnet, vrpn, mvn, rokoko, vive, kinect, headset),
+)
+KINDS = {make.__name__: make for make in (*OWN, *FOREIGN)}

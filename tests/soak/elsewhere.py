@@ -1,0 +1,211 @@
+"""A server in a process of its own, which is killed as a device is that loses its power, or held still.
+
+Run as a program it is the warm process out of which the servers are forked, one after the other: what a
+server needs is imported once. It does as it is told on its standard input.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Self
+
+import seerob
+from sources.listening import free_port
+
+HERE = "127.0.0.1"
+
+
+class Elsewhere:
+    """A server of a kind of `SERVERS`; started and stopped as an emulator is.
+
+    Args:
+        kind: Which.
+    """
+
+    def __init__(self, kind: str) -> None:
+        self.port = free_port(socket.SOCK_STREAM)
+        places = (Path(seerob.__file__).parents[1], Path(__file__).parents[1])
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "soak.elsewhere", kind, str(self.port)],
+            env=dict(os.environ, PYTHONPATH=os.pathsep.join(map(str, places))),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def start(self) -> Self:
+        """Begin; returns when it can be reached."""
+        self._tell("start")
+        return self
+
+    def stop(self) -> None:
+        """Kill it."""
+        self._tell("kill")
+
+    def freeze(self) -> None:
+        """Hold it still: its connections stay, and nothing is said."""
+        self._tell("freeze")
+
+    def thaw(self) -> None:
+        """Let it go on."""
+        self._tell("thaw")
+
+    def close(self) -> None:
+        """End it for good."""
+        self._process.communicate()
+
+    def _tell(self, what: str) -> None:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(f"{what}\n")
+        self._process.stdin.flush()
+        answer = self._process.stdout.readline()
+        assert answer == "done\n", answer
+
+
+# -- in the other process -----------------------------------------------------------------------
+
+
+def opcua(port: int) -> None:
+    from seerob.emulators.opcua import Emulated, OpcuaServer
+
+    OpcuaServer({"Belt/position": Emulated(lambda t: t, "mm")}, port=port).start()
+
+
+def opcua_robot(port: int) -> None:
+    from seerob.emulators.motions import swing
+    from seerob.emulators.opcua import OpcuaServer
+
+    OpcuaServer(robots={"arm": swing((0.0,) * 6)}, port=port).start()
+
+
+def opcua_standing(port: int) -> None:
+    from seerob.emulators.opcua import OpcuaServer
+
+    OpcuaServer(robots={"arm": lambda t: ((0.1,) * 6, (0.0,) * 6)}, port=port).start()
+
+
+def mqtt(port: int) -> None:
+    """Another maker's broker, and a machine that publishes."""
+    import asyncio
+    import logging
+
+    from amqtt.broker import Broker
+    from paho.mqtt.client import CallbackAPIVersion, Client
+
+    logging.disable(logging.CRITICAL)
+    config = {
+        "listeners": {"default": {"type": "tcp", "bind": f"{HERE}:{port}"}},
+        "plugins": {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}},
+    }
+    up = threading.Event()
+
+    async def serve() -> None:
+        await Broker(config).start()
+        up.set()
+        await asyncio.Event().wait()
+
+    def publish() -> None:
+        machine = Client(CallbackAPIVersion.VERSION2)
+        machine.connect(HERE, port)
+        machine.loop_start()
+        while True:
+            machine.publish("belt", b"250")
+            time.sleep(0.02)
+
+    threading.Thread(target=lambda: asyncio.run(serve()), daemon=True).start()
+    assert up.wait(20)
+    threading.Thread(target=publish, daemon=True).start()
+
+
+def foxglove(port: int) -> None:
+    """Foxglove's own, out of its SDK."""
+    import foxglove as sdk
+    from foxglove.channels import JointStatesChannel
+    from foxglove.messages import JointState, JointStates, Timestamp
+
+    begun = time.monotonic()
+    while True:
+        try:
+            sdk.start_server(host=HERE, port=port)
+            break
+        except RuntimeError:  # the system still has connections of the one before
+            assert time.monotonic() - begun < 90
+            time.sleep(0.02)
+    channel = JointStatesChannel("/joint_states")
+
+    def publish() -> None:
+        while True:
+            t = time.monotonic()
+            joints = [JointState(name=name, position=0.1, velocity=0.0) for name in "ab"]
+            stamp = Timestamp(sec=int(t), nsec=int(t % 1 * 1e9))
+            channel.log(JointStates(timestamp=stamp, joints=joints))
+            time.sleep(0.01)
+
+    threading.Thread(target=publish, daemon=True).start()
+
+
+SERVERS = {make.__name__: make for make in (opcua, opcua_robot, opcua_standing, mqtt, foxglove)}
+WARM = {
+    "opcua": ("asyncua.server.server", "seerob.emulators.opcua"),
+    "opcua_robot": ("asyncua.server.server", "seerob.emulators.opcua"),
+    "opcua_standing": ("asyncua.server.server", "seerob.emulators.opcua"),
+    "mqtt": ("amqtt.broker", "paho.mqtt.client"),
+    "foxglove": ("foxglove", "foxglove.messages", "foxglove.channels"),
+}
+
+
+def forked(kind: str, port: int) -> int:
+    """A process in which the server runs; returns its number once it can be reached."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reading)
+        SERVERS[kind](port)
+        os.write(writing, b"1")
+        os.close(writing)
+        signal.pause()
+        os._exit(0)
+    os.close(writing)
+    said = os.read(reading, 1)
+    os.close(reading)
+    assert said == b"1", f"the server of {kind} did not start"
+    return child
+
+
+def main(kind: str, port: int) -> None:
+    """Do as told, until there is no one to tell."""
+    from importlib import import_module
+
+    for name in WARM[kind]:
+        import_module(name)
+    child = 0
+    try:
+        for line in sys.stdin:
+            match line.strip():
+                case "start":
+                    child = forked(kind, port)
+                case "kill":
+                    os.kill(child, signal.SIGKILL)
+                    os.waitpid(child, 0)
+                    child = 0
+                case "freeze":
+                    os.kill(child, signal.SIGSTOP)
+                case "thaw":
+                    os.kill(child, signal.SIGCONT)
+            sys.stdout.write("done\n")
+            sys.stdout.flush()
+    finally:
+        if child:
+            os.kill(child, signal.SIGKILL)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]))

@@ -1,0 +1,96 @@
+"""How far what devices see of a person may be off: in closed form, and what it makes of three criteria."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from seerob.judging import Judge
+from seerob.tracking_error import TrackingError, tracking
+
+PEOPLE = "".join(
+    f'[[humans]]\nname = "{name}"\nstature = 1.75\nmass = 75\nsex = "male"\n'
+    f"at = {{ position = [{x}, 0, 0] }}\n"
+    for name, x in (("op", 3.0), ("other", -9.0))
+)
+AREA = '[[areas]]\nname = "zone"\nshape = { box = [1, 1, 3] }\n'
+MAT = (
+    '[[sensors]]\nname = "mat"\npressure_mat = { corners = [[0, -0.5], [0.5, -0.5], [0.5, 0.5], [0, 0.5]] }\n'
+)
+HEAD, HAND = "op/head", "op/right_hand"
+
+
+def twin(folder, more=""):
+    station = made(folder, FLOATING + TWO_R + PEOPLE + more, {"arm.urdf": two_r()})
+    return station, state_at(station, arm=((0.0, 0.0), (0.0, 0.0)))
+
+
+def off(station, state, *names):
+    indices = [next(b.index for b in station.model.bodies if b.name == name) for name in names]
+    return TrackingError(station.model, indices).at(state)
+
+
+def reach(station, name):
+    """Of a body's farthest point from its origin [m]."""
+    body = next(b for b in station.model.bodies if b.name == name)
+    return np.linalg.norm(body.corners, axis=1).max() + body.radius
+
+
+def test_a_bone_moves_its_points_by_its_place_and_by_its_turn_times_how_far_they_are(tmp_path):
+    station, state = twin(tmp_path)
+    assert off(station, state, HEAD, HAND).tolist() == [0, 0]
+    state.hearings["op"].bones = {"head": (0.02, 0.1), "right_hand": (None, 0.2), "left_hand": (0.3, None)}
+    found = off(station, state, HEAD, HAND, "op/left_hand", "op/pelvis", "other/head", "arm/l1")
+    expected = [0.02 + 0.1 * reach(station, HEAD), 0.2 * reach(station, HAND), 0.3, 0, 0, 0]
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_one_person_that_devices_see_is_enough(tmp_path):
+    station, state = twin(tmp_path)
+    state.hearings["other"].bones = {"head": (0.5, 0.0)}
+    assert off(station, state, HEAD, "other/head").tolist() == [0, 0.5]
+
+
+def test_a_bone_that_is_not_aimed_is_on_a_circle_around_its_joint(tmp_path):
+    """Points at r, turned by up to α, are off by up to the chord 2 r sin α/2, or by what is measured."""
+    station, state = twin(tmp_path)
+    hearing = state.hearings["op"]
+    hearing.bones = {"head": (0.02, None), "right_hand": (0.01, 0.9)}
+    r = reach(station, HEAD)
+    for angle in (0.3, np.pi):
+        hearing.aims[:] = [(0.0, {"head": angle, "right_hand": 0.3})]
+        assert off(station, state, HEAD, HAND, "op/left_hand") == pytest.approx(
+            [0.02 + 2 * r * np.sin(angle / 2), 0.01 + 0.9 * reach(station, HAND), 0.0]
+        )
+
+
+def test_the_input_that_decides_is_named_in_millimetres():
+    assert str(tracking(0.0123)) == "tracking of the person ± 12.3 mm"
+
+
+@pytest.mark.parametrize(
+    "criterion",
+    [
+        AREA + '[[safety]]\nkind = "safety_area"\nname = "it"\narea = "zone"\nof = "op"\n',
+        MAT + '[[safety]]\nkind = "pressure_mat"\nname = "it"\nsensor = "mat"\nof = "op"\n',
+    ],
+    ids=["safety_area", "pressure_mat"],
+)
+def test_the_room_is_that_of_the_nearest_and_whoever_may_be_inside_leaves_it_open(tmp_path, criterion):
+    station, state = twin(tmp_path, criterion)
+
+    def asked(**bones):
+        state.hearings["op"].bones = bones
+        state.refresh(0.0)
+        (found,) = Judge(station.bound)(state)
+        return found
+
+    exact = asked()
+    assert exact.verdict == "within"
+    # The pelvis is farther than the nearest; off by 1 m it would still be outside, by 9 m it may be inside.
+    for away, verdict, who in ((1.0, "within", exact.reason), (9.0, "undecided", "pelvis")):
+        found = asked(pelvis=(away, 0.0))
+        assert (found.value, found.verdict) == (exact.value, verdict)
+        assert who in found.reason
+    assert "9000.0 mm" in found.reason

@@ -1,0 +1,29 @@
+// In the room: what its colours mean, as long as they mean something.
+
+import { scene, stale } from "../page_state";
+import { coloring, hasScores, shownScore } from "../posture/coloring";
+import { ScaleBar } from "./ScoreColors";
+import { StateBadge } from "./StateBadge";
+
+const SHOWN = ["within", "exceeded", "undecided", "none"] as const;
+
+export function Legend() {
+  if (!scene.value || stale.value) return null;
+  return (
+    <section class="legend" aria-label="Colours">
+      <ul>
+        {SHOWN.map((state) => (
+          <li key={state}>
+            <StateBadge state={state} />
+          </li>
+        ))}
+      </ul>
+      {hasScores.value && coloring.value !== "verdict" && shownScore.value !== null && (
+        <p>
+          person: {shownScore.value} {coloring.value === "overall" ? "overall" : "by body part"}, best{" "}
+          <ScaleBar /> worst; own colour: not scored
+        </p>
+      )}
+    </section>
+  );
+}

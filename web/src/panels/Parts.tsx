@@ -1,0 +1,33 @@
+// What a result says of each of its parts: a link, a body area, a side.
+
+import { against, withUnit } from "../figures";
+import type { Result } from "../wire";
+import { StateBadge } from "./StateBadge";
+
+export function Parts({ parts }: { parts: readonly Result[] }) {
+  return (
+    <table class="parts">
+      <caption>Parts</caption>
+      <tbody>
+        {parts.map((part) => (
+          <Part key={part.name} part={part} />
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+function Part({ part }: { part: Result }) {
+  const { value, limit } = against(part.value, part.limit, part.unit, part.at_most);
+  return (
+    <tr>
+      <th scope="row">
+        {part.name}
+        {part.reason !== "" && <span class="reason">{part.reason}</span>}
+      </th>
+      <td class="number">{withUnit(value, part.unit)}</td>
+      <td class="number">{part.limit !== null && withUnit(limit, part.unit)}</td>
+      <td>{part.verdict && <StateBadge state={part.verdict} />}</td>
+    </tr>
+  );
+}

@@ -1,0 +1,61 @@
+// The colours of the manikin: what they speak of, and from what to what they go.
+
+import { coloring, palette } from "../posture/coloring";
+import { COLORINGS, type Coloring, cssColor, PALETTES, type Palette, scaleColor } from "../posture/scores";
+
+const TITLES: Record<Coloring, string> = { parts: "Body parts", overall: "Overall", verdict: "Verdicts" };
+const STEPS = [0, 0.25, 0.5, 0.75, 1];
+
+export function ColoringChoice() {
+  return (
+    <fieldset class="choice">
+      <legend>Colour the manikin by</legend>
+      {COLORINGS.map((key) => (
+        <button
+          key={key}
+          type="button"
+          aria-pressed={coloring.value === key}
+          onClick={() => {
+            coloring.value = key;
+          }}
+        >
+          {TITLES[key]}
+        </button>
+      ))}
+    </fieldset>
+  );
+}
+
+/** The scale from the best to the worst score. */
+export function ScaleBar() {
+  return (
+    <span class="scale" aria-hidden="true">
+      {STEPS.map((share) => (
+        <i key={share} style={{ background: cssColor(scaleColor(share, palette.value)) }} />
+      ))}
+    </span>
+  );
+}
+
+export function PaletteChoice() {
+  return (
+    <label class="scale-choice">
+      <span class="unit">best</span>
+      <ScaleBar />
+      <span class="unit">worst</span>
+      <select
+        aria-label="Colours from the best to the worst score"
+        value={palette.value}
+        onChange={(event) => {
+          palette.value = event.currentTarget.value as Palette;
+        }}
+      >
+        {PALETTES.map((name) => (
+          <option key={name} value={name}>
+            {name}
+          </option>
+        ))}
+      </select>
+    </label>
+  );
+}

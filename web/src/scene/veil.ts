@@ -1,0 +1,46 @@
+// A veil: a closed surface that is clear where one looks through it and denser toward its rim, so that a
+// smooth volume shows its shape without a line and without hiding what is inside.
+
+import { Color, DoubleSide, type Material, ShaderMaterial } from "three";
+import type { Verdict } from "../wire";
+import { colorOf, once, type Tone } from "./materials";
+
+const VERTEX = `
+varying vec3 vAcross;
+varying vec3 vToEye;
+void main() {
+  vec4 place = modelViewMatrix * vec4(position, 1.0);
+  vAcross = normalMatrix * normal;
+  vToEye = -place.xyz;
+  gl_Position = projectionMatrix * place;
+}`;
+
+// UNDECIDED is hatched like every other surface.
+const FRAGMENT = `
+uniform vec3 tone;
+uniform bool hatched;
+varying vec3 vAcross;
+varying vec3 vToEye;
+void main() {
+  float rim = 1.0 - abs(dot(normalize(vAcross), normalize(vToEye)));
+  float opacity = 0.14 + 0.5 * rim * rim * rim;
+  if (hatched && mod(gl_FragCoord.x - gl_FragCoord.y, 12.0) < 5.0) opacity *= 0.25;
+  gl_FragColor = vec4(tone, opacity);
+  #include <colorspace_fragment>
+}`;
+
+/** The shared veil of one verdict; its geometry needs normals. */
+export function veilMaterial(verdict: Verdict | null): Material {
+  const tone: Tone = verdict ?? "none";
+  return once(`veil ${tone}`, () => {
+    return new ShaderMaterial({
+      uniforms: { tone: { value: new Color(colorOf(tone)) }, hatched: { value: tone === "undecided" } },
+      vertexShader: VERTEX,
+      fragmentShader: FRAGMENT,
+      side: DoubleSide,
+      transparent: true,
+      depthWrite: false,
+      toneMapped: false,
+    });
+  });
+}

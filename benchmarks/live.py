@@ -2,7 +2,9 @@
 
 A UR10 over RTDE, a 7-axis arm over FRI and the variables of a cell over OPC UA at once, each emulated by a
 process of its own, beside a person with distances between all of them. A packet is as old as the kernel of
-this machine says. The peer is the same listeners with no twin beside them: what this machine makes late.
+this machine says; of a stream (RTDE), packets that are read together are as old as the newest of them. The
+peer is the same listeners with no twin beside them: what this machine makes late. A machine that does
+other things beside makes everything late: ``chrt -f 1 python benchmarks/live.py`` goes before them.
 
 ``--seconds`` is the length of either part, ``--switch`` how long a thread keeps the interpreter
 [s] instead of what a live run sets, ``--smoke`` a short run without judgement.
@@ -12,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 import re
 import socket
 import subprocess
@@ -186,6 +189,7 @@ def main() -> None:
     seconds = 0.5 if options.smoke else options.seconds
     if options.switch is not None:
         live.PROMPT = options.switch
+    print(f"work that waits on this machine before: {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores")
     fri = free_port()
     commands = [["rtde", "--port", "0"], ["opcua", "--port", "0"], ["fri", "--port", str(fri)]]
     with emulators(*commands) as (rtde, opcua, _), tempfile.TemporaryDirectory() as folder:

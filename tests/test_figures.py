@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from seerob.figures import DECIMALS, against, figure, margin
+from seerob.figures import DECIMALS, against, figure, margin, told
 
 
 def back(text):
@@ -63,3 +63,10 @@ def test_what_exceeds_by_a_hair_looks_exceeded_and_what_equals_looks_equal():
     assert against(1e-26, 2.0, "J", at_most=True) == ("0", "2")
     assert against(0.1 + 0.2, 0.3, "m", at_most=True) == ("0.30000000000000004", "0.3")
     assert margin(1.0000001, 1.0, "m/s", at_most=True) == "0.0001 m/s"
+
+
+def test_a_label_is_not_kinder_than_the_verdict_and_has_its_unit():
+    assert told(0.14996, 0.15, "m", at_most=False) == "0.1499 m"
+    assert told(0.9996, 1.0, "m/s", at_most=True) == "1 m/s"
+    assert told(1.00001, 1.0, "m/s", at_most=True) == "1.001 m/s"
+    assert told(0.055751, None, "m", at_most=False) == figure(0.055751, "m")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from seerob.human.skeleton import BONES
 from seerob.judging import Judge
 from seerob.tracking_error import TrackingError, tracking
 
@@ -62,6 +63,22 @@ def test_a_bone_that_is_not_aimed_is_on_a_circle_around_its_joint(tmp_path):
         hearing.aims[:] = [(0.0, {"head": angle, "right_hand": 0.3})]
         assert off(station, state, HEAD, HAND, "op/left_hand") == pytest.approx(
             [0.02 + 2 * r * np.sin(angle / 2), 0.01 + 0.9 * reach(station, HAND), 0.0]
+        )
+
+
+def test_what_no_device_sees_is_off_by_what_the_file_accepts_or_by_more(tmp_path):
+    folder, plain = tmp_path / "a", tmp_path / "b"
+    for where, accepted in ((folder, 0.25), (plain, 0.0)):
+        more = (
+            PEOPLE.replace('sex = "male"', 'sex = "male"\nunseen_uncertainty = 0.25') if accepted else PEOPLE
+        )
+        station = made(where, FLOATING + more)
+        state = state_at(station)
+        hearing = state.hearings["op"]
+        hearing.bones = {"head": (0.02, 0.0), "right_hand": (0.0, 0.0), "left_hand": (0.5, 0.0)}
+        hearing.observed[:] = [(0.0, frozenset(BONES) - {"right_hand", "left_hand"})]
+        assert off(station, state, HEAD, HAND, "op/left_hand", "op/pelvis", "other/head") == pytest.approx(
+            [0.02, accepted, 0.5, 0.0, 0.0]
         )
 
 

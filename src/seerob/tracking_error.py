@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from seerob.model import Model
 from seerob.state import State
+from seerob.told_bones import told_between, told_errors
 from seerob.tolerances import Tolerance
 from seerob.transforms import Array
 
@@ -19,7 +20,8 @@ class TrackingError:
     are from its origin. Of a hand, foot or head of which only the joint is seen, α is not known but bounded
     by φ (`seerob.human.ends`), and the chord :math:`2 ρ \sin(φ/2)` takes its place. What no device sees adds
     what the file accepts (``unseen_uncertainty``), else nothing: how wrong it is nobody knows, and
-    `State.require_bodies` leaves it undecided.
+    `State.require_bodies` leaves it undecided. A bone between two that are seen adds how far the lengths of
+    bones let its ends be (`seerob.told_bones`).
 
     Args:
         model: The compiled workstation.
@@ -36,6 +38,14 @@ class TrackingError:
                 reach = float(np.linalg.norm(body.corners, axis=1).max(initial=0.0)) + body.radius
                 bone = body.name.removeprefix(f"{body.owner}/")
                 self._bones.setdefault(body.owner, []).append((row, bone, reach))
+        self._joints = {
+            person: {
+                body.name.removeprefix(f"{person}/"): body.index
+                for body in model.bodies
+                if body.role == "human" and body.owner == person and body.carrier == person
+            }
+            for person in self._bones
+        }
 
     def at(self, state: State) -> Array:
         """Of each body [m], shape (b,)."""
@@ -49,11 +59,24 @@ class TrackingError:
                 position, angle = errors.get(bone, (None, None))
                 chord = 2 * reach * np.sin(unaimed.get(bone, 0.0) / 2)
                 found[row] = (position or 0.0) + max((angle or 0.0) * reach, chord)
+            told = self._told(state, person, errors) if errors else {}
+            for row, bone, _ in bones if told else ():
+                found[row] = max(found[row], told.get(bone, 0.0))
             if person in self._accepted:
                 unseen = state.hearings[person].unseen(state.t)
                 for row, bone, _ in bones if unseen else ():
                     found[row] = max(found[row], self._accepted[person] * (bone in unseen))
         return found
+
+    def _told(
+        self, state: State, person: str, errors: Mapping[str, tuple[float | None, float | None]]
+    ) -> dict[str, float]:
+        """Of bones between two that are seen [m], see `seerob.told_bones`."""
+        where = self._joints[person]
+        seen = {bone for bone, error in errors.items() if error != (None, None) and bone in where}
+        if not told_between(seen):
+            return {}
+        return told_errors(seen, errors, {bone: state.positions[i] for bone, i in where.items()})
 
 
 def tracking(error: float) -> Tolerance:

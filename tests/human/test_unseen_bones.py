@@ -20,6 +20,7 @@ from seerob.safety.minimum_distance import MinimumDistance
 from seerob.snapshot import Verdict
 from seerob.sources._capture_options import Weights
 from seerob.station import Station
+from seerob.tracking_error import TrackingError
 
 RIGHT = ("right_clavicle", "right_upper_arm", "right_forearm", "right_hand")
 UPPER = ("pelvis", "lumbar", "thorax", "neck", "head", *RIGHT)
@@ -155,3 +156,19 @@ def test_a_weight_of_nought_is_as_good_as_not_mapped():
 def test_a_person_whom_a_device_sees_whole_is_decided():
     _, (result,) = seen_only([bone for bone in BONES if "toes" not in bone], criteria=(distance(),))
     assert result.verdict is Verdict.WITHIN
+
+
+def test_a_bone_between_two_that_are_seen_widens_the_distance_by_what_its_lengths_allow():
+    """No device sees an elbow: the upper arm tells it by how it is turned; places alone leave a circle."""
+    turned = [bone for bone in BONES if "toes" not in bone and bone != "left_forearm"]
+    state, (result,) = seen_only(turned, criteria=(distance(),))
+    assert result.verdict is Verdict.WITHIN
+    gap = state.model.gap(state.model.select("operator"), state.model.select("post"))
+    off = TrackingError(state.model, gap.a)
+    assert off.at(state).max() < 0.05
+    errors = state.hearings["operator"].bones
+    state.hearings["operator"].bones = {bone: (place, None) for bone, (place, _) in errors.items()}
+    rows = {state.model.bodies[i].name: k for k, i in enumerate(gap.a)}
+    found = off.at(state)
+    assert found[rows["operator/left_forearm"]] == found[rows["operator/left_upper_arm"]] > 0.03
+    assert found[rows["operator/right_forearm"]] < 0.02

@@ -143,6 +143,16 @@ def test_a_counted_belt_is_known_again_after_a_silence():
     assert [stops(t, {"x": x}).q[0] for t, x in enumerate((0.0, 1.0, 5.0, 4.5))] == [0.0, 1.0, 2.0, 1.5]
 
 
+def test_a_counter_that_begins_again_makes_no_speed():
+    at = follow(Belt(length=5.0, position="x", speed="v"))
+    told = [at(0.1 * k, {"x": x, "v": 0.25}) for k, x in enumerate((1.0, 1.025, 3.0, 3.025))]
+    assert [place.anew for place in told] == [False, False, True, False]
+    assert [float(place.qd[0]) for place in told] == [0.25] * 4
+    # Without a speed beside it nobody knows better than the counter.
+    alone = follow(Belt(length=5.0, position="x"))
+    assert not any(alone(0.1 * k, {"x": x}).anew for k, x in enumerate((1.0, 3.0)))
+
+
 def test_with_its_speed_an_uneven_network_does_not_make_a_belt_jerk():
     """Pictures that arrive up to 40 ms late, each as it was when it was sent."""
     random = np.random.default_rng(1)

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
+from seerob.errors import InputError
 from seerob.safety.effective_mass import EffectiveMass
+from seerob.safety.force_polytope import ForcePolytope
 from seerob.safety.kinetic_energy import KineticEnergy
+from seerob.safety.tool_force import ToolForce
 from seerob.safety.velocity import Velocity
 from seerob.series import CODES, NO_VERDICT
 
@@ -55,7 +58,8 @@ def test_who_touches_has_no_direction_and_is_undecided(tmp_path):
     assert answers.verdict.tolist() == codes == [CODES["undecided"]] * 2
 
 
-CARRIED = FLOATING + TWO_R + TWO_R.replace('"arm"', '"upper"') + 'on = "arm/tip"\n'
+AXIS = '[[machines]]\nname = "axis"\nshape = { box = [1, 1, 0.1] }\nmass = 9\nslide = { along = [1, 0, 0] }\n'
+CARRIED = FLOATING + AXIS + TWO_R + 'on = "axis"\n'
 
 
 @pytest.mark.parametrize(
@@ -70,10 +74,47 @@ CARRIED = FLOATING + TWO_R + TWO_R.replace('"arm"', '"upper"') + 'on = "arm/tip"
 )
 def test_what_the_arrays_do_not_know_is_left_to_the_road(tmp_path, text, batched):
     model = made(tmp_path, text, {"arm.urdf": two_r()}).model
-    on = "upper" if text is CARRIED else "arm"
     asked = (
-        Velocity(name="v", at=on).batch(model),
-        KineticEnergy(name="E", robot=on).batch(model),
-        EffectiveMass(name="m", at=on).batch(model),
+        Velocity(name="v", at="arm").batch(model),
+        KineticEnergy(name="E", robot="arm").batch(model),
+        EffectiveMass(name="m", at="arm").batch(model),
     )
     assert tuple(each is not None for each in asked) == batched
+
+
+@pytest.mark.parametrize(
+    ("options", "batched"),
+    [
+        ({}, True),
+        ({"load": "none"}, True),
+        ({"load": "motion"}, False),
+        ({"definition": "free_moment"}, False),
+        ({"definition": "torque_box", "load": "motion"}, False),
+    ],
+)
+def test_forces_that_need_a_hull_or_the_motion_are_left_to_the_road(tmp_path, options, batched):
+    model = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()}).model
+    assert (ForcePolytope(name="f", at="arm", **options).batch(model) is not None) is batched
+
+
+@pytest.mark.parametrize(
+    ("asked", "needs"),
+    [
+        (ForcePolytope(name="f", at="arm"), True),
+        (ForcePolytope(name="f", at="arm", load="motion"), True),
+        (ForcePolytope(name="f", at="arm", load="none"), False),
+        (ToolForce(name="f", at="arm"), True),
+        (ToolForce(name="f", at="arm", torques="external"), False),
+        (KineticEnergy(name="E", robot="arm"), True),
+        (EffectiveMass(name="m", at="arm"), True),
+        (Velocity(name="v", at="arm"), False),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_a_mass_that_cannot_be_is_refused_where_it_is_needed(tmp_path, asked, needs):
+    model = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r(masses=(0, 1))}).model
+    if needs:
+        with pytest.raises(InputError, match="l1"):
+            asked.bind(model)
+    else:
+        assert asked.bind(model)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from made_cell import FLOATING, TWO_R, made, results_at, two_r
+from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob.contact.clamped_regions import FloorGap
 from seerob.kernels.approach import lowest_and_falling
 from seerob.snapshot import Origin, Result
 from seerob.station import Station
@@ -130,6 +131,17 @@ def test_floor_clamps_as_a_part_in_its_place_does(tmp_path: Path) -> None:
     drawn = regions(over_floor(tmp_path / "b", 0.14, "floor = false\n", slab))
     assert {n: p.limit for n, p in plane.items()} == {n: p.limit for n, p in drawn.items()}
     assert clamped(plane[HAND])
+
+
+def test_floor_counts_where_the_arm_may_be_by_the_next_instant(tmp_path: Path) -> None:
+    """0.11 m above the floor and falling at up to 0.4 m/s: in 10 ms above 0.1 m, in 100 ms below."""
+    station = over_floor(tmp_path, 0.16)
+    state = state_at(station, arm=((0.0, 0.0), (0.2, 0.0)))
+    floor = FloorGap(station.model, station.model.robot("arm").moving, 0.0)
+    thickness, wanted = np.array([0.1]), np.ones((2, 1), bool)
+    for t, expected in ((0.0, False), (0.1, True), (0.1, True), (0.11, False), (0.05, False)):
+        state.t = t
+        assert floor.clamped(state, thickness, wanted)[1, 0] == expected, t
 
 
 def test_what_moves_along_the_floor_does_not_come_down_on_it(tmp_path: Path) -> None:

@@ -253,3 +253,31 @@ def test_uncertainty_that_does_not_fit_is_named(tmp_path, wrong):
     station = made(tmp_path, UR5E + TOOL + f"torque_uncertainty = {wrong}\n")
     with pytest.raises(InputError, match="torque_uncertainty"):
         _ = station.bound
+
+
+PLANAR = {"robot": TWO_R, "q": np.array([0.0, np.pi / 2]), "files": {"arm.urdf": two_r()}}
+
+
+def test_units_of_force_moment_and_residual(tmp_path):
+    options = 'torques = "external"\ncontact = "free_moment"\n'
+    (found,) = run(tmp_path, options, (1.0, 2.0), ticks=1, **PLANAR)
+    assert {"": found.unit, **{part.name: part.unit for part in found.parts}} == {
+        "": "N", "Fx": "N", "Fy": "N", "Fz": "N", "moment": "N·m", "residual": "N·m", "residual share": "",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("every", "known"), [(0.04, True), (0.05, True), (0.06, False)])
+def test_speeds_up_to_50_ms_apart_make_an_acceleration(tmp_path, every, known):
+    last = run(tmp_path, f"every = {every}\n", (0.0, 0.0), ticks=14, **PLANAR)[-1]
+    assert (last.value is not None) is known
+
+
+def test_the_same_instant_twice_makes_no_acceleration(tmp_path):
+    station = made(tmp_path, TWO_R + TOOL, PLANAR["files"])
+    engine, judge = Engine(station.model, driven={"arm": 0.2}), Judge(station.bound)
+    engine.take([heard("arm", 0.0, np.zeros(2), np.zeros(2), tau=(0.0, 0.0))])
+    state = engine.start()
+    for _ in range(2):
+        (found,) = judge(state)
+        assert found.verdict is Verdict.UNDECIDED
+        assert "two evaluations" in found.reason

@@ -17,7 +17,7 @@ shape = { box = [1, 1, 1] }
 [[sensors]]
 name = "mat"
 response = 0.1
-at = { position = [0, 0, -0.01] }
+at = { position = [0, 0, 0] }
 pressure_mat = { corners = [[-0.9, -0.9], [0.9, -0.9], [0.9, 0.9], [-0.9, 0.9]] }
 """
 ASKED = {
@@ -52,7 +52,7 @@ UNITS = {
     "velocity": {"": "m/s"},
     "separation": {
         "": "m", **dict.fromkeys(("S_h", "S_r", "S_s", "C", "Z_d", "Z_r", "arm/l1", "arm/l2"), "m"),
-        "largest permissible speed": "m/s", "XX":"",
+        "largest permissible speed": "m/s", "share of the present speed": "",
     },
 }  # fmt: skip
 

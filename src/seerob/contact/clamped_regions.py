@@ -2,8 +2,8 @@
 
 People stand on z = 0 by definition, whether or not a part of the workstation is drawn there: unless told
 otherwise it is a surface, endless and horizontal. A body clamps against it where its lowest point is no
-higher than the body part is thick, or may be by the next instant at its present speed, while any of its points
-comes down; see `seerob.contact.clamping`.
+higher than the body part is thick, or may be by the next instant at its present speed, while any of its
+points comes down; see `seerob.contact.clamping`.
 """
 
 from __future__ import annotations

@@ -182,7 +182,7 @@ class _Routed:
         q, per_metre = self._track.at(float(way.q[0]))
         self._heading = q[2] = nearest_turn(float(q[2]), self._heading)
         # Once around is no jump.
-        anew = way.anew and self._way.was_placed
+        anew = way.anew and self._way.jumped
         return Place(q, None if way.qd is None else per_metre * way.qd[0], way.doubt, anew)
 
 
@@ -226,21 +226,24 @@ class _Carried:
         self._speed = 0.0
         """Of the belt, told last [m/s]."""
         self._placed = False
-        self.was_placed = False
-        """Whether it was put to its start just now."""
+        self.jumped = False
+        """Whether it was put elsewhere just now, once around not counted."""
         self._lost = ""
 
     def __call__(self, t: float, values: Mapping[str, Value]) -> Place:
         m, last = self._motion, self._way
         placed = m.placed is not None and bool(values[m.placed])
         anew = placed and not self._placed
-        self._placed, self.was_placed = placed, anew
+        self._placed, self.jumped = placed, anew
         speed = None if m.speed is None else np.array([_number(values, m.speed)])
         summed = None if speed is None else self._sum(t, float(speed[0]))
         if m.position is not None:
             run = _number(values, m.position)
             self._zero = run - m.start if anew else self._zero
-            self._way = nearing(run - self._zero, summed, t - self._t)
+            told = run - self._zero
+            # A place that the speed cannot have brought about is no motion: a counter that began again.
+            self.jumped = anew or (summed is not None and abs(told - summed) > FAR)
+            self._way = nearing(told, summed, t - self._t)
         elif anew:
             self._way, self._lost = m.start, ""
         elif summed is not None:
@@ -252,7 +255,7 @@ class _Carried:
             self._zero += self._way - q
             self._way, speed = q, None if speed is None else np.zeros(1)
         around = self._way // self._length != last // self._length and self._at_end is AtEnd.LOOP
-        return Place(np.array([q]), speed, self._lost, anew or around)
+        return Place(np.array([q]), speed, self._lost, self.jumped or around)
 
     def _sum(self, t: float, speed: float) -> float | None:
         """How far it was carried since it was heard last; None when that is too long ago."""

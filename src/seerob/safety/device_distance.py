@@ -120,7 +120,7 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
             return Result(
                 name=self.name,
                 value=value,
-                unit="m",
+                unit=self.unit,
                 limit=S,
                 at_most=False,
                 verdict=verdict,

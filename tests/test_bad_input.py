@@ -35,6 +35,8 @@ MJCF = (
     '<mujoco><worldbody><body><joint axis="0 0 1"/><geom type="box" size="1 1 1" mass="0"/></body>'
     "</worldbody></mujoco>"
 )
+
+
 HEAD = "t [s],j1 [rad],j2 [rad]\n"
 
 
@@ -48,6 +50,12 @@ def contact(options: str) -> str:
 
 def separation(stop: str, more: str = "") -> str:
     return OPERATOR + criterion("separation", f'between = ["arm", "op"]\nstop = {{ {stop} }}\n{more}')
+
+
+def by_table(old, new):
+    """A stop by a table of one's own in which something is replaced."""
+    table = OWN_TABLE.replace(old, new)
+    return separation(f'reaction = 1, model = "table", table = {{ {table} }}')
 
 
 def joints(limit: str) -> dict[str, str]:
@@ -229,7 +237,7 @@ WRONG = {
     ),
     "no jerk": ("jerk_limits = [0]", {}, "workstation.toml: robots[0] (jerk_limits)", "above 0"),
     "negative stopping distance": (
-        separation(f'reaction = 1, model = "table", table = {{ {OWN_TABLE.replace("[[[0.1]]]", "[[[-1]]]")} }}'),
+        by_table("[[[0.1]]]", "[[[-1]]]"),
         {},
         "workstation.toml: safety[0].stop.table.joints[0].way[0][0][0]",
         ">= 0",
@@ -286,9 +294,7 @@ WRONG = {
         "beyond its cycle of 5 s",
     ),
     "stopping table whose speeds descend": (
-        separation(
-            f'reaction = 1, model = "table", table = {{ {OWN_TABLE.replace("speed = [1]", "speed = [1, 0.5]")} }}'
-        ),
+        by_table("speed = [1]", "speed = [1, 0.5]"),
         {},
         "workstation.toml: safety[0].stop.table",
         "does not ascend",

@@ -43,7 +43,6 @@ pressure_mat = {{ corners = [[-2, -2], [2, -2], [2, 2], [-2, 2]] }}
         (0.1, (), "exceeded"),
         (0.1, RIGHT, "exceeded"),
         (0.1, FEET, "undecided"),
-        (0.1, BONES, "undecided"),
         # Far above.
         (5.0, (), "within"),
         (5.0, RIGHT, "undecided"),
@@ -62,3 +61,19 @@ def test_what_is_seen_exceeds_and_what_is_not_seen_leaves_it_open(tmp_path, aske
         assert "without op/right_" in found.reason
         assert found.reason.endswith(" more, which may be elsewhere")
         assert not any(part.name.startswith("op/right_") for part in found.parts)
+
+
+@pytest.mark.parametrize(
+    ("accepted", "verdicts"), [(0.3, ["within", "undecided"]), (None, ["undecided"] * 2)]
+)
+def test_an_estimate_that_the_file_accepts_may_be_off_by_so_much(tmp_path, accepted, verdicts):
+    """Something flat 0.35 m and 0.25 m above a person of 1.75 m, of whom no device sees the head."""
+    more = "" if accepted is None else f"unseen_uncertainty = {accepted}\n"
+    for k, verdict in enumerate(verdicts):
+        text = FLOATING + PERSON + more + CELL.format(z=1.75 + 0.05 + 0.35 - 0.1 * k)
+        station = made(tmp_path / str(k), text + NEAR.replace("0.01", "0.001"))
+        state = state_at(station)
+        hearing = state.hearings["op"]
+        hearing.bones = dict.fromkeys(BONES, (0.0, 0.0))
+        hearing.observed[:] = [(0.0, frozenset(BONES) - {"head"})]
+        assert Judge(station.bound)(state)[0].verdict == verdict

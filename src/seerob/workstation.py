@@ -14,7 +14,7 @@ from msgspec import Struct
 
 from seerob.errors import InputError
 from seerob.machines.display_table import Display
-from seerob.machines.tables import Belt, Grip, Motion, Route, Slide, Turn, Vehicle
+from seerob.machines.tables import Belt, Fingers, Motion, Route, Slide, Turn, Vehicle
 from seerob.mounting.simple_shape import Shape as Shape  # noqa: PLC0414
 from seerob.quantities import (
     Coordinate,
@@ -199,7 +199,7 @@ class Machine(Thing, frozen=True, kw_only=True):
     belt: Belt | None = None
     vehicle: Vehicle | None = None
     route: Route | None = None
-    grip: Grip | None = None
+    grip: Fingers | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from seerob.machines.following import follow
-from seerob.machines.tables import Grip, Route
+from seerob.machines.tables import Fingers, Route
 from seerob.machines.track import Track
 
 SQUARE = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))
@@ -75,9 +75,9 @@ def test_a_cart_goes_round_and_round_at_its_speed():
 
 
 def test_fingers_go_half_the_way_each():
-    at = follow(Grip(opening="w", upper=0.1))
+    at = follow(Fingers(opening="w", upper=0.1))
     assert at(0.0, {"w": 0.06}).q.tolist() == [0.03]
-    ends = follow(Grip(open="o", lower=0.0, upper=0.08, travel=0.4))
+    ends = follow(Fingers(open="o", lower=0.0, upper=0.08, travel=0.4))
     assert ends(0.0, {"o": True}).q.tolist() == [0.04]
     going = ends(0.2, {"o": False})
     assert going.q == pytest.approx([0.02])
@@ -85,4 +85,4 @@ def test_fingers_go_half_the_way_each():
     shut = ends(0.4, {"o": False})
     assert (shut.q.tolist(), shut.doubt) == ([0.0], "")
     with pytest.raises(ValueError, match="right angles to z"):
-        Grip(along=(0, 1, 1))
+        Fingers(along=(0, 1, 1))

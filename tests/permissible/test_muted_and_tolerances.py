@@ -55,7 +55,9 @@ def test_a_method_that_is_not_asked_is_not_enough_by_itself(by, expected):
 
 def test_what_a_stop_may_be_off_by_counts_in_full(tmp_path):
     """The map with tolerances is that of the longest times."""
-    off = KNOWN.replace("stopping = 0.3 ", "stopping = 0.3, tolerance = { reaction = 0.02, stopping = 0.05 } ")
+    off = KNOWN.replace(
+        "stopping = 0.3 ", "stopping = 0.3, tolerance = { reaction = 0.02, stopping = 0.05 } "
+    )
     longest = KNOWN.replace("reaction = 0.1, stopping = 0.3", "reaction = 0.12, stopping = 0.35")
     tolerant, worst, nominal = (
         maps(cell(tmp_path / str(i), text), By.ALL)[By.ALL].permissible

@@ -24,7 +24,8 @@ def asked(folder, more, *, x=2.4, proud=False):
     many = station.batch({"arm": np.zeros((2, 2))}, {"arm": np.zeros((2, 2))})["d"].answers
     assert many.value.tolist() == pytest.approx([found.value] * 2)
     assert many.verdict.tolist() == [NO_VERDICT if found.verdict is None else CODES[found.verdict]] * 2
-    if found.interval is not None and found.limit is not None:
+    assert (many.interval is None) == (found.interval is None)
+    if found.interval is not None:
         assert np.array(many.interval)[:, 0] == pytest.approx(found.interval)
     assert found.at_most is False
     return found

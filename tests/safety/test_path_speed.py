@@ -98,7 +98,21 @@ def test_stretches_a_thousandth_farther_than_the_nearest_are_passed_too():
 
 
 def test_a_stretch_without_a_length_is_its_place_and_distances_end_at_the_ends():
-    legs = np.array([[0.0, 0.0], [5.0, 0.0]]), np.array([[0.0, 0.0], [1.0, 0.0]])
-    for x, distance, leg in ((3.0, 2.0, 1), (1.0, 1.0, 0), (7.0, 1.0, 1), (5.5, 0.0, 1)):
+    legs = np.array([[0.0, 0.0], [5.0, 0.0]]), np.array([[0.0, 0.0], [3.0, 0.0]])
+    for x, distance, leg in ((3.0, 2.0, 1), (1.0, 1.0, 0), (9.0, 1.0, 1), (6.0, 0.0, 1)):
         found = passed(np.array([x, 0.0]), np.zeros(2), legs)
         assert (found.distance, found.legs.tolist()) == (pytest.approx(distance), [leg])
+
+
+def test_of_stretches_that_meet_the_one_that_it_follows_counts():
+    """At a corner from x to y and back: along it, not across it, however slowly."""
+    legs = np.zeros((3, 2)), np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
+    for qd, followed in (([0.1, 0.0], [0]), ([0.0, 0.1], [1]), ([-0.1, 0.0], [2]), ([0.0, 0.0], [0, 1, 2])):
+        assert passed(np.zeros(2), np.array(qd), legs).legs.tolist() == followed
+
+
+def test_at_a_place_between_two_stretches_the_lesser_counts_and_names_its_place(tmp_path):
+    rising = [(0, float(k), 0.0, v, name) for k, (v, name) in enumerate(((0.3, "a"), (0.5, "b"), (0.8, "c")))]
+    for x, speed, share, who in ((0.5, 0.3, 1.0, "a"), (1.0, 0.3, 1.0, "a"), (1.5, 0.25, 0.5, "b")):
+        found = watched(tmp_path, (x, 0.0), (speed, 0.0), rising)
+        assert (found.value, found.reason) == (pytest.approx(share), who)

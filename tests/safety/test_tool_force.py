@@ -281,3 +281,10 @@ def test_the_same_instant_twice_makes_no_acceleration(tmp_path):
         (found,) = judge(state)
         assert found.verdict is Verdict.UNDECIDED
         assert "two evaluations" in found.reason
+
+
+def test_the_force_is_drawn_where_it_acts(tmp_path):
+    """0.3 m beyond the tip at (1, 1), along the second link."""
+    options = 'torques = "external"\noffset = [0.3, 0, 0]\n'
+    (found,) = run(tmp_path, options, (1.0, 2.0), ticks=1, **PLANAR)
+    assert found.markers[0].origin == pytest.approx((1, 1.3, 0), abs=1e-6)

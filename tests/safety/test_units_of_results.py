@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
+from seerob.criterion import Criterion
+from seerob.plugin import load
 
 CELL = """
 [[humans]]
@@ -67,3 +69,5 @@ def test_units(tmp_path):
         kind: {"": result.unit, **{part.name: part.unit for part in result.parts}}
         for kind, result in found.items()
     } == UNITS
+    for kind, result in found.items():
+        assert result.at_most is load("safety", kind, Criterion).at_most, kind

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seerob.machines.tables import AtEnd, Belt, Grip, Motion, Route, Slide, Turn, Vehicle
+from seerob.machines.tables import AtEnd, Belt, Fingers, Motion, Route, Slide, Turn, Vehicle
 from seerob.samples import SignalSample
 from seerob.transforms import Array
 from seerob.variables.dictionary import Value
@@ -112,7 +112,7 @@ def follow(motion: Motion) -> Follow:
         return _Driven(motion)
     if isinstance(motion, Route):
         return _Routed(motion)
-    if isinstance(motion, Grip):
+    if isinstance(motion, Fingers):
         return _Gripping(motion)
     if motion.open is not None:
         return _Ends(motion, motion.open)
@@ -153,7 +153,7 @@ class _Driven:
 class _Gripping:
     """Two fingers, of which each goes half the way."""
 
-    def __init__(self, motion: Grip) -> None:
+    def __init__(self, motion: Fingers) -> None:
         self._ends = None if motion.open is None else _Ends(motion, motion.open)
         self._opening = motion.opening
 
@@ -194,7 +194,7 @@ def nearest_turn(angle: float, last: float | None) -> float:
 class _Ends:
     """One of two ends; on the way it is shown where it would be at an even speed, and not relied on."""
 
-    def __init__(self, motion: Slide | Turn | Grip, name: str) -> None:
+    def __init__(self, motion: Slide | Turn | Fingers, name: str) -> None:
         assert motion.lower is not None
         assert motion.upper is not None
         assert motion.travel is not None

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from seerob.machines.tables import Belt, Grip, Motion, Route, Slide, Turn
+from seerob.machines.tables import Belt, Fingers, Motion, Route, Slide, Turn
 from seerob.model_io.description import Description, Joint, JointKind, Link, Mimic
 from seerob.mounting.things import Color, LoadedThing, load_thing
 from seerob.transforms import Array
@@ -41,7 +41,7 @@ def loaded(machine: Machine, folder: Path, *, file: str) -> tuple[Description, L
         visual=tuple(mesh for piece in thing.pieces for mesh in piece.visual),
         solids=tuple(solid for piece in thing.pieces for solid in piece.solids),
     )
-    links = fingers(body) if isinstance(machine.motion, Grip) else (body,)
+    links = fingers(body) if isinstance(machine.motion, Fingers) else (body,)
     return Description(machine.name, links, BODY, "workstation file", thing.findings), thing
 
 
@@ -79,7 +79,7 @@ def joints(motion: Motion) -> tuple[Joint, ...]:
         return (Joint("turn", JointKind.REVOLUTE, axis, lower=motion.lower, upper=motion.upper),)
     if isinstance(motion, Belt):
         return (Joint("belt", JointKind.PRISMATIC, _unit(motion.along), lower=0.0, upper=motion.length),)
-    if isinstance(motion, Grip):
+    if isinstance(motion, Fingers):
         ends = (None if end is None else end / 2 for end in (motion.lower, motion.upper))
         lower, upper = ends
         return (Joint(FINGERS[0], JointKind.PRISMATIC, _unit(motion.along), lower=lower, upper=upper),)
@@ -99,7 +99,7 @@ def home(motion: Motion) -> Array:
         low = -np.inf if motion.lower is None else motion.lower
         high = np.inf if motion.upper is None else motion.upper
         return np.array([min(max(0.0, low), high)])
-    if isinstance(motion, Grip):
+    if isinstance(motion, Fingers):
         return np.array([0.5 * max(0.0, motion.lower or 0.0)])
     return motion.track.at(motion.start)[0] if isinstance(motion, Route) else np.zeros(3)
 

@@ -188,7 +188,7 @@ class Route(Table, frozen=True, kw_only=True):
         return _given({self.position: "m", self.speed: "m/s", self.placed: YES})
 
 
-class Grip(Table, frozen=True, kw_only=True):
+class Fingers(Table, frozen=True, kw_only=True):
     """Two fingers that open and close evenly: a parallel gripper.
 
     The table's shape and mass are those of one finger, as it stands with the gripper shut: on the side of
@@ -221,7 +221,7 @@ class Grip(Table, frozen=True, kw_only=True):
         return _given({self.opening: "m", self.open: YES})
 
 
-Motion = Slide | Turn | Belt | Vehicle | Route | Grip
+Motion = Slide | Turn | Belt | Vehicle | Route | Fingers
 
 
 def _given(needs: dict[str | None, str]) -> dict[str, str]:

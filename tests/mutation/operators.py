@@ -67,7 +67,7 @@ DRAWN = ("Arrow", "Ellipsoid", "Highlight", "Hull", "Label", "Polyline", "marker
 """Calls whose arguments no verdict depends on."""
 SPOKEN = ("basis", "subjects", "_markers", "_arrow", "_vector", "_label", "_picture", "_beams", "_line",
           "hull", "_hidden", "_told", "_limits_given", "_rounded",
-          "inputs", "_places")  # fmt: skip
+          "inputs", "_places", "_shells")  # fmt: skip
 """Functions whose result no verdict depends on."""
 
 

@@ -35,6 +35,15 @@ def test_the_deepest_is_shown_whoever_comes_first(tmp_path):
         assert found.interval[0] <= found.interval[1] == found.value
 
 
+def test_of_two_areas_the_one_that_is_entered_or_near_is_named(tmp_path):
+    text = ZONE + ZONE.replace("zone", "other").replace("0.5 }", "0.5 }\nat = { position = [5, 0, 0] }")
+    text += BOX.format(name="two", at=[20, 0, 0]) + WATCH.format(area='["zone", "other"]')
+    for x, verdict, who in ((4.5, "exceeded", "other"), (1.0, "within", "zone"), (4.0, "within", "other")):
+        station = made(tmp_path / str(x), text + BOX.format(name="one", at=[x, 0, 0]))
+        a = results_at(station)["a"]
+        assert (a.verdict, "one" in a.reason, who in a.reason) == (verdict, True, True)
+
+
 @pytest.mark.parametrize("name", ["one", "arm", "arm/l2"])
 def test_only_areas_are_areas(tmp_path, name):
     text = (

@@ -40,6 +40,15 @@ def test_a_mass_along_the_motion_begins_with_the_motion(tmp_path):
     assert codes[:2] == [NO_VERDICT] * 2
 
 
+@pytest.mark.parametrize("which", ['of = "arm"', 'at = "arm"', 'at = "arm"\noffset = [0.5, 0, 0]'])
+def test_the_fastest_point_of_many_instants_is_that_of_each(tmp_path, which):
+    text = SLOW + TWO_R + f'[[safety]]\nkind = "velocity"\nname = "m"\n{which}\nlimit = 2\n'
+    values, codes, answers = both(tmp_path, text, [((0.0, 0.5), (v, 0.0)) for v in (0.0, 0.7, -1.5)])
+    np.testing.assert_allclose(answers.value, values, rtol=1e-9)
+    assert answers.verdict.tolist() == codes
+    assert codes == [CODES["within"]] * 2 + [CODES["exceeded"]]
+
+
 @pytest.mark.parametrize("gap", [0.0005, 0.1])
 def test_a_line_of_half_a_millimetre_has_a_direction(tmp_path, gap):
     """Toward a wall across x, half a millimetre and more before the arm at (-1, 1.05)."""

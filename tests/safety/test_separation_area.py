@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, made, results_at, two_r
+from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.errors import InputError, UnknownName
+from seerob.judging import Judge
 from seerob.volumes.offset_shell import offset_shell
 
 CELL = (
@@ -106,3 +109,50 @@ def test_the_shell_lies_on_the_border_and_is_closed():
     edges = sorted(tuple(sorted((f[i], f[(i + 1) % 3]))) for f in faces for i in range(3))
     assert len(faces) == 80
     assert all(edges.count(e) == 2 for e in set(edges))
+
+
+POSTS = '[[safety]]\nkind = "separation_area"\nname = "it"\nseparation = "ssm"\nof = ["far", "post"]\n'
+FAR = '[[parts]]\nname = "far"\nshape = { box = [0.1, 0.1, 0.1] }\nat = { position = [0, 9, 0] }\n'
+
+
+def test_who_is_inside_is_told_with_the_distance_by_which(tmp_path):
+    """The post's near side is 1.1 m from the first link, and 0.95 m beside the end of the second's start."""
+    text = CELL.replace("[0, 2.5, 0]", "[0, 1.2, 0]") + FAR + POSTS
+    found = results(tmp_path, text)["it"]
+    S_p1, S_p2 = ((np.hypot(way, 0.05) + 1.6) * 0.4 + 0.16 for way in (1.0, 2.0))
+    room = min(1.1 - S_p1, np.hypot(0.95, 1.1) - S_p2)
+    post, largest = found.parts
+    assert (found.verdict, found.reason, found.limit, found.at_most) == ("exceeded", "post", 0.0, False)
+    assert (post.name, post.verdict, post.limit, post.at_most) == ("post", "exceeded", 0.0, False)
+    assert found.value == post.value == pytest.approx(room, abs=1e-9)
+    assert (largest.name, largest.value) == ("largest S_p", pytest.approx(S_p2, abs=1e-9))
+    assert {found.unit, post.unit, largest.unit} == {"m"}
+    lit = [m for m in found.markers if type(m).__name__ == "Segment"]
+    assert lit[0].end[1] == pytest.approx(1.15)
+    (hull, *_) = (m for m in found.markers if type(m).__name__ == "Hull")
+    assert (hull.verdict, len(lit)) == ("exceeded", 1)
+
+
+def test_the_picture_is_made_anew_when_it_is_old_or_the_verdict_changes(tmp_path):
+    station = made(tmp_path, CELL + FAR + POSTS, {"arm.urdf": two_r()})
+    state = state_at(station, arm=((0.0, 0.0), (0.1, 0.0)))
+    judge, shown = Judge(station.bound), []
+    for t, speed in ((0.0, 0.1), (0.05, 0.1), (0.1, 0.1), (0.15, 0.1), (0.12, 0.1), (0.01, 0.1), (0.02, 9.0)):
+        state.data.qvel[0] = speed
+        state.refresh(t)
+        shown.append(next(m for m in judge(state)[1].markers if type(m).__name__ == "Hull"))
+    again = [new is not old for old, new in pairwise(shown)]
+    assert again == [False, True, False, False, True, True]
+    assert [hull.verdict for hull in shown[-2:]] == ["within", "exceeded"]
+
+
+def test_a_surface_that_may_stick_out_leaves_the_border_open(tmp_path):
+    """A display mesh 20 mm larger than the links' boxes, to 35 mm at its corners."""
+    visual = '<visual><origin xyz="0.5 0 0"/><geometry><box size="1.04 0.14 0.14"/></geometry></visual>'
+    urdf = two_r().replace("</collision></link>", f"</collision>{visual}</link>")
+    S_p2 = (np.hypot(2.0, 0.05) + 1.6) * 0.4 + 0.16
+    for k, (more, verdict) in enumerate(((-0.001, "exceeded"), (0.01, "undecided"), (0.05, "within"))):
+        y = 0.1 + np.sqrt((S_p2 + more) ** 2 - 0.95**2)
+        moved = CELL.replace("[0, 2.5, 0]", f"[0, {y}, 0]") + FAR + POSTS
+        station = made(tmp_path / str(k), moved, {"arm.urdf": urdf})
+        assert results_at(station, arm=((0.0, 0.0), (1.0, 0.0)))["it"].verdict == verdict

@@ -12,7 +12,7 @@ from seerob.engine import Engine
 from seerob.errors import InputError
 from seerob.model_io import library
 from seerob.run import Judge
-from seerob.safety.tool_force import largest_error, wrench_from_torques
+from seerob.safety.tool_force import ToolForce, largest_error, wrench_from_torques
 from seerob.snapshot import Verdict
 
 TOOL = '[[safety]]\nkind = "tool_force"\nname = "force"\nat = "arm"\n'
@@ -288,3 +288,26 @@ def test_the_force_is_drawn_where_it_acts(tmp_path):
     options = 'torques = "external"\noffset = [0.3, 0, 0]\n'
     (found,) = run(tmp_path, options, (1.0, 2.0), ticks=1, **PLANAR)
     assert found.markers[0].origin == pytest.approx((1, 1.3, 0), abs=1e-6)
+
+
+def test_a_moment_that_no_torque_shows_hides_no_force():
+    found = wrench_from_torques(np.diag([1.0, 1, 1, 1, 1, 0]), np.ones(6), damped_below=0.02)
+    result = ToolForce(name="f", at="arm", limit=2.0)._result(found, np.ones(6), np.zeros(3), None)
+    assert (result.verdict, result.reason) == (Verdict.WITHIN, "")
+    assert result.value == pytest.approx(np.sqrt(3))
+
+
+def test_a_force_is_no_less_than_nothing():
+    """0.1 N, each torque known to ± 1 N·m: up to 3.1 N."""
+    tau = np.array([0.1, 0, 0])
+    found = wrench_from_torques(np.eye(3), tau, damped_below=0.02)
+    for limit, verdict in ((3.11, "within"), (3.09, "undecided")):
+        result = ToolForce(name="f", at="arm", limit=limit)._result(found, tau, np.zeros(3), np.ones(3))
+        assert result.interval == pytest.approx((0.0, 3.1))
+        assert result.verdict == verdict
+
+
+def test_an_uncertainty_that_is_no_number_is_refused_whoever_gives_it(tmp_path):
+    model = made(tmp_path, TWO_R, PLANAR["files"]).model
+    with pytest.raises(InputError, match="torque_uncertainty"):
+        ToolForce(name="f", at="arm", torque_uncertainty=(1.0, np.nan)).bind(model)

@@ -218,7 +218,8 @@ def test_areas_on_and_beside_the_speed_that_each_allows():
         np.testing.assert_allclose([found.limit for found in areas(limit, force)], allowed, rtol=1e-12)
     (allowed,) = {found.limit for found in areas(1.0, 50.0)}
     for v, verdict in ((allowed, WITHIN), (np.nextafter(allowed, 9), EXCEEDED)):
-        assert {(found.verdict, found.reason) for found in areas(v, 50.0)} == {(verdict, "")}
+        told = {(found.value, found.unit, found.verdict, found.reason) for found in areas(v, 50.0)}
+        assert told == {(v, "m/s", verdict, "")}
     for v, verdict, reason in ((limit, UNDECIDED, "a mesh"), (np.nextafter(limit, 9), EXCEEDED, "")):
         assert {(f.verdict, f.reason) for f in areas(v, np.nan, "a mesh")} == {(verdict, reason)}
     ends = Spread(speeds.permissible, speeds.permissible, np.zeros((0, 1, n)))

@@ -43,3 +43,27 @@ def test_distance_to_the_nearest_waypoint(tmp_path, q, value, reason):
 def test_a_robot_without_a_program_is_refused(tmp_path):
     with pytest.raises(InputError, match="no source of kind waypoints"):
         results_at(made(tmp_path, FLOATING + TWO_R + ASKED, {"arm.urdf": two_r()}))
+
+
+def test_waypoints_are_those_of_the_robots_own_program(tmp_path):
+    """Of two arms at one place, each has its own; one of them states no largest speed."""
+    text = TWO_R.replace('"arm"', '"other"') + TWO_R + SOURCE.replace('"arm"', '"other"')
+    text = text.replace('"program"', '"its"') + SOURCE.replace("q_deg = [90, 0]", "q_deg = [180, 0]") + ASKED
+    urdf = two_r().replace(' velocity="10"', "")
+    station = made(tmp_path, FLOATING + text.replace("model = \"arm.urdf\"", 'model = "a.urdf"', 1),
+                   {"arm.urdf": urdf, "a.urdf": two_r()})  # fmt: skip
+    found = results_at(station, arm=((np.pi / 2, 0.0), (0.0, 0.0)))["w"]
+    # From (0, 2) to (2, 0) and to (-2, 0).
+    assert found.value == pytest.approx(2 * np.sqrt(2))
+
+
+def test_the_working_point_of_the_tool_counts(tmp_path):
+    """0.3 m beyond the tip, on which the tool sits."""
+    tool = '[[tools]]\nname = "pin"\non = "arm/tip"\nshape = { sphere = 0.02 }\nmass = 1\n'
+    tool += "tcp = { position = [0.3, 0, 0] }\n"
+    station = made(tmp_path, FLOATING + TWO_R + tool + SOURCE + ASKED, {"arm.urdf": two_r()})
+    for q, name in ((0.0, "1"), (np.pi / 2, "side")):
+        found = results_at(station, arm=((q, 0.0), (0.0, 0.0)))["w"]
+        assert (found.value, found.reason) == (pytest.approx(0, abs=1e-6), f"nearest is {name}")
+    spheres = [m.center for m in found.markers if type(m).__name__ == "Sphere"]
+    np.testing.assert_allclose(spheres, [(2.3, 0, 0), (0, 2.3, 0)], atol=1e-5)

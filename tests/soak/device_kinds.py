@@ -153,6 +153,14 @@ def siemens_web(patch):
     return Made(server, SiemensWeb(name="plc", url=server.url, **options), target("speed", "speed"))
 
 
+def web(_):
+    from seerob.emulators.web import WebServer
+    from seerob.sources.web import Web
+
+    server = WebServer(lambda t: {"speed": 250.0}).start()
+    return Made(server, Web(name="plc", url=server.live, timeout=1.0), target("speed", "/speed"))
+
+
 def opcua(_):
     from seerob.emulators.opcua import URI
     from seerob.sources.opcua import Opcua
@@ -257,7 +265,7 @@ def headset(patch):
 FOREIGN = (opcua, opcua_robot, mqtt, foxglove)
 """Their servers are processes of their own, which are killed with SIGKILL."""
 OWN = (
-    *(rtde, fri, drfl, modbus_robot, rosbridge, ros_tcp, ros_tcp_endpoint, modbus, siemens_web),
+    *(rtde, fri, drfl, modbus_robot, rosbridge, ros_tcp, ros_tcp_endpoint, modbus, siemens_web, web),
     *(natnet, vrpn, mvn, rokoko, vive, kinect, headset),
 )
 KINDS = {make.__name__: make for make in (*OWN, *FOREIGN)}

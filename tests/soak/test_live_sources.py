@@ -152,9 +152,8 @@ def test_a_thousand_kills_leave_nothing_behind(monkeypatch, ears, kind):
     assert end[2] < settled[2] + SPARE
 
 
-@pytest.mark.parametrize(
-    "kind", ["opcua", *(pytest.param(k, marks=pytest.mark.soak) for k in ("opcua_robot", "mqtt", "foxglove"))]
-)
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", [make.__name__ for make in FOREIGN])
 def test_a_server_that_is_held_still_is_silent_within_the_time_out(monkeypatch, ears, kind):
     """Its connection stays, and it must not seem that nothing has changed."""
     server, source, target = KINDS[kind](monkeypatch)

@@ -119,10 +119,11 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
         else:
             # The real surface may stick out of the shape, a bone be elsewhere: nearly inside is not outside.
             least, close, deviation = perhaps
-            verdict = Verdict.UNDECIDED if least <= 0 else Verdict.WITHIN
+            doubtful = least <= 0
+            verdict = Verdict.UNDECIDED if doubtful else Verdict.WITHIN
             reason = (
                 f"{close} is within {deviation * 1e3:.1f} mm, what its shape and its place may be off by"
-                if least <= 0
+                if doubtful
                 else who
             )
             interval = None

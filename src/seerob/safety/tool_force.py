@@ -136,7 +136,8 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
                 return tau
             if not robot.alone:
                 raise Undecided(
-                    f"{robot.name} is moved, or moves others: what that accelerates is in the measured torques too"
+                    f"{robot.name} is moved, or moves others: "
+                    "what that accelerates is in the measured torques too"
                 )
             before = (state.t, state.qd(robot).copy())
             elapsed = np.nan if last is None else state.t - last[0]

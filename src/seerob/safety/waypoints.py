@@ -18,11 +18,11 @@ from seerob.state import State
 from seerob.transforms import Array
 from seerob.waypoints.programmed import Programmed
 
-RADIUS = 0.012
+DRAWN_RADIUS = 0.012
 """Of the balls that are drawn [m]."""
 DRAWN = 300
 """Points of the line that is drawn."""
-LABELLED = 60
+DRAWN_LABELS = 60
 """Waypoints with a text; more would hide the picture."""
 
 
@@ -91,15 +91,22 @@ def _drawn(model: Model, robot: Mechanism) -> _Drawn:
     limits = tuple(None if v is None else v.value for v in robot.velocity_limits)
     motion = source.motion(program, arm, limits)
     at = _tool_points(model, robot, np.array(motion.at))
-    rows = np.unique(np.linspace(0, len(motion.trajectory.q) - 1, DRAWN).astype(int))
-    way = _tool_points(model, robot, motion.trajectory.q[rows])
     names = tuple(w.name or str(i + 1) for i, w in enumerate(program.waypoints))
+    return _Drawn(names, at, _markers(model, robot, motion.trajectory.q, at, names))
+
+
+def _markers(
+    model: Model, robot: Mechanism, q: Array, at: Array, names: tuple[str, ...]
+) -> tuple[Marker, ...]:
+    """The way through joint positions of shape (n, d), and the waypoints at (k, 3) [m]."""
+    rows = np.unique(np.linspace(0, len(q) - 1, DRAWN).astype(int))
+    way = _tool_points(model, robot, q[rows])
     markers: list[Marker] = [Polyline(points=tuple(_vector(p) for p in way))]
     for i, p in enumerate(at):
-        markers.append(Sphere(center=_vector(p), radius=RADIUS))
-        if i < LABELLED:
-            markers.append(Label(position=_vector(np.add(p, (0.0, 0.0, 2 * RADIUS))), text=names[i]))
-    return _Drawn(names, at, tuple(markers))
+        markers.append(Sphere(center=_vector(p), radius=DRAWN_RADIUS))
+        if i < DRAWN_LABELS:
+            markers.append(Label(position=_vector(np.add(p, (0.0, 0.0, 2 * DRAWN_RADIUS))), text=names[i]))
+    return tuple(markers)
 
 
 def _tool_points(model: Model, robot: Mechanism, q: Array) -> Array:

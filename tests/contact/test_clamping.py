@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 
 from made_cell import UR10, made
-from seerob.contact.clamping import clamps, pinch_pairs, robot_pinch_pairs
+from seerob.contact.clamping import STILL, clamps, pinch_pairs, robot_pinch_pairs
 from seerob.distances.least import Shapes
 from seerob.geometry import Mesh, Solid, capsule
 
@@ -28,7 +28,7 @@ def test_gap_no_wider_than_the_body_part_clamps_it_whether_it_closes_or_opens() 
 
 
 def test_what_stands_still_clamps_nobody() -> None:
-    for speed, found in ((1.05e-3, True), (0.95e-3, False)):
+    for speed, found in ((1.05e-3, True), (STILL, False), (0.95e-3, False)):
         assert one(np.full(3, 0.05), speed=speed).any() == found
 
 

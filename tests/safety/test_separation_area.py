@@ -150,9 +150,14 @@ def test_a_surface_that_may_stick_out_leaves_the_border_open(tmp_path):
     """A display mesh 20 mm larger than the links' boxes, to 35 mm at its corners."""
     visual = '<visual><origin xyz="0.5 0 0"/><geometry><box size="1.04 0.14 0.14"/></geometry></visual>'
     urdf = two_r().replace("</collision></link>", f"</collision>{visual}</link>")
-    S_p2 = (np.hypot(2.0, 0.05) + 1.6) * 0.4 + 0.16
-    for k, (more, verdict) in enumerate(((-0.001, "exceeded"), (0.01, "undecided"), (0.05, "within"))):
-        y = 0.1 + np.sqrt((S_p2 + more) ** 2 - 0.95**2)
+    told = {}
+    for k, y in enumerate(np.arange(1.36, 1.5, 0.012)):
         moved = CELL.replace("[0, 2.5, 0]", f"[0, {y}, 0]") + FAR + POSTS
         station = made(tmp_path / str(k), moved, {"arm.urdf": urdf})
-        assert results_at(station, arm=((0.0, 0.0), (1.0, 0.0)))["it"].verdict == verdict
+        found = results_at(station, arm=((0.0, 0.0), (1.0, 0.0)))["it"]
+        told[found.value] = str(found.verdict)
+        off = max(body.deviation for body in station.model.bodies)
+    assert 0.02 <= off <= 0.02 * np.sqrt(3) + 1e-9
+    assert set(told.values()) == {"exceeded", "undecided", "within"}
+    for room, verdict in told.items():
+        assert verdict == ("exceeded" if room <= 0 else "undecided" if room <= off else "within")

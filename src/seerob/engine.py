@@ -15,7 +15,6 @@ gains as applied forces diverge at a floating root. Torque limits clamp the whol
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -26,10 +25,11 @@ from seerob.human.following import Following
 from seerob.inverse_kinematics import solve_pose
 from seerob.kernels import pull as kernel
 from seerob.machines.following import Machines, Moved
+from seerob.machines.gripping import Grips, own_masses
 from seerob.model import Mechanism, Model
 from seerob.mounting.compilation import pose_matrix
 from seerob.moving_base import moved_by_poses
-from seerob.reference import Reference
+from seerob.reference import Course, Reference
 from seerob.sample_values import is_finite, largest_speed, torques_of
 from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
 from seerob.state import Hearing, State
@@ -43,16 +43,6 @@ WILD = 300.0
 """Above it the physics has lost a joint [rad/s or m/s]."""
 POSE_TOLERANCE = 1e-4
 """Largest error of a solved Cartesian target [m or rad] that still counts as reached."""
-
-
-class Course(NamedTuple):
-    """Where every joint of the workstation is to be at each step of a tick and at its end, in rows."""
-
-    q: Array
-    """[rad or m]"""
-    v: Array
-    """Half a step earlier, as `mujoco.mj_step` counts."""
-    a: Array
 
 
 class Engine:
@@ -85,7 +75,7 @@ class Engine:
             contacts: Whether the contacts that the file asks for act.
         """
         driven = driven or {}
-        self.model = model
+        self.model = model = own_masses(model)
         self.controllers = controllers
         engine = model.workstation.engine
         # Without controllers there is nothing but physics that could move it.
@@ -148,6 +138,7 @@ class Engine:
         self.signals = Signals(model.dictionary, signals or {})
         self._machines = Machines(model.workstation.machines, self.signals)
         self.state = State(model, self._shown, self._hearings, self.signals)
+        self._grips = Grips(self.state, self._mj)
         self._tick = 0
         self._place(0.0)
 
@@ -370,6 +361,8 @@ class Engine:
             # The velocities of mj_step belong half a step earlier than its positions (see _pull).
             shown.qvel += 0.5 * (data.qvel - self._before)
         self.state.refresh(t)
+        if self._grips.follow(self.state):
+            self.state.refresh(t)
 
     def _note_errors(self) -> None:
         for name, following in self._followings.items() if self.controllers else ():

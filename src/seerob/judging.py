@@ -30,8 +30,12 @@ class _Kept(NamedTuple):
     """An answer of a criterion with a period of its own, until it is asked again."""
 
     result: Result
+    since: float
+    """Run time at which it was asked [s]."""
     due: float
     """Run time from which it is asked again [s]."""
+    muted: bool
+    """Whether it did not apply then."""
     asked: tuple[str, ...]
     """Robots, people and variables that it rests on."""
 
@@ -50,12 +54,13 @@ class Judge:
     def _one(self, i: int, bound: Bound, state: State) -> Result:
         kept = self._kept.get(i)
         criterion = bound.criterion
-        # A result between two evaluations lasts only as long as what it rests on is heard.
-        if kept and state.t < kept.due - SLACK and not any(map(state.interrupted, kept.asked)):
+        if kept and self._lasts(kept, criterion, state):
             return kept.result
         state.asked.clear()
+        muted: Result | None = None
         try:
-            result = self._muted(criterion, state) or bound.evaluate(state)
+            muted = self._muted(criterion, state)
+            result = muted or bound.evaluate(state)
             if result.value is not None and not math.isfinite(result.value):
                 raise Undecided(f"the value is {result.value}, not a finite number")
         except Undecided as reason:
@@ -70,8 +75,19 @@ class Judge:
         result = replace(result, basis=bound.basis)
         if criterion.every is not None:
             result = replace(result, t=state.t)
-            self._kept[i] = _Kept(result, state.t + criterion.every, tuple(sorted(state.asked)))
+            due, asked = state.t + criterion.every, tuple(sorted(state.asked))
+            self._kept[i] = _Kept(result, state.t, due, muted is not None, asked)
         return result
+
+    @staticmethod
+    def _lasts(kept: _Kept, criterion: Criterion, state: State) -> bool:
+        """Whether a result between two evaluations holds: what it rests on is heard, and not switched since.
+
+        Set back before its instant it says nothing.
+        """
+        if not kept.since - SLACK <= state.t < kept.due - SLACK or any(map(state.interrupted, kept.asked)):
+            return False
+        return criterion.active is None or bool(state.signal(criterion.active)) is not kept.muted
 
     @staticmethod
     def _muted(criterion: Criterion, state: State) -> Result | None:

@@ -53,6 +53,13 @@ class Body:
     """Hash of the display mesh."""
     triangles: int
     note: str
+    holder: str = ""
+    """The gripper that picks it up and lets it go: where it is, or whether it is here, depends on it."""
+
+    @property
+    def mover(self) -> str:
+        """Whoever decides where it is: the robot or the person that carries it, or a gripper; or empty."""
+        return self.carrier or self.holder
 
     @property
     def deviation(self) -> float:
@@ -116,6 +123,8 @@ class Mechanism:
     """Robot or machine that carries it; empty when it stands in the world."""
     riders: tuple[str, ...] = ()
     """Machines that are mounted on it: their bodies are among its own, their joints are not."""
+    holders: tuple[str, ...] = ()
+    """Those of them that pick things up: what it weighs depends on them."""
 
     @property
     def alone(self) -> bool:
@@ -284,7 +293,7 @@ class Model:
                 query=Query(self.shapes, key[0], key[1]),
                 a=key[0],
                 b=key[1],
-                carriers=tuple(dict.fromkeys(body.carrier for body in chosen if body.carrier)),
+                carriers=tuple(dict.fromkeys(body.mover for body in chosen if body.mover)),
                 deviation=sum(max(self.bodies[i].deviation for i in side) for side in key),
                 notes=tuple(dict.fromkeys(f"{b.owner}: {b.note}" for b in chosen if b.note)),
             )

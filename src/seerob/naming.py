@@ -69,8 +69,8 @@ def _mounts(names: Sequence[Named], entries: Entries, file: str) -> Iterator[Pro
     on = {
         thing.name: thing.on for group in ("tools", "workpieces") for thing in entries.get(group, {}).values()
     }
+    carriers = [*robots, *people, *machines]
     for group in ("tools", "workpieces", "areas", "sensors"):
-        carriers = [*robots, *people, *(machines if group in ("areas", "sensors") else ())]
         for i, thing in entries.get(group, {}).items():
             at, steps = thing.on, 0
             while at in on and steps <= len(on):

@@ -16,6 +16,7 @@ where it was until the later one, and the twin is put there instead of being pul
 from __future__ import annotations
 
 from bisect import bisect_right
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,16 @@ Knots = tuple[Array, Array, Array, NDArray[np.bool_]]
 
 MAX_KEPT = 4096
 """Samples kept at most: many times what a fast source sends within one tick."""
+
+
+class Course(NamedTuple):
+    """Where every joint of the workstation is to be at each step of a tick and at its end, in rows."""
+
+    q: Array
+    """[rad or m]"""
+    v: Array
+    """Half a step earlier, as `mujoco.mj_step` counts."""
+    a: Array
 
 
 class Reference:

@@ -16,6 +16,7 @@ from msgspec.structs import replace
 
 from seerob.engine import Engine
 from seerob.errors import InputError, Problem, SeerobError
+from seerob.in_doubt import in_doubt
 from seerob.judging import Bound as Bound  # noqa: PLC0414
 from seerob.judging import Judge as Judge  # noqa: PLC0414
 from seerob.live import LiveSource, delay_of
@@ -172,7 +173,8 @@ def scene(
                 owner=body.owner,
                 mesh=body.mesh,
                 triangles=body.triangles,
-                moves=bool(body.carrier),
+                moves=bool(body.mover),
+                mover=body.mover,
                 mass=None if body.mass is None else body.mass.value,
                 mass_origin=model.mass_origin(body),
                 note=body.note,
@@ -255,6 +257,7 @@ def snapshot(state: State, seq: int, results: tuple[Result, ...], looks: Looks |
         bones={m.name: bones for m in mechanisms if (bones := state.hearings[m.name].bones)},
         results=results,
         looks={} if looks is None else looks.at(state),
+        doubts=in_doubt(state),
     )
 
 

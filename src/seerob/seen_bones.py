@@ -8,7 +8,7 @@ from seerob.model import Model
 
 
 def bones_of(model: Model, bodies: Sequence[int]) -> tuple[tuple[str, ...], dict[str, frozenset[str]]]:
-    """Who carries bodies: all but people, and of each person the bones among them.
+    """Who moves bodies: all but people, and of each person the bones among them.
 
     Args:
         model: The compiled workstation.
@@ -19,8 +19,8 @@ def bones_of(model: Model, bodies: Sequence[int]) -> tuple[tuple[str, ...], dict
     for body in (model.bodies[i] for i in bodies):
         if body.role == "human" and body.carrier == body.owner:
             people.setdefault(body.owner, set()).add(body.name.removeprefix(f"{body.owner}/"))
-        elif body.carrier:
-            others[body.carrier] = None
+        elif body.mover:
+            others[body.mover] = None
     return tuple(others), {name: frozenset(bones) for name, bones in people.items()}
 
 

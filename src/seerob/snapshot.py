@@ -235,6 +235,9 @@ class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot"):
     results: tuple[Result, ...] = ()
     looks: dict[str, tuple[float, float, float] | None] = {}
     """Nodes whose look follows a variable: red, green, blue in 0…1; null where one is not drawn."""
+    doubts: dict[str, str] = {}
+    """Robots, humans, machines (with all that they move, `Node.mover`) and single nodes that may not be where
+    `poses` has them, with the reason."""
 
 
 # -- what does not change during a run ----------------------------------------------------------
@@ -246,9 +249,11 @@ class Node(Struct, frozen=True, kw_only=True):
     name: str
     """Unique full name, such as ``ur10/forearm_link`` or ``line/fixture/pin_2``."""
     role: str
-    """``robot``, ``tool``, ``workpiece``, ``part``, ``area`` or ``human``."""
+    """``robot``, ``human``, ``tool``, ``workpiece``, ``part``, ``machine`` or ``area``."""
     owner: str
-    """The robot, tool, part or human of the workstation file it belongs to."""
+    """The table entry of the workstation file it belongs to."""
+    mover: str = ""
+    """The robot, human or machine that decides where it is; empty for what stands."""
     mesh: str | None = None
     """Hash of its display mesh (binary glTF, metres, z up, in the body's frame), at ``/mesh/<hash>.glb``."""
     triangles: int = 0

@@ -14,12 +14,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.bearers import Bearers
 from seerob.distances.least import Closest, Closests, Per, Query
 from seerob.distances.surveying import Surveyor
 from seerob.errors import Undecided
 from seerob.hearing import SLACK
 from seerob.hearing import Hearing as Hearing  # noqa: PLC0414
-from seerob.joint_columns import Columns, moving_dofs
+from seerob.joint_columns import Columns
 from seerob.kernels.chain import along
 from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
 from seerob.model import Frame, Gap, Mechanism, Model
@@ -49,7 +50,8 @@ class State:
         """What machines say; `signal` raises when it may not be relied on."""
         self.asked: set[str] = set()
         """Robots and humans that answers have depended on since the set was last cleared."""
-        self._mj_ids = np.array([body.mj for body in model.bodies], np.int64)
+        self.bearers = Bearers(model)
+        """Which of MuJoCo's bodies moves each body."""
         n = len(model.bodies)
         self.rotations = np.zeros((n, 3, 3))
         """World from body, in the order of `Model.bodies`."""
@@ -69,12 +71,10 @@ class State:
         self._jacobian = np.zeros((6, model.mj.nv))
         self.columns = {m.name: Columns.of(m, model.mj) for m in model.mechanisms.values()}
         """Where the joints of each robot and human are among all."""
-        self._mj_roots = model.mj.body_rootid[self._mj_ids].astype(np.int64)
         # Views that MuJoCo writes through; to ask the data for them takes longer than to use them.
         self._xmat, self._xpos, self._xquat = data.xmat, data.xpos, data.xquat
         self._surveyor = Surveyor(model.shapes)
         self._cdof, self._com = data.cdof, data.subtree_com
-        self._moves: dict[tuple[int, ...], NDArray[np.bool_]] = {}
         self._rows: dict[tuple[int, ...], Indices] = {}
         self._bones_of: dict[tuple[int, ...], tuple[tuple[str, ...], dict[str, frozenset[str]]]] = {}
         self._corners = stacked([body.corners for body in model.bodies])
@@ -92,7 +92,7 @@ class State:
             self._xmat,
             self._xpos,
             self._xquat,
-            self._mj_ids,
+            self.bearers.ids,
             self.rotations,
             self.positions,
             self.quaternions,
@@ -103,7 +103,7 @@ class State:
 
     def poses(self) -> bytes:
         """Little-endian float32, seven per body: position [m], quaternion w first."""
-        return np.hstack([self.positions, self.quaternions]).astype("<f4").tobytes()
+        return np.hstack([self.positions, self.quaternions])[self.bearers.drawn].astype("<f4").tobytes()
 
     # -- what may be relied on --------------------------------------------------------------
 
@@ -135,7 +135,7 @@ class State:
         if name.startswith(VARIABLE):
             return self.signals.at(name.removeprefix(VARIABLE), self.t).doubt
         parts = self.hearings[name].doubted(self.t)
-        return self._doubt(name) or (f"{name}: {parts[0][0]}" if parts else "")
+        return self.whole_doubt(name) or (f"{name}: {parts[0][0]}" if parts else "")
 
     def bones_in_doubt(self, name: str) -> tuple[str, ...]:
         """Bones of a person that may not be where the twin shows them, when the others are.
@@ -146,7 +146,7 @@ class State:
             Undecided: Nothing of the person may be relied on.
         """
         self.asked.add(name)
-        if reason := self._doubt(name):
+        if reason := self.whole_doubt(name):
             raise Undecided(reason)
         key = ("bones in doubt", name)
         if key not in self._cache:
@@ -170,6 +170,8 @@ class State:
         if key in self._cache:
             return
         self.require(*others)
+        if lost := self.bearers.unknown.keys() & set(bodies):
+            raise Undecided(self.bearers.unknown[min(lost)])
         for name, bones in people.items():
             if bones.isdisjoint(self.bones_in_doubt(name)):
                 continue
@@ -177,7 +179,8 @@ class State:
                 raise Undecided(self.doubt(name))
         self._cache[key] = True
 
-    def _doubt(self, name: str) -> str:
+    def whole_doubt(self, name: str) -> str:
+        """The same without what is only said of single bones of a person."""
         hearing = self.hearings[name]
         reason = hearing.doubt(self.t)
         if reason:
@@ -189,13 +192,13 @@ class State:
             why = " (a torque limit is reached)" if hearing.saturated else ""
             return f"{name}: the twin is off by {hearing.error:.3g} rad or m, more than {limit:g}{why}"
         above = self.model.mechanisms[name].on
-        return self._doubt(above) if above else ""
+        return self.whole_doubt(above) if above else ""
 
     def lost_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
         """Those of some bodies that are bones in doubt of people of whom the others may be relied on."""
         _, people = self._bones(bodies)
         lost = {
-            f"{name}/{bone}" for name in people if not self._doubt(name) for bone in self.bones_in_doubt(name)
+            f"{name}/{bone}" for name in people if not self.whole_doubt(name) for bone in self.bones_in_doubt(name)
         }
         return tuple(i for i in bodies if self.model.bodies[i].name in lost) if lost else ()
 
@@ -266,7 +269,7 @@ class State:
         Raises:
             Undecided: A mass that nobody gave, or what drives it is too coarse for what a mass is asked for.
         """
-        self.require(mechanism.name)
+        self.require(mechanism.name, *mechanism.holders)
         if mechanism.unknown_masses:
             raise Undecided("; ".join(mechanism.unknown_masses))
         if why := self.hearings[mechanism.name].coarse:
@@ -320,12 +323,10 @@ class State:
             directions: Likewise, shape (b, 3).
         """
         self.require(mechanism.name)
-        if bodies not in self._moves:
-            mj = self.model.mj
-            self._moves[bodies] = np.array([moving_dofs(mj, self._mj_ids[i]) for i in bodies])
+        moves, roots = self.bearers.moves(self.model.mj, bodies), self.bearers.roots
         rows = np.array(bodies, np.int64)
         every = np.empty((len(rows), self.model.mj.nv))
-        along(self._cdof, self._com, self._mj_roots[rows], self._moves[bodies], points, directions, every)
+        along(self._cdof, self._com, roots[rows], moves, points, directions, every)
         return self.columns[mechanism.name].of_rows(every)
 
     def body_velocity(self, index: int) -> tuple[Array, Array]:
@@ -340,8 +341,9 @@ class State:
             data = self.data
             linear, angular = np.empty((2, *self.positions.shape))
             velocities(
-                data.cvel, data.subtree_com, self.positions, self._mj_ids, self._mj_roots, linear, angular
-            )
+                data.cvel, data.subtree_com, self.positions, self.bearers.ids, self.bearers.roots,
+                linear, angular,
+            )  # fmt: skip
             self._cache["v"] = linear, angular
         linear, angular = self._cache["v"]
         return linear, angular

@@ -184,6 +184,10 @@ class Tool(Mounted, frozen=True, kw_only=True):
 class Workpiece(Mounted, frozen=True, kw_only=True):
     """A payload: something a tool carries."""
 
+    rest: Pose | None = None
+    """Where it lies first, in the world: the gripper that ``on`` names picks it up and lets it go.
+    Without it, it is on what carries it all the time."""
+
 
 class Part(Thing, frozen=True, kw_only=True):
     """Something of the environment that stands still."""

@@ -188,10 +188,21 @@ def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, str, str]]:
                     and part.value
                 ):
                     yield part.value, statement.name, ast.unparse(part.target)
-        elif isinstance(statement, (ast.Assign, ast.AnnAssign)) and statement.value is not None:
-            target = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
-            if isinstance(target, ast.Name) and "DRAWN" not in target.id:
-                yield from named(statement.value, "<module>", 1, target.id)
+        else:
+            for name, value in assigned(statement):
+                if "DRAWN" not in name:
+                    yield from named(value, "<module>", 1, name)
+
+
+def assigned(statement: ast.stmt) -> Iterator[tuple[str, ast.expr]]:
+    """Names that a statement binds, each with what it is bound to: ``A, B = 1.0, 0.5`` binds two."""
+    if not isinstance(statement, (ast.Assign, ast.AnnAssign)) or statement.value is None:
+        return
+    target = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
+    pairs = [(target, statement.value)]
+    if isinstance(target, ast.Tuple) and isinstance(statement.value, ast.Tuple):
+        pairs = list(zip(target.elts, statement.value.elts, strict=True))
+    yield from ((name.id, value) for name, value in pairs if isinstance(name, ast.Name))
 
 
 def mutants(source: str, file: str) -> list[Mutant]:

@@ -26,7 +26,7 @@ import pytest
 from _pytest.runner import runtestprotocol
 
 import seerob
-from mutation.operators import Mutant, mutated
+from mutation.operators import Mutant, assigned, mutated
 
 PACKAGE = Path(inspect.getfile(seerob)).parent
 LEAST = 20
@@ -275,12 +275,10 @@ def _arguments(tree: ast.Module, name: str) -> ast.arguments:
 def _rebind(module: types.ModuleType, tree: ast.Module, mutant: Mutant) -> None:
     """A constant, wherever it was imported to."""
     for statement in tree.body:
-        if isinstance(statement, (ast.Assign, ast.AnnAssign)) and statement.value is not None:
-            end = statement.end_lineno or statement.lineno
-            if not statement.lineno <= mutant.line <= end:
+        for name, value in assigned(statement):
+            if name != mutant.assigned or not value.lineno <= mutant.line <= (value.end_lineno or 0):
                 continue
-            name = mutant.assigned
-            new = eval(compile(ast.Expression(statement.value), mutant.file, "eval"), vars(module))
+            new = eval(compile(ast.Expression(value), mutant.file, "eval"), vars(module))
             old = vars(module)[name]
             for other in list(sys.modules.values()):
                 if vars(other).get(name) is old:

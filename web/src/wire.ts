@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "2316e2a2172299d4";
+export const SCHEMA = "7cd3c1b87f492a97";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -297,16 +297,23 @@ export interface Snapshot {
   results: Result[];
   /** Nodes whose look follows a variable: red, green, blue in 0…1; null where one is not drawn. */
   looks: Record<string, Vec3 | null>;
+  /**
+   * Robots, humans, machines (with all that they move, `Node.mover`) and single nodes that may not be where
+   * `poses` has them, with the reason.
+   */
+  doubts: Record<string, string>;
 }
 
 /** One body of the scene; its index is its slot in `Snapshot.poses`. */
 export interface Node {
   /** Unique full name, such as `ur10/forearm_link` or `line/fixture/pin_2`. */
   name: string;
-  /** `robot`, `tool`, `workpiece`, `part`, `area` or `human`. */
+  /** `robot`, `human`, `tool`, `workpiece`, `part`, `machine` or `area`. */
   role: string;
-  /** The robot, tool, part or human of the workstation file it belongs to. */
+  /** The table entry of the workstation file it belongs to. */
   owner: string;
+  /** The robot, human or machine that decides where it is; empty for what stands. */
+  mover: string;
   /** Hash of its display mesh (binary glTF, metres, z up, in the body's frame), at `/mesh/<hash>.glb`. */
   mesh: string | null;
   triangles: number;

@@ -107,7 +107,8 @@ class Clamping:
             model.shapes, robot_pinch_pairs(model, robot, cap=cap), self._thickness, cap=cap
         )
         self._floor = None if floor is None else FloorGap(model, robot.moving, floor)
-        self._robots = [name for name, m in model.mechanisms.items() if m.role == "robot"]
+        # All that carries a surface: where a machine is not known, nor are the gaps to it.
+        self._carriers = [name for name, m in model.mechanisms.items() if m.role != "human"]
 
     def at(self, state: State, wanted: Flags) -> tuple[Flags, Flags]:
         """Which moving bodies clamp which regions, and which of those against the floor.
@@ -117,9 +118,9 @@ class Clamping:
             wanted: Of which bodies, that move now, and which regions that matters, shape (b, r).
 
         Raises:
-            Undecided: A robot that was not heard.
+            Undecided: A robot or a machine that was not heard.
         """
-        state.require(*self._robots)
+        state.require(*self._carriers)
         twists = state.body_velocities()
         clamped = self._gaps.clamped(state.t, state.rotations, state.positions, twists, wanted)
         if self._floor is None:

@@ -7,10 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from seerob.contact import collision
+from seerob.criterion import Evaluate
+from seerob.errors import Undecided
 from seerob.kernels.speed import directions
 from seerob.model import Mechanism, Model
+from seerob.snapshot import Result, Verdict
 from seerob.state import State
 from seerob.transforms import Array
+
+RESTS = 1e-3
+"""Speed of its joints up to which what carries a robot rests [rad/s or m/s]."""
 
 
 def simplified_mass(model: Model, robot: Mechanism) -> float:
@@ -57,3 +63,25 @@ def masses_along_motion(
         return np.full(len(bodies), np.nan)
     rows = state.along(tuple(bodies), robot, points, u)
     return np.where(np.isnan(u[:, 0]), np.nan, collision.mass_of_rows(rows, M))
+
+
+def while_carriers_rest(model: Model, robot: Mechanism, judge: Evaluate) -> Evaluate:
+    """The same judgement, but never within while something moves that carries the robot.
+
+    What carries it moves too then, and its mass is not in M/2 + m_L: the real mass may be larger.
+    """
+    rows = {}
+    above = robot.on
+    while above:
+        rows[above], above = model.mechanisms[above].v_address, model.mechanisms[above].on
+
+    def evaluate(state: State) -> Result:
+        result = judge(state)
+        if result.verdict is None or result.verdict is Verdict.EXCEEDED:
+            return result
+        for name, row in rows.items():
+            if np.abs(state.data.qvel[row]).max(initial=0.0) > RESTS:
+                raise Undecided(f"{name} moves and carries {robot.name}: its mass is not in M/2 + m_L")
+        return result
+
+    return evaluate if rows else judge

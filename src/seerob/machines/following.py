@@ -22,6 +22,9 @@ FAR = 0.1
 LONGEST_STEP = 0.5
 """Between two pictures that a belt's speed is summed up over [s]; longer is a silence."""
 
+ON_ITS_WAY = "on its way since"
+"""Begin of the doubt about a machine that is between the two ends that it tells of."""
+
 
 class Moved(NamedTuple):
     """Where a machine is at an instant."""
@@ -209,7 +212,7 @@ class _Ends:
         self._t = t
         q = wanted if self._q is None else self._q + float(np.clip(wanted - self._q, -step, step))
         self._q = q
-        doubt = f"on its way since {self._name} changed: between its ends nobody says where"
+        doubt = f"{ON_ITS_WAY} {self._name} changed: between its ends nobody says where"
         return Place(np.array([q]), doubt="" if q == wanted else doubt)
 
 

@@ -207,6 +207,9 @@ class Fingers(Table, frozen=True, kw_only=True):
     """Largest opening [m]; open."""
     travel: Seconds | None = None
     """Time from one end to the other [s], where ``open`` is told."""
+    touch: Annotated[float, unit("m", gt=0, le=0.1)] = 0.005
+    """A workpiece with ``rest`` is held once both fingers are as near to it as this [m], and let go once one
+    of them is twice as far."""
 
     def __post_init__(self) -> None:
         _direction("along", self.along)

@@ -27,6 +27,7 @@ def listed(mounting: Mounting) -> tuple[Body, ...]:
                 mesh=entry.mesh,
                 triangles=entry.triangles,
                 note="; ".join(notes),
+                holder=entry.holder,
             )
         )
     return tuple(bodies)

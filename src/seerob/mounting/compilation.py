@@ -28,13 +28,14 @@ from seerob.mounting.body_list import listed
 from seerob.mounting.contacts import add_contacts
 from seerob.mounting.mechanisms import Chain, Riders, mechanism
 from seerob.mounting.people import describe
+from seerob.mounting.picked_up import picked_up
 from seerob.mounting.specification import Mounting
 from seerob.mounting.specification import pose_matrix as pose_matrix  # noqa: PLC0414
 from seerob.mounting.things import AREA_COLOR, PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, MadeArea, load_thing
 from seerob.snapshot import Finding
 from seerob.transforms import Array
 from seerob.variables.binding import Bound, bound
-from seerob.workstation import Area, Human, Machine, Mounted, Robot, Tool, Workstation
+from seerob.workstation import Area, Human, Machine, Mounted, Robot, Tool, Workpiece, Workstation
 
 Progress = Callable[[str], None]
 
@@ -281,6 +282,9 @@ class _Compiler:
         color = TOOL_COLOR if role == "tool" else WORKPIECE_COLOR
         on = self._body(thing.on)
         self._thing(thing, role, on, pose_matrix(thing.at), color)
+        if isinstance(thing, Workpiece) and thing.rest is not None:
+            machine = next((m for m in self.station.machines if m.name == thing.on), None)
+            picked_up(self.mounting, thing, machine, pose_matrix(thing.rest), file=self.file)
         if isinstance(thing, Tool):
             carrier = self.carriers[on]
             wanted = next((r.tool for r in self.station.robots if r.name == carrier), None)

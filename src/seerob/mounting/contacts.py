@@ -54,7 +54,9 @@ def select(bodies: Sequence[Body], name: str) -> list[Body]:
     chosen = [
         b
         for b in bodies
-        if b.role != "area" and (name in (b.carrier, b.owner, b.name) or b.name.startswith(name + "/"))
+        if b.role != "area"
+        and not b.holder
+        and (name in (b.carrier, b.owner, b.name) or b.name.startswith(name + "/"))
     ]
     if not chosen:
         raise UnknownName("robot, human, tool or part with a shape", name, {b.owner for b in bodies})

@@ -136,6 +136,7 @@ def mechanism(
         rotor_inertia_known=all(joint.armature is not None for joint in commanded),
         on=riders.above(name),
         riders=riders.of(name),
+        holders=tuple(dict.fromkeys(b.holder for b in own_bodies if b.holder and b.holder != name)),
     )
 
 

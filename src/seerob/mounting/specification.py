@@ -33,6 +33,7 @@ class Entry:
     mass: Quantity | None
     mesh: str | None
     triangles: int
+    holder: str = ""
 
 
 @dataclass

@@ -128,9 +128,21 @@ class BetweenSamples:
             else ""
         )
 
-    def _require(self, names: Iterable[str]) -> None:
-        for name in names:
-            if name not in self._joints.motions and not self._model.mechanisms[name].home_given:
+    def _require(self, bodies: Iterable[int]) -> None:
+        """Raise `Undecided` unless it is known how everybody moves on whom the place of a body depends."""
+        followed = {m.name for m in self._model.workstation.machines if m.motion.variables()}
+        ids: set[int] = set()
+        for at in (self._model.bodies[i].mj for i in bodies):
+            while at > 0 and at not in ids:
+                ids.add(at)
+                at = int(self._model.mj.body_parentid[at])
+        every = self._model.mechanisms.values()
+        for name in (m.name for m in every if not ids.isdisjoint(m.mj_bodies.tolist())):
+            if name in self._joints.motions:
+                continue
+            if name in followed:
+                raise Undecided(f"{name} follows variables: what it does between samples is not known")
+            if not self._model.mechanisms[name].home_given:
                 raise Undecided(f"{name}: no source drives it and the file gives no position (q)")
 
     def _at(self, t: float) -> State:
@@ -149,10 +161,10 @@ class BetweenSamples:
         Raises:
             UnknownName: A name that means no body.
             InputError: A tolerance that is not above 0.
-            Undecided: Somebody whose place nobody gave.
+            Undecided: Somebody whose place nobody gave, or who follows variables.
         """
         gap = self._model.gap(self._model.select(a), self._model.select(b))
-        self._require(gap.carriers)
+        self._require((*gap.a, *gap.b))
         first, second = (chains_of(self._model, side, self._slid) for side in (gap.a, gap.b))
 
         def middle(t: float) -> tuple[Array, Array]:
@@ -186,10 +198,10 @@ class BetweenSamples:
         Raises:
             UnknownName: A name that means no body.
             InputError: A tolerance that is not above 0.
-            Undecided: Somebody whose place nobody gave.
+            Undecided: Somebody whose place nobody gave, or who follows variables.
         """
         bodies = self._model.select(of)
-        self._require(dict.fromkeys(c for i in bodies if (c := self._model.bodies[i].carrier)))
+        self._require(bodies)
         chains = chains_of(self._model, bodies, self._slid)
 
         def middle(t: float) -> tuple[Array, Array]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import partial
 
 import numpy as np
 
@@ -55,13 +57,13 @@ def wanted_bounds(
         return []
     between = BetweenSamples(model, motions)
     robots = [name for name, m in model.mechanisms.items() if m.role == "robot" and name in motions]
+    asked = [partial(between.distance, a, b, tolerance=tolerance) for a, b in _pairs(model)[:most]]
+    asked += [partial(between.speed, name, tolerance=tolerance) for name in robots[:most]]
     bounds = []
-    for a, b in _pairs(model)[:most]:
-        try:
-            bounds.append(between.distance(a, b, tolerance=tolerance))
-        except Undecided:
-            continue
-    return [*bounds, *(between.speed(name, tolerance=tolerance) for name in robots[:most])]
+    for ask in asked:
+        with suppress(Undecided):
+            bounds.append(ask())
+    return bounds
 
 
 def _pairs(model: Model) -> Sequence[tuple[str, str]]:

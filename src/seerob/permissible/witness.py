@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -15,7 +15,13 @@ from seerob.state import Hearing, State
 from seerob.transforms import Array
 from seerob.variables.dictionary import Value
 
-Bones = dict[str, tuple[float | None, float | None]]
+
+class Seen(NamedTuple):
+    """How far bones of a person may be from where the twin has them; see `seerob.hearing.Hearing`."""
+
+    bones: dict[str, tuple[float | None, float | None]]
+    unaimed: Mapping[str, float]
+    """Hands, feet and heads of which only the joint was seen, each with a bound [rad]."""
 
 
 class Witness:
@@ -32,7 +38,7 @@ class Witness:
         self._qvel: list[Array] = []
         self._doubts: list[dict[str, str]] = []
         self._heard: list[dict[str, Value | Undecided]] = []
-        self._bones: list[dict[str, Bones]] = []
+        self._seen: list[dict[str, Seen]] = []
 
     def __call__(self, state: State) -> tuple[Result, ...]:
         """Take one tick; what the judge says goes on."""
@@ -42,7 +48,8 @@ class Witness:
         self._doubts.append({name: state.doubt(name) for name in state.hearings})
         asked = {c.active for c in state.model.workstation.safety if c.active is not None}
         self._heard.append({name: _heard(state, name) for name in asked})
-        self._bones.append({name: dict(h.bones) for name, h in state.hearings.items() if h.bones})
+        people = {name: h for name, h in state.hearings.items() if h.bones}
+        self._seen.append({name: Seen(dict(h.bones), h.unaimed(state.t)) for name, h in people.items()})
         return self._judge(state)
 
     def _tick(self, t: float) -> int:
@@ -57,13 +64,13 @@ class Witness:
         k = self._tick(t)
         return self._qpos[k], self._qvel[k], self._doubts[k]
 
-    def heard(self, t: float) -> tuple[dict[str, Value | Undecided], dict[str, Bones]]:
+    def heard(self, t: float) -> tuple[dict[str, Value | Undecided], dict[str, Seen]]:
         """What switches criteria, as machines said it at the tick that is nearest to ``t`` [s], or why not.
 
-        Also how far bones of people were from where devices saw them, see `seerob.hearing.Hearing.bones`.
+        Also how far bones of people whom devices see may be from where the twin has them.
         """
         k = self._tick(t)
-        return self._heard[k], self._bones[k]
+        return self._heard[k], self._seen[k]
 
     def moves(self, mechanism: Mechanism) -> bool:
         """Whether somebody ever moved."""
@@ -107,9 +114,10 @@ class Posed(State):
         self.data.qpos[robot.q_address] = robot.coupling @ q + robot.offset
         self.data.qvel[robot.v_address] = robot.coupling @ qd
         self.doubts = {**doubts, robot.name: own_doubt}
-        self._said, bones = self._witness.heard(others_at)
+        self._said, seen = self._witness.heard(others_at)
         for name, hearing in self.hearings.items():
-            hearing.bones = bones.get(name, {})
+            hearing.bones, unaimed = seen.get(name, Seen({}, {}))
+            hearing.aims = [(t, unaimed)]
         self.asked.clear()
         self.refresh(t)
 

@@ -23,8 +23,7 @@ from seerob.permissible.tables import (
     trajectory_head,
     trajectory_rows,
 )
-from seerob.sinks._sheets import Sheets
-from seerob.sinks._xlsx import Workbook
+from seerob.sinks import _sheets
 from seerob.snapshot import Scene
 
 INPUT_HEAD: list[Cell] = ["of", "input", "value", "unit", "origin", "source"]
@@ -50,8 +49,7 @@ def workbook(found: PermissibleSpeed, cut: Sequence[PathSegment], scene: Scene, 
         period: Of the rescaled motion's rows [s].
     """
     out = io.BytesIO()
-    with Workbook(out) as book:
-        sheets = Sheets(book)
+    with _sheets.workbook(out) as sheets:
         sheets.add("Summary", ["what", "value"], _summary(found, scene), fit=True)
         sheets.add("Segments", list(SEGMENT_HEAD), segment_rows(cut))
         sheets.add("Map", list(map_head(found.map)), map_rows(found.map))

@@ -171,6 +171,8 @@ def _shells(
 ) -> tuple[Hull, ...]:
     shells = []
     for i, distance in zip(moving, S_p.tolist(), strict=True):
+        if i in state.bearers.away:
+            continue
         body = model.bodies[i]
         corners = body.corners @ state.rotations[i].T + state.positions[i]
         vertices, faces = offset_shell(corners, body.radius + max(distance, 0.0))

@@ -71,12 +71,12 @@ def others(model: Model, sensor: Sensor, bodies: tuple[int, ...]) -> tuple[tuple
     """
     left_out = {i for name in sensor.ignores for i in model.select(name)} | set(bodies)
     rest = [b for b in model.bodies if b.role != "area" and b.index not in left_out and b.solids]
-    return tuple(b.index for b in rest if not b.carrier), tuple(b.index for b in rest if b.carrier)
+    return tuple(b.index for b in rest if not b.mover), tuple(b.index for b in rest if b.mover)
 
 
 def carriers_of(model: Model, bodies: tuple[int, ...]) -> tuple[str, ...]:
     """Robots and people that carry some bodies."""
-    return tuple(dict.fromkeys(model.bodies[i].carrier for i in bodies if model.bodies[i].carrier))
+    return tuple(dict.fromkeys(model.bodies[i].mover for i in bodies if model.bodies[i].mover))
 
 
 class Presence:

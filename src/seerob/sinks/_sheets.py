@@ -1,30 +1,50 @@
-"""Sheets of a workbook as a person reads them: widths that fit, a header that stays, units, plain text."""
+"""Sheets of a workbook as a person reads them: widths that fit, a header that stays, and units."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
 
 from seerob.figures import DECIMALS
-from seerob.sinks._cell_looks import HEAD, WRAP
-from seerob.sinks._xlsx import MOST_COLUMNS, Cell, SheetRows, Workbook
+from seerob.sinks._book import book
+from seerob.sinks._cell_formats import HEAD, WRAP, Formats
+from seerob.sinks._sheet_rows import Cell, SheetRows
+
+if TYPE_CHECKING:
+    from xlsxwriter import Workbook
 
 EXCEL_ROWS = 1_048_576
 """Rows of a sheet, header included; longer data goes on in a further sheet."""
+MOST_COLUMNS = 16_384
+"""Columns of a sheet."""
 _NOT_IN_SHEET_NAME = re.compile(r"[\[\]:*?/\\\x00-\x1f'\ud800-\udfff\ufffe\uffff]")
 _UNIT = re.compile(r"\[([^\[\]]*)\]$")
 _NARROWEST, _WIDEST, _TEXT_COLUMN = 9, 60, 44
 _MORE = 2
-"""Places shown beyond `DECIMALS`: here the figures are for further work. The cell holds all digits."""
+"""Places shown beyond `DECIMALS`: here the figures are for further work. The cell holds 16 digits."""
 _OWN_UNIT = ("worst value", "limit", "value")
 """Columns whose unit stands in the row."""
 
 
+@contextmanager
+def workbook(file: IO[bytes] | Path) -> Iterator[Sheets]:
+    """A workbook to add sheets to; see `seerob.sinks._book.book`.
+
+    Raises:
+        OSError: The disk refuses.
+    """
+    with book(file) as made:
+        yield Sheets(made)
+
+
 class Sheets:
-    """Adds sheets to a workbook; text from files stays text, whatever it begins with."""
+    """Adds sheets to a workbook; made by `workbook`."""
 
     def __init__(self, book: Workbook) -> None:
-        self._book = book
+        self._book, self._formats = book, Formats(book)
         self._names: set[str] = set()
 
     def add(
@@ -45,26 +65,29 @@ class Sheets:
             left_out = f"(left out: {len(head) - MOST_COLUMNS + 1} columns; see the CSV files)"
             head = [*head[: MOST_COLUMNS - 1], left_out]
         widths = _widths(head, rows if fit and isinstance(rows, list) else [])
-        looks = tuple(_format(_unit(title)) for title in head)
+        looks = [_format(_unit(title)) for title in head]
         unit_at = list(head).index("unit") if fit and "unit" in head else -1
         word = WRAP if fit else ""
-        sheet = self._begin(name, head, widths)
+        sheet = self._begin(name, head, widths, looks)
         for row in rows:
             if sheet.full or sheet.rows >= EXCEL_ROWS:
                 sheet.close()
-                sheet = self._begin(name, head, widths)
-            if 0 <= unit_at < len(row):
-                own = _format(str(row[unit_at] or ""))
-                looks = tuple(
-                    own if title in _OWN_UNIT else look for title, look in zip(head, looks, strict=True)
-                )
-            sheet.append(row[: MOST_COLUMNS - 1] if wide else row, looks, word=word)
+                sheet = self._begin(name, head, widths, looks)
+            own = self._formats.of(_format(str(row[unit_at] or ""))) if 0 <= unit_at < len(row) else None
+            formats = [own if title in _OWN_UNIT else None for title in head] if own else ()
+            sheet.append(row[: MOST_COLUMNS - 1] if wide else row, formats, word=word)
         sheet.close()
 
-    def _begin(self, name: str, head: Sequence[Cell], widths: list[float]) -> SheetRows:
-        sheet = self._book.sheet(self._unique(name), widths)
-        sheet.append([str(title) for title in head], word=HEAD)
-        return sheet
+    def _begin(
+        self, name: str, head: Sequence[Cell], widths: Sequence[float], looks: Sequence[str]
+    ) -> SheetRows:
+        sheet = self._book.add_worksheet(self._unique(name))
+        sheet.freeze_panes(1, 1)
+        for k, (width, look) in enumerate(zip(widths, looks, strict=True)):
+            sheet.set_column(k, k, width, self._formats.of(look))
+        rows = SheetRows(sheet, self._formats)
+        rows.append([str(title) for title in head], word=HEAD)
+        return rows
 
     def _unique(self, name: str) -> str:
         stem = _NOT_IN_SHEET_NAME.sub("_", name).strip() or "sheet"

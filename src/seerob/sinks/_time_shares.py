@@ -10,7 +10,7 @@ from seerob.results import ResultLog
 from seerob.series import Series
 from seerob.sinks._html import Html, joined, table, tag
 from seerob.sinks._sentences import percent
-from seerob.sinks._xlsx import Cell
+from seerob.sinks._sheet_rows import Cell
 from seerob.snapshot import CriterionInfo
 
 HEAD: list[Cell] = [

@@ -20,9 +20,9 @@ from seerob.sinks._at_end import AtEndWithResults
 from seerob.sinks._bone_errors import HEAD as ERRORS
 from seerob.sinks._bone_errors import bone_rows
 from seerob.sinks._motion_sheets import MotionSheets
-from seerob.sinks._sheets import Sheets
+from seerob.sinks._sheet_rows import Cell
+from seerob.sinks._sheets import workbook
 from seerob.sinks._time_shares import HEAD, time_rows
-from seerob.sinks._xlsx import Cell, Workbook
 from seerob.snapshot import Basis, Scene, Snapshot
 
 _VERDICT_OF = {code: verdict for verdict, code in CODES.items()}
@@ -111,8 +111,7 @@ class ExcelWriter(AtEndWithResults):
             raise InputError.at(self.path, "", what, "close it in Excel, or give another folder") from error
 
     def _fill(self, path: Path) -> None:
-        with Workbook(path) as book:
-            sheets = Sheets(book)
+        with workbook(path) as sheets:
             steps = len(self.log) + len(self._motion) + 1
             sheets.add("Summary", _SUMMARY, list(self._summary()), fit=True)
             for k, series in enumerate(self.log.values()):

@@ -199,6 +199,8 @@ def _chain(model: Model, robot: Mechanism, body: Body) -> Array:
 def _levers(state: State, robot: Mechanism, chain: Array, index: int) -> Array:
     """Largest distance of a body from each axis of its chain [m], shape (k,)."""
     body = state.model.bodies[index]
+    if index in state.bearers.away:
+        return np.zeros(len(chain))
     joints = state.model.mj.dof_jntid[robot.v_address[chain]]
     corners = state.positions[index] + body.corners @ state.rotations[index].T
     arms = corners[None] - state.data.xanchor[joints][:, None]

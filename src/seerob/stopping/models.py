@@ -36,6 +36,8 @@ SHARES = {"bound": BOUND, "constant_deceleration": CONSTANT}
 """Of v_r T_s, by how a stop is modelled whose time is known."""
 MOVING = 1e-6
 """Speed above which a robot moves [m/s]."""
+RESTS = 1e-3
+"""Speed of its joints up to which a machine rests [rad/s or m/s]."""
 INSTANTS = 16
 """At most this many instants of a stop are asked for their distance to the person."""
 
@@ -157,10 +159,26 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         return _timed(stop, gap)
     bind = _tabulated if stop.model == "table" else _simulated
     found = bind(stop, model, robot, gap)
+    if robot.riders:
+        found = replace(found, courses=_while_riders_rest(found.courses, model, robot))
     if not robot.on:
         return found
     doubt = f"{robot.on}, which carries {robot.name}, has a way to stop of its own that is not in it"
     return replace(found, doubts=(*found.doubts, doubt))
+
+
+def _while_riders_rest(courses: Courses, model: Model, robot: Mechanism) -> Courses:
+    """The same, undecided while a machine on the robot moves: neither table nor simulation knows its stop."""
+    rows = {name: model.mechanisms[name].v_address for name in robot.riders}
+
+    def at(state: State) -> At:
+        state.require(*rows)
+        for name, row in rows.items():
+            if np.abs(state.data.qvel[row]).max(initial=0.0) > RESTS:
+                raise Undecided(f"{name} moves on {robot.name}, and its own way to stop is not known")
+        return courses(state)
+
+    return at
 
 
 def _given(name: str, value: float, unit: str) -> Input:

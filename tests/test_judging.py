@@ -77,3 +77,28 @@ def test_what_is_undecided_keeps_its_limit_and_the_side_that_it_bounds(asked, ki
     assert (result.verdict, result.value) == ("undecided", None)
     assert (result.limit, result.at_most) == ((4, True) if kind == "kinetic_energy" else (1, False))
     assert math.isfinite(result.limit)
+
+
+def test_a_criterion_with_a_period_is_asked_at_once_when_it_is_switched(tmp_path):
+    """Muted for two tenths of a second and then too fast: not only when the muted answer is due."""
+    plc = '[[sources]]\nkind = "signals_csv"\nname = "plc"\nfile = "s.csv"\ntime = "t"\ntime_unit = "s"\n'
+    arm = '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "m.csv"\n'
+    door = '[[variables]]\nname = "door"\nsource = "plc"\naddress = "x"\ntype = "bool"\n'
+    text = 'variables = "v.toml"\n' + FLOATING + TWO_R + plc + arm + ENERGY + 'every = 10\nactive = "door"\n'
+    files = {
+        "v.toml": door,
+        "s.csv": "t,x\n" + "".join(f"{0.1 * k:.1f},{int(k >= 2)}\n" for k in range(5)),
+        "m.csv": "t [s],J1 [rad],J2 [rad]\n" + "".join(f"{0.1 * k:.1f},{0.2 * k:.1f},0\n" for k in range(5)),
+        "arm.urdf": two_r(),
+    }
+    found = made(tmp_path, text, files).run().results["E"]
+    # ½ (1 kg + 1 kg · 2²) 2² m²/s²
+    assert (found.verdict, found.max()) == ("exceeded", pytest.approx(10.0, rel=1e-3))
+
+
+def test_an_answer_of_later_says_nothing_when_time_is_set_back(asked):
+    judge, state = asked(ENERGY + "every = 10\n")
+    state.refresh(5.0)
+    judge(state)
+    state.refresh(1.0)
+    assert judge(state)[0].t == 1.0

@@ -178,9 +178,8 @@ class Engine:
                 self._references[name].take(found.t, found.q, None, anew=found.anew and self._tick > 0)
                 hearing.heard.append((found.t, found.reason))
                 hearing.parts.append((found.t, found.parts))
-                if found.observed:
-                    hearing.observed.append((found.t, found.observed))
-                    hearing.aims.append((found.t, found.unaimed))
+                hearing.observed.append((found.t, found.observed))
+                hearing.aims.append((found.t, found.unaimed))
                 hearing.torques.append(None)
 
     def _silent(self, name: str) -> bool:

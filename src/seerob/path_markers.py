@@ -34,7 +34,7 @@ class Place(NamedTuple):
 
 
 def path_markers(pieces: Iterable[Sequence[Place]]) -> tuple[Polyline, ...]:
-    """Lines along the pieces of a path: within, exceeded or undecided against the given motion."""
+    """Lines along a path: within, exceeded or undecided against the given motion; the worst first."""
     stretches = [stretch for piece in pieces for stretch in _stretches(piece)]
     urgent = sorted((s for s in stretches if s[0].verdict is not Verdict.WITHIN), key=_urgency)
     # Where all is within, one label says how near it comes.
@@ -46,7 +46,7 @@ def path_markers(pieces: Iterable[Sequence[Place]]) -> tuple[Polyline, ...]:
             label=_label(stretch) if id(stretch) in chosen else "",
             verdict=stretch[0].verdict,
         )
-        for stretch in stretches
+        for stretch in sorted(stretches, key=_urgency)
     )
 
 

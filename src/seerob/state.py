@@ -197,9 +197,8 @@ class State:
     def lost_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
         """Those of some bodies that are bones in doubt of people of whom the others may be relied on."""
         _, people = self._bones(bodies)
-        lost = {
-            f"{name}/{bone}" for name in people if not self.whole_doubt(name) for bone in self.bones_in_doubt(name)
-        }
+        told = (name for name in people if not self.whole_doubt(name))
+        lost = {f"{name}/{bone}" for name in told for bone in self.bones_in_doubt(name)}
         return tuple(i for i in bodies if self.model.bodies[i].name in lost) if lost else ()
 
     def _bones(self, bodies: tuple[int, ...]) -> tuple[tuple[str, ...], dict[str, frozenset[str]]]:

@@ -38,6 +38,8 @@ def test_parts_of_one_robot_clamp_only_what_once_had_room() -> None:
     assert not found[:3].any()
     assert found[4:, 0].all()
     assert not found[:, 1].any()
+    # As wide as the body part is enough.
+    assert one(np.array([0.5, 0.4]), opened=False)[:, 1].tolist() == [True, True]
 
 
 def test_the_rest_of_the_way_is_looked_at_before_it_is_gone() -> None:

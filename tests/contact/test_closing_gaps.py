@@ -39,7 +39,7 @@ def wandering(seed: int) -> tuple[np.ndarray, np.ndarray]:
     steps = np.cumsum(steps * 4e-5, axis=0)
     steps[100:140] = steps[100]
     positions = np.array([[0.5, 0, 0], [-0.5, 0, 0], [0, 0, 0], [0, 0, 0.2], [0.1, 0.1, 0.4], [0.2, 0, 0.2]])
-    positions = positions + 3 * steps[..., :3] * np.array([0.2, 0, 0, 1, 1, 1])[:, None]
+    positions = positions + 3 * steps[..., :3] * np.array([0.2, 0.15, 0, 1, 1, 1])[:, None]
     turns = 5 * steps[..., 3:] * np.array([0, 0, 0, 1, 1, 1])[:, None]
     angle = np.linalg.norm(turns, axis=-1)
     x, y, z = np.moveaxis(turns / np.maximum(angle, 1e-12)[..., None], -1, 0)
@@ -165,3 +165,55 @@ def test_without_gaps_nothing_is_clamped(shapes):
     gaps = ClosingGaps(shapes, pairs, THICKNESS, cap=CAP)
     R, x = np.tile(np.eye(3), (6, 1, 1)), np.zeros((6, 3))
     assert not gaps.clamped(0.0, R, x, np.zeros((2, 6, 3)), np.ones((1, 3), bool)).any()
+
+
+def in_turn(shapes, pairs, instants, wanted, v):
+    """Flags of the last of some instants (R, x), 10 ms apart."""
+    gaps = ClosingGaps(shapes, pairs, THICKNESS, cap=CAP)
+    return [gaps.clamped(0.01 * k, R, x, v, wanted) for k, (R, x) in enumerate(instants)][-1]
+
+
+@pytest.mark.parametrize(("farther", "clamps_it"), [(0.5e-9, True), (5e-9, False)])
+def test_a_gap_counts_up_to_rounding_where_it_may_close_by_the_next_instant(shapes, farther, clamps_it):
+    """0.41 m from the wall's face to the capsule's axis less its radius; it moved by 0.02 m."""
+    pairs = pinch_pairs(shapes, [ARM], [WALL], frozenset(), cap=CAP)
+    thin = np.array([[True, False, False]])
+    instants = []
+    for x in (0.32, 0.34):
+        place = np.zeros((6, 3))
+        place[WALL, 0], place[ARM, 0] = 0.5, x - farther
+        instants.append((np.tile(np.eye(3), (6, 1, 1)), place))
+    assert pairs.gaps(*instants[-1])[0] == pytest.approx(THICKNESS[0] + 0.02 + farther, abs=1e-12)
+    assert in_turn(shapes, pairs, instants, thin, np.zeros((2, 6, 3))).tolist() == [[clamps_it, False, False]]
+
+
+@pytest.mark.parametrize("was_far", [True, False])
+def test_own_parts_that_were_far_apart_a_moment_ago_had_room(shapes, was_far):
+    pairs = pinch_pairs(shapes, [ARM, HAND], [], frozenset(), cap=CAP)
+    far, near, v = np.zeros((6, 3)), np.zeros((6, 3)), np.zeros((2, 6, 3))
+    far[HAND, 0], near[HAND, 0], v[0, HAND, 0] = 2.0, 0.08, -1.0
+    R, all_ = np.tile(np.eye(3), (6, 1, 1)), np.ones((2, 3), bool)
+    found = in_turn(shapes, pairs, [(R, far if was_far else near), (R, near)], all_, v)
+    assert found.all() if was_far else not found.any()
+
+
+@pytest.mark.parametrize(("gap", "clamps_it"), [(0.08, False), (0.055, True)])
+def test_what_turns_about_itself_moves_little_wherever_its_frame_is(gap, clamps_it):
+    """A plate of 0.1 m, 1 m from the origin of its body, by 0.1 rad: at most 7.1 mm, its frame by 0.1 m."""
+    middle = np.array([1.0, 0.0, 0.0])
+    square = middle + 0.05 * np.array([[0, -1, -1], [0, 1, -1], [0, -1, 1]])
+    shapes = Shapes.build([BODIES[WALL], ("plate", [Solid(points=square, radius=0.01)])])
+    pairs = pinch_pairs(shapes, [1], [0], frozenset(), cap=CAP)
+    c, s = np.cos(0.1), np.sin(0.1)
+    turned = np.array([np.eye(3), [[c, -s, 0], [s, c, 0], [0, 0, 1]]])
+
+    def instants(x):
+        return [
+            (np.array([np.eye(3), R]), np.array([[0.5, 0, 0], np.array([x, 0, 0]) - R @ middle]))
+            for R in turned
+        ]
+
+    x = float(pairs.gaps(*instants(0.0)[-1])[0][0]) - gap
+    assert pairs.gaps(*instants(x)[-1])[0] == pytest.approx(gap)
+    found = in_turn(shapes, pairs, instants(x), np.ones((1, 3), bool), np.zeros((2, 2, 3)))
+    assert found.tolist() == [[clamps_it, True, True]]

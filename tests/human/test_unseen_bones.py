@@ -13,6 +13,7 @@ from seerob import run as road
 from seerob.engine import Engine
 from seerob.ergonomic_posture import bind_posture
 from seerob.errors import Undecided
+from seerob.hearing import Hearing
 from seerob.human.estimated import estimated
 from seerob.human.skeleton import BONES, PARENTS
 from seerob.run import Judge
@@ -60,7 +61,8 @@ def distance(to="operator", limit=0.3):
 
 
 def test_a_bone_is_told_by_neighbours_on_both_sides_only():
-    assert estimated(BONES) == estimated(()) == ()
+    assert estimated(BONES) == ()
+    assert estimated(()) == BONES
     for bone in BONES:
         ends = bone not in PARENTS.values() and "toes" not in bone
         lonely = estimated(set(BONES) - {bone})
@@ -82,6 +84,17 @@ def test_hips_and_shoulders_of_a_picture_tell_the_trunk():
     joints = {f"{s}_{b}" for s in ("left", "right") for b in ("thigh", "shank", "foot", "upper_arm", "hand")}
     assert estimated({*joints, "head"}) == ()
     assert "pelvis" in estimated({bone for bone in joints if "arm" not in bone and "hand" not in bone})
+
+
+@pytest.mark.parametrize(
+    "sets",
+    [[set()], [BONES, set()], [set(), BONES], [UPPER, set(BONES) - set(UPPER)]],
+    ids=["nothing", "nothing next", "nothing before", "nothing twice"],
+)
+def test_who_is_not_seen_at_two_instants_alike_is_not_seen_between_them(sets):
+    observed = [(0.1 * k, frozenset(seen)) for k, seen in enumerate(sets)]
+    assert Hearing(given=False, driven=True, observed=observed).unseen(0.05) == BONES
+    assert Hearing(given=False, driven=True).unseen(0.05) == ()
 
 
 @pytest.mark.parametrize("physics", [True, False])

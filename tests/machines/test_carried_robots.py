@@ -188,9 +188,9 @@ def test_fingers_open_evenly(model):
     _, shut = moving(model, MOTION | {"hand": (np.zeros(1), np.zeros(1))})
     _, state = moving(model, MOTION | {"hand": (np.array([0.03]), np.zeros(1))})
     left, right = (model.frames[f"hand/{side}"] for side in ("left", "right"))
-    at = state.pose(left)[1] - state.pose(right)[1]
-    assert np.linalg.norm(at) == pytest.approx(0.06, abs=1e-12)
-    np.testing.assert_allclose(shut.pose(left)[1], shut.pose(right)[1], atol=1e-12)
+    inner = model.gap(model.select("hand/left"), model.select("hand/right"))
+    assert state.closest(inner).distance == pytest.approx(0.06, abs=1e-9)
+    assert shut.closest(inner).distance == pytest.approx(0.0, abs=1e-9)
     middle = (state.pose(left)[1] + state.pose(right)[1]) / 2
     np.testing.assert_allclose(middle, state.pose(model.frames["hand/body"])[1], atol=1e-12)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import mujoco
 import numpy as np
 import pytest
 from test_methods_of_permission import maps
@@ -13,7 +14,9 @@ from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.errors import Undecided
 from seerob.permissible.ceiling import Ceiling, Method
 from seerob.permissible.methods import By, governing
-from seerob.permissible.witness import Posed
+from seerob.permissible.witness import Posed, Witness
+from seerob.state import Hearing, State
+from seerob.tracking_error import TrackingError
 
 PLC = '[[sources]]\nkind = "signals_csv"\nname = "plc"\nfile = "s.csv"\ntime = "t"\ntime_unit = "s"\n'
 GATE = '[[variables]]\nname = "gate/open"\nsource = "plc"\naddress = "x"\ntype = "bool"\n'
@@ -109,3 +112,21 @@ def test_where_somebody_is_is_as_sure_as_in_the_run(tmp_path):
     gap = model.gap(model.select("op"), model.robot("arm").moving)
     with pytest.raises(Undecided, match="op: not heard"):
         state.closest_per_body(gap)
+
+
+def test_a_hand_that_nobody_sees_aimed_is_as_far_off_in_the_map_as_in_the_run(tmp_path):
+    """What is not known of how a hand is turned comes off its distance, wherever that is asked."""
+    model = cell(tmp_path, KNOWN).model
+    state = State(
+        model, mujoco.MjData(model.mj), {n: Hearing(given=True, driven=False) for n in model.mechanisms}
+    )
+    state.hearings["op"].bones = {"right_hand": (0.01, None)}
+    state.hearings["op"].aims = [(0.0, {"right_hand": 0.5})]
+    witness = Witness(lambda _: ())
+    state.refresh(0.0)
+    witness(state)
+    posed = Posed(model, model.robot("arm"), witness)
+    posed.place(3.0, 0.0, np.zeros(2), np.zeros(2))
+    off = TrackingError(model, model.select("op/right_hand"))
+    assert off.at(state).max() > 0.02
+    np.testing.assert_array_equal(off.at(posed), off.at(state))

@@ -118,10 +118,10 @@ def test_the_map_is_drawn_in_the_colours_of_what_is_permitted():
         return Place((float(x), 0.0, 0.0), permitted, given)
 
     lines = path_markers([[at(0, 1, 0.5), at(1, 1, 0.5), at(2, 0.2, 0.5), at(3, math.nan, 0.5), at(4, 0, 0)]])
-    assert [line.verdict for line in lines] == [Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED]
-    assert [p[0] for p in lines[1].points] == [2.0, 3.0]
-    assert lines[1].label == "0.20 m/s permitted, 0.50 given"
-    assert [bool(line.label) for line in lines] == [False, True, True]
+    assert [line.verdict for line in lines] == [Verdict.EXCEEDED, Verdict.UNDECIDED, Verdict.WITHIN]
+    assert [p[0] for p in lines[0].points] == [2.0, 3.0]
+    assert lines[0].label == "0.20 m/s permitted, 0.50 given"
+    assert [bool(line.label) for line in lines] == [True, True, False]
 
 
 def test_on_the_way_back_the_way_back_counts():

@@ -110,6 +110,26 @@ def test_planar_arm_cannot_move_out_of_its_plane(tmp_path, limit, verdict):
     assert result.verdict == verdict
     values = {part.name: part.value for part in result.parts}
     assert (values["σ₁"], values["σ₂"]) == pytest.approx((1.618034, 0.618034), abs=1e-6)
+    assert result.reason == ""  # two joints move a point in no room: there is no way out of that
+
+
+@pytest.mark.parametrize(
+    ("turns", "elbow", "reason"),
+    [("0 1 0", 0.0, "near a singularity: j2 leads"), ("0 0 1", 1.0, "singular in every pose nearby")],
+)
+def test_of_three_joints_the_one_that_leads_out_of_a_singularity_is_named(tmp_path, turns, elbow, reason):
+    """A stretched arm on one that turns about z: its elbow bends it; where all turn about z, none does."""
+    urdf = two_r().replace('<axis xyz="0 0 1"/>', f'<axis xyz="{turns}"/>')
+    urdf = urdf.replace(
+        '<link name="base"/>',
+        '<link name="root"/><link name="base"/><joint name="yaw" type="continuous"><parent link="root"/>'
+        '<child link="base"/><axis xyz="0 0 1"/><limit effort="1" velocity="1"/></joint>',
+    )
+    text = FLOATING + TWO_R + '[[safety]]\nkind = "manipulability"\nname = "m"\nat = "arm"\nlimit = 0.1\n'
+    station = made(tmp_path, text, {"arm.urdf": urdf})
+    found = results_at(station, arm=((0.0, 0.0, elbow), (0.0, 0.0, 0.0)))["m"]
+    assert found.verdict == "exceeded"
+    assert found.reason.startswith(reason)
 
 
 def test_manipulability_falls_to_zero_at_the_stretched_arm(tmp_path):

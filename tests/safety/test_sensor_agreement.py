@@ -69,3 +69,25 @@ def test_what_nobody_tells_is_undecided_and_mistakes_are_named(tmp_path):
     ):
         with pytest.raises(InputError, match=message):
             story(tmp_path, (0.0, 1.0, True), station=STATION.replace(*change))
+
+
+def test_it_begins_anew_when_time_is_set_back_and_not_when_it_is_asked_twice(tmp_path):
+    found = story(tmp_path, *((t, 0.0, True) for t in (0.0, 0.1, 0.1, 0.05, 0.1)))
+    assert [r.value for r in found] == pytest.approx([0, 0.1, 0.1, 0, 0.05])
+    assert {(r.unit, r.limit, r.at_most) for r in found} == {("s", 0.15, True)}
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_touching_the_field_is_being_in_it_whatever_the_device_calls_free(tmp_path, free):
+    """A ball of 1/16 m and a field that begins at 1/32 m: figures without rounding."""
+    station = STATION.replace("sphere = 0.05", "sphere = 0.0625").replace("0.02, 1.0", "0.0625, 1.0")
+    station += f"free = {str(free).lower()}\n"
+    for x, verdict in ((3 / 32, "exceeded"), (3 / 32 + 1e-6, "within"), (0.9, "within")):
+        *_, last = story(tmp_path, (0.0, x, free), (0.2, x, free), station=station)
+        assert (last.verdict, last.reason == "") == (verdict, verdict == "within")
+
+
+def test_it_lasts_as_long_as_the_limit_and_no_longer(tmp_path):
+    for t, verdict in ((0.15, "within"), (0.151, "exceeded")):
+        *_, last = story(tmp_path, (0.0, 0.0, True), (t, 0.0, True))
+        assert last.verdict == verdict

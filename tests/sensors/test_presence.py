@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.sensors.sensing import Presence
+from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob.sensors.sensing import Presence, Seen, Sight
 
 MAT = '[[sensors]]\nname = "mat"\n{more}pressure_mat = {{ corners = [[0, 0], [1, 0], [1, 1], [0, 1]] }}\n'
 BOX = '[[parts]]\nname = "{name}"\nshape = {{ box = [0.1, 0.1, 0.1] }}\n'
@@ -94,3 +94,19 @@ def test_nearly_on_the_mat_is_open_and_the_response_time_is_asked_for(tmp_path, 
     assert named["walked before detection"].value == 0
     assert (until.value, until.verdict) == ((0.0, None) if more else (None, "undecided"))
     assert bool(until.reason) is not bool(more)
+
+
+def test_one_body_that_the_device_sees_switches_it_and_one_alone_that_it_misses_does_not(tmp_path):
+    text = FLOATING + MAT.format(more="response = 0.25\n") + BOX.format(name="one") + BOX.format(name="two")
+    station = made(tmp_path, text)
+    state, index = state_at(station), {body.name: body.index for body in station.model.bodies}
+    bodies = index["one"], index["two"]
+    missed, seen = (Sight(kind, "why") for kind in (Seen.MISSED, Seen.DETECTED))
+    for sights, reason, output in (
+        ({bodies[0]: missed, bodies[1]: seen}, "detected: two", True),
+        ({bodies[0]: missed, bodies[1]: missed}, "NOT detected: one, why", False),
+    ):
+        presence = Presence(station.model, station.model.workstation.sensors[0], index["mat"], bodies)
+        found = presence.result("m", state, sights)
+        assert (found.verdict, found.reason) == ("exceeded", reason)
+        assert ("walked until the output switched" in {part.name for part in found.parts}) is output

@@ -16,8 +16,8 @@ from seerob.sinks.excel import Excel
 N = 100
 
 
-def book(folder, **options):
-    with Excel(**options).open(run.scene(), {}, {}, folder) as writer:
+def book(folder, *, every=0.0, **options):
+    with Excel(every=every, **options).open(run.scene(), {}, {}, folder) as writer:
         for k in range(N):
             writer.write(run.snapshot(k), run.samples(k))
     return openpyxl.load_workbook(folder / "results.xlsx")
@@ -109,6 +109,21 @@ def test_sheets_of_motion_can_be_left_out_and_are_thinned_evenly(tmp_path):
     assert [r["t [s]"] for r in found] == pytest.approx(0.01 * np.arange(0, N, 4))
     with pytest.raises(InputError, match="motion_rows"):
         Excel(motion_rows=1).open(run.scene(), {}, {}, tmp_path)
+
+
+@pytest.mark.parametrize("every", [0.04, 0.025])
+def test_motion_of_people_has_a_stated_rate_and_nothing_else_is_thinned(tmp_path, every):
+    made = book(tmp_path, every=every)
+    step = round(every / run.PERIOD + 0.499)
+    for name in ("joints op", "bones op"):
+        assert [r["t [s]"] for r in rows(made[name])] == pytest.approx(0.01 * np.arange(0, N, step))
+    assert [r["t [s]"] for r in rows(made["joints arm"])] == pytest.approx(0.01 * np.arange(N))
+    assert len(rows(made["distance"])) == N
+    assert len(rows(made["heard camera op"])) == N // 5
+    notes = {row[0]: row[1] for row in made["Summary"].iter_rows(values_only=True)}
+    assert f"every {every} s" in notes["motion of people"]
+    with pytest.raises(InputError, match="every"):
+        Excel(every=float("nan")).open(run.scene(), {}, {}, tmp_path)
 
 
 @pytest.mark.parametrize("most", [2, 3, 7, 64])

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Self
 
@@ -73,26 +74,30 @@ class Elsewhere:
 # -- in the other process -----------------------------------------------------------------------
 
 
-def opcua(port: int) -> None:
+Start = Callable[[], object]
+"""Called in the fork: returns when the server can be reached."""
+
+
+def opcua(port: int) -> Start:
     from seerob.emulators.opcua import Emulated, OpcuaServer
 
-    OpcuaServer({"Belt/position": Emulated(lambda t: t, "mm")}, port=port).start()
+    return OpcuaServer({"Belt/position": Emulated(lambda t: t, "mm")}, port=port).prepare().start
 
 
-def opcua_robot(port: int) -> None:
+def opcua_robot(port: int) -> Start:
     from seerob.emulators.motions import swing
     from seerob.emulators.opcua import OpcuaServer
 
-    OpcuaServer(robots={"arm": swing((0.0,) * 6)}, port=port).start()
+    return OpcuaServer(robots={"arm": swing((0.0,) * 6)}, port=port).prepare().start
 
 
-def opcua_standing(port: int) -> None:
+def opcua_standing(port: int) -> Start:
     from seerob.emulators.opcua import OpcuaServer
 
-    OpcuaServer(robots={"arm": lambda t: ((0.1,) * 6, (0.0,) * 6)}, port=port).start()
+    return OpcuaServer(robots={"arm": lambda t: ((0.1,) * 6, (0.0,) * 6)}, port=port).prepare().start
 
 
-def mqtt(port: int) -> None:
+def mqtt(port: int) -> Start:
     """Another maker's broker, and a machine that publishes."""
     import asyncio
     import logging
@@ -105,9 +110,8 @@ def mqtt(port: int) -> None:
         "listeners": {"default": {"type": "tcp", "bind": f"{HERE}:{port}"}},
         "plugins": {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}},
     }
-    up = threading.Event()
 
-    async def serve() -> None:
+    async def serve(up: threading.Event) -> None:
         await Broker(config).start()
         up.set()
         await asyncio.Event().wait()
@@ -120,28 +124,23 @@ def mqtt(port: int) -> None:
             machine.publish("belt", b"250")
             time.sleep(0.02)
 
-    threading.Thread(target=lambda: asyncio.run(serve()), daemon=True).start()
-    assert up.wait(20)
-    threading.Thread(target=publish, daemon=True).start()
+    def start() -> None:
+        up = threading.Event()
+        threading.Thread(target=lambda: asyncio.run(serve(up)), daemon=True).start()
+        assert up.wait(60)
+        threading.Thread(target=publish, daemon=True).start()
+
+    return start
 
 
-def foxglove(port: int) -> None:
+def foxglove(port: int) -> Start:
     """Foxglove's own, out of its SDK."""
     import foxglove as sdk
     from foxglove.channels import JointStatesChannel
     from foxglove.messages import JointState, JointStates, Timestamp
 
-    begun = time.monotonic()
-    while True:
-        try:
-            sdk.start_server(host=HERE, port=port)
-            break
-        except RuntimeError:  # the system still has connections of the one before
-            assert time.monotonic() - begun < 90
-            time.sleep(0.02)
-    channel = JointStatesChannel("/joint_states")
-
     def publish() -> None:
+        channel = JointStatesChannel("/joint_states")
         while True:
             t = time.monotonic()
             joints = [JointState(name=name, position=0.1, velocity=0.0) for name in "ab"]
@@ -149,26 +148,31 @@ def foxglove(port: int) -> None:
             channel.log(JointStates(timestamp=stamp, joints=joints))
             time.sleep(0.01)
 
-    threading.Thread(target=publish, daemon=True).start()
+    def start() -> None:
+        begun = time.monotonic()
+        while True:
+            try:
+                sdk.start_server(host=HERE, port=port)
+                break
+            except RuntimeError:  # the system still has connections of the one before
+                assert time.monotonic() - begun < 90
+                time.sleep(0.02)
+        threading.Thread(target=publish, daemon=True).start()
+
+    return start
 
 
 SERVERS = {make.__name__: make for make in (opcua, opcua_robot, opcua_standing, mqtt, foxglove)}
-WARM = {
-    "opcua": ("asyncua.server.server", "seerob.emulators.opcua"),
-    "opcua_robot": ("asyncua.server.server", "seerob.emulators.opcua"),
-    "opcua_standing": ("asyncua.server.server", "seerob.emulators.opcua"),
-    "mqtt": ("amqtt.broker", "paho.mqtt.client"),
-    "foxglove": ("foxglove", "foxglove.messages", "foxglove.channels"),
-}
+"""Each imports and builds what its server needs, once, and returns what starts it in a fork."""
 
 
-def forked(kind: str, port: int) -> int:
+def forked(start: Start, kind: str) -> int:
     """A process in which the server runs; returns its number once it can be reached."""
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
         os.close(reading)
-        SERVERS[kind](port)
+        start()
         os.write(writing, b"1")
         os.close(writing)
         signal.pause()
@@ -182,16 +186,12 @@ def forked(kind: str, port: int) -> int:
 
 def main(kind: str, port: int) -> None:
     """Do as told, until there is no one to tell."""
-    from importlib import import_module
-
-    for name in WARM[kind]:
-        import_module(name)
-    child = 0
+    start, child = SERVERS[kind](port), 0
     try:
         for line in sys.stdin:
             match line.strip():
                 case "start":
-                    child = forked(kind, port)
+                    child = forked(start, kind)
                 case "kill":
                     os.kill(child, signal.SIGKILL)
                     os.waitpid(child, 0)

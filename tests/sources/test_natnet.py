@@ -20,6 +20,8 @@ from sources.listening import by_name, free_port, heard
 
 VERSIONS = [(2, 0), (2, 1), (2, 3), (2, 6), (2, 7), (2, 9), (2, 11), (3, 0), (3, 1), (4, 0), (4, 1), (4, 2)]
 PERSON = animated("library:reach")
+PLACED = {name for name, _, _ in BONES} - {"LShoulder", "RShoulder"}
+"""Where a collar bone begins is known after a calibration only (``fitted`` in the convention)."""
 
 
 def server(version=(4, 1), **more):
@@ -76,9 +78,9 @@ def test_the_skeleton_stands_where_it_was_sent_from(version):
     points = by_name(samples[-1])
     sent = made.frame(round(samples[-1].t_device * made.rate)).skeletons[0]
     for (name, _, _), bone in zip(BONES, sent.bones, strict=True):
-        if name in points:
+        if name in PLACED:
             np.testing.assert_allclose(points[name].position, world_from_file("y") @ bone.position, atol=1e-6)
-    assert len(points) == len(BONES)
+    assert set(points) == PLACED
     assert 0.7 < points["Hip"].position[2] < 1.1
     assert samples[-1].quality is Quality.GOOD
     text = " ".join(f.text for f in findings)
@@ -99,7 +101,7 @@ def test_a_multicast_group_is_heard():
     with server(rate=60, group=group) as made:
         listened = Natnet(human="anna", port=made.port, data_port=group[1], timeout=1.0)
         samples = heard(listened, lambda s: len(s) >= 2)
-    assert len(samples[-1].points) == len(BONES)
+    assert len(samples[-1].points) == len(PLACED)
 
 
 def test_nobody_answers():

@@ -121,8 +121,8 @@ def test_no_factor_helps_a_part_that_is_too_near_at_rest():
 def test_search_ends_where_it_holds():
     assert largest_scale(lambda s: s <= 0.7, 2.0, 40) == pytest.approx(0.7)
     assert largest_scale(lambda s: s <= 0.7, 2.0, 3) <= 0.7
-    assert largest_scale(lambda s: s <= 7, 2.0) == 2.0
-    assert largest_scale(lambda s: False, 2.0) == 0.0
+    assert largest_scale(lambda s: s <= 7, 2.0, 1) == 2.0
+    assert largest_scale(lambda s: False, 2.0, 1) == 0.0
 
 
 def test_worst_case_is_the_largest_of_each_part():

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seerob.errors import Undecided, UnknownName
-from seerob.stopping.table import JointStop, StoppingTable, interpolate, joint_stop, shipped, table
+from seerob.stopping.table import MOST, JointStop, StoppingTable, interpolate, joint_stop, shipped, table
 
 THIRDS = (0.33, 0.66, 1.0)
 rng = np.random.default_rng(0)
@@ -104,6 +104,8 @@ def test_a_joint_that_stands_needs_nothing():
 
 
 ENTRY = {"joint": 0, "way": [[[0.3]]], "time": [[[0.2]]]}
+TWO = {"joint": 0, "speed": [0.5, 1.0], "way": [[[0.3]], [[0.4]]], "time": [[[0.2]], [[0.3]]]}
+LONG = {"joint": 0, "extension": [0.5, 1.0], "way": [[[0.3, 0.4]]], "time": [[[0.2, 0.3]]]}
 HEAD = {"robot": "r", "category": 0, "source": "s", "confidence": "1S"}
 
 
@@ -113,7 +115,12 @@ HEAD = {"robot": "r", "category": 0, "source": "s", "confidence": "1S"}
         ({**HEAD}, "either joints or tool"),
         ({**HEAD, "joints": [ENTRY, ENTRY]}, "twice"),
         ({**HEAD, "joints": [{**ENTRY, "speed": [1.0, 0.5]}]}, "ascend"),
+        ({**HEAD, "joints": [{**ENTRY, "speed": [0.5, float("inf")]}]}, "ascend"),
+        ({**HEAD, "joints": [{**ENTRY, "speed": [0.5, 0.5]}]}, "ascend"),
+        ({**HEAD, "joints": [{**ENTRY, "speed": [0.3, 0.9, 0.6]}]}, "ascend"),
         ({**HEAD, "joints": [{**ENTRY, "speed": [0.5, 1.0]}]}, "nodes are needed"),
+        ({**HEAD, "joints": [{**TWO, "time": [[[0.1]], [[float("inf")]]]}]}, "finite"),
+        ({**HEAD, "joints": [{**TWO, "way": [[[0.1]], [[0.1, 0.2]]]}]}, "nodes are needed"),
         ({**HEAD, "joints": [{**ENTRY, "way": [[[-0.3]]]}]}, ">= 0"),
         ({**HEAD, "joints": [{**ENTRY, "way": [[[float("nan")]]]}]}, "finite|>= 0"),
         ({**HEAD, "joints": [{**ENTRY, "time": [[[float("inf")]]]}]}, "finite"),
@@ -127,3 +134,27 @@ HEAD = {"robot": "r", "category": 0, "source": "s", "confidence": "1S"}
 def test_what_a_table_may_not_be(data, match):
     with pytest.raises(msgspec.ValidationError, match=match):
         msgspec.convert(data, StoppingTable)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {"joints": [ENTRY]},
+        {"joints": [ENTRY, {**TWO, "joint": 1}]},
+        {"joints": [LONG], "reach": 1.3},
+        {"tool": {"speed": [1.0, 2.0], "time": [0.1, 0.2]}},
+    ],
+)
+def test_what_a_table_may_be(data):
+    assert msgspec.convert({**HEAD, **data}, StoppingTable).robot == "r"
+
+
+def test_a_table_has_up_to_a_hundred_nodes_along_an_axis():
+    for nodes in (MOST, MOST + 1):
+        speed = [k / nodes for k in range(1, nodes + 1)]
+        data = {**HEAD, "tool": {"speed": speed, "time": speed}}
+        if nodes == MOST == 100:
+            assert msgspec.convert(data, StoppingTable).tool is not None
+        else:
+            with pytest.raises(msgspec.ValidationError, match="length <= 100"):
+                msgspec.convert(data, StoppingTable)

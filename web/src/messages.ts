@@ -25,6 +25,7 @@ export interface Frame {
   tracking: { [name: string]: number };
   results: Result[];
   looks: Snapshot["looks"];
+  doubts: Snapshot["doubts"];
 }
 
 export type FromWorker =

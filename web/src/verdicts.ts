@@ -46,6 +46,8 @@ export const VERDICT_TEXT: Record<Verdict, string> = {
 
 /** Colour of a marker that has no verdict. */
 export const NEUTRAL_COLOR = 0xaab6c6;
+/** Colour of a body that may be elsewhere. */
+export const DOUBT_COLOR = 0x8a94a3;
 export const NEUTRAL_TEXT = "#dbe3ee";
 
 /** Distance to the limit on the admissible side, as a share of the limit; null when it cannot be had. */

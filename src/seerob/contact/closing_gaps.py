@@ -85,11 +85,8 @@ class ClosingGaps:
         for query, _ in pairs.queries[1:] if end else pairs.queries:
             across[end : end + len(query.a)] = query.a
             end += len(query.a)
-        self._seen = np.ascontiguousarray(
-            np.concatenate(
-                [np.column_stack([across, first]), [[-1, i] for i in others] or np.empty((0, 2))]
-            ).astype(np.int64)
-        )
+        in_world = np.array([[-1, i] for i in others], np.int64).reshape(-1, 2)
+        self._seen = np.ascontiguousarray(np.concatenate([np.column_stack([across, first]), in_world]))
         self._own = np.ascontiguousarray(np.column_stack([across, first])[~pairs.opened])
         self._last: _Instant | None = None
 
@@ -160,7 +157,7 @@ class ClosingGaps:
         if asked.any():
             self._measure(now, np.where(asked, self._cap, -np.inf))
             # Of a body inside another the surfaces are as near as it is deep.
-            now.upper = np.where(asked, np.where(now.gaps < self._cap, np.abs(now.gaps), np.inf), now.upper)
+            now.upper = np.where(asked, np.abs(now.gaps), now.upper)
             now.had_room = now.had_room | (asked[:, None] & (now.gaps[:, None] >= self._thickness))
             now.lacking = self._lacking(now.had_room)
         return now
@@ -183,7 +180,7 @@ class ClosingGaps:
         """Measure gaps up to caps; those beyond stay unknown, unless it is the cap."""
         assert self._survey is not None
         found = self._survey.within(instant.rotations, instant.positions, caps)
-        known = (caps > -np.inf) & ((found.reach != Reach.BEYOND_CAP) | (caps >= self._cap))
+        known = (found.reach != Reach.BEYOND_CAP) | (caps >= self._cap)
         instant.gaps = np.where(known, found.distance, instant.gaps)
 
 

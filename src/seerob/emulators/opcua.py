@@ -13,7 +13,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from seerob.emulators.background import LoopEmulator
 from seerob.emulators.motions import Motion
@@ -74,6 +74,7 @@ class OpcuaServer(LoopEmulator):
         self.bad: set[str] = set()
         """Paths of variables that are called bad; may be changed while it runs."""
         self._made = time.monotonic()
+        self._built: tuple[Any, _Cell] | None = None
 
     @property
     def url(self) -> str:
@@ -90,18 +91,28 @@ class OpcuaServer(LoopEmulator):
         """Time since it was made [s]."""
         return time.monotonic() - self._made
 
-    async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
-        """Listen, and play."""
+    def prepare(self) -> Self:
+        """Build now what it shows, which takes a second: the next start, or one in each fork, saves it."""
+        self._built = asyncio.run(self._build())
+        return self
+
+    async def _build(self) -> tuple[Any, _Cell]:
         from asyncua.server.server import Server
 
         for name in (*SILENT, "asyncua.server"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
         server = Server()
         await server.init()
-        server.set_endpoint(self.url)
         await self._protect(server)
         cell = _Cell(server, self)
         await cell.build()
+        return server, cell
+
+    async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
+        """Listen, and play."""
+        server, cell = self._built or await self._build()
+        self._built = None
+        server.set_endpoint(self.url)
         async with server:
             ready()
             while not over.is_set():

@@ -23,10 +23,10 @@ def estimated(seen: Collection[str]) -> tuple[str, ...]:
     foot that is known; pelvis and thorax by both hips and both shoulders together. Which is a choice.
 
     Args:
-        seen: Bones that a device sees now; empty when no device sees the person at all, as when joints or
-            keyframes move it: then nothing is estimated.
+        seen: Bones that a device sees now. Whom joints or keyframes move nobody sees, and nothing of it is
+            estimated: that is not asked here.
     """
-    return _estimated(frozenset(seen)) if seen else ()
+    return _estimated(frozenset(seen))
 
 
 @lru_cache(maxsize=256)

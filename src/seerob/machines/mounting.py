@@ -10,6 +10,7 @@ import numpy as np
 
 from seerob.machines.tables import Belt, Fingers, Motion, Route, Slide, Turn
 from seerob.model_io.description import Description, Joint, JointKind, Link, Mimic
+from seerob.mounting.specification import extreme_points
 from seerob.mounting.things import Color, LoadedThing, load_thing
 from seerob.transforms import Array
 from seerob.workstation import Machine
@@ -41,19 +42,29 @@ def loaded(machine: Machine, folder: Path, *, file: str) -> tuple[Description, L
         visual=tuple(mesh for piece in thing.pieces for mesh in piece.visual),
         solids=tuple(solid for piece in thing.pieces for solid in piece.solids),
     )
-    links = fingers(body) if isinstance(machine.motion, Fingers) else (body,)
+    links = fingers(body, centred=_is_centred(machine)) if isinstance(machine.motion, Fingers) else (body,)
     return Description(machine.name, links, BODY, "workstation file", thing.findings), thing
 
 
-def fingers(finger: Link) -> tuple[Link, ...]:
+def _is_centred(machine: Machine) -> bool:
+    """Whether its shape lies about its origin, where a file cannot say otherwise."""
+    return machine.shape is not None and machine.shape.polygon is None
+
+
+def fingers(finger: Link, *, centred: bool) -> tuple[Link, ...]:
     """What holds them, a finger, and the same on the other side.
 
     Args:
         finger: As the file gives it, on the side to which its joint moves it.
+        centred: It lies about its origin instead, and is to be put on that side.
     """
     turned = np.diag([-1.0, -1.0, 1.0, 1.0])
     (joint,) = finger.joints
-    places = zip(FINGERS, (np.eye(4), turned), (None, Mimic(FINGERS[0])), strict=True)
+    aside = np.eye(4)
+    if centred:
+        points, radius = extreme_points(finger.solids)
+        aside[:3, 3] = (radius - float((points @ joint.axis).min())) * joint.axis
+    places = zip(FINGERS, (aside, turned @ aside), (None, Mimic(FINGERS[0])), strict=True)
     return (
         Link(BODY, None, np.eye(4)),
         *(

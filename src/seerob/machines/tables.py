@@ -192,7 +192,8 @@ class Fingers(Table, frozen=True, kw_only=True):
     """Two fingers that open and close evenly: a parallel gripper.
 
     The table's shape and mass are those of one finger, as it stands with the gripper shut: on the side of
-    ``along``, its inner face in the middle. The other is the same, turned by half a turn about z.
+    ``along``, its inner face in the middle (a box, cylinder, capsule or sphere is put there). The other is
+    the same, turned by half a turn about z.
     """
 
     along: Direction = ACROSS

@@ -13,6 +13,7 @@ from seerob.errors import InputError, suggestion
 from seerob.geometry import Mesh
 from seerob.model_io.mesh_formats import collada, gltf, obj, off, ply, stl, threemf
 from seerob.model_io.mesh_formats.source import MeshSource, RawFile, RawMesh
+from seerob.model_io.mesh_sides import sided
 from seerob.model_io.tidy import tidied
 from seerob.snapshot import Finding
 from seerob.transforms import Array
@@ -223,6 +224,9 @@ def _finished(source: MeshSource, raws: list[RawMesh], matrix: Array) -> tuple[N
         if said:
             source.note(f"{name}: {said}")
         if len(mesh.faces):
+            mesh, turned = sided(mesh)
+            if turned:
+                source.note(f"{name}: {turned}")
             meshes.append(NamedMesh(name, mesh))
         else:
             source.note(f"{name}: nothing but triangles without area; left out", level="warning")

@@ -42,10 +42,10 @@ def mended(mesh: Mesh) -> Mended:
             steps.append(f"{len(mesh.vertices) - len(welded.vertices)} near vertices welded")
             mesh = welded
     if not is_closed(mesh):
-        oriented, turned = _oriented(mesh)
+        agreed, turned = oriented(mesh)
         if turned:
             steps.append(f"{turned} triangles turned over")
-            mesh = oriented
+            mesh = agreed
     if is_closed(mesh):
         return Mended(mesh, tuple(steps), 0.0, 0.0)
     loops = _open_loops(mesh)
@@ -87,7 +87,7 @@ def _welded(mesh: Mesh) -> Mesh:
     return tidied(Mesh(mesh.vertices, target[mesh.faces].astype(np.int32), mesh.color))[0]
 
 
-def _oriented(mesh: Mesh) -> tuple[Mesh, int]:
+def oriented(mesh: Mesh) -> tuple[Mesh, int]:
     """Neighbours turned to agree, spreading from the first triangle of each body."""
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
     key = edges[:, 0] * len(mesh.vertices) + edges[:, 1]

@@ -14,6 +14,7 @@ from seerob.model_io import detail, lint, mass_properties, shapes
 from seerob.model_io.description import Inertial, Link
 from seerob.model_io.mesh import load_meshes
 from seerob.model_io.mesh_bodies import is_closed, joined
+from seerob.model_io.mesh_sides import sided
 from seerob.model_io.moments import signed_volume
 from seerob.snapshot import Finding, Origin
 from seerob.transforms import Array
@@ -96,6 +97,10 @@ def load_thing(
         source = f"shape of {thing.mesh}"
         whole = [mesh for _, mesh in meshes]
         findings += _holes(thing, whole, path)
+        if not all(map(is_closed, whole)) and is_closed(around := sided(joined(whole)[0])[0]):
+            # Split by colour or by name, none of the pieces has an inside; all of them together do.
+            inside = Solid(mesh=detail.physics_mesh(around))
+            pieces = (replace(pieces[0], solids=(*pieces[0].solids, inside)), *pieces[1:])
     else:
         assert thing.shape is not None
         piece, whole = _simple(thing.shape, color)
@@ -216,7 +221,7 @@ def _holes(thing: Thing, meshes: Sequence[Mesh], path: Path) -> tuple[Finding, .
     Raises:
         InputError: An area, of which only the inside matters.
     """
-    if all(map(is_closed, meshes)) or is_closed(joined(meshes)[0]):
+    if all(map(is_closed, meshes)) or is_closed(sided(joined(meshes)[0])[0]):
         return ()
     if isinstance(thing, Area):
         raise InputError.at(

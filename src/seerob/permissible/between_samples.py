@@ -132,7 +132,8 @@ class BetweenSamples:
         """Raise `Undecided` unless it is known how everybody moves on whom the place of a body depends."""
         followed = {m.name for m in self._model.workstation.machines if m.motion.variables()}
         ids: set[int] = set()
-        for at in (self._model.bodies[i].mj for i in bodies):
+        for i in bodies:
+            at = self._model.bodies[i].mj
             while at > 0 and at not in ids:
                 ids.add(at)
                 at = int(self._model.mj.body_parentid[at])

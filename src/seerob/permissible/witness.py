@@ -121,8 +121,8 @@ class Posed(State):
         self.asked.clear()
         self.refresh(t)
 
-    def _doubt(self, name: str) -> str:
-        """See `State.doubt`; of the others what the run knew of them then, of any bone."""
+    def whole_doubt(self, name: str) -> str:
+        """See `State.whole_doubt`; of the others what the run knew of them then, of any bone."""
         return self.doubts.get(name, "")
 
     def signal(self, name: str) -> Value:

@@ -12,17 +12,12 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from seerob import figures, provenance
-from seerob.contact import collision
+from seerob.contact import collision, impact_mass
 from seerob.contact import limits as contact_limits
 from seerob.contact import shape as contact_shape
 from seerob.contact.areas import NOT_MODELLED, area_results, margin
 from seerob.contact.clamped_regions import Clamping, floor_input
-from seerob.contact.impact_mass import (
-    masses_along_motion,
-    moving_masses,
-    simplified_mass,
-    while_carriers_rest,
-)
+from seerob.contact.impact_mass import masses_along_motion, moving_masses, simplified_mass
 from seerob.contact.limits import Judged
 from seerob.contact.regions import REGIONS, Person, without_limit
 from seerob.contact.rows import ContactRows
@@ -103,7 +98,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         contacts = Contacts(self, model)
         bones = () if contacts.people is None else contacts.people.bodies
         judge = seen_first(bones, contacts.evaluate, contacts.without)
-        return while_carriers_rest(model, contacts.robot, judge)
+        return impact_mass.while_carriers_rest(model, contacts.robot, judge)
 
     def table(self, model: Model) -> body_limits.BodyLimits:
         """The limits that apply."""

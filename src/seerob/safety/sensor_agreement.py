@@ -52,11 +52,11 @@ class SensorAgreement(Criterion, frozen=True, kw_only=True):
             raise InputError.at(self.name, "of", "nothing in it has a shape", "name who may enter the field")
         gap = model.gap((self._field(model),), bodies)
         since: float | None = None
-        last = -1.0
+        last: float | None = None
 
         def evaluate(state: State) -> Result:
             nonlocal since, last
-            if state.t < last:
+            if last is not None and state.t < last:
                 since = None
             last = state.t
             told = bool(state.signal(self.variable)) == self.free

@@ -1,4 +1,4 @@
-"""A workbook file that is being written by XlsxWriter: a row in memory at a time, the same bytes each time."""
+"""A workbook file written by XlsxWriter: a row in memory at a time, and the same bytes for the same cells."""
 
 from __future__ import annotations
 

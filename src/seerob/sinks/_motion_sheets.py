@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from seerob.samples import BodySample, Sample
 from seerob.sinks import _sample_cells
+from seerob.sinks._pace import Pace
 from seerob.sinks._people import people
 from seerob.sinks._thinning import ThinnedTable
 from seerob.snapshot import Scene, Snapshot
@@ -19,29 +20,35 @@ class MotionSheets:
 
     Args:
         scene: Of the run.
-        joint_rows: Rows of joints at most.
+        joint_rows: Rows of a robot's joints at most.
         rows: Rows of each other sheet at most; 0 for none of these sheets.
+        every: Least time between two rows of a person's joints, bones and errors [s].
         everybody: Bones also of people whom no device sees.
     """
 
-    def __init__(self, scene: Scene, *, joint_rows: int, rows: int, everybody: bool) -> None:
-        self._joint_rows, self._most = joint_rows, rows
+    def __init__(self, scene: Scene, *, joint_rows: int, rows: int, every: float, everybody: bool) -> None:
+        self._joint_rows, self._most, self._pace = joint_rows, rows, Pace(every, scene.period)
         self._joints = _sample_cells.joint_titles(scene)
-        self._people = people(scene) if rows else ()
-        self._measured = {person.name: person for person in self._people}
-        self._wanted = {person.name for person in self._people} if everybody else set()
+        self.people = people(scene)
+        """Of the scene."""
+        self._measured = {person.name: person for person in self.people}
+        self._wanted = {person.name for person in self.people} if everybody else set()
         self._tables: dict[str, ThinnedTable] = {}
 
     def take(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Take one tick."""
         t = snapshot.t
+        due = self._most > 0 and self._pace.due(t)
         for name, q in snapshot.joints.items():
+            if name in self._measured and not due:
+                continue
             key = f"joints {name}"
             table = self._tables.get(key)
             if table is None:
+                most = self._most if name in self._measured else self._joint_rows
                 titles = _sample_cells.joint_head(self._joints, name, len(q))
                 titles += self._measured[name].joint_measured_titles if name in self._measured else ()
-                table = self._begin(key, self._joint_rows, titles)
+                table = self._begin(key, most, titles)
             if table.wants():
                 person = self._measured.get(name)
                 measured = [] if person is None else person.joints_measured(snapshot)
@@ -50,7 +57,7 @@ class MotionSheets:
             return
         for sample in samples:
             self._heard(sample)
-        for person in self._people:
+        for person in self.people if due else ():
             if person.name in self._wanted:
                 key = f"bones {person.name}"
                 titles = [*person.bone_titles, *person.measured_titles]

@@ -17,6 +17,7 @@ from seerob.sink import Sink
 from seerob.sinks import _sample_cells
 from seerob.sinks._bone_errors import HEAD, bone_rows
 from seerob.sinks._growing_table import GrowingTable
+from seerob.sinks._pace import Pace
 from seerob.sinks._people import people
 from seerob.sinks._result_cells import result_cells
 from seerob.sinks._whole_folder import NAME, WholeFolder, checked
@@ -25,8 +26,6 @@ from seerob.snapshot import Scene, Snapshot
 Value = str | float | bool | None
 _LINE_ENDS = str.maketrans("\r\n\x00", "   ")
 _FORMULA = ("=", "+", "-", "@", "\t")
-SLACK = 1e-6
-"""Of a period: instants are not exact multiples of it."""
 
 
 class Separator(StrEnum):
@@ -87,9 +86,8 @@ class CsvWriter(WholeFolder):
     def __init__(self, scene: Scene, path: Path, options: CsvFiles) -> None:
         """Use `CsvFiles.open`."""
         super().__init__(path)
-        self._scene, self._every = scene, options.every
+        self._scene, self._pace = scene, Pace(options.every, scene.period)
         self._separator, self._decimal = _MARKS[options.separator], _MARKS[options.decimal]
-        self._due = -math.inf
         self._people = people(scene)
         self._measured = {person.name: person for person in self._people}
         self._joints = _sample_cells.joint_titles(scene)
@@ -103,9 +101,8 @@ class CsvWriter(WholeFolder):
             self._table(f"samples {_sample_cells.title(sample)}").add(heard)
         for name, bones in snapshot.bones.items():
             self._errors.setdefault(name, BoneErrors()).add(bones, snapshot.t)
-        if snapshot.t < self._due - SLACK * self._scene.period:
+        if not self._pace.due(snapshot.t):
             return
-        self._due = snapshot.t + self._every
         time = self._text(snapshot.t)
         for name, q in snapshot.joints.items():
             table = self.tables.get(f"joints {name}")

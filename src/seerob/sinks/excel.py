@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,18 +30,25 @@ _VERDICT_OF = {code: verdict for verdict, code in CODES.items()}
 
 
 class Excel(Sink, frozen=True, kw_only=True):
-    """Write results, joints and findings to an Excel workbook at the end of the run."""
+    """Write results, joints and findings to an Excel workbook at the end of the run.
+
+    Numbers have 16 significant digits, of which Excel shows 15; the sink ``csv`` writes all of them.
+    """
 
     file: Annotated[str, Meta(pattern=r"^[^/\\]+\.xlsx$", description="a file name that ends in .xlsx")] = (
         "results.xlsx"
     )
     """Name in the run's folder; an earlier workbook of that name is replaced."""
     rows: Annotated[int, Meta(ge=7)] = 100_000
-    """Most ticks written per criterion and of joints; beyond it they are thinned without losing an extremum
-    or an exceedance of a criterion, and the summary says so."""
+    """Most ticks written per criterion and of a robot's joints; beyond it they are thinned, of a criterion
+    without losing an extremum or an exceedance, and the summary says so."""
+    every: Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})] = 0.04
+    """Least time between two rows of a person's joints and bones, and of tracking errors [s]; 0 for every
+    tick. Criteria, joints of robots and samples are not thinned by it."""
     motion_rows: Annotated[int, Meta(ge=0)] = 3_000
-    """Most rows of each sheet of bones, tracking errors, samples, and of posture against safety; beyond it
-    they are thinned evenly. 0 leaves these sheets out. The sink ``csv`` writes all of them."""
+    """Most rows of each sheet of a person's joints and bones, of tracking errors, samples, and of posture
+    against safety; beyond it they are thinned evenly, and the summary says so. 0 leaves these sheets out.
+    The sink ``csv`` writes all of them."""
     bones: Literal["captured", "all"] = "captured"
     """Whose bones have a sheet: of people whom devices see, or of all."""
 
@@ -61,25 +69,27 @@ class Excel(Sink, frozen=True, kw_only=True):
         if self.motion_rows == 1 or self.motion_rows < 0:
             what = f"{self.motion_rows} rows hold no motion"
             raise InputError.at(folder, "excel.motion_rows", what, "2 or more, or 0 for no sheets of motion")
+        if not (math.isfinite(self.every) and self.every >= 0):
+            raise InputError.at(folder, "excel.every", f"{self.every} s", "0 or more seconds")
         motion = MotionSheets(
             scene,
             joint_rows=self.rows,
             rows=self.motion_rows,
+            every=self.every,
             everybody=self.bones == "all",
         )
-        return ExcelWriter(scene, folder / self.file, motion, rows=self.rows, motion_rows=self.motion_rows)
+        return ExcelWriter(scene, folder / self.file, motion, self)
 
 
 class ExcelWriter(AtEndWithResults):
     """Collects results and motion."""
 
-    def __init__(
-        self, scene: Scene, path: Path, motion: MotionSheets, *, rows: int, motion_rows: int
-    ) -> None:
+    def __init__(self, scene: Scene, path: Path, motion: MotionSheets, options: Excel) -> None:
         """Use `Excel.open`."""
         super().__init__(scene.criteria)
         self.path = path
-        self._scene, self._motion, self._rows, self._motion_rows = scene, motion, rows, motion_rows
+        self._scene, self._motion = scene, motion
+        self._rows, self._motion_rows, self._every = options.rows, options.motion_rows, options.every
         self._bases: dict[str, Basis] = {i.name: i.basis for i in scene.criteria if i.basis is not None}
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
@@ -167,6 +177,9 @@ class ExcelWriter(AtEndWithResults):
             if len(series) > self._rows:
                 text = f"thinned from {len(series)} ticks to at most {self._rows}"
                 yield [series.name, f"{text}; extrema and exceedances are kept"]
+        if self._every > self._scene.period and self._motion_rows and self._motion.people:
+            text = "joints, bones and errors have a row"
+            yield ["motion of people", f"{text} every {self._every:g} s; the sink csv has every tick"]
         for name, table in self._motion.sheets():
             if table.thinned:
                 yield [name, f"thinned evenly from {table.offered} rows"]

@@ -15,6 +15,7 @@ import numpy as np
 
 from seerob.errors import InputError
 from seerob.human.captured import Captured, CaptureFrame, Layout, Seen
+from seerob.motion_io.frame_arrays import FAR
 from seerob.snapshot import Finding
 from seerob.sources._bvh_file import Bvh as File
 from seerob.sources._bvh_file import read_bvh
@@ -127,11 +128,11 @@ def read(path: Path, *, unit: Unit = Unit.GUESS, up: Up = Up.GUESS, file: str = 
     """
     name = file or str(path)
     found = read_bvh(path, name)
+    said: list[Finding] = []
 
     def say(level: str, text: str) -> Finding:
         return Finding(level=level, subject=name, text=text)
 
-    said: list[Finding] = []
     length = chain(found)
     guessed = guess_unit(length)
     if unit is Unit.GUESS:
@@ -146,6 +147,12 @@ def read(path: Path, *, unit: Unit = Unit.GUESS, up: Up = Up.GUESS, file: str = 
     elif guessed is not None and guessed is not unit:
         text = f"in {unit} the longest chain of bones is {METRES[unit] * length:.3g} m"
         said.append(say("warning", f"{text}; in {guessed} it is a person's"))
+    if (far := found.shifted_beyond(FAR / METRES[unit])).any():
+        found.values[far] = np.nan
+        if not found.whole().any():
+            what = f"in no frame the joints are within {FAR:g} m"
+            raise InputError.at(name, "unit", what, "is the unit right?")
+        said.append(say("warning", f"{far.sum()} frames with a joint shifted by more than {FAR:g} m left out"))
     if up is Up.GUESS:
         up, clear = guess_up(found)
         text = f"{up} is taken as up: " + (

@@ -17,6 +17,7 @@ from seerob.errors import InputError, Problem, SeerobError
 from seerob.protocols import ProtocolError, sparkplug
 from seerob.protocols.broker_pulse import Pulse, known_end
 from seerob.protocols.json_pointer import document, parts
+from seerob.protocols.trusted_certificates import trusting
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.sources._json_values import told
@@ -219,11 +220,9 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
         except ModuleNotFoundError as error:
             remedy = "pip install seerob[mqtt]"
             raise InputError.at("sources", "kind", "mqtt needs the package aiomqtt", remedy) from error
-        import ssl
-
         password = None if self.password_env is None else os.environ.get(self.password_env)
-        trusted = None if self.ca is None else str(folder / self.ca)
-        context = ssl.create_default_context(cafile=trusted) if self.tls else None
+        trusted = None if self.ca is None else folder / self.ca
+        context = trusting(trusted, server=f"{self.host}:{self.port}") if self.tls else None
         client = aiomqtt.Client(
             self.host,
             self.port,

@@ -17,6 +17,7 @@ from msgspec.structs import replace
 from seerob.errors import InputError, Problem
 from seerob.protocols import ProtocolError, s7_web
 from seerob.protocols.http_answer import answer, is_here
+from seerob.protocols.trusted_certificates import trusting
 from seerob.quantities import Seconds
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
@@ -128,12 +129,9 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
 
     @asynccontextmanager
     async def _session(self, folder: Path) -> AsyncGenerator[_Session, None]:
-        import ssl
-
         import httpx
 
-        trusted = None if self.ca is None else str(folder / self.ca)
-        context = ssl.create_default_context(cafile=trusted)
+        context = trusting(None if self.ca is None else folder / self.ca, server=self.url)
         async with httpx.AsyncClient(verify=context, timeout=PATIENCE, trust_env=False) as client:
             session = _Session(client, self.url.rstrip("/") + s7_web.PATH)
             password = os.environ.get(self.password_env, "")

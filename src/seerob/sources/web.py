@@ -20,6 +20,7 @@ from seerob.errors import InputError, Problem
 from seerob.protocols import ProtocolError
 from seerob.protocols.http_answer import LARGEST, answer, is_here
 from seerob.protocols.json_pointer import document, parts
+from seerob.protocols.trusted_certificates import trusting
 from seerob.protocols.websocket_link import linked_to
 from seerob.quantities import Seconds
 from seerob.snapshot import Finding
@@ -242,9 +243,7 @@ class Web(VariablesSource, frozen=True, kw_only=True):
         return {self.header: f"{self.scheme} {os.environ.get(self.token_env, '')}".strip()}
 
     def _context(self, folder: Path) -> Any:
-        import ssl
-
-        return ssl.create_default_context(cafile=None if self.ca is None else str(folder / self.ca))
+        return trusting(None if self.ca is None else folder / self.ca, server=self.url)
 
     async def browse(self) -> AsyncGenerator[Node, None]:
         """The values of the first document, by their pointers."""

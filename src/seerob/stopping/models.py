@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
@@ -107,7 +108,7 @@ class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "rated_payload": self.rated_payload is not None and self.model != "table",
             "stopping": self.stopping is not None and self.model == "simulated",
             "brakes": self.brakes is not None and self.model != "simulated",
-            "torque_share": self.torque_share != 0.8
+            "torque_share": self.torque_share != SHARE
             and (self.model != "simulated" or self.brakes is not None),
             "direction": self.direction != "path" and self.model != "simulated",
         }
@@ -191,22 +192,20 @@ def fastest(state: State, gap: Gap) -> Array:
 
 
 def _timed(stop: Stop, gap: Gap) -> StopModel:
-    share = SHARES[stop.model]
+    share, a = SHARES[stop.model], stop.deceleration
+    T_s = math.nan if stop.stopping is None else stop.stopping
 
     def courses(state: State) -> At:
         v = fastest(state, gap)
         top = float(v.max())
 
         def at(scale: float) -> Course:
-            a = stop.deceleration
-            T_s = scale * top / a if a is not None else stop.stopping or 0.0
-            return course(scale * v, stop.reaction, T_s, share)
+            return course(scale * v, stop.reaction, T_s if a is None else scale * top / a, share)
 
         return at
 
     def inverse(v: Array, d: Array, v_h: Array, K: float) -> tuple[float, float | None]:
-        T_r, a, T_s = stop.reaction, stop.deceleration, stop.stopping or 0.0
-        top = float(v.max())
+        T_r, top = stop.reaction, float(v.max())
         if top < MOVING:
             # At rest nobody knows which part will be fastest: each may be.
             if a is None:
@@ -218,10 +217,7 @@ def _timed(stop: Stop, gap: Gap) -> StopModel:
             factor = largest_factor(v_h * T_r + K - d, v_h * top / a + v * T_r, share * v * top / a)
         return factor * top, factor
 
-    if stop.deceleration is not None:
-        known = _given("deceleration", stop.deceleration, "m/s²")
-    else:
-        known = _given("T_s", stop.stopping or 0.0, "s")
+    known = _given("T_s", T_s, "s") if a is None else _given("deceleration", a, "m/s²")
     if share == BOUND:
         return StopModel(
             courses,
@@ -232,7 +228,7 @@ def _timed(stop: Stop, gap: Gap) -> StopModel:
         )
     return StopModel(
         courses,
-        "S_s = v_r T_s / 2" + ("" if stop.deceleration is None else ", T_s = v / a of the fastest point"),
+        "S_s = v_r T_s / 2" + ("" if a is None else ", T_s = v / a of the fastest point"),
         (known,),
         inverse=inverse,
         not_modelled=(

@@ -151,7 +151,7 @@ def interpolate(axes: Sequence[Sequence[float]], values: Array, at: Sequence[flo
             found = found[0]
             continue
         k = min(max(bisect_right(axis, x) - 1, 0), len(axis) - 2)
-        share = min(max((x - axis[k]) / (axis[k + 1] - axis[k]), 0.0), 1.0)
+        share = max((x - axis[k]) / (axis[k + 1] - axis[k]), 0.0)
         found = (1 - share) * found[k] + share * found[k + 1]
     return float(found)
 

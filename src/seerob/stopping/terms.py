@@ -133,7 +133,7 @@ def largest_factor(c: Array, b: Array, a: Array | float = 0.0) -> float:
             return math.nan
         if down > 0:
             least = min(least, 2 * left / down)
-        elif grows != 0 or with_square != 0:
+        elif with_square != 0:
             least = 0.0
     return least
 
@@ -143,7 +143,7 @@ def worst_case(S_p: Array) -> Array:
     return np.asarray(np.max(S_p, axis=0))
 
 
-def largest_scale(holds: Callable[[float], bool], top: float, halvings: int = 20) -> float:
+def largest_scale(holds: Callable[[float], bool], top: float, halvings: int) -> float:
     """Largest factor of all speeds for which something holds, from below; 0 when it does not at 0.
 
     Args:

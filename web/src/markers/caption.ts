@@ -6,14 +6,20 @@ import { NEUTRAL_TEXT, STATE_ICONS, VERDICT_TEXT } from "../verdicts";
 import type { Verdict } from "../wire";
 import type { View } from "./drawn";
 
-const FONT_PX = 13;
-const PAD_PX = 7;
-const HEIGHT_PX = 24;
+const PAD_PX = 6;
 const SHARPNESS = 2;
 const LONGEST = 64;
-/** Lower edge of the plate below its point, in heights of the plate: a little above it. */
-const RAISED = -0.35;
-const FONT = `600 ${FONT_PX * SHARPNESS}px system-ui, "Segoe UI", "Noto Sans", sans-serif`;
+/** Lower edge of the plate above its point [px]. */
+const RAISED_PX = 8;
+const FAMILY = 'system-ui, "Segoe UI", "Noto Sans", sans-serif';
+
+/** A figure, or only the name of a place. */
+export type Size = "figure" | "name";
+
+const SIZES: Record<Size, { font: string; height: number }> = {
+  figure: { font: `600 ${12 * SHARPNESS}px ${FAMILY}`, height: 21 },
+  name: { font: `500 ${11 * SHARPNESS}px ${FAMILY}`, height: 17 },
+};
 
 const at = new Vector3();
 
@@ -23,8 +29,10 @@ export class Caption {
   private readonly material: SpriteMaterial;
   private texture: CanvasTexture | null = null;
   private shown = "";
+  /** How much higher than where it belongs it is [px]. */
+  liftedPx = 0;
 
-  constructor() {
+  constructor(private readonly size: Size = "figure") {
     this.material = new SpriteMaterial({
       depthTest: false,
       transparent: true,
@@ -34,7 +42,7 @@ export class Caption {
     this.object = new Sprite(this.material);
     this.object.renderOrder = 10;
     this.object.raycast = () => {};
-    this.object.center.set(0.5, RAISED);
+    this.lift(0);
   }
 
   update(text: string, verdict: Verdict | null): void {
@@ -56,12 +64,18 @@ export class Caption {
   }
 
   get heightPx(): number {
-    return HEIGHT_PX;
+    return SIZES[this.size].height;
+  }
+
+  /** Its lower edge above where it belongs [px]. */
+  get bottomPx(): number {
+    return RAISED_PX + this.liftedPx;
   }
 
   /** Draw it so much higher on the screen than where it belongs [px]. */
   lift(px: number): void {
-    this.object.center.y = RAISED - px / HEIGHT_PX;
+    this.liftedPx = px;
+    this.object.center.set(0.5, -this.bottomPx / this.heightPx);
   }
 
   dispose(): void {
@@ -71,9 +85,10 @@ export class Caption {
 
   private paint(text: string, verdict: Verdict | null): void {
     const brush = this.canvas.getContext("2d")!;
-    brush.font = FONT;
+    const { font } = SIZES[this.size];
+    brush.font = font;
     const width = Math.ceil(brush.measureText(text).width) + 2 * PAD_PX * SHARPNESS;
-    const height = HEIGHT_PX * SHARPNESS;
+    const height = this.heightPx * SHARPNESS;
     // A texture cannot change its size once it is on the graphics card.
     if (width !== this.canvas.width || height !== this.canvas.height || !this.texture) {
       this.canvas.width = width;
@@ -90,14 +105,14 @@ export class Caption {
     brush.clearRect(0, 0, width, height);
     brush.beginPath();
     brush.roundRect(2, 2, width - 4, height - 4, 10);
-    brush.fillStyle = "rgba(10, 14, 20, 0.88)";
+    brush.fillStyle = "rgba(10, 14, 20, 0.78)";
     brush.fill();
     brush.lineWidth = 2.5;
     brush.strokeStyle = color;
     if (verdict === "undecided") brush.setLineDash([10, 7]);
     brush.stroke();
     brush.setLineDash([]);
-    brush.font = FONT;
+    brush.font = font;
     brush.fillStyle = color;
     brush.textBaseline = "middle";
     brush.fillText(text, PAD_PX * SHARPNESS, height / 2 + 1);

@@ -1,6 +1,7 @@
 // What every kind of marker is once it is on the screen.
 
 import type { Object3D, PerspectiveCamera, Vector3 } from "three";
+import type { Caption } from "./caption";
 
 /** How the screen sees the world, for what keeps its size in pixels. */
 export interface View {
@@ -14,6 +15,8 @@ export interface Drawn<M> {
   readonly object: Object3D;
   /** Where its caption goes, in world coordinates. */
   readonly anchor: Vector3;
+  /** Of a marker that is text. */
+  readonly caption?: Caption;
   /** Draw this marker instead of the one before it. */
   update(marker: M): void;
   /** Keep widths and letters constant in pixels; called before each picture. */

@@ -8,7 +8,7 @@ import type { Drawn, View } from "./drawn";
 export class LabelDrawn implements Drawn<Label> {
   readonly object = new Group();
   readonly anchor = new Vector3();
-  private readonly caption = new Caption();
+  readonly caption = new Caption("name");
 
   constructor() {
     this.object.add(this.caption.object);

@@ -7,6 +7,7 @@ import type { Marker, Result, Verdict } from "../wire";
 import { Caption } from "./caption";
 import type { Drawn, View } from "./drawn";
 import { makeDrawn } from "./index";
+import { Leaders } from "./leaders";
 import { stackCaptions } from "./stacking";
 
 interface Slot {
@@ -17,12 +18,19 @@ interface Slot {
 
 /** Labels of how many results are written into the room: more would hide what they are about. */
 const CAPTIONED_RESULTS = 3;
+/** Labels of one result, unless it is selected. */
+const LABELS_OF_ONE = 2;
 
 export class MarkerLayer {
   readonly root = new Group();
   /** Bodies that highlights paint. */
   readonly painted = new Map<string, Verdict | null>();
   private readonly slots = new Map<string, Slot[]>();
+  private readonly leaders = new Leaders();
+
+  constructor() {
+    this.root.add(this.leaders.object);
+  }
 
   /**
    * Draw the markers of these results.
@@ -45,40 +53,55 @@ export class MarkerLayer {
     }
     for (const result of results) {
       const markers = muted.has(result.name) ? [] : result.markers;
-      this.draw(result.name, markers, captioned.has(result.name));
+      const most = result.name === selected ? Number.POSITIVE_INFINITY : LABELS_OF_ONE;
+      this.draw(result.name, markers, captioned.has(result.name) ? most : 0);
     }
   }
 
-  /** Called before each picture: what has a size in pixels keeps it. */
-  face(view: View): void {
+  /**
+   * Called before each picture: what has a size in pixels keeps it.
+   *
+   * @param others Further captions in the room, which lie below where they would cover these.
+   */
+  face(view: View, others: readonly Caption[]): void {
     for (const slots of this.slots.values()) {
       for (const { drawn, caption } of slots) {
         drawn.face?.(view);
         caption?.face(view);
       }
     }
-    stackCaptions(this.captions(), view);
+    for (const caption of others) caption.face(view);
+    const all = [...others, ...this.captions()];
+    stackCaptions(all, view);
+    this.leaders.update(all, view);
   }
 
   private *captions(): Iterable<Caption> {
     for (const slots of this.slots.values()) {
-      for (const { caption } of slots) if (caption?.object.visible) yield caption;
+      for (const { drawn, caption } of slots) {
+        if (caption?.object.visible) yield caption;
+        if (drawn.caption) yield drawn.caption;
+      }
     }
   }
 
-  private draw(name: string, markers: readonly Marker[], captioned: boolean): void {
+  private draw(name: string, markers: readonly Marker[], labels: number): void {
     const slots = this.slots.get(name) ?? [];
     this.slots.set(name, slots);
     let used = 0;
+    let left = labels;
     // Figures without the name of what they are of would be riddles.
     let owner = `${name}: `;
     for (const marker of markers) {
       const slot = this.slotFor(slots, used, marker);
       if (!slot) continue;
       slot.drawn.update(marker);
-      const label = captioned && "label" in marker ? marker.label : "";
+      const label = left > 0 && "label" in marker ? marker.label : "";
       this.write(slot, label === "" || label.startsWith(name) ? label : owner + label, marker.verdict);
-      if (label !== "") owner = "";
+      if (label !== "") {
+        owner = "";
+        left -= 1;
+      }
       if (marker.type === "highlight") paintWorst(this.painted, marker.body, marker.verdict);
       used += 1;
     }

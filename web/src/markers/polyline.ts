@@ -25,7 +25,9 @@ export class PolylineDrawn implements Drawn<Polyline> {
       }
       leg.update(points[i]!, points[(i + 1) % points.length]!, verdict);
     }
-    if (points[0]) this.anchor.fromArray(points[0]);
+    // In the middle: where two lines meet their captions would.
+    const middle = points[points.length >> 1];
+    if (middle) this.anchor.fromArray(middle);
   }
 
   face(view: View): void {

@@ -11,6 +11,7 @@ interface Place {
   x: number;
   y: number;
   width: number;
+  height: number;
 }
 
 /** Lift each caption above the ones before it that it would cover. */
@@ -19,17 +20,23 @@ export function stackCaptions(captions: Iterable<Caption>, { camera, pixel }: Vi
   const placed: Place[] = [];
   for (const caption of captions) {
     caption.object.getWorldPosition(at).project(camera);
-    const step = caption.heightPx + GAP_PX;
-    const place = { x: at.x * half * camera.aspect, y: at.y * half, width: caption.widthPx };
+    const place = {
+      x: at.x * half * camera.aspect,
+      y: at.y * half,
+      width: caption.widthPx,
+      height: caption.heightPx + GAP_PX,
+    };
     const from = place.y;
-    for (let below = covered(placed, place, step); below; below = covered(placed, place, step)) {
-      place.y = below.y + step;
+    for (let below = covered(placed, place); below; below = covered(placed, place)) {
+      place.y = below.y + below.height;
     }
     caption.lift(place.y - from);
     placed.push(place);
   }
 }
 
-function covered(placed: readonly Place[], { x, y, width }: Place, step: number): Place | undefined {
-  return placed.find((p) => Math.abs(p.x - x) < (p.width + width) / 2 && Math.abs(p.y - y) < step - 1e-6);
+function covered(placed: readonly Place[], { x, y, width, height }: Place): Place | undefined {
+  return placed.find(
+    (p) => Math.abs(p.x - x) < (p.width + width) / 2 && y < p.y + p.height - 1e-6 && p.y < y + height - 1e-6,
+  );
 }

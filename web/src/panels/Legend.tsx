@@ -1,5 +1,6 @@
 // In the room: what its colours mean, as long as they mean something.
 
+import { doubts } from "../doubts";
 import { scene, stale } from "../page_state";
 import { coloring, hasScores, shownScore } from "../posture/coloring";
 import { ScaleBar } from "./ScoreColors";
@@ -17,6 +18,11 @@ export function Legend() {
             <StateBadge state={state} />
           </li>
         ))}
+        {doubts.value.size > 0 && (
+          <li class="doubt-key">
+            <i aria-hidden="true" /> may be elsewhere
+          </li>
+        )}
       </ul>
       {hasScores.value && coloring.value !== "verdict" && shownScore.value !== null && (
         <p>

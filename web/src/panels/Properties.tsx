@@ -1,5 +1,6 @@
 // What is known about the selection, where it is known from, and what is not known.
 
+import { doubtAmong, doubts } from "../doubts";
 import { formatJoint, formatNumber, formatQuantity } from "../format";
 import { frame, scene, selectedNodes, selection, stale } from "../page_state";
 import type { JointInfo, MechanismInfo, Node, Scene } from "../wire";
@@ -14,6 +15,7 @@ export function Properties() {
   const first = nodes[0];
   if (!first) return <p class="empty">{chosen.name} is not in this scene.</p>;
   const mechanism = chosen.kind === "owner" ? run.mechanisms.find((m) => m.name === chosen.name) : undefined;
+  const doubt = doubtAmong(nodes, doubts.value);
   const findings = run.findings.filter(
     (f) => nodes.some((n) => isAbout(f.subject, n)) || f.subject === chosen.name,
   );
@@ -23,6 +25,12 @@ export function Properties() {
       <dl>
         <dt>Role</dt>
         <dd>{first.role}</dd>
+        {doubt !== undefined && (
+          <>
+            <dt>May be elsewhere</dt>
+            <dd class="unknown">{doubt}</dd>
+          </>
+        )}
         {chosen.kind === "node" && first.owner !== first.name && (
           <>
             <dt>Belongs to</dt>

@@ -1,6 +1,7 @@
 // What is there: robots and their links, humans, tools, workpieces, parts.
 
 import { useComputed, useSignal } from "@preact/signals";
+import { doubtAmong, doubts } from "../doubts";
 import { shortName } from "../format";
 import { hidden, scene, select, selectedNodes, selection, toggleHidden } from "../page_state";
 import type { Node } from "../wire";
@@ -98,6 +99,7 @@ function OwnerItem({ owner, open }: { owner: Owner; open: boolean }) {
         >
           {owner.name}
         </button>
+        <DoubtSign nodes={owner.nodes} />
         <EyeButton names={names} label={owner.name} />
       </div>
       {shown && (
@@ -126,9 +128,25 @@ function NodeItem({ node }: { node: Node }) {
         >
           {shortName(node.name, node.owner)}
         </button>
+        <DoubtSign nodes={[node]} />
         <EyeButton names={[node.name]} label={node.name} />
       </div>
     </li>
+  );
+}
+
+function DoubtSign({ nodes }: { nodes: readonly Node[] }) {
+  const reason = doubtAmong(nodes, doubts.value);
+  if (reason === undefined) return null;
+  return (
+    <span
+      class="doubt"
+      role="img"
+      aria-label={`may be elsewhere: ${reason}`}
+      title={`May be elsewhere: ${reason}`}
+    >
+      ?
+    </span>
   );
 }
 

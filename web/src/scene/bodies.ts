@@ -12,10 +12,11 @@ import {
   Vector3,
 } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { type Doubts, doubtOf } from "../doubts";
 import { FLOATS_PER_NODE } from "../poses";
 import type { Node, Scene, Snapshot, Verdict } from "../wire";
 import { featureEdges } from "./feature_edges";
-import { bodyMaterial, lineMaterial, markerMaterial, scoreMaterial } from "./materials";
+import { bodyMaterial, doubtMaterial, lineMaterial, markerMaterial, scoreMaterial } from "./materials";
 import { veilMaterial } from "./veil";
 
 /** Role of what is only room: a safety area. */
@@ -40,6 +41,8 @@ export class Body {
   /** Colour that a variable gives it; undefined for its own. */
   private worn: number | undefined = undefined;
   private lit = false;
+  /** Whether it may be elsewhere. */
+  doubted = false;
 
   constructor(readonly node: Node) {
     this.group.name = node.name;
@@ -103,6 +106,13 @@ export class Body {
     this.repaint();
   }
 
+  /** Show that it may be elsewhere; goes before every colour, as none may be relied on. */
+  doubt(on: boolean): void {
+    if (on === this.doubted) return;
+    this.doubted = on;
+    this.repaint();
+  }
+
   /** Make it stand out as selected. */
   light(on: boolean): void {
     if (on === this.lit) return;
@@ -112,12 +122,13 @@ export class Body {
 
   private repaint(): void {
     for (const { fill, edges, smooth } of this.enclosed) {
-      const verdict = this.painted ?? null;
+      const verdict = this.doubted ? "undecided" : (this.painted ?? null);
       fill.material = smooth ? veilMaterial(verdict) : markerMaterial("fill", verdict);
       edges.material = lineMaterial(verdict);
     }
     for (const { mesh, own } of this.dressed) {
-      if (this.tint !== undefined) mesh.material = scoreMaterial(this.tint);
+      if (this.doubted) mesh.material = doubtMaterial();
+      else if (this.tint !== undefined) mesh.material = scoreMaterial(this.tint);
       else if (this.painted !== undefined) mesh.material = bodyMaterial(this.painted);
       else mesh.material = this.worn === undefined ? own : scoreMaterial(this.worn);
       for (const material of [own].flat()) {
@@ -198,6 +209,11 @@ export class Bodies {
       body.wear(look ? look.reduce((sum, part) => sum * 256 + Math.round(255 * part), 0) : undefined);
     }
     this.reveal();
+  }
+
+  /** Show who may be elsewhere, and only those. */
+  doubt(doubts: Doubts): void {
+    for (const body of this.list) body.doubt(doubtOf(body.node, doubts) !== undefined);
   }
 
   private reveal(): void {

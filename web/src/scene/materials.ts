@@ -9,7 +9,7 @@ import {
   MeshStandardMaterial,
   PointsMaterial,
 } from "three";
-import { NEUTRAL_COLOR, VERDICT_COLORS } from "../verdicts";
+import { DOUBT_COLOR, NEUTRAL_COLOR, VERDICT_COLORS } from "../verdicts";
 import type { Verdict } from "../wire";
 
 export type Tone = Verdict | "none";
@@ -111,6 +111,22 @@ export function bodyMaterial(verdict: Verdict | null): Material {
       transparent: tone === "undecided",
     });
     if (tone === "undecided") hatch(material);
+    return material;
+  });
+}
+
+/** The shared material of a body that may be elsewhere: no colour of its own, and seen through. */
+export function doubtMaterial(): Material {
+  return once("doubt", () => {
+    const material = new MeshStandardMaterial({
+      color: DOUBT_COLOR,
+      roughness: 0.9,
+      metalness: 0,
+      side: DoubleSide,
+      transparent: true,
+      opacity: 0.8,
+    });
+    hatch(material);
     return material;
   });
 }

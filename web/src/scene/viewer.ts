@@ -3,14 +3,16 @@
 import { effect, signal } from "@preact/signals";
 import { Quaternion, Vector3 } from "three";
 import type { PoseFeed } from "../connection";
+import { doubtsIn } from "../doubts";
 import { Glide } from "../glide";
 import type { View } from "../markers/drawn";
 import { MarkerLayer } from "../markers/layer";
 import type { Frame } from "../messages";
-import { hidden, mutedCriteria, select, selectedNodes, selection, stale } from "../page_state";
+import { hidden, mutedCriteria, scene as run, select, selectedNodes, selection, stale } from "../page_state";
 import { manikinTints } from "../posture/coloring";
 import type { Scene } from "../wire";
 import { Bodies } from "./bodies";
+import { DoubtCaptions } from "./doubt_captions";
 import { Outline } from "./outline";
 import { pickOnClick } from "./picking";
 import { Stage } from "./stage";
@@ -26,6 +28,7 @@ export class Viewer {
   readonly bodies = new Bodies();
   readonly markers = new MarkerLayer();
   readonly viewpoint: Viewpoint;
+  private readonly doubts = new DoubtCaptions(this.bodies);
   private readonly outline = new Outline(this.bodies);
   private readonly view: View;
   private readonly glide = new Glide();
@@ -40,7 +43,7 @@ export class Viewer {
 
   constructor(element: HTMLElement) {
     this.stage = new Stage(element);
-    this.stage.world.add(this.bodies.root, this.markers.root);
+    this.stage.world.add(this.bodies.root, this.markers.root, this.doubts.root);
     this.viewpoint = new Viewpoint(this.stage, this.bodies);
     this.view = { camera: this.stage.camera, pixel: 0 };
     pickOnClick(this.stage, this.bodies, (name) => select(name === null ? null : { kind: "node", name }));
@@ -91,7 +94,7 @@ export class Viewer {
     this.viewpoint.update();
     const { camera, element } = this.stage;
     this.view.pixel = (2 * Math.tan((camera.fov * Math.PI) / 360)) / Math.max(element.clientHeight, 1);
-    this.markers.face(this.view);
+    this.markers.face(this.view, [...this.doubts.shown()]);
   }
 
   /** Pose of a body in three.js's own world, y up. */
@@ -128,6 +131,9 @@ export class Viewer {
     );
     this.paint();
     this.bodies.wear(this.frame?.looks ?? {});
+    const doubts = doubtsIn(this.frame);
+    this.bodies.doubt(doubts);
+    this.doubts.update(run.peek(), doubts, showCaptions.peek());
     this.stage.invalidate();
   }
 

@@ -1,0 +1,240 @@
+"""Grippers that pick up and let go: where a workpiece is, on whom it weighs, and when nobody knows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from seerob import load
+from seerob.engine import Engine
+from seerob.errors import InputError, Undecided
+from seerob.samples import JointSample
+
+AXIS = """
+[[machines]]
+name = "axis"
+shape = { box = [0.2, 0.2, 0.1] }
+mass = 5
+turn = { about = [0, 1, 0] }
+[[machines]]
+name = "hand"
+on = "axis"
+at = { position = [1.0, 0, 0] }
+shape = { box = [0.02, 0.02, 0.06] }
+mass = 0.2
+grip = { upper = 0.1 }
+[[parts]]
+name = "post"
+shape = { sphere = 0.1 }
+at = { position = [1.0, 0, -2.0] }
+"""
+NUT = """
+[[workpieces]]
+name = "nut"
+on = "hand"
+shape = { box = [0.04, 0.04, 0.04] }
+mass = 2.0
+rest = { position = [1.0, 0, 0.01], rpy = [0.3, 0, 0] }
+"""
+STATION = "[engine]\nphysics = false\n" + AXIS + NUT
+WIDE, SHUT, LIFTED = 0.1, 0.05, -0.5
+SILENT = None
+TICK = 0.01
+
+
+class Cell:
+    """A gripper on an arm of one joint, told where to be at each tick."""
+
+    def __init__(self, folder, text=STATION):
+        (folder / "workstation.toml").write_text(text)
+        self.station = load(folder)
+        self.model = self.station.model
+        self.engine = Engine(self.model, driven={"axis": 0.05, "hand": 0.05})
+        self.k = 0
+        self._hear(0.0, WIDE)
+        self.state = self.engine.start()
+
+    def _hear(self, angle, opening, speed=0.0):
+        said = {"axis": (angle, speed)}
+        if opening is not SILENT:
+            said["hand"] = (opening / 2, 0.0)
+        self.engine.take(
+            JointSample(source=name, seq=self.k, t=self.k * TICK, target=name, q=(q,), qd=(qd,))
+            for name, (q, qd) in said.items()
+        )
+
+    def go(self, *steps, speed=0.0):
+        """Through angles and openings, one a tick."""
+        for angle, opening in steps:
+            self.k += 1
+            self._hear(angle, opening, speed)
+            self.state = self.engine.tick()
+        return self
+
+    def pose(self, name="nut/resting"):
+        index = next(b.index for b in self.model.bodies if b.name == name)
+        return self.state.rotations[index].copy(), self.state.positions[index].copy()
+
+    def between(self, a, b):
+        return self.state.closest(self.model.gap(self.model.select(a), self.model.select(b))).distance
+
+    def picked(self):
+        return self.go((0.0, WIDE), (0.0, SHUT))
+
+
+def turned(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+
+@pytest.fixture
+def cell(tmp_path):
+    return Cell(tmp_path)
+
+
+def test_what_lies_there_is_no_part_of_the_gripper(cell):
+    cell.go((0.0, WIDE))
+    box = np.abs(cell.pose()[0] @ np.diag([0.02] * 3)).sum(axis=1)
+    assert cell.pose()[1] == pytest.approx([1.0, 0, 0.01])
+    # As far as from the box to the sphere below it, which the gripper, higher up, does not come near.
+    assert cell.between("nut", "post") == pytest.approx(2.01 - box[2] - 0.1, abs=2e-3)
+    assert cell.between("hand", "post") == pytest.approx(2.0 - 0.03 - 0.1, abs=2e-3)
+
+
+def test_it_keeps_its_place_in_the_hand_until_it_is_let_go(cell):
+    R, x = cell.pose()
+    cell.picked()
+    for angle in np.linspace(0, LIFTED, 11):
+        cell.go((angle, SHUT))
+        held = cell.pose("nut")
+        np.testing.assert_allclose(held[0], turned(angle) @ R, atol=1e-6)
+        np.testing.assert_allclose(held[1], turned(angle) @ x, atol=1e-6)
+    cell.go((LIFTED, WIDE), (0.0, WIDE))
+    np.testing.assert_allclose(cell.pose()[0], held[0], atol=1e-6)
+    np.testing.assert_allclose(cell.pose()[1], held[1], atol=1e-6)
+    # And it is picked up from there again.
+    cell.go((LIFTED, WIDE), (LIFTED, SHUT), (0.0, SHUT))
+    np.testing.assert_allclose(cell.pose("nut")[1], x, atol=1e-6)
+
+
+def test_it_weighs_on_the_gripper_while_it_is_held(cell):
+    axis = cell.model.mechanisms["axis"]
+    empty = cell.go((0.0, WIDE)).state.mass_matrix(axis)[0, 0]
+    cell.picked()
+    # Steiner: m (x² + z²) about the axis, and the box about its own y axis.
+    added = 2.0 * (1.0**2 + 0.01**2) + 2.0 * (0.04**2 + 0.04**2) / 12
+    empty_shut = cell.state.mass_matrix(axis)[0, 0] - added
+    assert empty_shut == pytest.approx(empty, rel=1e-6)
+    assert cell.go((0.0, WIDE)).state.mass_matrix(axis)[0, 0] == pytest.approx(empty, rel=1e-6)
+
+
+def test_gravity_and_energy_go_with_it(tmp_path):
+    energy = '[[safety]]\nkind = "velocity"\nname = "v"\nof = "nut"\nlimit = 1.0\n'
+    cell = Cell(tmp_path, STATION + energy)
+    from seerob.joint_torques import gravity
+
+    axis = cell.model.mechanisms["axis"]
+    (speed,) = cell.station.bound
+    empty = gravity(cell.state, axis)
+    cell.picked()
+    weight = 2.0 * 9.80665
+    assert abs(gravity(cell.state, axis) - empty)[0] == pytest.approx(weight * 1.0, rel=5e-3)
+    cell.go((-0.01, SHUT), (-0.02, SHUT), speed=-1.0)
+    corner = np.linalg.norm([1.0 + 0.02 * 1.5, 0.02 * 1.5 + 0.01])
+    assert 1.0 < speed.evaluate(cell.state).value < corner + 1e-6
+    cell.go((-0.02, WIDE), (-0.03, WIDE), speed=-1.0)
+    assert speed.evaluate(cell.state).value == 0.0
+
+
+@pytest.mark.parametrize(
+    ("rest", "why"),
+    [
+        ([1.0, 0.06, 0.0], "beside a finger"),
+        ([1.0, 0.0, 0.056], "above both fingertips"),
+        ([1.05, 0.0, 0.0], "in front of them"),
+    ],
+)
+def test_what_is_not_between_the_fingers_stays(tmp_path, rest, why):
+    cell = Cell(tmp_path, STATION.replace("[1.0, 0, 0.01], rpy = [0.3, 0, 0]", str(rest)))
+    cell.go((0.0, WIDE), (0.0, 0.04), (0.0, 0.0), (LIFTED, 0.0))
+    np.testing.assert_allclose(cell.pose()[1], rest, atol=1e-12, err_msg=why)
+
+
+def test_a_silent_gripper_leaves_it_undecided(cell):
+    cell.go((0.0, WIDE), *[(0.0, SILENT)] * 8)
+    with pytest.raises(Undecided, match="hand: not heard"):
+        cell.between("nut/resting", "post")
+    with pytest.raises(Undecided, match="hand: not heard"):
+        cell.state.mass_matrix(cell.model.mechanisms["axis"])
+    assert cell.go((0.0, WIDE), (0.0, WIDE)).between("nut", "post") > 0
+
+
+def test_let_go_in_silence_means_nobody_knows_where(cell):
+    cell.picked().go(*[(LIFTED, SILENT)] * 8)
+    # Still held after the silence: nothing was missed.
+    assert cell.go((LIFTED, SHUT), (LIFTED, SHUT)).between("nut", "post") > 0
+    cell.go(*[(0.0, SILENT)] * 8)
+    cell.go((0.0, WIDE), (0.0, WIDE))
+    with pytest.raises(
+        Undecided, match=r"nut: let go while its gripper was not relied on .*nobody knows where"
+    ):
+        cell.between("nut/resting", "post")
+    assert cell.between("hand", "post") > 0
+    with pytest.raises(Undecided, match="nobody knows where"):
+        cell.between("nut", "post")
+
+
+def test_the_picture_shows_it_where_it_is(cell):
+    names = [b.name for b in cell.model.bodies]
+    for steps in [(0.0, WIDE)], [(0.0, SHUT), (LIFTED, SHUT)]:
+        cell.go(*steps)
+        rows = np.frombuffer(cell.state.poses(), "<f4").reshape(-1, 7)
+        one, other = rows[names.index("nut")], rows[names.index("nut/resting")]
+        np.testing.assert_array_equal(one, other)
+        assert abs(one[:3]).max() < 2
+
+
+def test_two_runs_of_one_model_do_not_share_what_they_hold(tmp_path):
+    one = Cell(tmp_path)
+    mass = one.model.mj.body_mass.copy()
+    other = Cell(tmp_path)
+    other.picked()
+    one.go((0.0, WIDE))
+    assert one.pose()[1] == pytest.approx([1.0, 0, 0.01])
+    np.testing.assert_array_equal(one.model.mj.body_mass, mass)
+
+
+def test_a_person_beside_it_is_not_beside_the_robot(tmp_path):
+    text = STATION.replace("[1.0, 0, -2.0]", "[1.0, 0, -0.2]")
+    rest = text.replace("position = [1.0, 0, 0.01], rpy = [0.3, 0, 0]", "position = [3.0, 0, 0]")
+    far = Cell(tmp_path, rest).go((0.0, WIDE))
+    without = Cell(tmp_path, text.replace(NUT, "")).go((0.0, WIDE))
+    assert far.between("hand", "post") == without.between("hand", "post")
+
+
+def test_with_physics_it_is_carried_too(tmp_path):
+    cell = Cell(tmp_path, AXIS + NUT)
+    cell.picked()
+    angles = 0.5 * LIFTED * (1 - np.cos(np.linspace(0, np.pi, 60)))
+    cell.go(*((angle, SHUT) for angle in angles), *[(LIFTED, SHUT)] * 20)
+    x = cell.pose("nut")[1]
+    np.testing.assert_allclose(x, turned(LIFTED) @ [1.0, 0, 0.01], atol=2e-3)
+    assert cell.state.hearings["axis"].error < 5e-3
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (('on = "hand"', 'on = "axis"'), "axis has no fingers to pick nut up with"),
+        (
+            (
+                "shape = { box = [0.02, 0.02, 0.06] }",
+                "shape = { polygon = [[0.1, 0], [0.2, 0], [0.2, 0.1]], height = [0, 0.1] }",
+            ),
+            "its fingers do not face each other",
+        ),
+    ],
+)
+def test_mistakes_are_said(tmp_path, wrong, message):
+    with pytest.raises(InputError, match=message):
+        Cell(tmp_path, STATION.replace(*wrong))

@@ -1,0 +1,130 @@
+"""Which options of a stop go together, what it says of itself, and its largest permissible speed by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from seerob.stopping.models import MOVING, SHARE, Stop, StopTolerance, bind_stop
+from seerob.stopping.terms import BOUND, CONSTANT, largest_speed_decelerating, largest_speed_in_time
+from seerob.stopping.tolerances import shifted, tolerances
+from seerob.tolerances import Tolerance
+
+KNOWN = {"reaction": 0.1, "stopping": 0.3}
+HALF = {**KNOWN, "model": "constant_deceleration"}
+BRAKING = {"reaction": 0.1, "deceleration": 2.0, "model": "constant_deceleration"}
+TABLE = {"reaction": 0.1, "model": "table", "table": "ur10_cb3"}
+SIMULATED = {"reaction": 0.1, "model": "simulated"}
+OFF = StopTolerance
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        KNOWN,
+        HALF,
+        BRAKING,
+        {**TABLE, "table_for": "arm", "rated_payload": 5.0, "stopping": 0.5},
+        {**SIMULATED, "brakes": (1.0,), "direction": "toward"},
+        {**SIMULATED, "torque_share": 0.5},
+        {**KNOWN, "tolerance": OFF()},
+        {**KNOWN, "tolerance": OFF(reaction=0.0999, stopping=0.2999)},
+        {**BRAKING, "tolerance": OFF(deceleration=1.9999)},
+    ],
+)
+def test_options_that_go_together(options):
+    assert Stop(**options).reaction == 0.1
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"reaction": 0.1}, '"bound" needs stopping$'),
+        ({**HALF, "deceleration": 2.0}, "needs either stopping or deceleration$"),
+        ({"reaction": 0.1, "model": "constant_deceleration"}, "needs either stopping or deceleration$"),
+        ({"reaction": 0.1, "model": "table"}, '"table" needs table$'),
+        ({**KNOWN, "deceleration": 2.0}, "deceleration does nothing"),
+        ({**KNOWN, "table": "ur10_cb3"}, "table does nothing"),
+        ({**KNOWN, "table_for": "arm"}, "table_for does nothing"),
+        ({**KNOWN, "rated_payload": 5.0}, "rated_payload does nothing"),
+        ({**SIMULATED, "stopping": 0.3}, "stopping does nothing"),
+        ({**KNOWN, "brakes": (1.0,)}, "brakes does nothing"),
+        ({**KNOWN, "torque_share": 0.5}, "torque_share does nothing"),
+        ({**SIMULATED, "torque_share": 0.5, "brakes": (1.0,)}, "torque_share does nothing"),
+        ({**KNOWN, "direction": "toward"}, "direction does nothing"),
+        ({**KNOWN, "tolerance": OFF(reaction=0.1)}, r"reaction = 0\.1, but reaction = 0\.1 is not more"),
+        ({**KNOWN, "tolerance": OFF(deceleration=0.1)}, r"= 0\.1, but deceleration is not given$"),
+    ],
+)  # fmt: skip
+def test_options_that_do_not(options, said):
+    with pytest.raises(ValueError, match=said):
+        Stop(**options)
+
+
+def test_brakes_have_eight_tenths_of_the_torque_limits_unless_the_file_says_otherwise():
+    assert Stop(**SIMULATED).torque_share == SHARE == 0.8
+
+
+def known(options):
+    (found,) = bind_stop(Stop(**options), None, None, None).inputs
+    return found.name, found.value, found.unit, found.origin
+
+
+def test_what_a_stop_says_of_itself():
+    assert known(KNOWN) == known(HALF) == ("T_s", 0.3, "s", "given")
+    assert known(BRAKING) == ("deceleration", 2.0, "m/s²", "given")
+    formulas = [bind_stop(Stop(**options), None, None, None).formula for options in (KNOWN, HALF, BRAKING)]
+    half = "S_s = v_r T_s / 2"
+    assert formulas == ["S_s = v_r T_s", half, f"{half}, T_s = v / a of the fastest point"]
+
+
+# -- the largest permissible speed ----------------------------------------------------------------
+
+D, V_H, K, T_R = np.array([2.0, 2.6]), np.array([1.6, 1.7]), 0.35, 0.1
+
+
+def lacks(options, v):
+    """By how much the part that is worst off is too near, at speeds [m/s]."""
+    a = options.get("deceleration")
+    T_s = options.get("stopping") if a is None else v.max() / a
+    share = 0.5 if options.get("model") else 1.0
+    return (V_H * (T_R + T_s) + v * T_R + share * v * T_s + K - D).max()
+
+
+@pytest.mark.parametrize("options", [KNOWN, HALF, BRAKING])
+@pytest.mark.parametrize("v", [(1.0, 2.5), (0.7, 0.4), (MOVING, 0.0)])
+def test_at_the_largest_factor_the_worst_part_is_as_near_as_it_may_be(options, v):
+    v = np.array(v)
+    speed, factor = bind_stop(Stop(**options), None, None, None).inverse(v, D, V_H, K)
+    assert speed == pytest.approx(factor * v.max(), rel=1e-12)
+    assert lacks(options, factor * v) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("v", [(0.0, 0.0), (0.0, 0.999 * MOVING)])
+def test_at_rest_each_part_may_be_the_fastest(v):
+    inverse = {k: bind_stop(Stop(**o), None, None, None).inverse for k, o in
+               {BOUND: KNOWN, CONSTANT: HALF, None: BRAKING}.items()}  # fmt: skip
+    for share in (BOUND, CONSTANT):
+        each = largest_speed_in_time(D, V_H, T_R, 0.3, K, share)
+        assert each[0] < each[1]
+        assert inverse[share](np.array(v), D, V_H, K) == (each[0], None)
+    each = largest_speed_decelerating(D, V_H, T_R, 2.0, K)
+    assert each[0] < each[1]
+    assert inverse[None](np.array(v), D, V_H, K) == (each[0], None)
+
+
+# -- tolerances -----------------------------------------------------------------------------------
+
+
+def test_a_stop_at_the_ends_of_its_tolerances():
+    """S_p is largest with long times and a small deceleration."""
+    times = Stop(**KNOWN, tolerance=OFF(reaction=0.02, stopping=0.05))
+    assert tolerances(times) == (Tolerance("stop.reaction", 0.02, "s"), Tolerance("stop.stopping", 0.05, "s"))
+    for side in (-1, 0, 1):
+        found = shifted(times, (side, -side))
+        assert (found.reaction, found.stopping) == pytest.approx((0.1 + side * 0.02, 0.3 - side * 0.05))
+        assert found.tolerance is None
+    braking = Stop(**BRAKING, tolerance=OFF(deceleration=0.5))
+    assert tolerances(braking) == (Tolerance("stop.deceleration", 0.5, "m/s²"),)
+    assert [shifted(braking, (side,)).deceleration for side in (-1, 1)] == [2.5, 1.5]
+    assert tolerances(Stop(**KNOWN)) == tolerances(Stop(**KNOWN, tolerance=OFF())) == ()

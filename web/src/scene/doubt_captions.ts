@@ -1,0 +1,64 @@
+// Above each robot, person and machine that may be elsewhere: why.
+
+import { Box3, Group } from "three";
+import type { Doubts } from "../doubts";
+import { Caption } from "../markers/caption";
+import type { Scene } from "../wire";
+import type { Bodies } from "./bodies";
+
+/** More would hide the room; the tree has all of them. */
+const MOST = 4;
+
+export class DoubtCaptions {
+  readonly root = new Group();
+  private readonly captions: Caption[] = [];
+  private readonly box = new Box3();
+  private readonly part = new Box3();
+
+  constructor(private readonly bodies: Bodies) {}
+
+  /** Write them anew; who has no body to be seen has none. */
+  update(scene: Scene | null, doubts: Doubts, written: boolean): void {
+    let used = 0;
+    for (const { name } of scene?.mechanisms ?? []) {
+      const reason = written && used < MOST ? doubts.get(name) : undefined;
+      if (reason === undefined || !this.above(name)) continue;
+      const caption = this.captionAt(used);
+      this.box.getCenter(caption.object.position).z = this.box.max.z;
+      caption.object.visible = true;
+      caption.update(shortened(name, reason), "undecided");
+      used += 1;
+    }
+    for (const caption of this.captions.slice(used)) caption.object.visible = false;
+  }
+
+  /** Those that are written now. */
+  *shown(): Iterable<Caption> {
+    for (const caption of this.captions) if (caption.object.visible) yield caption;
+  }
+
+  private captionAt(index: number): Caption {
+    let caption = this.captions[index];
+    if (!caption) {
+      caption = new Caption();
+      this.captions.push(caption);
+      this.root.add(caption.object);
+    }
+    return caption;
+  }
+
+  private above(owner: string): boolean {
+    this.box.makeEmpty();
+    for (const { node, group, extent } of this.bodies.byName.values()) {
+      if (node.owner !== owner || !group.visible || extent.isEmpty()) continue;
+      this.box.union(this.part.copy(extent).applyMatrix4(group.matrix));
+    }
+    return !this.box.isEmpty();
+  }
+}
+
+// The time-out and the like are in the tree and the table.
+function shortened(name: string, reason: string): string {
+  const short = reason.replace(/ \([^()]*\)$/, "");
+  return short.startsWith(name) ? short : `${name}: ${short}`;
+}

@@ -35,6 +35,7 @@ def test_an_answer_lasts_no_longer_than_each_that_it_rests_on_is_heard(asked, si
     judge, state = asked(BETWEEN + "limit = 1\nevery = 10\n")
     (first,) = judge(state)
     assert first.verdict == "within"
+    assert judge(state)[0] is first
     state.refresh(0.1)
     assert judge(state)[0] is first
     state.hearings[silent].given = False

@@ -22,6 +22,7 @@ from seerob.recording import Recording
 from seerob.station import load
 
 FOLDER = Path(__file__).parents[1] / "workstations" / "ur10_rtde"
+ATTEMPTS = 5
 MOTION = FOLDER.parent / "ur10_assembly" / "motion" / "cycle.xlsx"
 
 
@@ -52,19 +53,23 @@ def at_port(folder: Path, port: int) -> Path:
 def test_the_live_workstation_runs_decided_and_is_reported(tmp_path, capsys):
     with emulator() as port:
         file = at_port(tmp_path, port)
-        run = ["run", str(file), "--port", "0", "--seconds", "1", "-o", str(tmp_path / "run")]
-        assert cli.main(run) == Exit.WITHIN
-    said = capsys.readouterr().out
+        for attempt in range(ATTEMPTS):
+            folder = tmp_path / f"run {attempt}"
+            ended = cli.main(["run", str(file), "--port", "0", "--seconds", "1", "-o", str(folder)])
+            said = capsys.readouterr().out
+            if "behind real time" not in said:
+                break
+            # What a machine that cannot keep up says of itself: a busy one is asked again.
+            assert ended in (Exit.WITHIN, Exit.UNDECIDED)
+    assert ended == Exit.WITHIN
     assert "preliminary until it is confirmed on the controller" in said
     assert "undecided" not in said
-    recording = Recording.open(tmp_path / "run" / "run.mcap")
+    recording = Recording.open(folder / "run.mcap")
     assert {type(s).__name__ for tick in recording.ticks() for s in tick.samples} == {
         "JointSample",
         "SignalSample",
     }
-    assert (
-        cli.main(["report", str(tmp_path / "run" / "run.mcap"), "-o", str(tmp_path / "again")]) == Exit.WITHIN
-    )
+    assert cli.main(["report", str(folder / "run.mcap"), "-o", str(tmp_path / "again")]) == Exit.WITHIN
     assert "changed" not in capsys.readouterr().out
 
 

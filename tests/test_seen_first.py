@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from made_cell import FLOATING, made, state_at
 from seerob.human.skeleton import BONES
 from seerob.judging import Judge
+from seerob.partly_seen import seen_first
+from seerob.snapshot import Result, Verdict
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 RIGHT = frozenset(bone for bone in BONES if bone.startswith("right_"))
@@ -77,3 +81,44 @@ def test_an_estimate_that_the_file_accepts_may_be_off_by_so_much(tmp_path, accep
         hearing.bones = dict.fromkeys(BONES, (0.0, 0.0))
         hearing.observed[:] = [(0.0, frozenset(BONES) - {"head"})]
         assert Judge(station.bound)(state)[0].verdict == verdict
+
+
+def answering(verdict, reason):
+    return lambda state: Result(name="it", verdict=verdict, reason=reason)
+
+
+def losing(*lost):
+    bodies = [SimpleNamespace(name=f"b{i}") for i in range(20)]
+    return SimpleNamespace(lost_bodies=lambda _: lost, model=SimpleNamespace(bodies=bodies))
+
+
+@pytest.mark.parametrize(
+    ("lost", "named"),
+    [((0,), "b0"), ((0, 1, 2), "b0, b1, b2"), ((0, 1, 2, 3), "b0, b1, b2 and 1 more")],
+)
+@pytest.mark.parametrize("part", [Verdict.EXCEEDED, Verdict.WITHIN, Verdict.UNDECIDED, None])
+def test_three_that_may_be_elsewhere_are_named_and_the_rest_counted(lost, named, part):
+    whole = answering(Verdict.UNDECIDED, "whole")
+    asked = seen_first(tuple(range(20)), whole, lambda _: part and answering(part, "part"))
+    told = f"part; without {named}, which may be elsewhere" if part is Verdict.EXCEEDED else "whole"
+    assert asked(losing(*lost)).reason == told
+    assert asked(losing()).reason == "whole"
+
+
+def test_a_question_is_made_once_for_each_of_the_last_sixteen_sets():
+    made_for = []
+    asked = seen_first((0,), answering(None, ""), made_for.append)
+    for k in [*range(16), *range(16), 16, 1, 0]:
+        asked(losing(k))
+    assert made_for == [(k,) for k in [*range(17), 0]]
+
+
+@pytest.mark.parametrize("observed", [set(), {"left_hand"}])
+def test_of_whom_nothing_is_seen_nothing_is_known(tmp_path, observed):
+    """Across the ankles of a person who is seen before or never: no bone is left to ask about."""
+    station = made(tmp_path, FLOATING + PERSON + CELL.format(z=0.1) + NEAR)
+    state = state_at(station)
+    state.hearings["op"].observed[:] = [(0.0, frozenset(observed)), (0.1, frozenset())]
+    (found,) = Judge(station.bound)(state)
+    assert found.verdict == "undecided"
+    assert "no device sees" in found.reason

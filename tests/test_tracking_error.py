@@ -19,6 +19,17 @@ AREA = '[[areas]]\nname = "zone"\nshape = { box = [1, 1, 3] }\n'
 MAT = (
     '[[sensors]]\nname = "mat"\npressure_mat = { corners = [[0, -0.5], [0.5, -0.5], [0.5, 0.5], [0, 0.5]] }\n'
 )
+SSM = """
+[[safety]]
+kind = "separation"
+name = "ssm"
+between = ["arm", "op"]
+stop = { reaction = 0.01, stopping = 0.01 }
+human_speed = 1.6
+intrusion = 0
+human_uncertainty = 0
+robot_uncertainty = 0
+"""
 HEAD, HAND = "op/head", "op/right_hand"
 
 
@@ -82,6 +93,22 @@ def test_what_no_device_sees_is_off_by_what_the_file_accepts_or_by_more(tmp_path
         )
 
 
+def test_a_bone_between_two_that_are_seen_ends_where_its_parent_does(tmp_path):
+    """An elbow of which a device says nothing: at the end of the upper arm, however that is turned."""
+    station, state = twin(tmp_path)
+    shoulder, elbow = (
+        state.positions[next(b.index for b in station.model.bodies if b.name == f"op/left_{bone}")]
+        for bone in ("upper_arm", "forearm")
+    )
+    arm = {"left_upper_arm": (0.01, 0.2), "left_hand": (0.03, None)}
+    for unseen in ({}, {"left_forearm": (None, None)}):
+        state.hearings["op"].bones = arm | unseen
+        found = off(station, state, "op/left_forearm", "op/left_hand", "op/right_forearm")
+        assert found == pytest.approx([0.01 + 0.2 * np.linalg.norm(elbow - shoulder), 0.03, 0])
+    state.hearings["op"].bones = {"left_upper_arm": (0.01, 0.2)}
+    assert off(station, state, "op/left_forearm") == 0
+
+
 def test_the_input_that_decides_is_named_in_millimetres():
     assert str(tracking(0.0123)) == "tracking of the person ± 12.3 mm"
 
@@ -91,8 +118,9 @@ def test_the_input_that_decides_is_named_in_millimetres():
     [
         AREA + '[[safety]]\nkind = "safety_area"\nname = "it"\narea = "zone"\nof = "op"\n',
         MAT + '[[safety]]\nkind = "pressure_mat"\nname = "it"\nsensor = "mat"\nof = "op"\n',
+        SSM + '[[safety]]\nkind = "separation_area"\nname = "it"\nseparation = "ssm"\nof = "op"\n',
     ],
-    ids=["safety_area", "pressure_mat"],
+    ids=["safety_area", "pressure_mat", "separation_area"],
 )
 def test_the_room_is_that_of_the_nearest_and_whoever_may_be_inside_leaves_it_open(tmp_path, criterion):
     station, state = twin(tmp_path, criterion)
@@ -100,13 +128,12 @@ def test_the_room_is_that_of_the_nearest_and_whoever_may_be_inside_leaves_it_ope
     def asked(**bones):
         state.hearings["op"].bones = bones
         state.refresh(0.0)
-        (found,) = Judge(station.bound)(state)
-        return found
+        return Judge(station.bound)(state)[-1]
 
     exact = asked()
     assert exact.verdict == "within"
-    # The pelvis is farther than the nearest; off by 1 m it would still be outside, by 9 m it may be inside.
-    for away, verdict, who in ((1.0, "within", exact.reason), (9.0, "undecided", "pelvis")):
+    # The pelvis is farther than the nearest; off by 0.9 m it would still be outside, by 9 m it may be inside.
+    for away, verdict, who in ((0.9, "within", exact.reason), (9.0, "undecided", "pelvis")):
         found = asked(pelvis=(away, 0.0))
         assert (found.value, found.verdict) == (exact.value, verdict)
         assert who in found.reason

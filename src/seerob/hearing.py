@@ -71,7 +71,7 @@ class Hearing:
             return "nothing heard yet"
         age = t - self.heard[k - 1][0]
         if age > self.timeout + SLACK:
-            return f"not heard for {age:.2f} s (time-out {self.timeout:g} s)"
+            return f"not heard for {age:.2f} s (time-out {self.timeout:.3g} s)"
         return next((reason for _, reason in self.heard[k - 1 : k + 1] if reason), "")
 
     def doubted(self, t: float) -> tuple[PartDoubt, ...]:

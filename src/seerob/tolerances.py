@@ -85,4 +85,4 @@ def deciding(tolerances: Sequence[Tolerance], widths: Array) -> str:
     if not len(tolerances):
         return ""
     # What is infinite by more than one input is by the first.
-    return f"decided by {tolerances[int(np.nan_to_num(widths, nan=np.inf).argmax())]}"
+    return f"decided by {tolerances[int(np.nan_to_num(widths, nan=np.inf, posinf=np.inf).argmax())]}"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mutation.operators import mutants, mutated
+from mutation.operators import SPOKEN, mutants, mutated
 from mutation.session import PACKAGE, put_in
 from seerob.criterion import judge
 from seerob.verdict import Verdict
@@ -52,6 +52,25 @@ def test_each_mutant_is_one_change():
     texts = {ast.unparse(mutated(SOURCE, mutant)) for mutant in found}
     assert len(texts) == len(found)
     assert ast.unparse(ast.parse(SOURCE)) not in texts
+
+
+def test_what_is_left_alone_is_left_alone_by_its_own_name():
+    text = "def basis(v): return v < 1\nclass Presence:\n    def _told(self, v): return v < 1\n"
+    other = "class Other:\n    def _told(self, v): return v < 1\n"
+    assert mutants(text, "made.py") == []
+    assert {m.function for m in mutants(text + other, "made.py")} == {"Other._told"}
+    trees = [ast.parse(path.read_text("utf-8")) for path in (PACKAGE / "sensors").glob("*.py")]
+    trees += [ast.parse(path.read_text("utf-8")) for path in (PACKAGE / "safety").glob("*.py")]
+    found = {name for tree in trees for name in _functions(tree)}
+    assert found >= set(SPOKEN)
+
+
+def _functions(tree):
+    """Names of functions, and of methods with and without their class."""
+    for node in tree.body:
+        for part in (node, *(node.body if isinstance(node, ast.ClassDef) else ())):
+            if isinstance(part, ast.FunctionDef):
+                yield from {part.name, f"{getattr(node, 'name', '')}.{part.name}"}
 
 
 def test_a_default_is_changed_where_the_function_keeps_it(monkeypatch):

@@ -44,6 +44,21 @@ def test_of_two_areas_the_one_that_is_entered_or_near_is_named(tmp_path):
         assert (a.verdict, "one" in a.reason, who in a.reason) == (verdict, True, True)
 
 
+@pytest.mark.parametrize(
+    ("x", "verdict", "reason"), [(0.75, "exceeded", "one"), (0.75 + 1e-9, "within", "one")]
+)
+def test_what_touches_an_area_is_in_it(tmp_path, x, verdict, reason):
+    """A cube of 1 m and one of 1/2 m: figures without rounding. Of one area the reason names none."""
+    text = ZONE.replace("sphere = 0.5", "box = [1, 1, 1]") + BOX.format(name="two", at=[9, 0, 0])
+    text += BOX.replace("0.2, 0.2, 0.2", "0.5, 0.5, 0.5").format(name="one", at=[x, 0, 0])
+    a = results_at(made(tmp_path, text + WATCH.format(area='"zone"')))["a"]
+    assert (a.verdict, a.reason) == (verdict, reason)
+    assert a.value == pytest.approx(0, abs=2e-3)
+    both = results_at(made(tmp_path / "both", text + WATCH.format(area='["zone", "zone"]')))["a"]
+    assert both.verdict == verdict
+    assert both.reason.startswith("one in zone")
+
+
 @pytest.mark.parametrize("name", ["one", "arm", "arm/l2"])
 def test_only_areas_are_areas(tmp_path, name):
     text = (

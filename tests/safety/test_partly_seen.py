@@ -68,6 +68,9 @@ def test_what_is_seen_exceeds_by_itself_in_every_criterion(tmp_path):
         assert partly[kind].verdict == "exceeded", kind
         assert "without op/head" in partly[kind].reason, kind
     assert partly["S"].verdict == "exceeded"
+    for kind in ("safety_area", "separation_area"):
+        names = {part.name for part in whole[kind].parts} - {part.name for part in partly[kind].parts}
+        assert names == {"op/head"}, kind
     names = {part.name for part in partly["power_and_force"].parts}
     assert "Skull and forehead" not in names
     assert {"Skull and forehead", "Chest"} <= {part.name for part in whole["power_and_force"].parts}

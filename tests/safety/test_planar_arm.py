@@ -103,6 +103,16 @@ def test_on_the_limit_is_within_and_the_next_number_is_not(tmp_path, table):
     assert (result.verdict, on.verdict, over.verdict) == (None, "within", "exceeded")
 
 
+def test_a_speed_is_drawn_at_its_point(tmp_path):
+    """The second link lies along y, from (1, 0); 1 rad/s about the base."""
+    table = 'kind = "velocity"\nat = "arm/l2"\noffset = [0.5, 0.1, 0]'
+    (found,) = judged(tmp_path, [table], pose=((0.0, np.pi / 2), (1.0, 0.0)))
+    (arrow,) = found.markers
+    assert found.value == pytest.approx(np.hypot(0.9, 0.5))
+    assert arrow.origin == pytest.approx((0.9, 0.5, 0))
+    assert np.divide(arrow.vector, 0.5) == pytest.approx((-0.5, 0.9, 0))
+
+
 @pytest.mark.parametrize(("limit", "verdict"), [(0.1, "exceeded"), (0.0, "within")])
 def test_planar_arm_cannot_move_out_of_its_plane(tmp_path, limit, verdict):
     (result,) = judged(tmp_path, [f'kind = "manipulability"\nat = "arm"\nlimit = {limit}'])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob.engine import Engine
 from seerob.errors import InputError, UnknownName
 from seerob.judging import Judge
 from seerob.volumes.offset_shell import offset_shell
@@ -84,6 +85,12 @@ def test_what_separation_does_not_know_leaves_it_undecided(tmp_path):
     assert "intrusion" in found.reason
 
 
+def test_of_a_robot_that_is_not_heard_it_says_what_it_would_have_bounded(tmp_path):
+    station = made(tmp_path, CELL + AREA.format(of="post"), {"arm.urdf": two_r()})
+    found = {result.name: result for result in Judge(station.bound)(Engine(station.model).start())}["post"]
+    assert (found.verdict, found.value, found.unit, found.at_most) == ("undecided", None, "m", False)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [(('separation = "ssm"', 'separation = "sms"'), "ssm"), (('of = "post"', 'of = "arm"'), "itself")],
@@ -125,6 +132,7 @@ def test_who_is_inside_is_told_with_the_distance_by_which(tmp_path):
     assert (found.verdict, found.reason, found.limit, found.at_most) == ("exceeded", "post", 0.0, False)
     assert (post.name, post.verdict, post.limit, post.at_most) == ("post", "exceeded", 0.0, False)
     assert found.value == post.value == pytest.approx(room, abs=1e-9)
+    assert post.reason == f"{np.hypot(0.95, 1.1):.3f} m from arm/l2, S_p {S_p2:.3f} m"
     assert (largest.name, largest.value) == ("largest S_p", pytest.approx(S_p2, abs=1e-9))
     assert {found.unit, post.unit, largest.unit} == {"m"}
     lit = [m for m in found.markers if type(m).__name__ == "Segment"]
@@ -137,12 +145,12 @@ def test_the_picture_is_made_anew_when_it_is_old_or_the_verdict_changes(tmp_path
     station = made(tmp_path, CELL + FAR + POSTS, {"arm.urdf": two_r()})
     state = state_at(station, arm=((0.0, 0.0), (0.1, 0.0)))
     judge, shown = Judge(station.bound), []
-    for t, speed in ((0.0, 0.1), (0.05, 0.1), (0.1, 0.1), (0.15, 0.1), (0.12, 0.1), (0.01, 0.1), (0.02, 9.0)):
+    for t, speed in zip((0.0, 0.0, 0.05, 0.1, 0.15, 0.12, 0.01, 0.02), (0.1,) * 7 + (9.0,), strict=True):
         state.data.qvel[0] = speed
         state.refresh(t)
         shown.append(next(m for m in judge(state)[1].markers if type(m).__name__ == "Hull"))
     again = [new is not old for old, new in pairwise(shown)]
-    assert again == [False, True, False, False, True, True]
+    assert again == [False, False, True, False, False, True, True]
     assert [hull.verdict for hull in shown[-2:]] == ["within", "exceeded"]
 
 
@@ -161,3 +169,19 @@ def test_a_surface_that_may_stick_out_leaves_the_border_open(tmp_path):
     assert set(told.values()) == {"exceeded", "undecided", "within"}
     for room, verdict in told.items():
         assert verdict == ("exceeded" if room <= 0 else "undecided" if room <= off else "within")
+
+
+@pytest.mark.parametrize(
+    ("x", "verdict"), [(2.75 - 1e-9, "exceeded"), (2.75, "exceeded"), (2.75 + 1e-9, "within")]
+)
+def test_the_border_is_inside(tmp_path, x, verdict):
+    """S_p of an arm at rest is 1 m/s for half a second; the arm ends at 2 m: figures without rounding."""
+    text = CELL.replace("0.1, stopping = 0.3", "0.25, stopping = 0.25").replace("1.6\n", "1.0\n")
+    text = text.replace("intrusion = 0.1", "intrusion = 0").replace("= 0.05", "= 0").replace("= 0.01", "= 0")
+    text = text.replace("box = [0.1, 0.1, 0.1]", "box = [0.5, 0.5, 0.5]").replace(
+        "[0, 2.5, 0]", f"[{x!r}, 0, 0]"
+    )
+    found = results(tmp_path, text + AREA.format(of="post"), 0.0)["post"]
+    assert (found.verdict, found.reason) == (verdict, "post")
+    assert len(found.parts) == (2 if verdict == "exceeded" else 1)
+    assert found.parts[-1].value == 0.5

@@ -365,6 +365,8 @@ def test_toward_counts_what_comes_nearer_and_never_falls_below_standstill(tmp_pa
     toward = separation(tmp_path / "t", SIMULATED + ', direction = "toward"', q=q, x=8.0)
     assert terms(toward)[0] == pytest.approx(terms(path)[0])
     ways = [r_s[1] + r_s[2] for r_s in (terms(path), terms(toward))]
+    assert 0 <= terms(toward)[1] <= terms(path)[1] + 1e-12
+    assert terms(toward)[2] >= 0
     assert ways[1] <= ways[0] + 1e-12
     if nearer:
         end = separation(tmp_path / "e", SIMULATED, q=(q1 + 0.1 + 0.0625, 0.0), x=8.0, qd=(0.0, 0.0))
@@ -395,6 +397,53 @@ def test_toward_misses_nothing_between_the_instants_it_looks_at(tmp_path, monkey
     found = stop_models.approach(stopped, state, gap)
     assert (found >= loss - 1e-9).all()
     assert (found <= stopped.ways.sum(axis=0) + 1e-9).all()
+
+
+@pytest.mark.parametrize("instants", [2, 5, 10**6])
+def test_toward_is_the_least_distance_looked_at_and_what_the_ways_between_leave_open(
+    tmp_path, monkeypatch, instants
+):
+    """Between two instants a part comes nearer by no more than half of what its way leaves over."""
+    cell = station(tmp_path, SIMULATED, x=3.5)
+    robot = cell.model.robot("arm")
+    gap = cell.model.gap(cell.model.select("op"), robot.moving)
+    state = state_at(cell, arm=((-0.6, 0.0), (2.5, 0.0)))
+    stopped = StopSimulation(cell.model, robot, np.array([15.0, 9.0]), gap.b).stop(state, 0.1)
+    K = len(stopped.t)
+    rows = np.unique(np.linspace(0, K - 1, min(K, instants)).round().astype(int))
+    assert len(rows) == min(K, instants) > 1
+    rotations, positions, seen = state.rotations.copy(), state.positions.copy(), []
+    for row in rows:
+        rotations[list(gap.b)], positions[list(gap.b)] = stopped.rotations[row], stopped.positions[row]
+        seen.append(gap.query.per_body(rotations, positions).distance.copy())
+    wanted = []
+    for part, distances in enumerate(np.transpose(seen)):
+        least = distances.min()
+        for a, b, near, then in zip(rows, rows[1:], distances, distances[1:], strict=False):
+            way = stopped.ways[a:b, part].sum()
+            least = min(least, (near + then - way) / 2)
+        wanted.append(max(distances[0] - least, 0.0))
+    monkeypatch.setattr(stop_models, "INSTANTS", instants)
+    assert stop_models.approach(stopped, state, gap) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_what_a_simulated_stop_says_of_itself(tmp_path):
+    """Far away the present speeds hold, and faster ones are not searched for: a simulation takes long."""
+    path = separation(tmp_path / "p", SIMULATED, x=9.0)
+    assert "whole path" in path.basis.formula
+    share = part(path, "share of the present speed")
+    assert (share.value, share.reason) == (1.0, "or more")
+    toward = separation(tmp_path / "t", SIMULATED + ', direction = "toward"', x=9.0)
+    assert "loss of distance" in toward.basis.formula
+    one = two_r().replace('effort="1000.0" ', "", 1)
+    for folder, urdf, origin, said in (
+        ("a", two_r(effort=50.0), "estimated", "0.8 of the torque limits"),
+        ("b", one, "missing", "0.8 of the torque limits"),
+    ):
+        S = separation(tmp_path / folder, 'reaction = 0.1, model = "simulated"', urdf=urdf, x=9.0)
+        (brakes,) = (i for i in S.basis.inputs if i.name == "brake torques")
+        assert (brakes.origin, said in brakes.source) == (origin, True)
+        assert "not given" not in brakes.source
 
 
 def test_simulated_stop_without_rotor_inertia_is_undecided_above_and_exceeded_below(tmp_path):

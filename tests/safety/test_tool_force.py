@@ -311,3 +311,12 @@ def test_an_uncertainty_that_is_no_number_is_refused_whoever_gives_it(tmp_path):
     model = made(tmp_path, TWO_R, PLANAR["files"]).model
     with pytest.raises(InputError, match="torque_uncertainty"):
         ToolForce(name="f", at="arm", torque_uncertainty=(1.0, np.nan)).bind(model)
+
+
+def test_masses_that_cannot_be_are_refused_where_torques_hold_them_and_only_there(tmp_path):
+    arm = {**PLANAR, "files": {"arm.urdf": two_r(masses=(0.0, 1.0))}}
+    with pytest.raises(InputError, match="force needs it"):
+        run(tmp_path / "a", "", (1.0, 2.0), **arm)
+    (found,) = run(tmp_path / "b", 'torques = "external"\n', (1.0, 2.0), ticks=1, **arm)
+    # F = J⁻ᵀ τ: F_x = −τ2, F_y = τ1 − τ2.
+    assert found.value == pytest.approx(np.hypot(2.0, 1.0), rel=1e-6)

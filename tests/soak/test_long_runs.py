@@ -1,24 +1,30 @@
-"""Hours of run time with every sink: memory does not grow.
+"""Hours of run time with every sink and a page that looks on: memory does not grow.
 
-``SEEROB_SOAK_HOURS`` scales the long form.
+``SEEROB_SOAK_HOURS`` scales the long form; its figures are printed with ``-rP``.
 """
 
 import gc
 import os
+import threading
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from websockets.exceptions import ConnectionClosed
 
 import seerob as sr
 from seerob.recording import Recording
+from seerob.server.live import LiveView
 from seerob.sinks.dossier import Dossier
 from seerob.sinks.excel import Excel
 from seerob.sinks.recorder import Recorder
+from seerob.snapshot import Snapshot
+from server.frames import Visitor
 from soak.cut_short import workstation
 
 SPARE = 48 * 2**20
-"""What allocators, the newest block of each column, and the recorder's index may take."""
+"""What allocators, the newest block of each column, and the recorder's index may take [byte]."""
 
 
 def resident():
@@ -31,19 +37,35 @@ def resident():
 
 
 class Watched(Iterator):
-    """Ticks without samples, and the memory at the first tenth and at the end, before files are written."""
+    """Ticks without samples, and the memory after each eighth, the last before files are written."""
 
     def __init__(self, ticks):
-        self.left, self.total, self.early, self.late = ticks, ticks, None, None
+        self.done, self.total, self.memory = 0, ticks, []
 
     def __next__(self):
-        if self.left == 0:
-            self.late = resident()
+        if self.done > 0 and self.done * 8 // self.total > (self.done - 1) * 8 // self.total:
+            self.memory.append(resident())
+        if self.done == self.total:
             raise StopIteration
-        if self.early is None and self.left <= 0.9 * self.total:
-            self.early = resident()
-        self.left -= 1
+        self.done += 1
         return ()
+
+
+class Onlooker(threading.Thread):
+    """A page that looks on until the server is gone.
+
+    Args:
+        server: Of the page.
+    """
+
+    def __init__(self, server):
+        super().__init__()
+        self.page, self.seen = Visitor(server), 0
+
+    def run(self):
+        with self.page, suppress(ConnectionClosed):
+            while True:
+                self.seen += isinstance(self.page.read(60.0), Snapshot)
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="resident memory is read from /proc")
@@ -57,11 +79,19 @@ class Watched(Iterator):
 def test_memory_does_not_grow(tmp_path, hours):
     station = sr.load(workstation(tmp_path / "cell"))
     feed = Watched(round(hours * 3600 / station.workstation.engine.tick))
-    summary = station.run(
-        feed=feed, folder=tmp_path, sinks=[Recorder(lossless=True), Dossier(pictures=0), Excel()]
-    )
+    sinks = [Recorder(lossless=True), Dossier(pictures=0), Excel()]
+    scene = station.scene(with_sources=False)
+    with LiveView(scene=scene, meshes=station.model.meshes, port=0) as view:
+        looking = Onlooker(view.server)
+        looking.start()
+        summary = station.run(feed=feed, folder=tmp_path, sinks=sinks, writers=[view], scene=scene)
+    looking.join(60.0)
+    memory = ", ".join(f"{m / 2**20:.1f}" for m in feed.memory)
+    size = (tmp_path / "run.mcap").stat().st_size / 2**20
+    print(f"{hours:g} h: {memory} MiB after each eighth, file of {size:.1f} MiB, {looking.seen} frames shown")
+    assert looking.seen > 10
     assert summary.ticks == feed.total
-    assert feed.late - feed.early < SPARE
+    assert max(feed.memory) - feed.memory[0] < SPARE
     # The same log, not a copy of it.
     assert all(len(series) == feed.total for series in summary.results.values())
     recording = Recording.open(tmp_path / "run.mcap")

@@ -239,6 +239,21 @@ def test_rows_that_are_wrong_are_left_out_and_told(tmp_path):
     assert "12 frames are there, 999999999999 are announced" in told(fewer)
 
 
+def test_frames_that_are_in_another_town_are_left_out_and_told(tmp_path):
+    def dotless(text):
+        lines = text.rstrip().split("\n")
+        lines[-3:-1] = [line.replace(".", "", 1) for line in lines[-3:-1]]
+        return "\n".join(lines)
+
+    captured = read(made(tmp_path / "x.bvh", change=dotless))
+    frames = list(captured.frames)
+    assert len(frames) == captured.count == FRAMES - 2
+    assert max(np.abs(frame.positions).max() for frame in frames) < 3
+    assert "2 frames that shift joints by more than 100 m left out" in told(captured)
+    with pytest.raises(InputError, match="every frame shifts joints by more than 100 m"):
+        read(made(tmp_path / "y.bvh", scale=1e5), unit=Unit.CM)
+
+
 # -- files that are wrong ------------------------------------------------------------------------
 
 

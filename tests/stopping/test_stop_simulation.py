@@ -127,10 +127,15 @@ def test_ways_bound_the_path_of_every_corner_and_never_exceed_full_speed_for_the
     assert (found.S_s >= v * found.T_s * 0.3).all()
 
 
-@pytest.mark.parametrize("shape", ['box size="1 0.1 0.1"', 'sphere radius="0.2"'])
+PROUD = '<visual><origin xyz="0.5 0 0"/><geometry><box size="1.04 0.14 0.14"/></geometry></visual>'
+
+
+@pytest.mark.parametrize("shape", ['box size="1 0.1 0.1"', 'sphere radius="0.2"', "proud"])
 def test_speeds_are_those_of_the_state_in_any_pose(tmp_path, shape):
     rng = np.random.default_rng(1)
     urdf = two_r().replace('box size="1 0.1 0.1"', shape)
+    if shape == "proud":
+        urdf = two_r().replace("</collision></link>", f"</collision>{PROUD}</link>")
     for i in range(5):
         q, qd = rng.uniform(-2, 2, 2), rng.uniform(-2, 2, 2)
         stopped, state, _ = stop(tmp_path / str(i), urdf, q, qd, [50.0, 50.0])
@@ -172,3 +177,62 @@ def test_braked_minimises_what_it_says():
         slips = after != 0
         assert torque[slips] == pytest.approx(-(B * np.sign(after))[slips], abs=1e-5)
         assert (np.abs(torque) <= B + 1e-5).all()
+
+
+@pytest.mark.parametrize(("reaction", "steps"), [(0.004, 1), (0.1, 10), (0.105, 11)])
+def test_while_reacting_it_goes_on_as_it_moves_in_steps_of_ten_milliseconds(tmp_path, reaction, steps):
+    q, qd = np.array([0.3, 0.2]), np.array([1.0, -2.0])
+    stopped, _, _ = stop(tmp_path, two_r(), q, qd, [50.0, 50.0], reaction=reaction, scale=0.5)
+    assert stopped.braking == steps
+    t = stopped.t[: steps + 1]
+    np.testing.assert_allclose(t, np.linspace(0, reaction, steps + 1), rtol=1e-12)
+    np.testing.assert_allclose(stopped.q[: steps + 1], q + 0.5 * t[:, None] * qd, rtol=1e-12)
+    np.testing.assert_allclose(stopped.qd[: steps + 1], np.tile(0.5 * qd, (steps + 1, 1)))
+    elbow = np.column_stack([np.cos(stopped.q[:, 0]), np.sin(stopped.q[:, 0]), 0 * stopped.t])
+    np.testing.assert_allclose(stopped.positions[:, 1], elbow, atol=1e-12)
+
+
+def test_what_follows_a_joint_follows_it_while_it_stops(tmp_path):
+    """The elbow turns twice as far the other way, from 0.3 rad on."""
+    urdf = two_r(mimic='<mimic joint="j1" multiplier="-2" offset="0.3"/>')
+    stopped, _, _ = stop(tmp_path, urdf, [0.2], [1.0], [30.0], gravity=False)
+    angle = np.arctan2(stopped.rotations[:, 1, 1, 0], stopped.rotations[:, 1, 0, 0])
+    np.testing.assert_allclose(angle, 0.3 - stopped.q[:, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("seconds", "ends"), [(4.98, True), (5.02, False)])
+def test_a_stop_of_more_than_five_seconds_is_none(tmp_path, seconds, ends):
+    """Of the brakes: what is lost while reacting is not counted."""
+    brakes = [3.0 * INERTIA / seconds]
+    if ends:
+        stopped, _, _ = stop(tmp_path, ONE, [0.0], [3.0], brakes, gravity=False)
+        assert stopped.T_s == pytest.approx(seconds, abs=1.01 * STEP)
+        return
+    with pytest.raises(Undecided, match="to a stand within 5 s"):
+        stop(tmp_path, ONE, [0.0], [3.0], brakes, gravity=False)
+
+
+def test_it_does_not_stand_while_one_joint_sinks(tmp_path):
+    """In a vertical plane: the shoulder is held, the elbow's brake has half of what it needs."""
+    upright = two_r().replace('axis xyz="0 0 1"', 'axis xyz="0 -1 0"')
+    stopped, _, _ = stop(tmp_path, upright, [0.0, 0.0], [0.0, 0.0], [100.0, G / 2])
+    assert (stopped.q[:, 0] == 0).all()
+    assert stopped.q[-1, 1] == pytest.approx(-brentq(lambda x: np.sin(x) / x - 0.5, 1, 3), abs=5e-3)
+    assert (stopped.qd[-1] == 0).all()
+
+
+def test_the_error_falls_with_the_square_of_the_step(tmp_path, monkeypatch):
+    """Where it stands, against a sixteenth of the step."""
+    ends = []
+    for k, step in enumerate((4e-3, 2e-3, 2.5e-4)):
+        monkeypatch.setattr("seerob.stopping.simulated.STEP", step)
+        stopped, _, _ = stop(
+            tmp_path / str(k), two_r(), [0.3, 0.9], [1.5, 1.0], [3.0, 0.5], gravity=False, reaction=1e-9
+        )
+        at = round(0.08 / step) + 1
+        assert (stopped.qd[at] > 0).all()
+        assert stopped.t[at] == pytest.approx(0.08 + 1e-9)
+        ends.append(np.append(stopped.q[at], stopped.qd[at]))
+    coarse, fine = (np.abs(end - ends[-1]).max() for end in ends[:2])
+    assert 3 < coarse / fine < 5.5, (coarse, fine)
+    assert fine < 1e-5

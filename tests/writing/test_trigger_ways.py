@@ -12,6 +12,7 @@ import pytest
 from msgspec.structs import replace as changed
 
 from amqtt_broker import broker
+from foreign_opcua import URI, foreign_opcua
 from live_story import wait_for
 from seerob import load
 from seerob.errors import InputError
@@ -149,6 +150,33 @@ def test_registers_are_not_written(tmp_path):
     station = made(tmp_path, coil(1), '{ table = "holding", at = 5, type = "bit", bit = 0 }')
     with pytest.raises(InputError, match="a trigger is written to a coil alone"):
         _ = station.sources
+
+
+# -- OPC UA -------------------------------------------------------------------------------------
+
+
+def test_a_node_of_another_makers_server_is_written(tmp_path):
+    nodes = {"fast": False, "other": False}
+    with foreign_opcua(nodes, writable=nodes) as (url, node):
+        station = made(tmp_path, f'kind = "opcua"\nurl = "{url}"', f'"nsu={URI};s=fast"')
+        edges(
+            station,
+            (Verdict.WITHIN, lambda: True),
+            (Verdict.EXCEEDED, lambda: node["fast"].read_value() is True),
+            (Verdict.WITHIN, lambda: node["fast"].read_value() is False),
+        )
+        assert node["other"].read_value() is False
+
+
+def test_a_node_that_its_server_protects_stays_as_it_is(tmp_path, caplog):
+    with foreign_opcua({"fast": False}) as (url, node):
+        station = made(tmp_path, f'kind = "opcua"\nurl = "{url}"', f'"nsu={URI};s=fast"')
+        edges(
+            station,
+            (Verdict.WITHIN, lambda: True),
+            (Verdict.EXCEEDED, lambda: "twin/fast" in caplog.text),
+        )
+        assert node["fast"].read_value() is False
 
 
 # -- MQTT ---------------------------------------------------------------------------------------

@@ -21,6 +21,8 @@ declare global {
       pose(name: string): { position: number[]; quaternion: number[] } | null;
       /** Colour of a score that a body is shown in, 0xrrggbb; null for its own or a verdict's. */
       tint(name: string): number | null;
+      /** Whether a body is shown as one that may be elsewhere. */
+      doubted(name: string): boolean;
       /** Where a point of the world (z up) [m] is on the screen [px]. */
       project(point: [number, number, number]): [number, number];
     };
@@ -52,6 +54,7 @@ function begin(element: HTMLElement): void {
     },
     pose: (name) => viewer.poseOf(name),
     tint: (name) => viewer.bodies.byName.get(name)?.tint ?? null,
+    doubted: (name) => viewer.bodies.byName.get(name)?.doubted ?? false,
     project: (point) => viewer.project(point),
   };
 }

@@ -58,6 +58,9 @@ BODY = [
     ("right leg", (0, -0.1, 0.86), (0, -0.1, 0.08), 0.075),
     ("left leg", (0, 0.1, 0.86), (0, 0.1, 0.08), 0.075),
 ]
+SILENT = (17.0, 18.0)
+"""When the robot is not heard [s]."""
+
 PARTS = [
     ("table", (-0.4, -0.6, 0.74), (0.9, 0.6, 0.8), (0.45, 0.36, 0.28, 1.0)),
     ("line/fixture/pin_1", (0.55, -0.2, 0.8), (0.59, -0.16, 0.9), (0.5, 0.55, 0.6, 1.0)),
@@ -136,6 +139,7 @@ def workstation() -> tuple[Scene, dict[str, bytes]]:
             name=f"ur10/{name}",
             role="robot",
             owner="ur10",
+            mover="ur10",
             mesh=keep(capsule_mesh((0, 0, 0), end, radius, color=METAL)),
             triangles=800,
             mass=3.0 if name == "forearm_link" else None,
@@ -310,5 +314,8 @@ def snapshot(seq: int, t: float) -> Snapshot:
         poses=np.array(block, "<f4").tobytes(),
         joints={"ur10": joints(t)},
         tracking={"ur10": 1e-4},
+        doubts={"ur10": f"ur10: not heard for {t - SILENT[0]:.2f} s (time-out 0 s)"}
+        if SILENT[0] <= t < SILENT[1]
+        else {},
         results=(*results, *made_up_person.results(t, speed, distance)),
     )

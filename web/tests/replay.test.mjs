@@ -34,6 +34,24 @@ test("a click on the strip moves the cursor, the room and the numbers", async ()
   assert.equal(await page.locator(".strip").getAttribute("aria-valuenow"), String(t));
 });
 
+test("who may be elsewhere is hatched, in the tree, and in the legend; the rest is not", async () => {
+  const box = await page.locator(".strip").boundingBox();
+  const visit = async (t) => {
+    await page.mouse.click(box.x + (box.width * t) / 20, box.y + box.height / 2);
+    await page.waitForFunction((to) => Math.abs(window.seerob.t - to) < 0.1, t);
+  };
+  const doubted = (name, is) => page.waitForFunction(([n, d]) => window.seerob.doubted(n) === d, [name, is]);
+  await visit(17.5);
+  await doubted("ur10/forearm_link", true);
+  await doubted("operator/right hand", false);
+  await page.getByRole("img", { name: /^may be elsewhere: ur10: not heard for 0\.[45]\d s/ }).waitFor();
+  assert.equal(await page.locator(".item .doubt").count(), 1);
+  await page.locator(".legend").getByText("may be elsewhere").waitFor();
+  await visit(10);
+  await doubted("ur10/forearm_link", false);
+  await page.waitForFunction(() => !document.querySelector(".item .doubt, .doubt-key"));
+});
+
 test("arrows step by one snapshot, with shift by a second", async () => {
   const t = await settled(page);
   await page.keyboard.press("ArrowRight");

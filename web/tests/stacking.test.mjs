@@ -4,13 +4,13 @@ import { load } from "./source.mjs";
 
 const { stackCaptions } = await load("markers/stacking");
 
-// Screen coordinates in and out: the projection is the identity on a square of 200 px.
-const view = { camera: { fov: 90, aspect: 1 }, pixel: 0.01 };
+// Screen coordinates in and out: the projection is the identity on a square of 800 px.
+const view = { camera: { fov: 90, aspect: 1 }, pixel: 1 / 400 };
 
 function captionAt(x, y, widthPx) {
   const caption = { lifted: 0, widthPx, heightPx: 24, object: {} };
   caption.object.getWorldPosition = (to) => {
-    to.set(x / 100, y / 100, 0);
+    to.set(x / 400, y / 400, 0);
     to.project = () => to;
     return to;
   };
@@ -43,4 +43,15 @@ test("no two captions cover each other, and one alone stays where it belongs", (
       }
     }
   }
+});
+
+test("at the upper edge of the room captions go down, not behind the tools", () => {
+  const all = Array.from({ length: 5 }, () => captionAt(0, 300, 60));
+  stackCaptions(
+    all.map((c) => c.caption),
+    view,
+  );
+  const places = all.map((c) => 300 + c.caption.lifted).sort((a, b) => a - b);
+  assert.ok(places.at(-1) + 24 <= 400 - 50);
+  for (const [i, y] of places.slice(1).entries()) assert.ok(y - places[i] >= 24, `${places}`);
 });

@@ -74,7 +74,8 @@ def marker_stature(captured: Captured, bound: Bound, *, name: str) -> MarkerStat
         raise InputError.at(name, "stature", what, "give --stature in metres, such as 1.75")
     frames = spread(captured, FRAMES)
     parts = [frames[k::PARTS] for k in range(PARTS)]
-    off = np.array([[_off(part, *bound(float(s))) for s in STATURES] for part in parts])
+    bodies = [bound(float(s)) for s in STATURES]
+    off = np.array([[_off(part, *body) for body in bodies] for part in parts])
     found = [_lowest(row) for row in (off.mean(axis=0), *off)]
     if not np.isfinite(found).all() or max(found) - min(found) > WIDEST:
         shown = ", ".join(f"{value:.2f}" if np.isfinite(value) else "none" for value in found[1:])

@@ -208,7 +208,7 @@ class Matrices:
     def at(self, shifts: Shifts) -> Array:
         """M at shifted inputs, shape (n, n): no less than it can be with 1, no more with −1."""
         found = self._at(shifts, 0)
-        if any(p.lost is not p.lost_at_most for p in self.parts) and np.linalg.eigvalsh(found)[0] <= 0:
+        if np.linalg.eigvalsh(found)[0] <= 0:
             found = self._at(shifts, 1)
         return found
 

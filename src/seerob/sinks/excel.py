@@ -30,10 +30,7 @@ _VERDICT_OF = {code: verdict for verdict, code in CODES.items()}
 
 
 class Excel(Sink, frozen=True, kw_only=True):
-    """Write results, joints and findings to an Excel workbook at the end of the run.
-
-    Numbers have 16 significant digits, of which Excel shows 15; the sink ``csv`` writes all of them.
-    """
+    """Write results, joints and findings to an Excel workbook at the end of the run, in 16 digits."""
 
     file: Annotated[str, Meta(pattern=r"^[^/\\]+\.xlsx$", description="a file name that ends in .xlsx")] = (
         "results.xlsx"
@@ -129,7 +126,7 @@ class ExcelWriter(AtEndWithResults):
                 self._tell(k + 1, steps)
             for one in _posture_safety.sides(self._scene, self.log) if self._motion_rows else ():
                 head, instants = _posture_safety.head(one), _posture_safety.rows(one, self._motion_rows)
-                sheets.add(f"posture, safety {one.person}", head, instants)
+                sheets.add(_beside(one), head, instants)
             for k, (name, table) in enumerate(self._motion.sheets()):
                 sheets.add(name, table.titles, table.rows())
                 self._tell(len(self.log) + k + 1, steps)
@@ -180,6 +177,9 @@ class ExcelWriter(AtEndWithResults):
         if self._every > self._scene.period and self._motion_rows and self._motion.people:
             text = "joints, bones and errors have a row"
             yield ["motion of people", f"{text} every {self._every:g} s; the sink csv has every tick"]
+        for one in _posture_safety.sides(self._scene, self.log) if self._motion_rows else ():
+            text = f"at most about {self._motion_rows} instants; extrema of every score and measure are kept"
+            yield [_beside(one), text]
         for name, table in self._motion.sheets():
             if table.thinned:
                 yield [name, f"thinned evenly from {table.offered} rows"]
@@ -188,6 +188,11 @@ class ExcelWriter(AtEndWithResults):
         for name, basis in self._bases.items():
             for i in basis.inputs:
                 yield [name, i.name, i.value, i.unit, i.origin.value, i.source]
+
+
+def _beside(one: _posture_safety.Sides) -> str:
+    """Name of the sheet of a person's posture and safety."""
+    return f"posture, safety {one.person}"
 
 
 _SUMMARY: list[Cell] = [

@@ -68,10 +68,9 @@ class Bvh:
         return np.asarray(np.isfinite(self.values).all(axis=1))
 
     def shifted_beyond(self, far: float) -> NDArray[np.bool_]:
-        """Rows with a position channel further than ``far`` from nought [unit of the file], shape (frames,)."""
+        """Rows whose position channels are more than ``far`` together [unit of the file], shape (frames,)."""
         columns = [column for joint in self.joints for _, column in joint.translations]
-        with np.errstate(invalid="ignore"):
-            return np.asarray((np.abs(self.values[:, columns]) > far).any(axis=1))
+        return np.asarray(np.abs(self.values[:, columns]).sum(axis=1) > far)
 
     def poses(self, rows: slice) -> tuple[Array, Array]:
         """Where the joints are, in the file's unit and axes.

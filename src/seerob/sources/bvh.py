@@ -128,11 +128,11 @@ def read(path: Path, *, unit: Unit = Unit.GUESS, up: Up = Up.GUESS, file: str = 
     """
     name = file or str(path)
     found = read_bvh(path, name)
-    said: list[Finding] = []
 
     def say(level: str, text: str) -> Finding:
         return Finding(level=level, subject=name, text=text)
 
+    said: list[Finding] = []
     length = chain(found)
     guessed = guess_unit(length)
     if unit is Unit.GUESS:
@@ -150,9 +150,9 @@ def read(path: Path, *, unit: Unit = Unit.GUESS, up: Up = Up.GUESS, file: str = 
     if (far := found.shifted_beyond(FAR / METRES[unit])).any():
         found.values[far] = np.nan
         if not found.whole().any():
-            what = f"in no frame the joints are within {FAR:g} m"
+            what = f"every frame shifts joints by more than {FAR:g} m"
             raise InputError.at(name, "unit", what, "is the unit right?")
-        said.append(say("warning", f"{far.sum()} frames with a joint shifted by more than {FAR:g} m left out"))
+        said.append(say("warning", f"{far.sum()} frames that shift joints by more than {FAR:g} m left out"))
     if up is Up.GUESS:
         up, clear = guess_up(found)
         text = f"{up} is taken as up: " + (

@@ -131,10 +131,11 @@ def _by_joint(
             if others is None:
                 raise Undecided(f"{name}: not in the stopping table, and stop.stopping is not given")
             return speed * others, others
-        if full[j] is None:
+        whole = full[j]
+        if not whole:
             raise Undecided(f"{name}: neither the stopping table nor the robot says what full speed is")
         share = _payload_share(table, robot, load)
-        way, time = joint_stop(entries[j], speed / (full[j] or 1.0), share, extension)
+        way, time = joint_stop(entries[j], speed / whole, share, extension)
         return min(way, speed * time), time
 
     def courses(state: State) -> At:
@@ -189,7 +190,7 @@ def _chain(model: Model, robot: Mechanism, body: Body) -> Array:
     """Joints of a robot that move a body, from the base outward, as rows of its coupling, shape (k,)."""
     found: list[int] = []
     at = body.mj
-    while at > 0:
+    while at:
         here = [row for row, dof in enumerate(robot.v_address) if model.mj.dof_bodyid[dof] == at]
         found = here + found
         at = int(model.mj.body_parentid[at])

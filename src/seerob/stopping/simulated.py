@@ -110,7 +110,7 @@ class StopSimulation:
         self._data.qpos[:] = state.data.qpos
         self._data.qvel[:] = 0.0
         trace = _Trace(self)
-        t, q, v = 0.0, state.q(self.robot).astype(float), scale * state.qd(self.robot)
+        q, v = state.q(self.robot).astype(float), scale * state.qd(self.robot)
         steps = int(np.ceil(reaction / COASTING_STEP - 1e-9))
         for k in range(steps):
             self._place(q + k * reaction / steps * v, v)

@@ -29,7 +29,7 @@ export class Caption {
   private readonly material: SpriteMaterial;
   private texture: CanvasTexture | null = null;
   private shown = "";
-  /** How much higher than where it belongs it is [px]. */
+  /** How much higher than where it belongs it is, negative for lower [px]. */
   liftedPx = 0;
 
   constructor(private readonly size: Size = "figure") {

@@ -44,7 +44,7 @@ export class Leaders {
   update(captions: Iterable<Caption>, { camera, pixel }: View): void {
     let count = 0;
     for (const caption of captions) {
-      if (caption.liftedPx < LEAST_PX || count === MOST) continue;
+      if (Math.abs(caption.liftedPx) < LEAST_PX || count === MOST) continue;
       caption.object.getWorldPosition(this.from);
       const depth = this.to.copy(this.from).sub(camera.position).length();
       this.to.setFromMatrixColumn(camera.matrixWorld, 1).multiplyScalar(caption.bottomPx * pixel * depth);

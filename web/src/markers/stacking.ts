@@ -1,10 +1,13 @@
-// Captions that would lie over each other on the screen are stacked upward, in a steady order.
+// Captions that would lie over each other on the screen are stacked upward, in a steady order; below where
+// they belong when the room ends above.
 
 import { Vector3 } from "three";
 import type { Caption } from "./caption";
 import type { View } from "./drawn";
 
 const GAP_PX = 2;
+/** Height of the tools at the upper edge of the room, and how far captions are above their points [px]. */
+const TOOLS_PX = 56;
 const at = new Vector3();
 
 interface Place {
@@ -14,12 +17,17 @@ interface Place {
   height: number;
 }
 
-/** Lift each caption above the ones before it that it would cover. */
+/** Lift each caption above the ones before it that it would cover, or lower it below them. */
 export function stackCaptions(captions: Iterable<Caption>, { camera, pixel }: View): void {
   const half = Math.tan((camera.fov * Math.PI) / 360) / pixel;
   const placed: Place[] = [];
   for (const caption of captions) {
     caption.object.getWorldPosition(at).project(camera);
+    // Beside the picture or behind the eye: nobody sees it, and there is no room to look for.
+    if (!(Math.abs(at.x) < 2 && Math.abs(at.y) < 2)) {
+      caption.lift(0);
+      continue;
+    }
     const place = {
       x: at.x * half * camera.aspect,
       y: at.y * half,
@@ -29,6 +37,12 @@ export function stackCaptions(captions: Iterable<Caption>, { camera, pixel }: Vi
     const from = place.y;
     for (let below = covered(placed, place); below; below = covered(placed, place)) {
       place.y = below.y + below.height;
+    }
+    if (place.y > from && place.y + place.height > half - TOOLS_PX) {
+      place.y = from - place.height;
+      for (let above = covered(placed, place); above; above = covered(placed, place)) {
+        place.y = above.y - place.height;
+      }
     }
     caption.lift(place.y - from);
     placed.push(place);

@@ -57,8 +57,8 @@ export class DoubtCaptions {
   }
 }
 
-// The time-out and the like are in the tree and the table.
+// The time-out, the consequences and the like are in the tree and the table.
 function shortened(name: string, reason: string): string {
-  const short = reason.replace(/ \([^()]*\)$/, "");
-  return short.startsWith(name) ? short : `${name}: ${short}`;
+  const own = reason.startsWith(`${name}: `) ? reason.slice(name.length + 2) : reason;
+  return `${name}: ${own.replace(/( \(|: ).*$/, "")}`;
 }

@@ -1,0 +1,125 @@
+"""Mass matrices at the ends of what centres of mass may be off: closed forms of one joint, bounds of two."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from seerob.mounting.mass_tolerances import MassTolerances
+from seerob.tolerances import Tolerance
+
+M, I_Z = 2.0, 0.05
+
+
+def one(kind, x):
+    """A link of 2 kg whose centre is x from its joint, with 0.05 kg·m² about itself."""
+    return (
+        '<robot name="one"><link name="base"/><link name="l1"><inertial>'
+        f'<origin xyz="{x} 0 0"/><mass value="{M}"/>'
+        f'<inertia ixx="{I_Z}" iyy="{I_Z}" izz="{I_Z}" ixy="0" ixz="0" iyz="0"/></inertial>'
+        '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>'
+        f'<joint name="j1" type="{kind}"><parent link="base"/><child link="l1"/><axis xyz="0 0 1"/>'
+        '<limit effort="100" velocity="10" lower="-1" upper="1"/></joint></robot>'
+    )
+
+
+@pytest.mark.parametrize("qd", [0.0, 1.0, -3.0])
+@pytest.mark.parametrize(
+    ("kind", "x", "way", "least", "most"),
+    [
+        ("revolute", 0.5, 0.1, M * 0.4**2 + I_Z, M * 0.6**2 + I_Z),
+        ("revolute", 0.0, 0.1, I_Z, M * 0.1**2 + I_Z),
+        ("revolute", 0.05, 0.1, I_Z, M * 0.15**2 + I_Z),
+        ("prismatic", 0.5, 0.1, 0.0, M),
+    ],
+)
+def test_one_joint_has_the_moment_of_a_centre_nearer_to_it_or_farther(
+    tmp_path, kind, x, way, least, most, qd
+):
+    """The lesser is never less than a body that weighs nothing; what slides does not ask where it is."""
+    cell = made(tmp_path, FLOATING + TWO_R + f"com_tolerance = {way}\n", {"arm.urdf": one(kind, x)})
+    robot = cell.model.robot("arm")
+    found = MassTolerances(cell.model, robot)
+    assert found.tolerances == (Tolerance("com_tolerance of arm", way, "m"),)
+    assert found.simplified(3.0, (1,)) == 3.0
+    at = found.matrices(state_at(cell, arm=([0.3], [qd]))).at
+    nominal = M if kind == "prismatic" else M * x**2 + I_Z
+    assert [at((side,))[0, 0] for side in (-1, 0, 1)] == pytest.approx([least, nominal, most], abs=1e-12)
+
+
+TOOL = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ sphere = 0.02 }}\n{}\n'
+DENSITY = 0.7 / (4 / 3 * np.pi * 0.02**3)
+
+
+def young(state, name, way, lighter, heavier):
+    """What is lost, lost at most and gained by the inequality of the module, with ε of the motion."""
+    model, robot = state.model, state.model.robot("arm")
+    body = model.mj.body(name).id
+    rows = np.zeros((2, 3, model.mj.nv))
+    mujoco.mj_jacBodyCom(model.mj, state.data, *rows, body)
+    J_c, J_w = rows[:, :, robot.v_address]
+    moved, turned = J_c.T @ J_c, way**2 * J_w.T @ J_w
+    v, w = np.linalg.norm(J_c @ state.qd(robot)), way * np.linalg.norm(J_w @ state.qd(robot))
+    if min(v, w) < 1e-12:
+        v, w = np.sqrt(np.trace(moved)), np.sqrt(np.trace(turned))
+    eps, m = w / v, float(model.mj.body_mass[body])
+    less = eps * moved + (1 / eps - 1) * turned if eps < 1 else moved
+    return (
+        lighter * m * less,
+        lighter * m * moved,
+        heavier * m * (eps * moved + (1 + 1 / eps) * turned),
+    )
+
+
+@pytest.mark.parametrize("qd", [(1.0, -2.5), (0.0, 0.0), (1.0, -1.0), (1.0, -1.999), (1.0, -2.0), (3.0, 1.0)])
+@pytest.mark.parametrize("q2", [0.0, np.pi / 2])
+def test_two_joints_are_within_youngs_inequality_for_their_motion(tool_cells, q2, qd):
+    """At rest, without turning, turning about itself, and nearly so; masses off as well."""
+    for cell, shares in tool_cells:
+        robot = cell.model.robot("arm")
+        state = state_at(cell, arm=((0.2, q2), qd))
+        found = MassTolerances(cell.model, robot)
+        assert [(str(t).split(" of")[0], t.unit) for t in found.tolerances] == [
+            *((key, "%") for key in shares), ("com_tolerance", "m"),
+        ]  # fmt: skip
+        off = sum(shares.values())
+        lost, at_most, gained = young(state, "grip", 0.02, 1 - off, 1 + off)
+        matrices, still, plain = found.matrices(state), (0,) * len(shares), state.mass_matrix(robot)
+        np.testing.assert_allclose(matrices.at((*still, 1)), plain + gained, atol=1e-12)
+        least = plain - lost
+        least = plain - at_most if np.linalg.eigvalsh(least)[0] <= 0 else least
+        np.testing.assert_allclose(matrices.at((*still, -1)), least, atol=1e-12)
+        if shares:
+            assert found.tolerances[0].half == pytest.approx(100 * off)
+            assert found.simplified(2.0, (1, 1)) == pytest.approx(2.0 + off * 0.7)
+
+
+@pytest.fixture(scope="module")
+def tool_cells(tmp_path_factory):
+    cells = []
+    for k, (mass, shares) in enumerate(
+        [
+            ("mass = 0.7", {}),
+            ("mass = 0.7", {"mass_tolerance": 0.2}),
+            (f"density = {DENSITY}", {"density_tolerance": 0.3}),
+        ]
+    ):
+        more = "\n".join([mass, "com_tolerance = 0.02", *(f"{key} = {s}" for key, s in shares.items())])
+        folder = tmp_path_factory.mktemp(str(k))
+        text = FLOATING + TWO_R + TOOL.format(more)
+        cells.append((made(folder, text, {"arm.urdf": two_r()}), shares))
+    return cells
+
+
+def test_a_bound_that_no_robot_can_have_gives_way_to_one_without_the_body(tmp_path):
+    """A heavy grip on light links that may be 0.6 m off: the lesser of the first bounds has no inverse."""
+    text = FLOATING + TWO_R + TOOL.format("mass = 3\ncom_tolerance = 0.6")
+    cell = made(tmp_path, text, {"arm.urdf": two_r(masses=(0.1, 0.1))})
+    state = state_at(cell, arm=((0.2, 0.3), (1.0, -1.2)))
+    plain = state.mass_matrix(cell.model.robot("arm"))
+    lost, at_most, _ = young(state, "grip", 0.6, 1, 1)
+    assert np.linalg.eigvalsh(plain - lost)[0] < 0 < np.linalg.eigvalsh(plain - at_most)[0]
+    least = MassTolerances(cell.model, cell.model.robot("arm")).matrices(state).at((-1,))
+    np.testing.assert_allclose(least, plain - at_most, atol=1e-12)

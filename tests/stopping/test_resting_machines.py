@@ -1,0 +1,61 @@
+"""Up to which speed what carries a robot, and what it carries, rests; and which results wait for it."""
+
+from __future__ import annotations
+
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from seerob.contact import impact_mass
+from seerob.contact.impact_mass import while_carriers_rest
+from seerob.errors import Undecided
+from seerob.snapshot import Result, Verdict
+from seerob.stopping import models
+from seerob.stopping.models import Stop, bind_stop
+
+AXIS = """
+[[machines]]
+name = "axis"
+shape = { box = [0.1, 0.1, 0.1] }
+mass = 2
+slide = { along = [1, 0, 0], lower = -1, upper = 1 }
+"""
+WALL = '[[parts]]\nname = "wall"\nshape = { box = [0.1, 1, 1] }\nat = { position = [9, 0, 0] }\n'
+SPEEDS = [(0.0, True), (models.RESTS, True), (-models.RESTS, True), (1.05e-3, False), (-1.05e-3, False)]
+
+
+def moving(cell, speed):
+    state = state_at(cell, arm=((0.0, 0.0), (0.1, 0.0)), axis=([0.0], [0.0]))
+    state.data.qvel[cell.model.mechanisms["axis"].v_address] = speed
+    return state
+
+
+def test_both_rest_up_to_a_millimetre_a_second():
+    assert models.RESTS == impact_mass.RESTS == 1e-3
+
+
+@pytest.mark.parametrize(("speed", "rests"), SPEEDS)
+def test_a_machine_on_the_robot_stops_by_neither_its_brakes_nor_its_table(tmp_path, speed, rests):
+    text = FLOATING + TWO_R + AXIS.replace("mass = 2", 'mass = 2\non = "arm/tip"') + WALL
+    cell = made(tmp_path, text, {"arm.urdf": two_r()})
+    robot = cell.model.robot("arm")
+    gap = cell.model.gap(cell.model.select("wall"), robot.moving)
+    stop = bind_stop(Stop(reaction=0.1, model="simulated", brakes=(9.0, 9.0)), cell.model, robot, gap)
+    if rests:
+        assert stop.courses(moving(cell, speed))(1.0).T_s > 0
+        return
+    with pytest.raises(Undecided, match="axis moves on arm"):
+        stop.courses(moving(cell, speed))
+
+
+@pytest.mark.parametrize(("speed", "rests"), SPEEDS)
+def test_nothing_is_within_or_open_by_a_mass_that_leaves_out_what_carries_it(tmp_path, speed, rests):
+    cell = made(tmp_path, FLOATING + AXIS + TWO_R + 'on = "axis"\n', {"arm.urdf": two_r()})
+    state, robot = moving(cell, speed), cell.model.robot("arm")
+    for verdict in (None, Verdict.EXCEEDED, Verdict.WITHIN, Verdict.UNDECIDED):
+        result = Result(name="F", verdict=verdict)
+        judge = while_carriers_rest(cell.model, robot, lambda _, result=result: result)
+        if rests or verdict in (None, Verdict.EXCEEDED):
+            assert judge(state) is result
+            continue
+        with pytest.raises(Undecided, match="axis moves and carries arm"):
+            judge(state)

@@ -8,9 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.joint_columns import moving_dofs
-from seerob.model import Model
+from seerob.model import Body, Model
 
 Indices = NDArray[np.int64]
+
+
+def untold(body: Body) -> str:
+    """Why nobody knows where a body is that a gripper picks up, without a run."""
+    return f"{body.owner}: {body.holder} picks it up and lets it go, and only a run tells where it is"
 
 
 class Bearers:
@@ -24,7 +29,8 @@ class Bearers:
         roots: The first body of its tree, likewise.
         drawn: Index of the body in whose place each is drawn, shape (n,): its own, unless it is away.
         away: Bodies that are not where their robot is, because they lie elsewhere.
-        unknown: Bodies of which nobody knows where they are, with the reason.
+        unknown: Bodies of which nobody knows where they are, with the reason: what is picked up, until an
+            engine follows it.
     """
 
     def __init__(self, model: Model) -> None:
@@ -32,7 +38,7 @@ class Bearers:
         self.roots = model.mj.body_rootid[self.ids].astype(np.int64)
         self.drawn = np.arange(len(model.bodies))
         self.away: set[int] = set()
-        self.unknown: dict[int, str] = {}
+        self.unknown = {b.index: untold(b) for b in model.bodies if b.holder}
         self._moves: dict[tuple[int, ...], NDArray[np.bool_]] = {}
 
     def put(self, mj: Any, index: int, bearer: int) -> None:

@@ -14,6 +14,9 @@ from seerob.workstation import Workstation
 
 AFTER = 1e-6
 """Between a sample and its repetition [s]: two of one instant there are not."""
+SETTLE = 0.5
+"""After a slip [s]: the twin swings to where the robot went meanwhile, faster than the robot ever was, and is
+in the right place for a moment on its way."""
 
 
 class Clock:
@@ -51,7 +54,7 @@ def hear(
     Run time t is the world's instant ``clock.start + t - delay``: when a tick is computed, what it
     speaks of is a delay old, and samples on either side of it have been heard. The run begins at the
     first sample, or without one when that takes too long. Where the clock slipped, what each robot said
-    last is older than run time shows, and is degraded from then on; so is its next sample.
+    last is older than run time shows, and is degraded from then on; so are its next and those of `SETTLE`.
 
     Args:
         recorded: From `seerob.run.pump`, endless.
@@ -63,11 +66,13 @@ def hear(
     clock.begin(origin + listening.delay)
     newest: dict[tuple[str, ...], JointSample | PoseSample | BodySample] = {}
     doubtful: set[tuple[str, ...]] = set()
+    settled: dict[tuple[str, ...], float] = {}
     slipped = clock.slipped
     for samples in recorded:
         waiting: set[tuple[str, ...]] = set()
         if clock.slipped > slipped:
             slipped, doubtful, waiting = clock.slipped, set(newest), set(newest)
+            settled = {what: sample.t + SETTLE for what, sample in newest.items()}
         zero = clock.start - listening.delay
         taken: list[Sample] = []
         for sample in (*heard, *listening.take()):
@@ -79,7 +84,8 @@ def hear(
             if what in newest and t <= newest[what].t:
                 continue
             quality = sample.quality
-            if what in doubtful and quality is Quality.GOOD:
+            swings = what in doubtful or t < settled.get(what, t)
+            if swings and quality is Quality.GOOD:
                 # Run time stood still while the robot went on: the speed between both samples is false.
                 quality = Quality.DEGRADED
             doubtful.discard(what)

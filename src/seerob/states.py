@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.bearers import untold
 from seerob.distances.least import Closests, Per, Query, Survey
 from seerob.errors import Undecided
 from seerob.joint_columns import Columns, moving_dofs
@@ -198,6 +199,7 @@ class States:
             Shapes (N, b), (N, b, 3) and (N, b, 3).
         """
         self.require(*filter(None, (self.model.bodies[i].carrier for i in bodies)))
+        self._settled(bodies)
         if "fastest" not in self._cache:
             bench, moved, shape = self._bench, self._moved, self.positions.shape
             twists = np.empty((2, *shape))
@@ -221,8 +223,15 @@ class States:
         """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``, shape (N, b)."""
         return self._distances(gap, Per.BODY)
 
+    def _settled(self, bodies: Sequence[int]) -> None:
+        """Refuse what a gripper picks up."""
+        for body in (self.model.bodies[i] for i in bodies):
+            if body.holder:
+                raise Undecided(untold(body))
+
     def _distances(self, gap: Gap, per: Per) -> Closests:
         self.require(*gap.carriers)
+        self._settled((*gap.a, *gap.b))
         question = gap.query, per
         if question not in self._answers:
             self._answers |= self._bench.questions.ask(question, self.rotations, self.positions)

@@ -28,7 +28,7 @@ class Tolerance(NamedTuple):
 
     def __str__(self) -> str:
         """``stop.reaction ± 20 ms``."""
-        shown = {"s": (1e3, "ms"), "m": (1e3, "mm"), "kg": (1, "kg")}
+        shown = {"s": (1e3, "ms"), "m": (1e3, "mm")}
         factor, unit = shown.get(self.unit, (1.0, self.unit))
         return f"{self.name} ± {self.half * factor:.4g} {unit}"
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from seerob.human.skeleton import BONES
 from seerob.model import Model
 from seerob.state import State
 from seerob.told_bones import told_between, told_errors
@@ -38,12 +39,9 @@ class TrackingError:
                 reach = float(np.linalg.norm(body.corners, axis=1).max(initial=0.0)) + body.radius
                 bone = body.name.removeprefix(f"{body.owner}/")
                 self._bones.setdefault(body.owner, []).append((row, bone, reach))
+        index = {body.name: body.index for body in model.bodies}
         self._joints = {
-            person: {
-                body.name.removeprefix(f"{person}/"): body.index
-                for body in model.bodies
-                if body.role == "human" and body.owner == person and body.carrier == person
-            }
+            person: {bone: index[name] for bone in BONES if (name := f"{person}/{bone}") in index}
             for person in self._bones
         }
 

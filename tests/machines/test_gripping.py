@@ -212,6 +212,15 @@ def test_a_person_beside_it_is_not_beside_the_robot(tmp_path):
     assert far.between("hand", "post") == without.between("hand", "post")
 
 
+@pytest.mark.parametrize(("who", "verdict"), [("nut", "undecided"), ("axis/body", "within")])
+def test_many_instants_at_once_do_not_tell_where_it_is(tmp_path, who, verdict):
+    asked = f'kind = "minimum_distance"\nname = "d"\nbetween = ["{who}", "post"]\nlimit = 0.1\n'
+    (tmp_path / "workstation.toml").write_text(f"{STATION}[[safety]]\n{asked}")
+    found = load(tmp_path).batch({"axis": [[0.0]]}, {"axis": [[0.0]]})["d"]
+    assert found.verdict == verdict
+    assert verdict == "within" or "hand picks it up and lets it go" in found.reasons[0]
+
+
 def test_with_physics_it_is_carried_too(tmp_path):
     cell = Cell(tmp_path, AXIS + NUT)
     cell.picked()

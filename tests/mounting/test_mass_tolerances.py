@@ -31,7 +31,7 @@ def one(kind, x):
     [
         ("revolute", 0.5, 0.1, M * 0.4**2 + I_Z, M * 0.6**2 + I_Z),
         ("revolute", 0.0, 0.1, I_Z, M * 0.1**2 + I_Z),
-        ("revolute", 0.05, 0.1, I_Z, M * 0.15**2 + I_Z),
+        ("revolute", 0.08, 0.1, I_Z, M * 0.18**2 + I_Z),
         ("prismatic", 0.5, 0.1, 0.0, M),
     ],
 )
@@ -123,3 +123,15 @@ def test_a_bound_that_no_robot_can_have_gives_way_to_one_without_the_body(tmp_pa
     assert np.linalg.eigvalsh(plain - lost)[0] < 0 < np.linalg.eigvalsh(plain - at_most)[0]
     least = MassTolerances(cell.model, cell.model.robot("arm")).matrices(state).at((-1,))
     np.testing.assert_allclose(least, plain - at_most, atol=1e-12)
+
+
+def test_a_link_that_is_heavier_has_more_of_its_own_inertia_too(tmp_path):
+    cell = made(tmp_path, FLOATING + TWO_R + "mass_tolerance = 0.2\n", {"arm.urdf": one("revolute", 0.5)})
+    robot = cell.model.robot("arm")
+    found = MassTolerances(cell.model, robot)
+    at = found.matrices(state_at(cell, arm=([0.3], [1.0]))).at
+    nominal = M * 0.5**2 + I_Z
+    assert [at((side,))[0, 0] for side in (-1, 0, 1)] == pytest.approx(
+        [0.8 * nominal, nominal, 1.2 * nominal]
+    )
+    assert [found.simplified(1.0, (side,)) for side in (-1, 0, 1)] == pytest.approx([0.8, 1.0, 1.2])

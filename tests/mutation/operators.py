@@ -7,7 +7,7 @@ these is changed:
 - each sign: ``+`` and ``-``, ``*`` and ``/``, ``+=``, a minus, an ``abs``, ``not``, ``and`` and ``or``;
 - each number: a tenth and a thousandfold more (one more of whole ones), and each ``True`` and ``False``,
   defaults of arguments among them;
-- each name of a unit of the SI, to a thousand of it;
+- each name of a unit of the SI, to a thousand of it, in functions as in what a module or class binds;
 - each verdict, and each name with an opposite, such as ``min``.
 
 No verdict hangs on what only draws or describes, and that is left alone by name: markers and what they are

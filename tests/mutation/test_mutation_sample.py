@@ -14,6 +14,7 @@ import pytest
 from mutation.operators import SPOKEN, mutants, mutated
 from mutation.session import PACKAGE, put_in
 from seerob.criterion import judge
+from seerob.stopping import models, terms
 from seerob.verdict import Verdict
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -80,6 +81,19 @@ def test_a_default_is_changed_where_the_function_keeps_it(monkeypatch):
     assert judge(1.0, 2.0) is Verdict.WITHIN
     put_in(mutant, source)
     assert judge(1.0, 2.0) is Verdict.EXCEEDED
+
+
+def test_each_constant_of_a_statement_that_binds_several_is_put_in_by_its_name(monkeypatch):
+    source = (PACKAGE / "stopping/terms.py").read_text("utf-8")
+    changed = [m for m in mutants(source, "stopping/terms.py") if m.function == "<module>"]
+    assert [(m.assigned, m.after) for m in changed] == [
+        ("BOUND", "1.1"), ("BOUND", "1000.0"), ("CONSTANT", "0.55"), ("CONSTANT", "500.0"),
+    ]  # fmt: skip
+    monkeypatch.setattr(terms, "BOUND", terms.BOUND)
+    monkeypatch.setattr(models, "CONSTANT", terms.CONSTANT)
+    monkeypatch.setattr(terms, "CONSTANT", terms.CONSTANT)
+    put_in(changed[2], source)
+    assert (terms.BOUND, terms.CONSTANT, models.CONSTANT) == (1.0, 0.55, 0.55)
 
 
 def test_equivalent_mutants_have_a_reason_and_are_named_once():

@@ -66,5 +66,7 @@ def test_the_worst_of_every_tolerance_is_put_in():
     field = Detection(approach="orthogonal", edition="2010", capability=0.03, reach_over=0)
     C = separation(detection=field, intrusion_tolerance=0.03).at_worst(None)
     assert (C.detection, C.intrusion) == (None, pytest.approx(0.128 + 0.03))
+    open_ = Detection(approach="orthogonal", edition="2010", capability=0.08, reach_over=0)
+    assert separation(detection=open_, intrusion_tolerance=0.03).at_worst(None).intrusion == 0.03
     same = separation(detection=field, human_speed=1.6, human_speed_tolerance=0.2).at_worst(None)
     assert (same.detection, same.intrusion) == (field, None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
@@ -11,6 +12,7 @@ from seerob.errors import Undecided
 from seerob.snapshot import Result, Verdict
 from seerob.stopping import models
 from seerob.stopping.models import Stop, bind_stop
+from seerob.stopping.simulated import StopSimulation
 
 AXIS = """
 [[machines]]
@@ -45,6 +47,16 @@ def test_a_machine_on_the_robot_stops_by_neither_its_brakes_nor_its_table(tmp_pa
         return
     with pytest.raises(Undecided, match="axis moves on arm"):
         stop.courses(moving(cell, speed))
+
+
+def test_a_simulated_stop_is_that_of_the_robot_alone(tmp_path):
+    """What carries it stands still where it is, however it moves now."""
+    cell = made(tmp_path, FLOATING + AXIS + TWO_R + 'on = "axis"\n', {"arm.urdf": two_r()})
+    robot = cell.model.robot("arm")
+    simulation = StopSimulation(cell.model, robot, np.array([9.0, 9.0]), robot.moving)
+    rests, moves = (simulation.stop(moving(cell, speed), 0.1) for speed in (0.0, 0.7))
+    assert rests.speeds[0] == pytest.approx([0.1 * np.hypot(1, 0.05), 0.1 * np.hypot(2, 0.05)])
+    np.testing.assert_array_equal(rests.speeds, moves.speeds)
 
 
 @pytest.mark.parametrize(("speed", "rests"), SPEEDS)

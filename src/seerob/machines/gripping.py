@@ -93,6 +93,8 @@ class _Grip:
             places: [Query(model.shapes, (finger.index,), places, cap=cap) for finger in self._fingers]
             for places in (tuple(self._held), tuple(self._resting))
         }
+        for index in (*self._held, *self._resting):
+            state.bearers.unknown.pop(index, None)
         self._holds = True
         self._unheard = ""
         self._bring(state, held=False)

@@ -229,6 +229,20 @@ def test_a_clock_that_slips_makes_the_next_sample_doubtful_and_none_go_back():
     assert heard[3].t > heard[2].t
 
 
+def test_after_a_slip_nothing_is_sure_until_the_twin_has_settled():
+    """On its way to where the robot went it is faster than any robot, and once in the right place."""
+    clock = Clock()
+    start = time.monotonic()
+    ticks = [[joint(t=start + 0.12 * k)] for k in range(12)]
+    feed = hear(iter(lambda: (), None), Said(*ticks), clock)
+    before = next(feed)
+    clock.slipped += 0.3
+    after = [s for _ in range(10) for s in next(feed)]
+    assert [s.quality for s in before] == ["good"] * 2
+    assert [s.quality for s in after] == ["degraded"] * 4 + ["good"] * 6
+    assert after[4].t - before[-1].t == pytest.approx(0.6)
+
+
 def test_a_run_begins_with_what_is_heard_then_and_not_with_what_was_heard_before():
     async def script():
         yield joint(t=1.0)

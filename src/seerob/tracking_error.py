@@ -39,9 +39,9 @@ class TrackingError:
                 reach = float(np.linalg.norm(body.corners, axis=1).max(initial=0.0)) + body.radius
                 bone = body.name.removeprefix(f"{body.owner}/")
                 self._bones.setdefault(body.owner, []).append((row, bone, reach))
-        index = {body.name: body.index for body in model.bodies}
+        places = {body.name: body.index for body in model.bodies}
         self._joints = {
-            person: {bone: index[name] for bone in BONES if (name := f"{person}/{bone}") in index}
+            person: {bone: places[name] for bone in BONES if (name := f"{person}/{bone}") in places}
             for person in self._bones
         }
 

@@ -226,13 +226,11 @@ def test_the_error_falls_with_the_square_of_the_step(tmp_path, monkeypatch):
     ends = []
     for k, step in enumerate((4e-3, 2e-3, 2.5e-4)):
         monkeypatch.setattr("seerob.stopping.simulated.STEP", step)
-        stopped, _, _ = stop(
-            tmp_path / str(k), two_r(), [0.3, 0.9], [1.5, 1.0], [3.0, 0.5], gravity=False, reaction=1e-9
-        )
-        at = round(0.08 / step) + 1
-        assert (stopped.qd[at] > 0).all()
-        assert stopped.t[at] == pytest.approx(0.08 + 1e-9)
+        stopped, _, _ = stop(tmp_path / str(k), ONE, [0.8], [-2.0], [25.0], reaction=1e-9)
+        at = round(0.2 / step) + 1
+        assert stopped.qd[at] < 0
+        assert stopped.t[at] == pytest.approx(0.2 + 1e-9)
         ends.append(np.append(stopped.q[at], stopped.qd[at]))
     coarse, fine = (np.abs(end - ends[-1]).max() for end in ends[:2])
-    assert 3 < coarse / fine < 5.5, (coarse, fine)
+    assert coarse / fine == pytest.approx(4, rel=0.1)
     assert fine < 1e-5

@@ -153,7 +153,7 @@ def test_a_table_has_up_to_a_hundred_nodes_along_an_axis():
     for nodes in (MOST, MOST + 1):
         speed = [k / nodes for k in range(1, nodes + 1)]
         data = {**HEAD, "tool": {"speed": speed, "time": speed}}
-        if nodes == MOST == 100:
+        if nodes == MOST:
             assert msgspec.convert(data, StoppingTable).tool is not None
         else:
             with pytest.raises(msgspec.ValidationError, match="length <= 100"):

@@ -52,6 +52,7 @@ class ModbusServer(LoopEmulator):
         """Listen and answer."""
         from pymodbus.constants import ExcCodes
         from pymodbus.server import ModbusTcpServer
+        from pymodbus.server.requesthandler import ServerRequestHandler
         from pymodbus.simulator import DataType, SimData, SimDevice
 
         logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)
@@ -81,7 +82,15 @@ class ModbusServer(LoopEmulator):
             ] or [SimData(0, datatype=DataType.INVALID)]
         every = data[Table.COIL], data[Table.DISCRETE], data[Table.HOLDING], data[Table.INPUT]
         device = SimDevice(self.device, simdata=every, action=play)
-        server = ModbusTcpServer(device, address=(self.host, self.port))
+        handlers: list[ServerRequestHandler] = []
+
+        class Server(ModbusTcpServer):
+            def callback_new_connection(self) -> ServerRequestHandler:
+                handlers[:] = [known for known in handlers if not known.is_closing]
+                handlers.append(super().callback_new_connection())  # type: ignore[no-untyped-call]
+                return handlers[-1]
+
+        server = Server(device, address=(self.host, self.port))
         if not await server.listen() or server.transport is None:
             raise OSError(f"cannot listen on {self.host}:{self.port}")
         self.port = server.transport.sockets[0].getsockname()[1]  # type: ignore[attr-defined]
@@ -90,6 +99,12 @@ class ModbusServer(LoopEmulator):
             await over.wait()
         finally:
             await server.shutdown()  # type: ignore[no-untyped-call]
+            # One that was accepted at the last moment is not among those that it closes.
+            for _ in range(3):
+                await asyncio.sleep(0)
+            for handler in handlers:
+                if handler.transport is not None:
+                    handler.transport.close()
 
     def _play(self, table: Table, start: int, registers: list[int]) -> None:
         """Bring the registers of a table, from an address on, up to date."""

@@ -1,5 +1,7 @@
 """Voxels turned about any axis: no point of theirs is lost at any angle."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -16,11 +18,14 @@ def test_every_point_of_a_voxel_stays_in_the_turned_set(axis):
     heights = (corner - anchor) @ axis
     radii = np.linalg.norm(np.cross(corner - anchor, axis), axis=1)
     low, half = heights.min() - pitch, pitch / 2 * np.abs(axis).sum()
+    signs = np.array(list(product((-1, 1), repeat=3)))
+    wide = np.linalg.norm(np.cross(signs, axis), axis=1).max() / 2
     plane = profile(
         radii,
         heights - low,
         np.full(3, pitch),
         half / pitch,
+        wide,
         pitch / 16,
         radii.max() + pitch,
         np.ptp(heights) + 2 * pitch,
@@ -28,7 +33,7 @@ def test_every_point_of_a_voxel_stays_in_the_turned_set(axis):
     grid = VoxelGrid(pitch)
     grid.cover(np.full(3, -1.5), np.full(3, 1.5))
     grid.count = revolve(
-        grid.cells, grid.full, grid.origin, pitch, plane, pitch / 16, anchor, axis, low, half
+        grid.cells, grid.full, grid.origin, pitch, plane, pitch / 16, anchor, axis, low, half, wide * pitch
     )
     points = corner[rng.integers(0, 3, 40_000)] + rng.uniform(-0.5, 0.5, (40_000, 3)) * pitch
     turned = Rotation.from_rotvec(rng.uniform(0, 2 * np.pi, 40_000)[:, None] * axis).apply(points - anchor)

@@ -24,15 +24,20 @@ def half_spaces(mesh):
 def not_contained(triangles, pieces, *, tolerance=1e-9, depth=24):
     """Triangles (n, 3, 3) that no convex piece holds as a whole, however often they are halved.
 
-    A triangle with its corners in one convex piece is in it: what is not returned is proven.
+    A triangle with its corners in one convex piece is in it: what is not returned is proven. One that a
+    face of each piece keeps out is returned as it is.
     """
     spaces = [half_spaces(piece) for piece in pieces]
+    apart = []
     for _ in range(depth):
-        held = np.zeros(len(triangles), bool)
+        held, out = np.zeros(len(triangles), bool), np.ones(len(triangles), bool)
         corners = triangles.reshape(-1, 3)
         for normals, offsets in spaces:
-            held |= ((corners @ normals.T - offsets).max(axis=1) <= tolerance).reshape(-1, 3).all(axis=1)
-        triangles = triangles[~held]
+            beyond = (corners @ normals.T - offsets).reshape(-1, 3, len(offsets))
+            held |= beyond.max(axis=(1, 2)) <= tolerance
+            out &= beyond.min(axis=1).max(axis=1) > tolerance
+        apart.append(triangles[out])
+        triangles = triangles[~(held | out)]
         if not len(triangles):
             break
         edges = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
@@ -42,7 +47,7 @@ def not_contained(triangles, pieces, *, tolerance=1e-9, depth=24):
         triangles = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
         if len(triangles) > 300_000:
             break
-    return triangles
+    return np.concatenate([*apart, triangles])
 
 
 # One triangle of 5 mm² hangs in the air 26 mm beside the arm in the maker's display mesh of the UR10.

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, UR10, heard, judged, made, results_at, state_at, two_r
+from made_cell import FLOATING, TWO_R, heard, judged, made, results_at, state_at, two_r
 from seerob.contact.regions import FORBIDDEN, REGIONS
 from seerob.engine import Engine
 from seerob.errors import InputError
@@ -178,17 +178,6 @@ def test_load_counts_in_full(tmp_path: Path) -> None:
     assert found["M/2 + m_L"].value == pytest.approx(M_R + 3.0, rel=1e-6)
 
 
-def test_unknown_mass_is_undecided(tmp_path: Path) -> None:
-    urdf = two_r()
-    start = urdf.index("<inertial>", urdf.index('name="l2"'))
-    bare = urdf[:start] + urdf[urdf.index("</inertial>", start) + len("</inertial>") :]
-    text = f'{FLOATING}{TWO_R}[[safety]]\nkind = "power_and_force"\nrobot = "arm"\n'
-    station = made(tmp_path, text, {"arm.urdf": bare})
-    result = judged(station.bound, state_at(station, arm=(STRETCHED, [0.1, 0])))[0]
-    assert result.verdict is Verdict.UNDECIDED
-    assert "arm/l2" in result.reason
-
-
 def test_robot_that_was_not_heard_is_undecided(tmp_path: Path) -> None:
     station = flat(tmp_path)
     result = judged(station.bound, Engine(station.model, driven={"arm": 0.2}).start())[0]
@@ -322,16 +311,6 @@ def test_basis_has_the_options_and_the_mass_that_moves(tmp_path: Path) -> None:
     assert (inputs["horizon"].value, inputs["person_speed"].value) == (0.3, 1.2)
     multiplier = inputs["Chest: transient multiplier"]
     assert (multiplier.value, multiplier.origin) == (1.5, Origin.GIVEN)
-
-
-def test_mass_of_the_basis_is_without_the_fixed_base(tmp_path: Path) -> None:
-    text = UR10 + '[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\n'
-    station = made(tmp_path, text)
-    inputs = {i.name: i.value for i in station.bound[0].basis.inputs}
-    M = inputs["M, moving links of arm"]
-    assert pytest.approx(28.435, abs=0.01) == M  # published sum of the six links
-    q = ([0, -1.2, 1.4, -1.5, -1.5, 0], [0.1, 0, 0, 0, 0, 0])
-    assert by_name(results_at(station, arm=q)["pfl"])["M/2 + m_L"].value == pytest.approx(M / 2 + 3)
 
 
 def test_marker_never_shows_an_exceeded_speed_as_equal(tmp_path: Path) -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, heard, made, results_at, state_at, two_r
+from made_cell import heard, results_at, state_at, two_r
+from made_separation import BOUND, TABLE, K, V, part, separation, station, terms
+from made_separation import KNOWN as TERMS
 from seerob.engine import Engine
 from seerob.errors import InputError
 from seerob.human.skeleton import BONES
@@ -13,48 +15,33 @@ from seerob.judging import Judge
 from seerob.stopping.models import MOVING
 from seerob.verdict import Verdict
 
-STOP = "reaction = 0.1, stopping = 0.3"
-KNOWN = "intrusion = 0.2\nhuman_uncertainty = 0.1\nrobot_uncertainty = 0.05\nhuman_speed = 1.6\n"
-K, V_H, T = 0.35, 1.6, 0.4
-V = np.hypot(2, 0.05)
-"""Speed of the stretched arm's fastest corner at 1 rad/s [m/s]."""
-TABLE = (
-    'reaction = 0.1, model = "table", table = { robot = "arm", category = 0, source = "s", confidence = "1S", '
-    "rated_payload = 5.0, joints = [{ joint = 0, full_speed = 3.0, way = [[[0.4]]], time = [[[0.3]]] }, "
-    "{ joint = 1, full_speed = 3.0, way = [[[0.2]]], time = [[[0.1]]] }] }"
-)
-SIMULATED = 'reaction = 0.1, model = "simulated", brakes = [4e3, 2e3]'
+KNOWN = TERMS + "human_speed = 1.6\n"
+V_H, T = 1.6, 0.4
+STIFF = 'reaction = 0.1, model = "simulated", brakes = [4e3, 2e3]'
+"""Brakes so strong that a simulated stop takes a few milliseconds."""
 AT_HOME = ((0.0, 0.0), (1.0, 0.0))
 OUT = '<visual><origin xyz="0.5 0 0"/><geometry><box size="1.04 0.14 0.14"/></geometry></visual>'
 """A display mesh 20 mm larger than the links' boxes."""
 
 
-def station(folder, stop=STOP, options=KNOWN, *, x=6.0, person="", urdf=None, arm="", more=""):
-    text = FLOATING + TWO_R + arm + more
-    text += f'[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n{person}'
-    text += f"at = {{ position = [{x}, 0, -1] }}\n"
-    text += f'[[safety]]\nkind = "separation"\nname = "S"\nbetween = ["arm", "op"]\nstop = {{ {stop} }}\n'
-    return made(folder, text + options, {"arm.urdf": urdf or two_r()})
+def cell(folder, stop=BOUND, options=KNOWN, **more):
+    return station(folder, stop, options, **more)
 
 
-def found(folder, *args, q=(0.0, 0.0), qd=(1.0, 0.0), **more):
-    return results_at(station(folder, *args, **more), arm=(q, qd))["S"]
-
-
-def part(result, name):
-    return next(p for p in result.parts if p.name == name)
+def found(folder, stop=BOUND, options=KNOWN, **more):
+    return separation(folder, stop, options, **more)
 
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    return station(tmp_path_factory.mktemp("plain"))
+    return cell(tmp_path_factory.mktemp("plain"))
 
 
 @pytest.fixture(scope="module")
 def larger(tmp_path_factory):
     """Whose surfaces may stick out."""
     urdf = two_r().replace("</collision></link>", f"</collision>{OUT}</link>")
-    return station(tmp_path_factory.mktemp("larger"), urdf=urdf)
+    return cell(tmp_path_factory.mktemp("larger"), urdf=urdf)
 
 
 def test_every_figure_has_its_unit_and_its_side(plain):
@@ -81,17 +68,17 @@ def test_the_part_that_governs_is_the_one_with_the_least_room_and_not_the_neares
 
 
 @pytest.mark.parametrize(("more", "verdict"), [(1e-9, "within"), (-1e-9, "exceeded")])
-def test_a_distance_is_exceeded_from_its_limit_down(tmp_path, plain, more, verdict):
+def test_the_verdict_of_a_distance_turns_at_its_limit(tmp_path, plain, more, verdict):
     room = results_at(plain, arm=AT_HOME)["S"]
     tight = KNOWN.replace("= 0.2", f"= {0.2 + room.value - room.limit - more!r}")
-    S = found(tmp_path, STOP, tight)
+    S = found(tmp_path, BOUND, tight)
     assert S.value - S.limit == pytest.approx(more, abs=1e-12)
     assert (S.verdict, part(S, "arm/l2").verdict, S.interval) == (verdict, verdict, None)
 
 
 def test_what_is_not_known_counts_as_nothing_and_leaves_open_only_what_is_within(tmp_path):
     sparse = "human_speed = 1.6\n"
-    far, near = found(tmp_path / "far", STOP, sparse), found(tmp_path / "near", STOP, sparse, x=3.0)
+    far, near = found(tmp_path / "far", BOUND, sparse), found(tmp_path / "near", BOUND, sparse, x=3.0)
     assert far.limit == pytest.approx((V + V_H) * T)
     assert [part(far, name).value for name in ("C", "Z_d", "Z_r")] == [0, 0, 0]
     assert (far.verdict, part(far, "arm/l1").verdict) == (Verdict.UNDECIDED, Verdict.UNDECIDED)
@@ -122,7 +109,7 @@ def test_the_input_that_makes_the_interval_widest_decides(tmp_path, plain, intru
     """± C against ± what devices are off by: both on one side."""
     room = results_at(plain, arm=AT_HOME)["S"]
     x = 6.0 - (room.value - room.limit)
-    open_ = station(tmp_path, STOP, KNOWN + f"intrusion_tolerance = {intrusion}\n", x=x)
+    open_ = cell(tmp_path, BOUND, KNOWN + f"intrusion_tolerance = {intrusion}\n", x=x)
     state = state_at(open_, arm=AT_HOME)
     state.hearings["op"].bones = {"head": (seen, 0.0)}
     (S,) = Judge(open_.bound)(state)
@@ -132,11 +119,11 @@ def test_the_input_that_makes_the_interval_widest_decides(tmp_path, plain, intru
 
 
 def test_an_interval_shows_what_tolerances_alone_leave_open(tmp_path):
-    S = found(tmp_path, STOP, KNOWN.replace("= 0.2", "= 0") + "intrusion_tolerance = 0.3\n")
+    S = found(tmp_path, BOUND, KNOWN.replace("= 0.2", "= 0") + "intrusion_tolerance = 0.3\n")
     assert S.verdict is Verdict.WITHIN
     # C is never below 0.
     assert S.interval == pytest.approx((S.value - 0.3, S.value), abs=1e-12)
-    slower = found(tmp_path / "v", STOP, KNOWN + "human_speed_tolerance = 0.2\n")
+    slower = found(tmp_path / "v", BOUND, KNOWN + "human_speed_tolerance = 0.2\n")
     assert slower.interval == pytest.approx((slower.value - 0.2 * T, slower.value + 0.2 * T), abs=1e-12)
     assert [(i.name, i.value, i.unit) for i in slower.basis.inputs if "tolerance" in i.name] == [
         ("tolerance of human_speed", 0.2, "m/s")
@@ -148,11 +135,11 @@ def test_the_fixed_distance_remembers_what_each_input_made_of_it(tmp_path):
 
     2 · 0.02 s · (1.6 m/s + 3 V) = 0.3 m is more than C's 2 · 0.07 m; at rest the reaction's would be 64 mm.
     """
-    stop = STOP + ", tolerance = { reaction = 0.02 }"
+    stop = BOUND + ", tolerance = { reaction = 0.02 }"
     options = KNOWN + 'intrusion_tolerance = 0.07\nmode = "fixed"\n'
     at_rest = found(tmp_path / "a", stop, options, qd=(0.0, 0.0))
     x = 6.0 - at_rest.value + (3 * V + V_H) * T + K
-    open_ = station(tmp_path / "b", stop, options, x=x)
+    open_ = cell(tmp_path / "b", stop, options, x=x)
     engine = Engine(open_.model, controllers=False)
     engine.take([heard("arm", 0.0, (np.pi, 0.0), (3.0, 0.0))])
     state, judge = engine.start(), Judge(open_.bound)
@@ -171,17 +158,17 @@ def test_the_fixed_distance_remembers_what_each_input_made_of_it(tmp_path):
 
 def test_the_distance_asked_for_is_that_of_the_present_speeds_and_in_the_fixed_mode_the_largest(tmp_path):
     for mode in ("dynamic", "fixed"):
-        cell = station(tmp_path / mode, STOP, f'{KNOWN}mode = "{mode}"\n')
-        S = cell.bound[0].criterion
-        assert (S.batch(cell.model) is None) == (mode == "fixed")
-        required, state = S.required(cell.model), state_at(cell, arm=AT_HOME)
+        twin = cell(tmp_path / mode, BOUND, f'{KNOWN}mode = "{mode}"\n')
+        S = twin.bound[0].criterion
+        assert (S.batch(twin.model) is None) == (mode == "fixed")
+        required, state = S.required(twin.model), state_at(twin, arm=AT_HOME)
         first = required(state)
         assert first == pytest.approx([(v + V_H) * T + K for v in (np.hypot(1, 0.05), V)])
         state.data.qvel[0] = 0.5
         state.refresh(0.0)
         halved = [(v / 2 + V_H) * T + K for v in (np.hypot(1, 0.05), V)]
         assert required(state) == pytest.approx(first if mode == "fixed" else halved)
-    off = station(tmp_path / "off", STOP, KNOWN + "intrusion_tolerance = 0.1\n")
+    off = cell(tmp_path / "off", BOUND, KNOWN + "intrusion_tolerance = 0.1\n")
     assert off.bound[0].criterion.batch(off.model) is None
 
 
@@ -194,35 +181,35 @@ def test_what_a_surface_may_stick_out_is_in_every_separation_distance(larger):
     wanted = (V + out + V_H) * T + K + out
     assert result.limit == pytest.approx(wanted)
     assert part(result, "C").value == pytest.approx(0.2 + out)
-    terms = [part(result, name).value for name in ("S_h", "S_r", "S_s", "C", "Z_d", "Z_r")]
-    assert terms[:3] == pytest.approx([V_H * T, (V + out) * 0.1, (V + out) * 0.3])
-    assert sum(terms) == pytest.approx(wanted)
+    of_S_p = terms(result)
+    assert of_S_p[:3] == pytest.approx([V_H * T, (V + out) * 0.1, (V + out) * 0.3])
+    assert sum(of_S_p) == pytest.approx(wanted)
     assert S.required(larger.model)(state)[1] == pytest.approx(wanted)
     distance = np.array([part(result, name).value for name in ("arm/l1", "arm/l2")])
     S_p, (speed, share) = S.inverse(larger.model)(state, distance)
     assert S_p[1] == pytest.approx(wanted)
     assert (speed, share) == (part(result, speed.name), part(result, share.name))
-    answers = S.batch(larger.model)(larger.model.states({"arm": np.array([[0.0, 0.0, 1.0, 0.0]])}))
+    answers = larger.batch({"arm": np.zeros((1, 2))}, {"arm": np.array([[1.0, 0.0]])})["S"].answers
     assert answers.limit == pytest.approx([wanted])
 
 
 @pytest.mark.parametrize("mode", ["dynamic", "fixed"])
 def test_terms_of_a_person_whose_speed_is_iso_13855s_sum_to_the_distance(tmp_path, mode):
-    S = found(tmp_path, STOP, f'{KNOWN.replace("human_speed = 1.6", "")}mode = "{mode}"\n')
-    terms = [part(S, name).value for name in ("S_h", "S_r", "S_s", "C", "Z_d", "Z_r")]
-    assert terms == pytest.approx([V_H * T, V * 0.1, V * 0.3, 0.2, 0.1, 0.05])
-    assert sum(terms) == pytest.approx(S.limit)
+    S = found(tmp_path, BOUND, f'{KNOWN.replace("human_speed = 1.6", "")}mode = "{mode}"\n')
+    of_S_p = terms(S)
+    assert of_S_p == pytest.approx([V_H * T, V * 0.1, V * 0.3, 0.2, 0.1, 0.05])
+    assert sum(of_S_p) == pytest.approx(S.limit)
 
 
 @pytest.mark.parametrize(("accepted", "verdict"), [(0.25, "within"), (None, "undecided")])
 def test_a_bone_that_no_device_sees_is_estimated_where_the_file_accepts_it(tmp_path, accepted, verdict):
     more = "" if accepted is None else f"unseen_uncertainty = {accepted}\n"
-    cell = station(tmp_path, person=more)
-    state = state_at(cell, arm=AT_HOME)
+    twin = cell(tmp_path, person=more)
+    state = state_at(twin, arm=AT_HOME)
     hearing = state.hearings["op"]
     hearing.bones = dict.fromkeys(BONES, (0.0, 0.0))
     hearing.observed[:] = [(0.0, frozenset(BONES) - {"right_hand"})]
-    (S,) = Judge(cell.bound)(state)
+    (S,) = Judge(twin.bound)(state)
     assert S.verdict == verdict
     if accepted is not None:
         assert S.interval == pytest.approx((S.value - accepted, S.value + accepted))
@@ -249,7 +236,7 @@ def test_a_robot_at_rest_has_no_present_speed_to_compare_with(tmp_path, plain):
 
 
 def test_beyond_ten_times_the_present_speed_is_no_share(plain):
-    now, room = results_at(plain, arm=((0.0, 0.0), (0.01, 0.0)))["S"], None
+    now = results_at(plain, arm=((0.0, 0.0), (0.01, 0.0)))["S"]
     (speed, said), share = permissible(now)
     room = now.value - V_H * T - K
     assert (speed, said) == (pytest.approx(room / T), "")
@@ -265,7 +252,7 @@ def test_a_search_that_ends_at_the_top_says_or_more(tmp_path):
     less = permissible(found(tmp_path / "l", TABLE, qd=(1.0, 0.0)))
     assert 1 < less[1][0] < 10
     assert [said for _, said in less] == ["", ""]
-    now = permissible(found(tmp_path / "s", SIMULATED, arm="rotor_inertia = [0.0, 0.0]\n"))
+    now = permissible(found(tmp_path / "s", STIFF))
     assert now == [(pytest.approx(V), "or more"), (1.0, "or more")]
 
 
@@ -274,13 +261,13 @@ def test_at_given_distances_a_sensor_counts_as_in_the_result(tmp_path):
     curtain = '[[sensors]]\nname = "curtain"\ncapability = 0.03\nresponse = 0.02\n'
     curtain += "light_curtain = { ends = [[3, -2, 0.2], [3, 2, 0.2]], height = 1.5 }\n"
     options = KNOWN.replace("intrusion = 0.2\n", 'sensor = "curtain"\n')
-    cell = station(tmp_path, STOP, options, more=curtain)
-    state = state_at(cell, arm=AT_HOME)
-    (result,) = Judge(cell.bound)(state)
+    twin = cell(tmp_path, BOUND, options, more=curtain)
+    state = state_at(twin, arm=AT_HOME)
+    (result,) = Judge(twin.bound)(state)
     distance = np.array([part(result, name).value for name in ("arm/l1", "arm/l2")])
-    S_p, (speed, share) = cell.bound[0].criterion.inverse(cell.model)(state, distance)
-    C = part(result, "C").value
-    assert S_p[1] == pytest.approx((V + V_H) * 0.42 + C + 0.15)
+    S_p, (speed, share) = twin.bound[0].criterion.inverse(twin.model)(state, distance)
+    assert part(result, "C").value == pytest.approx(0.128)
+    assert S_p[1] == pytest.approx((V + V_H) * 0.42 + 0.128 + 0.15)
     assert S_p[1] == pytest.approx(result.limit)
     assert (speed, share) == (part(result, speed.name), part(result, share.name))
 
@@ -293,5 +280,10 @@ def test_only_a_simulated_stop_asks_for_masses(tmp_path):
     start = urdf.index("<inertial>", urdf.index('name="l2"'))
     bare = urdf[:start] + urdf[urdf.index("</inertial>", start) + len("</inertial>") :]
     assert found(tmp_path / "given", urdf=bare).verdict is Verdict.WITHIN
-    S = found(tmp_path / "simulated", SIMULATED, arm="rotor_inertia = [0, 0]\n", urdf=bare)
+    S = found(tmp_path / "simulated", STIFF, urdf=bare)
     assert (S.verdict, "arm/l2" in S.reason) == (Verdict.UNDECIDED, True)
+    # One that cannot be is refused by whoever needs it, and by nobody else.
+    nothing = two_r(masses=(1.0, 0.0))
+    assert found(tmp_path / "any", urdf=nothing).verdict is Verdict.WITHIN
+    with pytest.raises(InputError, match="S needs it"):
+        found(tmp_path / "refused", STIFF, urdf=nothing)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob.errors import Undecided
 from seerob.stopping.models import Stop, bind_stop
 from seerob.stopping.table import JointStop, StoppingTable
 
@@ -83,11 +84,22 @@ def test_a_joint_that_another_turns_the_other_way_adds_to_the_way(tmp_path):
 
 
 def test_without_a_full_speed_of_its_own_the_robots_holds(tmp_path):
-    """10 rad/s: at 5 it is half of it, and a limit of 0 says nothing."""
+    """10 rad/s: at 5 it is half of it."""
     one = JointStop(
         joint=0, speed=(0.25, 1.0), way=(((9.0,),), ((9.0,),)), time=(((0.1,),), ((0.4,),))
     )  # fmt: skip
     assert course(tmp_path / "a", table(one), (0.0, 0.0), (5.0, 0.0)).T_s == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("of_the_file", [True, False])
+def test_a_speed_limit_of_0_says_nothing_of_full_speed(tmp_path, of_the_file):
+    """Some descriptions write 0 for unknown: a share of it would be any, and the stop nobody's figure."""
+    one = JointStop(joint=0, speed=(1.0,), way=(((9.0,),),), time=(((0.4,),),))
+    said = {"at": "velocity_limits = [0, 1]\n"} if of_the_file else {}
+    urdf = two_r() if of_the_file else two_r().replace('velocity="10"', 'velocity="0"')
+    with pytest.raises(Undecided, match="j1: neither the stopping table nor the robot says what full speed"):
+        course(tmp_path / "moves", table(one), (0.0, 0.0), (5.0, 0.0), urdf=urdf, **said)
+    assert course(tmp_path / "stands", table(one), (0.0, 0.0), (0.0, 0.0), urdf=urdf, **said).T_s == 0.0
 
 
 def payload(folder, mass, its, **options):

@@ -17,7 +17,6 @@ from seerob.contact.limits import Judged, RegionArrays
 from seerob.contact.regions import FORBIDDEN, REGIONS
 from seerob.contact.tolerances import area_verdict
 from seerob.human.skeleton import SIDES
-from seerob.model import Frame
 from seerob.norms.body_limits import BodyArea, BodyLimits, BodyRegion
 from seerob.snapshot import Aspect, Result, Row, RowState, Verdict
 from seerob.transforms import Array
@@ -40,7 +39,7 @@ class Bound(Protocol):
     """That the pressure limits allow each moving body, free and clamped [N], shape (b, 2, a)."""
     unknown: list[str]
     """Why a moving body's contact area is not known, per body."""
-    frames: list[Frame]
+    names: list[str]
     """Of the moving bodies."""
 
 
@@ -56,7 +55,7 @@ class ContactRows:
     def __init__(self, bound: Bound, *, hand: str | None) -> None:
         arrays = bound.arrays
         self._arrays, self._forces, self._unknown = arrays, bound.forces, bound.unknown
-        self._bodies = [frame.name for frame in bound.frames]
+        self._bodies = bound.names
         self._columns = {region.name: k for k, region in enumerate(arrays.regions)}
         self._first = np.searchsorted(arrays.owner, np.arange(len(arrays.regions))).tolist()
         self._in_regions = [REGIONS.index(region.name) for region in arrays.regions]

@@ -150,6 +150,7 @@ async def connect(way: Way, folder: Path) -> AsyncGenerator[Client, None]:
         raise ProtocolError(f"the server refuses: {_text(error)}") from error
     except ValueError as error:
         raise ProtocolError(str(error)) from error
+    link = client.uaclient.protocol
     try:
         yield client
     except UaError as error:
@@ -159,6 +160,10 @@ async def connect(way: Way, folder: Path) -> AsyncGenerator[Client, None]:
         with suppress(Exception):
             async with asyncio.timeout(PATIENCE / 2):
                 await client.disconnect()
+        # A link that broke while it was closed counts as closed there, and its socket stays open.
+        if link is not None and link.transport is not None:
+            link.transport.close()
+            await asyncio.sleep(0)
 
 
 async def _protect(client: Client, way: Way, folder: Path) -> None:

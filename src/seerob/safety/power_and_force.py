@@ -25,7 +25,7 @@ from seerob.contact.tolerances import ContactEnds, ranks, robot_masses
 from seerob.criterion import Criterion, Evaluate, worst
 from seerob.errors import Undecided, UnknownName
 from seerob.kernels.contact_speeds import governing
-from seerob.model import Frame, Model
+from seerob.model import Model
 from seerob.norms import body_limits
 from seerob.norms.crushing_gaps import NOT_VERIFIED, gap_inputs
 from seerob.norms.limit_inputs import excluded_input, limit_inputs, table_input
@@ -222,7 +222,7 @@ class Contacts:
         self.robot = model.robot(spec.robot)
         self.robot.require_masses(spec.name)
         self.moving = self.robot.moving
-        self.frames = [Frame(model.bodies[i].name, model.bodies[i].mj, np.eye(4)) for i in self.moving]
+        self.names = [model.bodies[i].name for i in self.moving]
         for key, names in (("excluded", spec.excluded), ("thickness", spec.thickness)):
             for name in names:
                 if name not in REGIONS:

@@ -61,6 +61,7 @@ def _written(file: IO[bytes], folder: str) -> Iterator[Workbook]:
         for sheet in made.worksheets():
             with suppress(OSError):  # of a full disk, once more; the file is closed all the same
                 sheet.row_data_fh.close()
+        out.over = True
     if out.refused is not None:
         raise out.refused
 
@@ -75,10 +76,12 @@ class _Output:
         self._file = file
         self.refused: OSError | None = None
         """Why the disk took no more."""
+        self.over = False
+        """The file is no longer ours."""
 
     def write(self, data: bytes) -> int:
         """Write, or drop what comes after an error."""
-        if self.refused is None:
+        if self.refused is None and not self.over:
             try:
                 self._file.write(data)
             except OSError as error:
@@ -86,10 +89,10 @@ class _Output:
         return len(data)
 
     def tell(self) -> int:
-        return self._file.tell()
+        return 0 if self.over else self._file.tell()
 
     def seek(self, at: int, whence: int = 0) -> int:
-        return self._file.seek(at, whence)
+        return at if self.over else self._file.seek(at, whence)
 
     def flush(self) -> None:
         """The file is flushed when it is closed."""

@@ -1,0 +1,148 @@
+"""Speed and separation monitoring of a robot whose stop is simulated: by hand, and what is unknown."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made_cell import state_at, two_r
+from made_separation import ROTOR, SIMULATED, K, V, part, separation, station, terms
+from seerob.stopping import models as stop_models
+from seerob.stopping.simulated import StopSimulation
+
+
+def test_simulated_stop_of_one_joint_is_the_constant_deceleration(tmp_path):
+    """The outer brake holds, so that I = 1 + 4: a = B / I; the corner travels its circle."""
+    S = separation(tmp_path, SIMULATED)
+    a = 40.0 / 5.0
+    assert terms(S)[:3] == pytest.approx([1.6 * (0.1 + 1 / a), 0.1 * V, V / (2 * a)], abs=0.005)
+    assert S.limit >= 1.6 * (0.1 + 1 / a) + 0.1 * V + V / (2 * a) + K - 1e-9
+
+
+def test_rotors_lengthen_the_simulated_stop(tmp_path):
+    """The base's rotor weighs as much as the arm's 5 kg·m²: twice the time and way."""
+    one = separation(tmp_path / "one", SIMULATED)
+    two = separation(tmp_path / "two", SIMULATED, arm="rotor_inertia = [5.0, 0.0]\n")
+    assert terms(two)[2] == pytest.approx(2 * terms(one)[2], rel=0.03)
+    assert terms(two)[0] - 0.16 == pytest.approx(2 * (terms(one)[0] - 0.16), rel=0.03)
+
+
+def test_simulated_stop_is_never_more_than_the_bound_with_its_stopping_time(tmp_path):
+    simulated = separation(tmp_path / "s", SIMULATED)
+    T_s = terms(simulated)[0] / 1.6 - 0.1
+    bound = separation(tmp_path / "b", f"reaction = 0.1, stopping = {T_s}")
+    assert simulated.limit < bound.limit
+
+
+@pytest.mark.parametrize(("q1", "nearer"), [(-np.pi / 2, True), (np.pi / 2, False)])
+def test_toward_counts_what_comes_nearer_and_never_falls_below_standstill(tmp_path, q1, nearer):
+    """A quarter turn away from the person, the arm swings toward or away."""
+    q = (q1, 0.0)
+    path = separation(tmp_path / "p", SIMULATED, q=q, x=8.0)
+    toward = separation(tmp_path / "t", SIMULATED + ', direction = "toward"', q=q, x=8.0)
+    assert terms(toward)[0] == pytest.approx(terms(path)[0])
+    ways = [r_s[1] + r_s[2] for r_s in (terms(path), terms(toward))]
+    assert 0 <= terms(toward)[1] <= terms(path)[1] + 1e-12
+    assert terms(toward)[2] >= 0
+    assert ways[1] <= ways[0] + 1e-12
+    if nearer:
+        end = separation(tmp_path / "e", SIMULATED, q=(q1 + 0.1 + 0.0625, 0.0), x=8.0, qd=(0.0, 0.0))
+        assert path.value - end.value <= ways[1]
+        assert ways[1] == pytest.approx(path.value - end.value, abs=0.02)
+    else:
+        assert ways[1] < 0.15 * ways[0]
+        assert ways[1] >= 0
+
+
+@pytest.mark.parametrize("instants", [2, 3, 16])
+def test_toward_misses_nothing_between_the_instants_it_looks_at(tmp_path, monkeypatch, instants):
+    """The arm swings past the person: as far at the end as at the start, nearer in between."""
+    cell = station(tmp_path, SIMULATED, x=3.5)
+    robot = cell.model.robot("arm")
+    gap = cell.model.gap(cell.model.select("op"), robot.moving)
+    state = state_at(cell, arm=((-0.6, 0.0), (2.5, 0.0)))
+    stopped = StopSimulation(cell.model, robot, np.array([15.0, 9.0]), gap.b).stop(state, 0.1)
+    assert stopped.q[-1, 0] > 0.3
+    rotations, positions = state.rotations.copy(), state.positions.copy()
+    seen = []
+    for R, x in zip(stopped.rotations, stopped.positions, strict=True):
+        rotations[list(gap.b)], positions[list(gap.b)] = R, x
+        seen.append(gap.query.per_body(rotations, positions).distance.copy())
+    loss = seen[0] - np.min(seen, axis=0)
+    assert loss.max() > 0.1
+    monkeypatch.setattr(stop_models, "INSTANTS", instants)
+    found = stop_models.approach(stopped, state, gap)
+    assert (found >= loss - 1e-9).all()
+    assert (found <= stopped.ways.sum(axis=0) + 1e-9).all()
+
+
+@pytest.mark.parametrize("instants", [2, 5, 10**6])
+def test_toward_is_the_least_distance_looked_at_and_what_the_ways_between_leave_open(
+    tmp_path, monkeypatch, instants
+):
+    """Between two instants a part comes nearer by no more than half of what its way leaves over."""
+    cell = station(tmp_path, SIMULATED, x=3.5)
+    robot = cell.model.robot("arm")
+    gap = cell.model.gap(cell.model.select("op"), robot.moving)
+    state = state_at(cell, arm=((-0.6, 0.0), (2.5, 0.0)))
+    stopped = StopSimulation(cell.model, robot, np.array([15.0, 9.0]), gap.b).stop(state, 0.1)
+    K = len(stopped.t)
+    rows = np.unique(np.linspace(0, K - 1, min(K, instants)).round().astype(int))
+    assert len(rows) == min(K, instants) > 1
+    rotations, positions, seen = state.rotations.copy(), state.positions.copy(), []
+    for row in rows:
+        rotations[list(gap.b)], positions[list(gap.b)] = stopped.rotations[row], stopped.positions[row]
+        seen.append(gap.query.per_body(rotations, positions).distance.copy())
+    wanted = []
+    for body, distances in enumerate(np.transpose(seen)):
+        least = distances.min()
+        for a, b, near, then in zip(rows, rows[1:], distances, distances[1:], strict=False):
+            way = stopped.ways[a:b, body].sum()
+            least = min(least, (near + then - way) / 2)
+        wanted.append(max(distances[0] - least, 0.0))
+    monkeypatch.setattr(stop_models, "INSTANTS", instants)
+    assert stop_models.approach(stopped, state, gap) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_what_a_simulated_stop_says_of_itself(tmp_path):
+    """Far away the present speeds hold, and faster ones are not searched for: a simulation takes long."""
+    path = separation(tmp_path / "p", SIMULATED, x=9.0)
+    assert "whole path" in path.basis.formula
+    share = part(path, "share of the present speed")
+    assert (share.value, share.reason) == (1.0, "or more")
+    toward = separation(tmp_path / "t", SIMULATED + ', direction = "toward"', x=9.0)
+    assert "loss of distance" in toward.basis.formula
+    one = two_r().replace('effort="1000.0" ', "", 1)
+    for folder, urdf, origin, said in (
+        ("a", two_r(effort=50.0), "estimated", "0.8 of the torque limits"),
+        ("b", one, "missing", "0.8 of the torque limits"),
+    ):
+        S = separation(tmp_path / folder, 'reaction = 0.1, model = "simulated"', urdf=urdf, x=9.0)
+        (brakes,) = (i for i in S.basis.inputs if i.name == "brake torques")
+        assert (brakes.origin, said in brakes.source) == (origin, True)
+        assert "not given" not in brakes.source
+
+
+def test_simulated_stop_without_rotor_inertia_is_undecided_above_and_exceeded_below(tmp_path):
+    far = separation(tmp_path / "far", SIMULATED, arm="", x=9.0)
+    assert far.verdict == "undecided"
+    assert "rotor inertia" in far.reason
+    assert separation(tmp_path / "near", SIMULATED, arm="", x=2.5).verdict == "exceeded"
+
+
+def test_simulated_stop_without_torque_limits_is_undecided(tmp_path):
+    stop = 'reaction = 0.1, model = "simulated"'
+    S = separation(tmp_path / "u", stop, urdf=two_r().replace('effort="1000.0" ', ""), x=9.0)
+    assert S.verdict == "undecided"
+    limited = separation(tmp_path / "l", stop, arm=ROTOR + "torque_limits = [50.0, 25.0]\n")
+    same = separation(tmp_path / "s", SIMULATED)
+    assert limited.limit == same.limit  # 0.8 of the limits
+
+
+def test_permissible_speed_by_simulation_is_one_that_holds(tmp_path):
+    S = separation(tmp_path / "now", SIMULATED, x=3.1)
+    factor = part(S, "share of the present speed").value
+    assert 0 < factor < 1
+    then = separation(tmp_path / "then", SIMULATED, x=3.1, qd=(factor, 0.0))
+    beyond = separation(tmp_path / "beyond", SIMULATED, x=3.1, qd=(factor + 1 / 64, 0.0))
+    assert (then.verdict, beyond.verdict) == ("within", "exceeded")

@@ -54,12 +54,12 @@ def folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="seerob-"))
 
 
-def dynamics(poses: int) -> None:
-    """M, J and E of every library robot through `State`, against Pinocchio built from the same figures."""
+def dynamics(poses: int, names: tuple[str, ...]) -> None:
+    """M, J and E of library robots through `State`, against Pinocchio built from the same figures."""
     rng = np.random.default_rng(0)
     worst = {"M": 0.0, "J": 0.0, "E": 0.0}
     counted = 0
-    for name in library.names():
+    for name in names:
         description = library.load(name)
         station = made(folder(), f'{FLOATING}[[robots]]\nname = "arm"\nmodel = "library:{name}"\n')
         robot, model = station.model.robot("arm"), oracle.pinocchio_model(description)
@@ -78,7 +78,7 @@ def dynamics(poses: int) -> None:
         counted += not robot.unknown_masses
     said = ", ".join(f"{what} {value:.1e}" for what, value in worst.items())
     print(
-        f"dynamics   {len(library.names())} robots ({counted} with masses), {poses} poses: {said} (relative)"
+        f"dynamics   {len(names)} robots ({counted} with masses), {poses} poses: {said} (relative)"
     )
     print(f"           against pinocchio {pin.__version__}")
 
@@ -100,10 +100,10 @@ def states(
         yield engine.tick() if k else engine.start()
 
 
-def tracking(seconds: float) -> None:
+def tracking(seconds: float, timesteps: tuple[float, ...] = (0.001, 0.002)) -> None:
     """Error at the tool of a UR10 with 3 kg, at the instant of each state."""
     model = oracle.pinocchio_model(library.load("ur10"))
-    for timestep in (0.001, 0.002):
+    for timestep in timesteps:
         station = made(folder(), f"engine = {{ timestep = {timestep} }}\n{UR10}{LOAD}")
         tip = station.model.mechanism("arm").tip
         for rate, qd in ((100, True), (100, False), (50, True), (50, False), (500, True)):
@@ -155,12 +155,17 @@ def energy(ticks: int) -> None:
         print(f"energy     {name}, {ticks / 100:g} s of free motion: varies by {spread:.1e} (relative)")
 
 
-def replay() -> None:
-    """The starter's run against its own recording, computed again from the files inside it."""
+def replay(ticks: int | None) -> None:
+    """The starter's run, or its first ticks, against its own recording, computed again from the files inside it."""
     source, place = files("seerob.commands") / "starter", folder()
     for entry in source.iterdir():
         (place / entry.name).write_bytes(entry.read_bytes())
-    load(place).run(folder=place / "first", sinks=[Recorder(lossless=True)])
+    left = iter(range(ticks)) if ticks else None
+    load(place).run(
+        folder=place / "first",
+        sinks=[Recorder(lossless=True)],
+        stop=left and (lambda: next(left, None) is None),
+    )
     first = Recording.open(place / "first" / "run.mcap")
     load_recorded(first).replay(first, folder=place / "again", sinks=[Recorder(lossless=True)])
     again = Recording.open(place / "again" / "run.mcap")
@@ -175,11 +180,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--smoke", action="store_true", help="few poses and short motions")
     smoke = parser.parse_args().smoke
-    dynamics(3 if smoke else 200)
-    tracking(0.2 if smoke else 3.0)
+    names = tuple(library.names())
+    dynamics(2 if smoke else 200, names[::4] if smoke else names)
+    tracking(*((0.1, (0.002,)) if smoke else (3.0,)))
     person(0.2 if smoke else 3.0)
     energy(10 if smoke else 100)
-    replay()
+    replay(50 if smoke else None)
     return 0
 
 

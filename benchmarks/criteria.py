@@ -195,7 +195,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--smoke", action="store_true")
     options = parser.parse_args()
-    ticks, samples = (60, 60) if options.smoke else (800, 10_000)
+    ticks, samples = (30, 30) if options.smoke else (800, 10_000)
     each, median, p99, alone = per_tick(ticks)
     print(f"one robot, one person, {len(each)} criteria, one core:")
     for name, spent in each.items():

@@ -23,6 +23,7 @@ from seerob.source import Opened, Source
 from seerob.station import load_recorded
 
 DEMO = Path(__file__).parent.parent / "workstations" / "ur10_assembly"
+TICKS = 80
 CSV = "t [s],j1 [rad],j2 [rad]\n" + "".join(
     f"{0.01 * k:.2f},{np.sin(0.02 * k):.9f},{0.3 + 0.004 * k:.9f}\n" for k in range(81)
 )
@@ -91,14 +92,15 @@ def replayed(station, recording):
 def demo(tmp_path_factory):
     station = sr.load(DEMO)
     folder = tmp_path_factory.mktemp("demo")
-    return station, record(station, folder, 160)
+    return station, record(station, folder, TICKS)
 
 
+@pytest.mark.xdist_group("demo")
 def test_replay_of_the_demo_is_the_run(demo):
     station, recording = demo
     then = list(recording.snapshots())
     now, _ = replayed(station, recording)
-    assert len(then) == 160
+    assert len(then) == TICKS
     assert all(len(s.results) == len(station.bound) for s in then)
     assert encoded(now) == encoded(then)
 
@@ -117,6 +119,7 @@ print(hashlib.sha256(b"".join(encoded(now))).hexdigest())
 """
 
 
+@pytest.mark.xdist_group("demo")
 def test_a_fresh_process_recomputes_the_demo_from_the_recording_alone(demo, tmp_path):
     import hashlib
 
@@ -201,8 +204,8 @@ def test_a_file_that_has_changed_since_is_told(tmp_path):
 
 
 def test_robot_of_an_installed_package_is_recomputed_where_it_is_installed(tmp_path):
-    name = "package:example-robot-data/ur_description/urdf/ur3_robot.urdf"
-    station = made(tmp_path / "cell", FLOATING + TWO_R.replace("arm.urdf", name) + "q = [0, 1, 0, 0, 0, 0]\n")
+    name = "package:example-robot-data/double_pendulum_description/urdf/double_pendulum.urdf"
+    station = made(tmp_path / "cell", FLOATING + TWO_R.replace("arm.urdf", name) + "q = [0, 1]\n")
     recording = record(station, tmp_path / "out")
     assert load_recorded(recording).model.files == station.model.files
     assert any(file.startswith("outside/arm/") for file in recording.files)
@@ -216,6 +219,7 @@ def test_workstation_file_of_another_name_is_found_in_the_recording(tmp_path):
     assert load_recorded(recording).model.files == station.model.files
 
 
+@pytest.mark.xdist_group("demo")
 def test_replay_refuses_another_tick(demo, tmp_path):
     _, recording = demo
     other = made(tmp_path, "engine = { tick = 0.004 }\n" + TWO_R, {"arm.urdf": two_r()})
@@ -303,6 +307,7 @@ def test_value_that_is_not_finite_is_undecided(tmp_path):
         assert (result.verdict, result.value) == ("undecided", None)
 
 
+@pytest.mark.xdist_group("demo")
 def test_every_result_carries_its_basis(demo):
     station, recording = demo
     for result in next(iter(recording.snapshots())).results:
@@ -312,6 +317,7 @@ def test_every_result_carries_its_basis(demo):
     assert station.bound
 
 
+@pytest.mark.xdist_group("demo")
 def test_every_value_of_the_demo_is_finite_or_undecided_with_a_reason(demo):
     """Standing still has no direction of motion and no limit to be judged by."""
     _, recording = demo

@@ -60,7 +60,8 @@ t = 2.0
 posture = "bend_forward"
 """
 STATION = (
-    HUMAN
+    "engine = { physics = false }\n"
+    + HUMAN
     + """
 [[phases]]
 title = "all"

@@ -11,6 +11,8 @@ from seerob.human.skeleton import JOINTS, mirrored
 from seerob.snapshot import Highlight
 
 STILL = np.zeros(len(JOINTS))
+pytestmark = pytest.mark.xdist_group("mirrored rules")
+"""One process says it all once."""
 HUMAN = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 ARM = 'supported_arms = "left", back_supported = false, legs = "posture", load = 1'
 WORK = f'{ARM}, load_use = "repeated", hand = "right", muscle_arms = true'

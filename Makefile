@@ -79,6 +79,8 @@ types: $(DEV)
 imports: $(DEV)
 	$(BIN)/lint-imports
 
+# Without it, every process that a test starts compiles every library again.
+unit: export PYTHONDONTWRITEBYTECODE :=
 unit: $(DEV) $(PAGE)
 	$(BIN)/pytest -n 2 --dist loadgroup
 

@@ -13,6 +13,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from importlib.resources import files
+from itertools import repeat
 from pathlib import Path
 
 import msgspec
@@ -77,9 +78,7 @@ def dynamics(poses: int, names: tuple[str, ...]) -> None:
             worst["E"] = max(worst["E"], abs(float(kinetic_energy(M, state.qd(robot))) - E) / E)
         counted += not robot.unknown_masses
     said = ", ".join(f"{what} {value:.1e}" for what, value in worst.items())
-    print(
-        f"dynamics   {len(names)} robots ({counted} with masses), {poses} poses: {said} (relative)"
-    )
+    print(f"dynamics   {len(names)} robots ({counted} with masses), {poses} poses: {said} (relative)")
     print(f"           against pinocchio {pin.__version__}")
 
 
@@ -156,15 +155,15 @@ def energy(ticks: int) -> None:
 
 
 def replay(ticks: int | None) -> None:
-    """The starter's run, or its first ticks, against its own recording, computed again from the files inside it."""
+    """The starter's run, or its first ticks, against its recording, computed again from the files in it."""
     source, place = files("seerob.commands") / "starter", folder()
     for entry in source.iterdir():
         (place / entry.name).write_bytes(entry.read_bytes())
-    left = iter(range(ticks)) if ticks else None
+    left = repeat(None) if ticks is None else repeat(None, ticks)
     load(place).run(
         folder=place / "first",
         sinks=[Recorder(lossless=True)],
-        stop=left and (lambda: next(left, None) is None),
+        stop=lambda: next(left, "none left") is not None,
     )
     first = Recording.open(place / "first" / "run.mcap")
     load_recorded(first).replay(first, folder=place / "again", sinks=[Recorder(lossless=True)])

@@ -249,10 +249,10 @@ def test_what_cannot_be_decided_without_models_is_left_to_binding():
         assert mistakes(text + f"[[safety]]\nkind='minimum_distance'\nbetween=['ur10','{subject}']") == {}
 
 
-def test_thousands_of_mistakes_are_cut_short():
-    _, problems = convert_workstation({f"key{i}": 1 for i in range(5000)}, "w.toml")
+def test_a_thousand_mistakes_are_cut_short():
+    _, problems = convert_workstation({f"key{i}": 1 for i in range(1000)}, "w.toml")
     assert len(problems) == 201
-    assert "4800 mistakes more" in problems[-1].what
+    assert "800 mistakes more" in problems[-1].what
 
 
 def test_quantities_are_converted_where_the_key_says_so():
@@ -356,6 +356,9 @@ VALUES = st.recursive(
     LEAVES, lambda v: st.lists(v, max_size=4) | st.dictionaries(KEYS, v, max_size=4), max_leaves=8
 )
 GROUPS = [*Workstation.__struct_fields__, "more"]
+ANY_TABLE = st.dictionaries(
+    st.sampled_from(GROUPS), VALUES | st.lists(st.dictionaries(KEYS, VALUES, max_size=5)), max_size=4
+)
 
 
 def outcome(table):
@@ -364,12 +367,8 @@ def outcome(table):
     return str(problems)
 
 
-@settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(
-    st.dictionaries(
-        st.sampled_from(GROUPS), VALUES | st.lists(st.dictionaries(KEYS, VALUES, max_size=5)), max_size=4
-    )
-)
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(ANY_TABLE)
 def test_any_table_is_a_workstation_or_a_list_of_mistakes(table):
     outcome(table)
 
@@ -381,7 +380,7 @@ def places(value, path=()):
             yield from places(value[key], (*path, key))
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_one_thing_changed_in_the_starter_is_read_or_refused(data):
     table = copy.deepcopy(tomllib.loads(STARTER))
@@ -393,7 +392,7 @@ def test_one_thing_changed_in_the_starter_is_read_or_refused(data):
     outcome(table)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(st.integers(0, len(STARTER.encode()) - 1), st.binary(max_size=3))
 def test_a_damaged_file_is_read_or_refused(tmp_path_factory, at, put):
     raw = STARTER.encode()

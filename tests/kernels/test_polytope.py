@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from seerob.kernels.polytope import largest, vertices
-from seerob.polytope import Polytope, free_moment, torque_box, zero_moment
+from seerob.polytope import SAME, Polytope, _hull, free_moment, torque_box, zero_moment
 
 
 def brute_force(A: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -302,3 +302,10 @@ def test_torque_box_is_the_hull_of_every_extreme_torque() -> None:
     p = torque_box(J_v, -high, high)
     assert p.largest == pytest.approx(np.linalg.norm(images, axis=1).max(), rel=1e-12)
     assert volume(p) == pytest.approx(ConvexHull(images).volume, rel=1e-9)
+
+
+def test_corners_that_rounding_parts_are_one_however_near_the_origin():
+    corners = np.array(list(product((0.0, 40.0), repeat=3)))
+    parted = np.concatenate([corners, corners + 40.0 * SAME / 10])
+    whole = _hull(parted, np.zeros((3, 0)))
+    assert len(whole.corners) == len(corners)

@@ -18,7 +18,7 @@ physics = false
 kind = "opcua"
 name = "plc"
 url = "URL"
-timeout = 30
+timeout = 3
 [[machines]]
 name = "axis"
 shape = { box = [0.2, 0.2, 0.2] }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 
@@ -20,6 +21,11 @@ WITH_MASSES = [name for name in library.names() if any(link.inertial for link in
 def installed(tail: str) -> Path:
     files = metadata.distribution("example-robot-data").files or []
     return next(Path(str(f.locate())) for f in files if str(f).endswith(tail))
+
+
+@cache
+def robot_of(path: Path):
+    return load_robot(str(path), folder=Path())
 
 
 def close(a, b):
@@ -50,7 +56,7 @@ FILES = ["ur3_robot.urdf", "ur5_robot.urdf", "ur10_robot.urdf", "panda.urdf", "z
 @pytest.mark.parametrize("tail", FILES)
 def test_files_against_pinocchios_own_reader(tail):
     path = installed("/" + tail)
-    robot = load_robot(str(path), folder=Path())
+    robot = robot_of(path)
     model = pin.buildModelFromUrdf(str(path))
     data = model.createData()
     joints = {joint.name: joint for link in robot.links for joint in link.joints}
@@ -86,7 +92,7 @@ def test_files_against_pinocchios_own_reader(tail):
 
 def test_limits_are_those_of_pinocchios_own_reader():
     path = installed("/ur10_robot.urdf")
-    robot = load_robot(str(path), folder=Path())
+    robot = robot_of(path)
     model = pin.buildModelFromUrdf(str(path))
     for i, joint in enumerate(robot.joints()):
         assert joint.lower == model.lowerPositionLimit[i]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,13 @@ from seerob.model_io.loader import load_robot
 UR10 = "package:example-robot-data/robots/ur_description/urdf/ur10_robot.urdf"
 
 
+@cache
+def dressed_ur10():
+    return load_robot("library:ur10", folder=Path(), meshes=UR10, name="left")
+
+
 def test_every_vertex_is_where_the_maker_puts_it():
-    dressed = load_robot("library:ur10", folder=Path(), meshes=UR10, name="left")
+    dressed = dressed_ur10()
     maker = load_robot(UR10, folder=Path())
     rng = np.random.default_rng(2)
     for q in rng.uniform(-3, 3, (3, 6)):
@@ -33,7 +39,7 @@ def test_every_vertex_is_where_the_maker_puts_it():
 
 
 def test_figures_stay_the_librarys_and_shapes_are_the_makers():
-    dressed, plain = load_robot("library:ur10", folder=Path(), meshes=UR10, name="left"), library.load("ur10")
+    dressed, plain = dressed_ur10(), library.load("ur10")
     for link, before in zip(dressed.links, plain.links, strict=True):
         assert (link.name, link.parent) == (before.name, before.parent)
         assert (link.inertial is None) == (before.inertial is None)

@@ -93,7 +93,7 @@ def test_contact_permits_the_published_speed_of_the_hand(tmp_path):
 
 @pytest.mark.parametrize("criteria", [(PFL + KEPT_OUT,), (KNOWN,), (PFL + KEPT_OUT, KNOWN)])
 def test_the_rescaled_motion_is_within_where_the_given_one_was_not(tmp_path, criteria):
-    found = cell(tmp_path, *criteria).permissible_speed(wish=Wish(verify=0.02))
+    found = cell(tmp_path, *criteria).permissible_speed(wish=Wish(spacing=0.05, verify=0.02))
     assert found.rescaled is not None
     assert "exceeded" in {series.verdict for series in found.before.values()}
     assert {series.verdict for series in found.after.results.values()} == {"within"}
@@ -162,7 +162,8 @@ def test_not_faster_than_given(tmp_path):
     tip = '[[safety]]\nkind = "velocity"\nname = "V"\nat = "arm"\nlimit = 9.0\n'
     station = cell(tmp_path, tip)
     free, held = (
-        station.permissible_speed(wish=Wish(not_faster=x, verify=0.02)).rescaled for x in (False, True)
+        station.permissible_speed(wish=Wish(not_faster=x, spacing=0.1, verify=0.02)).rescaled
+        for x in (False, True)
     )
     assert isinstance(free, Rescaled)
     assert isinstance(held, Rescaled)
@@ -202,7 +203,7 @@ def test_it_can_be_stopped_and_leaves_nothing(tmp_path):
             raise Stop
 
     with pytest.raises(Stop):
-        cell(tmp_path / "cell", KNOWN).permissible_speed(say=say)
+        cell(tmp_path / "cell", KNOWN).permissible_speed(wish=COARSE, say=say)
     assert not (tmp_path / "cell" / "runs").exists()
 
 

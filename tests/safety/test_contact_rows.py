@@ -77,12 +77,12 @@ def test_sharp_edges_leave_the_pressure_open(tmp_path: Path) -> None:
             assert row.reason.startswith("contact pressure of arm/")
 
 
-def near(folder: Path, hand: str) -> dict[str, Row]:
+def near(folder: Path, hand: str, horizon: float = 0.3) -> dict[str, Row]:
     human = (
         f'[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nhand = "{hand}"\n'
         "at = { position = [2.25, 0, -1.0] }\n"
     )
-    station = cell(folder, FLAT + 'human = "op"\nhorizon = 0.3', more=human)
+    station = cell(folder, FLAT + f'human = "op"\nhorizon = {horizon}', more=human)
     return {row.name: row for row in pfl(station).rows}
 
 
@@ -95,12 +95,9 @@ def test_only_what_can_be_hit_has_rows_with_its_bones(tmp_path: Path) -> None:
 
 
 def test_hands_are_told_apart_by_the_dominant_one(tmp_path: Path) -> None:
-    other = {"right": "left", "left": "right"}
-    for hand in ("right", "left"):
-        rows = near(tmp_path / hand, hand)
-        palms = [row for name, row in rows.items() if name.startswith("Palm")]
-        for row in palms:
-            assert row.side == (other[hand] if "non-dominant" in row.name else hand)
+    for hand, other in (("right", "left"), ("left", "right")):
+        rows = near(tmp_path / hand, hand, horizon=0.5)
+        assert (rows["Palm, dominant"].side, rows["Palm, non-dominant"].side) == (hand, other)
 
 
 def test_excluded_regions_stay_visible_as_excluded(tmp_path: Path) -> None:

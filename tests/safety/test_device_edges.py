@@ -244,6 +244,15 @@ def test_a_hazard_whose_surface_may_stick_out_leaves_a_band_of_undecided(tmp_pat
     assert found.verdict == verdict
 
 
+def test_the_label_in_the_room_has_no_more_room_than_there_is(tmp_path):
+    text = CURTAIN.format(at=[0, 0, 0], more="capability = 0.014\nresponse = 0.1", height=1.5, pitch="")
+    text += ROD.format(name="saw", x=0.2, y=0.2, z=0.2, at=[0, 1.00016, 0.5])
+    text += FAR.format(sensor="curtain", hazard="saw") + 'edition = "2010"\nreach_over = 0\n'
+    found = results(tmp_path, text)["d"]
+    assert found.value == pytest.approx(0.89884)
+    assert [m.label for m in found.markers] == ["0.8988 m, S 0.64 m"]
+
+
 @pytest.mark.parametrize(
     ("at", "edges", "value"),
     [

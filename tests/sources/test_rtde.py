@@ -88,7 +88,7 @@ def test_a_controller_that_comes_late_is_followed(tmp_path):
     assert warning == [
         "controller: not reached at start: Connection refused; it is tried again during the run"
     ]
-    story = Story(400, at_20=server.start)
+    story = Story(100, lambda story: story.decided() > 10, at_20=server.start)
     try:
         lived(station, story)
     finally:

@@ -68,7 +68,8 @@ class Engine:
         Args:
             model: The compiled workstation.
             driven: Time-out [s] of the source of each robot and human that a source drives.
-            live: Those of them whose source is live; when a sample is late they coast, until the time-out.
+            live: Those of them whose source is live; when a sample is late they coast, until the time-out;
+                machines do not.
             signals: Time-out [s] of each source of variables.
             controllers: Whether the twin is pulled at all; off, it moves freely from where the first
                 samples put it, and nothing that is heard later is compared with it.
@@ -100,8 +101,10 @@ class Engine:
             for m in self._mechanisms
             if m.offset.any() or not np.array_equal(m.coupling, np.eye(len(m.v_address)))
         }
+        # What a variable says of a machine stands until it says something else.
+        coasting = set(live) - {machine.name for machine in model.workstation.machines}
         self._references = {
-            m.name: Reference(m.home, largest_speed(m), coast=driven[m.name] if m.name in live else 0.0)
+            m.name: Reference(m.home, largest_speed(m), coast=driven[m.name] if m.name in coasting else 0.0)
             for m in self._mechanisms
         }
         self._hearings = {

@@ -228,3 +228,15 @@ def test_a_machine_may_have_a_motion_of_its_own_instead(tmp_path):
     (tmp_path / "gate.csv").write_text(table("t,x", [(0.1 * k, 0.05 * k) for k in range(11)]))
     loaded = made(tmp_path, station, "", "t,x\n0,0")
     assert loaded.run().results["speed"].max() == pytest.approx(0.5, rel=1e-2)
+
+
+def test_a_live_machine_stands_where_it_was_said_to_be_however_late_it_hears_the_next(tmp_path):
+    station = made(tmp_path, PERSON + GATE, POSITION, table("t,x", [(0, 0), (1, 0)]))
+    engine = Engine(station.model, driven={"gate": 5.0}, live={"gate"}, signals={"plc": 5.0})
+    for seq, (t, x) in enumerate([(0.0, 0.2), (0.25, 0.2), (0.5, 0.4)]):
+        engine.take([SignalSample(source="plc", seq=seq, t=t, values={"gate/position": x})])
+    engine.start()
+    (gate,) = station.model.mechanisms["gate"].q_address
+    way = [engine.tick().data.qpos[gate] for _ in range(300)]
+    assert max(way) < 0.41
+    assert way[100:] == pytest.approx([0.4] * 200, abs=1e-6)

@@ -26,6 +26,9 @@ from seerob.variables.dictionary import BadValue, Value, Variable
 
 COVER_WITHIN = 1.0
 """How long a device is listened to for what it has of the dictionary, at start [s]."""
+LONGEST_PULSE = 0.25
+"""A device that speaks of changes is asked so often at least whether it is there [s]: what stands is as old
+as the last answer, and a change is a motion since then."""
 BEAT = 0.05
 """A sample is sent at least this often while there is a connection [s]: no news is news, too."""
 PULSES = 4

@@ -21,7 +21,7 @@ from seerob.protocols.trusted_certificates import trusting
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.sources._json_values import told
-from seerob.sources._variables import BEAT, PULSES, Change, Node, VariablesSource
+from seerob.sources._variables import BEAT, LONGEST_PULSE, PULSES, Change, Node, VariablesSource
 from seerob.variables.dictionary import Variable
 
 if TYPE_CHECKING:
@@ -176,7 +176,7 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
             for text in (*plain, *(t for node in metrics for t in _topics(node))):
                 await client.subscribe(text, qos=0, timeout=PATIENCE)
             yield _standing(wanted, metrics)
-            within = min([self.timeout, *(v.timeout for v in variables)]) / PULSES
+            within = min([self.timeout / PULSES, *(v.timeout / PULSES for v in variables), LONGEST_PULSE])
             async with aclosing(Pulse(client, within)) as pulse:
                 async for message in messages:
                     if not pulse.shown(spoke=message is not None):

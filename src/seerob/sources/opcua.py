@@ -27,7 +27,7 @@ from seerob.quantities import Seconds
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.sources._opcua_files import at_home, missing
-from seerob.sources._variables import PULSES, Change, Node, VariablesSource
+from seerob.sources._variables import LONGEST_PULSE, PULSES, Change, Node, VariablesSource
 from seerob.variables.dictionary import Kind, Variable
 from seerob.variables.units import unit
 
@@ -109,7 +109,7 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
             changes = Changes()
             lost |= await changes.watch(client, nodes, self.interval)
             yield tuple(Change(name, None, doubt=why) for name, why in lost.items())
-            async for changed in changes.heard(client, self.timeout / PULSES):
+            async for changed in changes.heard(client, min(self.timeout / PULSES, LONGEST_PULSE)):
                 yield tuple(
                     # A value that stands is as new as the connection, however long ago it changed.
                     Change(name, found.value, doubt=found.doubt)

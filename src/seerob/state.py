@@ -288,8 +288,9 @@ class State:
         """World rotation (3, 3) and position (3,) [m] of a frame."""
         key = ("pose", id(frame))
         if key not in self._cache:
-            self._cache[key] = carried(self._xmat, self._xpos, frame.mj, frame.body_from_frame)
-        rotation, position = self._cache[key]
+            # With the frame itself: another one may get the id of one that is forgotten.
+            self._cache[key] = frame, *carried(self._xmat, self._xpos, frame.mj, frame.body_from_frame)
+        _, rotation, position = self._cache[key]
         return rotation, position
 
     def jacobian(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> Array:

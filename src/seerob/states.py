@@ -189,8 +189,9 @@ class States:
             found = np.empty((len(self), 6, len(dofs)))
             root, moves = int(bench.mj.body_rootid[frame.mj]), moving_dofs(bench.mj, frame.mj)
             jacobians(moved["cdof"], moved["subtree_com"], root, dofs, moves, points, found)
-            self._cache[key] = found if columns.coupling is None else found @ columns.coupling
-        return np.asarray(self._cache[key])
+            # With the frame itself: another one may get the id of one that is forgotten.
+            self._cache[key] = frame, found if columns.coupling is None else found @ columns.coupling
+        return np.asarray(self._cache[key][1])
 
     def fastest_points(self, bodies: Sequence[int]) -> tuple[Array, Array, Array]:
         """Bounds on the speeds of any points of bodies, corners and their velocities; see `State`.

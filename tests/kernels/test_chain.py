@@ -54,3 +54,13 @@ def test_displacements_bound_every_point_and_are_reached():
         inner = rng.dirichlet(np.ones(len(hull)), 200) @ hull
         assert (np.linalg.norm(seen(1, i, j, inner) - seen(0, i, j, inner), axis=1) <= most + 1e-12).all()
     assert found[3] == 0.0
+
+
+def test_a_frame_that_is_forgotten_leaves_nothing_to_the_next_that_gets_its_place_in_memory(station):
+    state = state_at(station, arm=(np.linspace(-1, 1, 6), np.zeros(6)))
+    robot = station.model.robot("arm")
+    for _ in range(50):
+        for i in robot.moving:
+            assert np.array_equal(
+                state.pose(Frame("", station.model.bodies[i].mj, np.eye(4)))[1], state.positions[i]
+            )

@@ -5,7 +5,7 @@ import pytest
 from soak.hammering import hammer, hammer_in_processes
 from soak.made_files import KINDS
 
-FEW, MANY = 200, 100_000
+FEW, MANY = 60, 100_000
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -78,6 +78,7 @@ class _Output:
         """Why the disk took no more."""
         self.over = False
         """The file is no longer ours."""
+        self._at = file.tell()
 
     def write(self, data: bytes) -> int:
         """Write, or drop what comes after an error."""
@@ -86,13 +87,20 @@ class _Output:
                 self._file.write(data)
             except OSError as error:
                 self.refused = error
+        self._at += len(data)
         return len(data)
 
     def tell(self) -> int:
-        return 0 if self.over else self._file.tell()
+        return self._at
 
     def seek(self, at: int, whence: int = 0) -> int:
-        return at if self.over else self._file.seek(at, whence)
+        """To a place that is counted from the begin: an archive asks for no other."""
+        if whence:
+            raise ValueError(f"seek from {whence}, not from the begin")
+        if self.refused is None and not self.over:
+            self._file.seek(at)
+        self._at = at
+        return at
 
     def flush(self) -> None:
         """The file is flushed when it is closed."""

@@ -27,7 +27,7 @@ from made_cell import FLOATING, heard, hinge_limits, made, state_at
 from oracles import pinocchio_oracle as oracle
 from seerob.engine import Engine
 from seerob.model_io import library
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 from seerob.run import pump
 from seerob.safety.kinetic_energy import kinetic_energy
 from seerob.sinks.recorder import Recorder

@@ -29,7 +29,8 @@ from pathlib import Path
 import numpy as np
 
 import seerob as sr
-from seerob import live, run
+from seerob import run
+from seerob.live import listening as live
 from seerob.samples import SignalSample, key
 
 FOLDER = Path(__file__).parents[1] / "workstations" / "plc_cell"

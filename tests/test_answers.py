@@ -9,7 +9,7 @@ import pytest
 
 from seerob.answers import Answers, judge_many
 from seerob.criterion import judge, judge_interval
-from seerob.series import CODES, NO_VERDICT
+from seerob.results.series import CODES, NO_VERDICT
 from seerob.snapshot import Verdict
 
 EDGES = np.array([-1.0, np.nextafter(1.0, 0), 1.0, np.nextafter(1.0, 2), np.inf, np.nan])

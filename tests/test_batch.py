@@ -8,8 +8,8 @@ import pytest
 from made_cell import TWO_R, UR10, heard, made, two_r, wave
 from seerob.engine import Engine
 from seerob.errors import InputError, UnknownName
+from seerob.results.series import CODES
 from seerob.run import Judge
-from seerob.series import CODES
 from seerob.snapshot import Verdict
 
 N = 70

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seerob.results import log_of
+from seerob.results.result_log import log_of
 from seerob.sinks import _posture_safety
 from seerob.snapshot import Verdict
 from seerob.station import load

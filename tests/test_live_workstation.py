@@ -18,7 +18,7 @@ from seerob.commands.emulating.rtde import HOME
 from seerob.emulators.motions import swing
 from seerob.emulators.rtde import RtdeServer
 from seerob.errors import InputError
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 from seerob.station import load
 
 FOLDER = Path(__file__).parents[1] / "workstations" / "ur10_rtde"

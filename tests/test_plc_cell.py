@@ -9,7 +9,7 @@ from pathlib import Path
 from seerob import load
 from seerob.cli import parser
 from seerob.commands.emulating import opcua, rtde
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 from seerob.sinks.recorder import Recorder
 
 SHIPPED = Path(__file__).parents[1] / "workstations" / "plc_cell"

@@ -16,7 +16,7 @@ import seerob as sr
 from made_cell import FLOATING, TWO_R, heard, made, two_r
 from seerob.engine import Engine
 from seerob.errors import InputError
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 from seerob.run import Clock, Judge, bind, pump, ticks
 from seerob.sinks.recorder import Recorder
 from seerob.source import Opened, Source
@@ -107,7 +107,7 @@ def test_replay_of_the_demo_is_the_run(demo):
 
 AGAIN = """
 import sys, hashlib, msgspec
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 from seerob.station import load_recorded
 sys.path.insert(0, sys.argv[2])
 from test_run import encoded, replayed

@@ -9,8 +9,8 @@ import pytest
 from made_cell import FLOATING, made, state_at
 from seerob.human.skeleton import BONES
 from seerob.judging import Judge
-from seerob.partly_seen import seen_first
 from seerob.snapshot import Result, Verdict
+from seerob.whereabouts.partly_seen import seen_first
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 RIGHT = frozenset(bone for bone in BONES if bone.startswith("right_"))

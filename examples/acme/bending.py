@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from seerob.criterion import Criterion, Evaluate, judge
-from seerob.ergonomic_posture import bind_posture
 from seerob.model import Model
+from seerob.postures.ergonomic_posture import bind_posture
 from seerob.scoring.spans import beyond
 from seerob.snapshot import Basis, Result, Verdict
 from seerob.state import State

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from seerob.errors import InputError, SeerobError, Undecided, UnknownName
     from seerob.model import Model
     from seerob.reading import read
-    from seerob.recording import Recording
-    from seerob.results import ResultLog, Series
+    from seerob.recordings.recording import Recording
+    from seerob.results.result_log import ResultLog, Series
     from seerob.run import Summary
     from seerob.snapshot import Origin, Result, Snapshot, Verdict
     from seerob.station import Station, load, load_recorded
@@ -30,8 +30,8 @@ _HOMES = {
     "errors": ("InputError", "SeerobError", "Undecided", "UnknownName"),
     "model": ("Model",),
     "reading": ("read",),
-    "recording": ("Recording",),
-    "results": ("ResultLog", "Series"),
+    "recordings.recording": ("Recording",),
+    "results.result_log": ("ResultLog", "Series"),
     "run": ("Summary",),
     "snapshot": ("Origin", "Result", "Snapshot", "Verdict"),
     "station": ("Station", "load", "load_recorded"),

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.series import CODES, NO_VERDICT
+from seerob.results.series import CODES, NO_VERDICT
 from seerob.snapshot import Verdict
 from seerob.transforms import Array
 
 Codes = NDArray[np.uint8]
-"""Verdicts; see `seerob.series.CODES`."""
+"""Verdicts; see `seerob.results.series.CODES`."""
 Flags = NDArray[np.bool_]
 
 WITHIN, EXCEEDED, UNDECIDED = CODES[Verdict.WITHIN], CODES[Verdict.EXCEEDED], CODES[Verdict.UNDECIDED]

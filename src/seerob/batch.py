@@ -22,8 +22,8 @@ from seerob.criterion import Criterion, EvaluateMany
 from seerob.errors import Undecided, UnknownName
 from seerob.judging import Judge
 from seerob.model import Model
+from seerob.results.series import CODES
 from seerob.run import Bound, Feed, engine_of, settled
-from seerob.series import CODES
 from seerob.snapshot import Result, Verdict
 from seerob.state import Hearing, State
 from seerob.states import Bench, Motion, Questions, Reasons

@@ -79,8 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write(f"{error}\n")
         return Exit.ERROR
     except KeyboardInterrupt:
-        sys.stderr.write("stopped\n")
-        return Exit.ERROR
+        return _stopped()
     except BrokenPipeError:
         # Whoever read has gone; the interpreter must not try to write the rest at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -93,8 +92,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Libraries with a bare except turn an interrupt into an error of their own.
         if not _interrupted(error):
             raise
-        sys.stderr.write("stopped\n")
-        return Exit.ERROR
+        return _stopped()
+
+
+def _stopped() -> Exit:
+    # An interrupt inside text that a library had run makes the interpreter end by a signal instead of with
+    # our exit code, until other text is run.
+    eval("0")  # noqa: S307
+    sys.stderr.write("stopped\n")
+    return Exit.ERROR
 
 
 def _interrupted(error: BaseException | None) -> bool:

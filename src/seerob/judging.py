@@ -11,9 +11,9 @@ from msgspec.structs import replace
 
 from seerob.criterion import Criterion, Evaluate
 from seerob.errors import Undecided
-from seerob.hearing import SLACK
 from seerob.snapshot import Basis, Result, Verdict
 from seerob.state import State
+from seerob.whereabouts.hearing import SLACK
 
 
 @dataclass(frozen=True)

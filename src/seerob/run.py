@@ -16,15 +16,14 @@ from msgspec.structs import replace
 
 from seerob.engine import Engine
 from seerob.errors import InputError, Problem, SeerobError
-from seerob.in_doubt import in_doubt
 from seerob.judging import Bound as Bound  # noqa: PLC0414
 from seerob.judging import Judge as Judge  # noqa: PLC0414
-from seerob.live import LiveSource, delay_of
+from seerob.live.listening import LiveSource, delay_of
+from seerob.live.real_time import Clock
 from seerob.machines.displays import Looks
 from seerob.model import Model
 from seerob.mounting.compilation import pose_matrix
-from seerob.real_time import Clock
-from seerob.results import ResultLog
+from seerob.results.result_log import ResultLog
 from seerob.samples import Sample
 from seerob.sink import KeepsResults, Writer
 from seerob.snapshot import (
@@ -40,6 +39,7 @@ from seerob.snapshot import (
 )
 from seerob.source import Matrix4, Opened, Pump, Source, Target
 from seerob.state import State
+from seerob.whereabouts.in_doubt import in_doubt
 from seerob.workstation import content_hash
 
 Feed = Iterator[tuple[Sample, ...]]

@@ -8,7 +8,7 @@ from typing import Protocol, Self, runtime_checkable
 
 from msgspec import Struct
 
-from seerob.results import ResultLog
+from seerob.results.result_log import ResultLog
 from seerob.samples import Sample
 from seerob.snapshot import Scene, Snapshot
 

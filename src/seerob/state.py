@@ -18,16 +18,16 @@ from seerob.bearers import Bearers
 from seerob.distances.least import Closest, Closests, Per, Query
 from seerob.distances.surveying import Surveyor
 from seerob.errors import Undecided
-from seerob.hearing import SLACK
-from seerob.hearing import Hearing as Hearing  # noqa: PLC0414
 from seerob.joint_columns import Columns
 from seerob.kernels.chain import along
 from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
 from seerob.model import Frame, Gap, Mechanism, Model
-from seerob.seen_bones import bones_of, unseen_reason
 from seerob.transforms import Array
 from seerob.variables.dictionary import Value
 from seerob.variables.signals import Signals
+from seerob.whereabouts.hearing import SLACK
+from seerob.whereabouts.hearing import Hearing as Hearing  # noqa: PLC0414
+from seerob.whereabouts.seen_bones import bones_of, unseen_reason
 
 Indices = NDArray[np.int64]
 
@@ -162,7 +162,7 @@ class State:
         Args:
             bodies: By index.
             estimates: Whether bones that nobody sees will do where the file accepts them
-                (``unseen_uncertainty``): whoever asks adds `seerob.tracking_error.TrackingError`.
+                (``unseen_uncertainty``): whoever asks adds `seerob.whereabouts.tracking_error.TrackingError`.
         """
         key = ("relied on", bodies, estimates)
         others, people = self._bones(bodies)

@@ -17,9 +17,9 @@ from seerob import run as road
 from seerob.batch import Batch
 from seerob.criterion import Criterion
 from seerob.errors import InputError, Problem
-from seerob.filing import SOURCES, source_files
 from seerob.given_states import motion_of
-from seerob.live import Listening, LiveSource
+from seerob.live.listening import Listening, LiveSource
+from seerob.live.real_time import Clock, hear, require_recorded
 from seerob.model import Model
 from seerob.mounting.compilation import Progress, compile_workstation
 from seerob.mounting.things import MadeArea
@@ -27,8 +27,8 @@ from seerob.permissible import evaluation
 from seerob.permissible.evaluation import PermissibleSpeed, Say, Wish
 from seerob.permissible.joint_limits import Given, joint_limits
 from seerob.reading import read
-from seerob.real_time import Clock, hear, require_recorded
-from seerob.recording import Recording
+from seerob.recordings.filing import SOURCES, source_files
+from seerob.recordings.recording import Recording
 from seerob.run import Bound, Feed, Summary
 from seerob.sink import Sink, Writer
 from seerob.snapshot import Scene

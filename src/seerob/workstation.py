@@ -16,6 +16,7 @@ from seerob.errors import InputError
 from seerob.machines.display_table import Display
 from seerob.machines.tables import Belt, Fingers, Motion, Route, Slide, Turn, Vehicle
 from seerob.mounting.simple_shape import Shape as Shape  # noqa: PLC0414
+from seerob.postures.task_phase import TaskPhase
 from seerob.quantities import (
     Coordinate,
     Density,
@@ -33,7 +34,6 @@ from seerob.quantities import (
 from seerob.quantities import Metres3 as Metres3  # noqa: PLC0414
 from seerob.quantities import Pose as Pose  # noqa: PLC0414
 from seerob.sensors.tables import Sensor
-from seerob.task_phase import TaskPhase
 from seerob.writing.target_table import CartesianTarget
 from seerob.writing.trigger_table import Trigger
 

@@ -11,7 +11,7 @@ import pytest
 from made_cells import make_cell
 
 from seerob.errors import SeerobError
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 
 
 @pytest.fixture
@@ -99,3 +99,18 @@ def test_an_interrupt_that_a_library_turned_into_its_own_error_is_one(monkeypatc
     monkeypatch.setattr(kinds, "run", interrupted)
     assert cli.main(["kinds"]) == 3
     assert capsys.readouterr().err == "stopped\n"
+
+
+def test_an_interrupt_in_generated_code_ends_with_the_exit_code_too(tmp_path):
+    """Dataclasses and the like run text; CPython remembers an interrupt in there and ends by a signal."""
+    (tmp_path / "interrupted_kinds.py").write_text(
+        "import sys\n"
+        "from seerob import cli\n"
+        "from seerob.commands import kinds\n"
+        "kinds.run = lambda options: exec('raise KeyboardInterrupt')\n"
+        "sys.exit(cli.main(['kinds']))\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-m", "interrupted_kinds"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert (ended.returncode, ended.stderr) == (3, "stopped\n")

@@ -9,7 +9,7 @@ from made_postures import PERSON, made_angles
 from made_cell import judged, made, state_at
 from seerob.human.posture import posture
 from seerob.human.skeleton import JOINTS
-from seerob.results import ResultLog
+from seerob.results.result_log import ResultLog
 from seerob.scoring.eaws_posture import (
     EawsThresholds,
     Interpolation,

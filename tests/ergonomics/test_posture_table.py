@@ -11,7 +11,7 @@ from made_cell import judged, made, state_at
 from seerob.errors import InputError
 from seerob.human.posture import posture
 from seerob.human.skeleton import JOINTS
-from seerob.posture_file import read_zones
+from seerob.postures.zone_file import read_zones
 from seerob.run import bind
 from seerob.scoring.published import published
 from seerob.snapshot import Origin, RowState, Verdict

@@ -8,12 +8,12 @@ from made_postures import PERSON
 
 from made_cell import heard, judged, made, results_at, state_at
 from seerob.engine import Engine
-from seerob.ergonomic_posture import posture as angles_of
 from seerob.ergonomics import reba, rula
 from seerob.errors import InputError
 from seerob.human.angles import Angles, angles
 from seerob.human.posture import posture
 from seerob.human.skeleton import JOINTS, bone_poses, mirrored
+from seerob.postures.ergonomic_posture import posture as angles_of
 from seerob.run import Judge, bind
 from seerob.scoring.bands import band_of
 from seerob.scoring.owas import Legs

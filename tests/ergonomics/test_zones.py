@@ -9,7 +9,7 @@ from made_postures import PERSON, made_angles, random_q
 from seerob.errors import InputError
 from seerob.human.angles import angles
 from seerob.human.skeleton import JOINTS, bone_poses, mirrored
-from seerob.posture_file import zones_of
+from seerob.postures.zone_file import zones_of
 from seerob.scoring.published import published
 from seerob.scoring.zones import MEASURES, ZoneRow, ZoneWatch, mistakes, value_of
 

@@ -8,13 +8,13 @@ from made_capture import PERSON, captured, frames_of, source, walking, workstati
 
 from seerob import run as road
 from seerob.engine import Engine
-from seerob.ergonomic_posture import bind_posture
 from seerob.human.ends import ENDS, aimed, swing
 from seerob.human.posture import posture
 from seerob.human.skeleton import AXES, BONES, bone_poses
+from seerob.postures.ergonomic_posture import bind_posture
 from seerob.samples import BodyPoint
 from seerob.station import Station
-from seerob.tracking_error import TrackingError
+from seerob.whereabouts.tracking_error import TrackingError
 
 LIMITS = PERSON.joints()
 LOWER = np.array([-np.inf if j.lower is None else j.lower for j in LIMITS])

@@ -8,10 +8,10 @@ from made_capture import captured, frames_of, play, source, walking, workstation
 
 from seerob import run as road
 from seerob.engine import Engine
-from seerob.ergonomic_posture import bind_posture
 from seerob.errors import Undecided
 from seerob.human.estimated import in_doubt_with
 from seerob.human.skeleton import BONES
+from seerob.postures.ergonomic_posture import bind_posture
 from seerob.station import Station
 
 ARM = ("right_upper_arm", "right_forearm", "right_hand")

@@ -6,7 +6,7 @@ import numpy as np
 from made_capture import captured, frames_of, source, walking, workstation
 
 from seerob.human.skeleton import BONES
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 from seerob.samples import BodySample
 from seerob.sinks.recorder import Recorder
 from seerob.sources._capture_options import Weights

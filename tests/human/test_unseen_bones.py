@@ -11,17 +11,17 @@ from msgspec.structs import replace
 
 from seerob import run as road
 from seerob.engine import Engine
-from seerob.ergonomic_posture import bind_posture
 from seerob.errors import Undecided
-from seerob.hearing import Hearing
 from seerob.human.estimated import estimated
 from seerob.human.skeleton import BONES, PARENTS
+from seerob.postures.ergonomic_posture import bind_posture
 from seerob.run import Judge
 from seerob.safety.minimum_distance import MinimumDistance
 from seerob.snapshot import Verdict
 from seerob.sources._capture_options import Weights
 from seerob.station import Station
-from seerob.tracking_error import TrackingError
+from seerob.whereabouts.hearing import Hearing
+from seerob.whereabouts.tracking_error import TrackingError
 
 RIGHT = ("right_clavicle", "right_upper_arm", "right_forearm", "right_hand")
 UPPER = ("pelvis", "lumbar", "thorax", "neck", "head", *RIGHT)

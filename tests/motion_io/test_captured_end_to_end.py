@@ -14,7 +14,7 @@ from seerob.cli import main
 from seerob.human import keyframes, manikin, motion
 from seerob.human.mapping import conventions, plain
 from seerob.human.skeleton import BONES, JOINTS, bone_poses
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 
 PERSON = manikin.build(name="person", stature=1.75, mass=75.0, sex="male")
 RATE, COUNT = 30.0, 24

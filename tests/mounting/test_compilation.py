@@ -8,9 +8,9 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
 from seerob.errors import InputError
-from seerob.filing import filed
 from seerob.geometry import capsule
 from seerob.mounting.specification import extreme_points
+from seerob.recordings.filing import filed
 from seerob.transforms import rotation_from_rpy
 
 GRIP = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = { box = [0.2, 0.1, 0.1] }\nmass = 0.5\n'

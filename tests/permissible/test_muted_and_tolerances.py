@@ -16,7 +16,7 @@ from seerob.permissible.ceiling import Ceiling, Method
 from seerob.permissible.methods import By, governing
 from seerob.permissible.witness import Posed, Witness
 from seerob.state import Hearing, State
-from seerob.tracking_error import TrackingError
+from seerob.whereabouts.tracking_error import TrackingError
 
 PLC = '[[sources]]\nkind = "signals_csv"\nname = "plc"\nfile = "s.csv"\ntime = "t"\ntime_unit = "s"\n'
 GATE = '[[variables]]\nname = "gate/open"\nsource = "plc"\naddress = "x"\ntype = "bool"\n'

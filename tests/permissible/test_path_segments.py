@@ -15,14 +15,14 @@ from made_cell import FLOATING, TWO_R, made, two_r
 from seerob import cli
 from seerob.commands.whole_folder import whole_folder
 from seerob.errors import InputError
-from seerob.path_map import read_map
-from seerob.path_markers import Place, path_markers
 from seerob.permissible.evaluation import Wish
 from seerob.permissible.segments import segments
 from seerob.permissible.solved_motion import solved
 from seerob.permissible.tables import SEGMENT_HEAD, csv_bytes, map_head, map_rows, segment_rows
 from seerob.safety.path_speed import passed
 from seerob.samples import PoseSample
+from seerob.trajectories.path_map import read_map
+from seerob.trajectories.path_markers import Place, path_markers
 from seerob.verdict import Verdict
 
 TIP = '[[safety]]\nkind = "velocity"\nname = "V"\nat = "arm"\nlimit = 0.5\n'

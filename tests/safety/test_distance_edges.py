@@ -7,7 +7,7 @@ import pytest
 
 from made_cell import TWO_R, made, results_at, state_at, two_r
 from seerob.judging import Judge
-from seerob.series import CODES, NO_VERDICT
+from seerob.results.series import CODES, NO_VERDICT
 
 CELL = "engine = { gravity = [0, 0, 0], physics = false }\n" + TWO_R
 BOX = '[[parts]]\nname = "box"\nshape = {{ box = [0.2, 0.2, 0.2] }}\nat = {{ position = [{x}, 0, 0] }}\n'

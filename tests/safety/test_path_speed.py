@@ -7,8 +7,17 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
 from seerob.errors import InputError
-from seerob.path_map import GIVEN, PERMISSIBLE, PIECE, TOOL, TOOL_GIVEN, TOOL_PERMISSIBLE, WHO, WHY
 from seerob.safety.path_speed import passed
+from seerob.trajectories.path_map import (
+    GIVEN,
+    PERMISSIBLE,
+    PIECE,
+    TOOL,
+    TOOL_GIVEN,
+    TOOL_PERMISSIBLE,
+    WHO,
+    WHY,
+)
 
 HEAD = (PIECE, "J1 [rad]", "J2 [rad]", PERMISSIBLE, GIVEN, TOOL_PERMISSIBLE, TOOL_GIVEN, *TOOL, *WHO, WHY)
 WATCH = '[[safety]]\nkind = "path_speed"\nname = "P"\nrobot = "arm"\nmap = "map.csv"\n'

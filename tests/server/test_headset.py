@@ -6,10 +6,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from seerob.headset_offers import LONGEST_NAME, MOST_NAMES, OFFERS, SHORTEST
 from seerob.human.estimated import estimated
 from seerob.human.mapping import conventions
-from seerob.live import Listener
+from seerob.live.headset_offers import LONGEST_NAME, MOST_NAMES, OFFERS, SHORTEST
+from seerob.live.listening import Listener
 from seerob.server.live import Live
 from seerob.server.serving import Server
 from seerob.snapshot import Tracked, Tracking

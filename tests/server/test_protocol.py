@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 from seerob.server import hub
 from seerob.server.client import WINDOW
 from seerob.server.live import Live, LiveView

@@ -1,7 +1,7 @@
 """The report's table of tracking errors says of how many bones it speaks; a score says what it may be."""
 
-from seerob.bone_errors import BoneErrors
 from seerob.figures import whatever_is_missing
+from seerob.results.bone_errors import BoneErrors
 from seerob.sinks._bone_errors import bones_told
 
 

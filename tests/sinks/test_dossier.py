@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from seerob.errors import InputError
-from seerob.results import ResultLog
+from seerob.results.result_log import ResultLog
 from seerob.sinks.dossier import Dossier
 from seerob.snapshot import Result, Verdict
 

@@ -9,8 +9,8 @@ import pytest
 
 from seerob.errors import InputError
 from seerob.figures import DECIMALS
-from seerob.results import log_of
-from seerob.series import CODES
+from seerob.results.result_log import log_of
+from seerob.results.series import CODES
 from seerob.sinks import _sheets as sheets_module
 from seerob.sinks.excel import Excel
 from seerob.snapshot import Verdict

@@ -6,7 +6,7 @@ import openpyxl
 import pytest
 
 from seerob.errors import InputError
-from seerob.results import log_of
+from seerob.results.result_log import log_of
 from seerob.sinks import _posture_safety
 from seerob.sinks._growing_table import GrowingTable
 from seerob.sinks._thinning import ThinnedTable

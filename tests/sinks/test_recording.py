@@ -18,8 +18,8 @@ from mcap_protobuf.decoder import DecoderFactory
 
 import seerob
 from seerob.errors import InputError, SeerobError
-from seerob.recording import Recording
-from seerob.recording_format import BASIS, SAMPLES, SCENE, SNAPSHOT
+from seerob.recordings.format import BASIS, SAMPLES, SCENE, SNAPSHOT
+from seerob.recordings.recording import Recording
 from seerob.sinks import recorder as recorder_module
 from seerob.sinks.recorder import Recorder
 from seerob.snapshot import Scene, Snapshot

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import seerob.errors
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 
 CELL = """
 title = "Soak"

@@ -12,8 +12,8 @@ import numpy as np
 
 from seerob.emulators.background import Emulator
 from seerob.emulators.motions import swing
-from seerob.headset_offers import OFFERS, read
-from seerob.live import LiveSource
+from seerob.live.headset_offers import OFFERS, read
+from seerob.live.listening import LiveSource
 from seerob.page_messages import Tracking
 from seerob.source import Target
 from seerob.variables.dictionary import Variable

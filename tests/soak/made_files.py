@@ -30,7 +30,7 @@ from seerob.motion_io import (
 from seerob.motion_io.frame_arrays import FAR
 from seerob.motion_io.kinect_recording import Reading
 from seerob.motion_io.markers import MarkerReading
-from seerob.posture_file import read_zones
+from seerob.postures.zone_file import read_zones
 from seerob.protocols.kinect import LAYOUT
 from seerob.sources import bvh, mvnx
 from seerob.waypoints.reading import read_program

@@ -18,10 +18,10 @@ import pytest
 
 from live_story import open_files, wait_for
 from seerob import sources
-from seerob.hearing import Hearing
-from seerob.live import Listener, LiveSource
+from seerob.live.listening import Listener, LiveSource
 from seerob.samples import Quality, SignalSample
 from seerob.sources.opcua_robot import OpcuaRobot
+from seerob.whereabouts.hearing import Hearing
 from soak.device_kinds import FOREIGN, KINDS, OWN
 from soak.elsewhere import Elsewhere
 
@@ -76,9 +76,9 @@ class Ears(logging.Filter):
 
 @pytest.fixture
 def ears(monkeypatch):
-    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.002)
-    monkeypatch.setattr("seerob.live.LONGEST_PAUSE", 0.02)
-    log, made = logging.getLogger("seerob.live"), []
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.002)
+    monkeypatch.setattr("seerob.live.listening.LONGEST_PAUSE", 0.02)
+    log, made = logging.getLogger("seerob.live.listening"), []
 
     def make(source):
         made.append(Ears(source))

@@ -14,7 +14,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 import seerob as sr
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 from seerob.server.live import LiveView
 from seerob.sinks.dossier import Dossier
 from seerob.sinks.excel import Excel

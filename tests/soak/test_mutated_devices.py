@@ -7,13 +7,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from seerob import headset_offers
 from seerob.emulators import natnet_datagrams
 from seerob.emulators.mvn_person import animated
 from seerob.emulators.natnet import NatnetServer
 from seerob.emulators.rokoko import RokokoSender
 from seerob.emulators.vive import FIVE, WORN, worn
 from seerob.emulators.vrpn import VrpnServer
+from seerob.live import headset_offers
 from seerob.protocols import ProtocolError, natnet, natnet_models, rokoko, vive, vrpn
 from seerob.server.hub import read_message
 from seerob.snapshot import Tracking

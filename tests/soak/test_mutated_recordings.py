@@ -5,7 +5,7 @@ import random
 import pytest
 
 from seerob.errors import InputError
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 from seerob.sinks.recorder import Recorder
 from sinks import made_run
 from soak.mutations import mutated

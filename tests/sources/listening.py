@@ -3,7 +3,7 @@
 import socket
 import time
 
-from seerob.live import Listener
+from seerob.live.listening import Listener
 
 PATIENCE = 30.0
 

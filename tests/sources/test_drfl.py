@@ -20,7 +20,7 @@ from seerob import cli
 from seerob.commands.emulating import drfl as emulating
 from seerob.emulators.drfl import DrflSender
 from seerob.errors import InputError
-from seerob.live import Listener
+from seerob.live.listening import Listener
 from seerob.protocols import ProtocolError
 from seerob.protocols.doosan_drfl import LENGTH, Message, RobotState, decode, encode
 from seerob.samples import JointSample, Quality, SignalSample

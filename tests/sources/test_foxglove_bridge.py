@@ -25,7 +25,7 @@ from listening import heard
 
 from live_story import wait_for
 from seerob.emulators.rosbridge import document
-from seerob.live import Listener
+from seerob.live.listening import Listener
 from seerob.protocols.ros_messages import Content, Joints
 from seerob.protocols.ros_serialised import Edition, encode
 from seerob.samples import JointSample, PoseSample
@@ -166,7 +166,7 @@ def test_what_is_not_offered_is_said(monkeypatch, caplog, topic, said):
 
 
 def test_a_bridge_that_is_restarted_is_heard_again(monkeypatch):
-    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
     samples = []
     context = Context()
     server = foxglove.start_server(host="127.0.0.1", port=0, context=context)

@@ -10,10 +10,10 @@ import pytest
 
 from live_story import Story, lived, open_files, wait_for
 from made_cell import made
-from seerob.differentiation import Differentiator, end_slope
 from seerob.emulators.fri import FriServer
 from seerob.errors import InputError
-from seerob.live import Listener
+from seerob.live.differentiation import Differentiator, end_slope
+from seerob.live.listening import Listener
 from seerob.protocols.fri import Edition, Monitoring, encode_monitoring
 from seerob.samples import JointSample, SignalSample
 from seerob.sources.fri import DeviceTime, Fri
@@ -120,7 +120,7 @@ def test_strangers_are_not_listened_to(port):
 
 
 def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch, port):
-    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
     monkeypatch.setattr("seerob.sources.fri.SILENCE", 0.05)
     files, threads = open_files(), threading.active_count()
     server, heard = FriServer(motion, to=("127.0.0.1", port)), []

@@ -11,7 +11,7 @@ import pytest
 from seerob.emulators.kinect import KinectSender
 from seerob.emulators.kinect_person import CAMERA, animated
 from seerob.errors import InputError
-from seerob.live import Listener
+from seerob.live.listening import Listener
 from seerob.protocols import ProtocolError
 from seerob.protocols.kinect import BODY_FROM_OPTICAL, Body, Picture, decode_message, encode_message
 from seerob.protocols.kinect_link import NONSENSE, Sieve

@@ -13,7 +13,7 @@ from seerob.errors import InputError
 from seerob.samples import JointSample
 from seerob.snapshot import Polyline, Sphere
 from seerob.sources.waypoints import Waypoints
-from seerob.trajectory import Trajectory
+from seerob.trajectories.trajectory import Trajectory
 from seerob.waypoints.reduction import reduced
 
 GIVEN = {"joint_speed": 1.0, "joint_acceleration": 2.0, "joint_jerk": 20.0}

@@ -23,10 +23,10 @@ from seerob.commands.emulating import modbus as emulating
 from seerob.emulators.modbus import ModbusServer
 from seerob.emulators.modbus_robot import program
 from seerob.errors import InputError, UnknownName
-from seerob.live import Listener
+from seerob.live.listening import Listener
 from seerob.protocols.modbus import MOST, Block, Place, Table, Type, Words, blocks, decode, encode
 from seerob.protocols.modbus_map import load, names
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 from seerob.samples import JointSample, Quality, SignalSample
 from seerob.sinks.recorder import Recorder
 from seerob.source import Target
@@ -139,7 +139,7 @@ def test_variables_arrive_and_a_wrong_address_takes_none_with_it():
 
 
 def test_at_start_it_is_told_what_the_device_does_not_have(monkeypatch):
-    monkeypatch.setattr("seerob.live.ASK_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.live.listening.ASK_WITHIN", 30.0)
     monkeypatch.setattr("seerob.sources._variables.COVER_WITHIN", 30.0)
     with plc() as server:
         findings = Modbus(host="127.0.0.1", port=server.port).open(Path(), TARGET).findings
@@ -149,7 +149,7 @@ def test_at_start_it_is_told_what_the_device_does_not_have(monkeypatch):
 
 
 def test_a_device_that_is_switched_off_and_on_is_asked_again(monkeypatch):
-    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.02)
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.02)
     server = plc().start()
     files, threads = open_files(), threading.active_count()
     try:

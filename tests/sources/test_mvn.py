@@ -21,7 +21,7 @@ from seerob.emulators.mvn_datagrams import datagrams
 from seerob.emulators.mvn_person import Pose, animated, followed, recorded, segments
 from seerob.errors import InputError
 from seerob.human.skeleton import BONES, bone_poses
-from seerob.live import Listener
+from seerob.live.listening import Listener
 from seerob.protocols.mvn import Header, Items, Kind, decode, encode, pack_items
 from seerob.protocols.mvn_segments import SEGMENTS, names
 from seerob.source import Target

@@ -16,7 +16,7 @@ from live_story import Story, lived, wait_for
 from made_cell import made
 from seerob.emulators.opcua import URI, Emulated, OpcuaServer
 from seerob.errors import InputError, SeerobError
-from seerob.live import Listener
+from seerob.live.listening import Listener
 from seerob.protocols.opcua_client import Address, Security, address
 from seerob.protocols.opcua_robotics import natural
 from seerob.protocols.opcua_units import number, unit
@@ -52,7 +52,7 @@ def target(*variables, folder=""):
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """A machine under load answers late."""
-    monkeypatch.setattr("seerob.live.ASK_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.live.listening.ASK_WITHIN", 30.0)
 
 
 @pytest.fixture(scope="module")
@@ -95,8 +95,8 @@ def test_variables_are_subscribed_and_stand_until_they_change(server):
 
 
 def test_a_server_that_is_killed_is_found_again(monkeypatch):
-    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.05)
-    monkeypatch.setattr("seerob.live.LONGEST_PAUSE", 0.2)
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.05)
+    monkeypatch.setattr("seerob.live.listening.LONGEST_PAUSE", 0.2)
     server = OpcuaServer({"Belt/speed": PLC["Belt/speed"]}).start()
     try:
         with listening(Opcua(name="plc", url=server.url), target(SPEED)) as heard:

@@ -17,7 +17,7 @@ from live_story import wait_for
 from seerob.commands.emulating import ros_tcp as emulating
 from seerob.emulators.ros_tcp import RosTcpEndpoint, UnityProject
 from seerob.errors import InputError
-from seerob.live import Listener
+from seerob.live.listening import Listener
 from seerob.protocols import ProtocolError, ros_tcp
 from seerob.protocols.ros_messages import Content, Joints, Transform
 from seerob.protocols.ros_serialised import Edition, decode, encode

@@ -16,7 +16,7 @@ from live_story import Story, lived, open_files, wait_for
 from made_cell import made
 from seerob.emulators.rosbridge import RosbridgeServer
 from seerob.errors import InputError
-from seerob.live import Listener
+from seerob.live.listening import Listener
 from seerob.protocols.ros_messages import Content, Joints, Plan, Point, Transform
 from seerob.protocols.ros_serialised import Edition
 from seerob.protocols.rosbridge import Compression
@@ -43,7 +43,7 @@ def sorted_motion(t):
 @pytest.fixture(autouse=True)
 def _patient(monkeypatch):
     """A busy machine may take its time to answer at start."""
-    monkeypatch.setattr("seerob.live.ASK_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.live.listening.ASK_WITHIN", 30.0)
     monkeypatch.setattr("seerob.sources._ros.ASKED", 20.0)
 
 
@@ -229,7 +229,7 @@ def test_another_robots_joints_and_wrong_counts_are_errors(tmp_path):
 
 
 def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch):
-    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
     server = RosbridgeServer(motion, NAMES, rate=250.0).start()
     samples = []
     files, threads = open_files() if sys.platform == "linux" else 0, threading.active_count()

@@ -14,10 +14,10 @@ from live_story import Story, lived, open_files, wait_for
 from made_cell import TWO_R, made, two_r
 from seerob.emulators.rtde import RtdeServer
 from seerob.errors import InputError
-from seerob.live import Listener
+from seerob.live.listening import Listener
 from seerob.protocols import ProtocolError
 from seerob.protocols.rtde_states import RobotMode, SafetyStatus, quality
-from seerob.recording import Recording
+from seerob.recordings.recording import Recording
 from seerob.samples import Quality, SignalSample
 from seerob.sinks.recorder import Recorder
 from seerob.sources.rtde import Rtde, figures, joint_sample, states
@@ -172,7 +172,7 @@ def test_only_real_time_will_do(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="counts open files in /proc")
 def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch, caplog):
-    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
     server = RtdeServer(motion).start()
     heard = []
     files, threads = open_files(), threading.active_count()

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from live_story import wait_for
 from seerob.emulators.siemens_web import SiemensWebServer
 from seerob.errors import InputError
-from seerob.live import Listener
+from seerob.live.listening import Listener
 from seerob.protocols import ProtocolError
 from seerob.protocols.s7_web import reading, result, results
 from seerob.source import Target
@@ -76,7 +76,7 @@ def test_variables_arrive_and_the_session_is_given_back():
 
 
 def test_a_plc_that_is_switched_off_and_on_is_asked_again(monkeypatch):
-    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.02)
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.02)
     server = plc().start()
     try:
         with listening(source(server)) as heard:

@@ -14,7 +14,7 @@ from seerob import cli
 from seerob.commands.emulating import web as emulating
 from seerob.emulators.web import STATE, WebServer
 from seerob.errors import InputError
-from seerob.live import Listener
+from seerob.live.listening import Listener
 from seerob.source import Target
 from seerob.sources.web import Web, leaves
 from seerob.variables.dictionary import Kind, Variable
@@ -33,8 +33,8 @@ def told(t):
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """A machine under load answers late."""
-    monkeypatch.setattr("seerob.live.ASK_WITHIN", 30.0)
-    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.02)
+    monkeypatch.setattr("seerob.live.listening.ASK_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.02)
     monkeypatch.setenv("PLC_TOKEN", "secret")
 
 

@@ -17,8 +17,8 @@ from seerob.figures import against, with_unit
 from seerob.snapshot import Finding, Verdict
 
 if TYPE_CHECKING:
-    from seerob.bone_errors import BoneErrors
-    from seerob.results import Series
+    from seerob.results.bone_errors import BoneErrors
+    from seerob.results.result_log import Series
     from seerob.run import Summary
     from seerob.station import Station
 

@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         InputError: What it shall play is wrong, or it cannot listen there.
     """
-    from seerob.live import because
+    from seerob.live.listening import because
 
     server, what, where = import_module(f"seerob.{PACKAGE}.{options.kind}").emulated(options)
     stopped = Stopped()

@@ -14,7 +14,7 @@ from seerob.commands.run import Stopped
 from seerob.errors import InputError, SeerobError
 
 if TYPE_CHECKING:
-    from seerob.live import LiveSource
+    from seerob.live.listening import LiveSource
     from seerob.samples import Sample
     from seerob.sources._variables import VariablesSource
 
@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     """
     import asyncio
 
-    from seerob.live import Listener, because
+    from seerob.live.listening import Listener, because
     from seerob.samples import SignalSample
 
     source, given = _source(options)
@@ -113,7 +113,7 @@ def _variables(source: VariablesSource, kind: str, given: dict[str, Any]) -> int
     import asyncio
 
     from seerob.commands.variables import nodes_of
-    from seerob.live import because
+    from seerob.live.listening import because
 
     try:
         nodes = asyncio.run(nodes_of(source))
@@ -138,7 +138,7 @@ def _save_calibration(source: LiveSource, path: Path, where: str) -> None:
     import asyncio
     from datetime import datetime
 
-    from seerob.live import because
+    from seerob.live.listening import because
     from seerob.model_io.calibration import written
     from seerob.sources.rtde import Rtde
 
@@ -168,7 +168,7 @@ def _source(options: argparse.Namespace) -> tuple[LiveSource, dict[str, Any]]:
     """The source, and the options that make it."""
     import msgspec
 
-    from seerob.live import LiveSource
+    from seerob.live.listening import LiveSource
     from seerob.plugin import load
 
     kind = load("sources", options.kind, LiveSource)  # type: ignore[type-abstract,unused-ignore]

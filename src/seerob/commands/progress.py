@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Self
 
 from seerob.commands import STATUS
-from seerob.results import ResultLog
+from seerob.results.result_log import ResultLog
 from seerob.samples import Sample
 from seerob.sink import KeepsResults, Writer
 from seerob.snapshot import Snapshot

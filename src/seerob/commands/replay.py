@@ -27,7 +27,7 @@ def run(options: argparse.Namespace) -> int:
 
 def show(path: Path, options: argparse.Namespace) -> int:
     """Serve a recording until Ctrl-C."""
-    from seerob.recording import Recording
+    from seerob.recordings.recording import Recording
     from seerob.server.player import Player
     from seerob.server.serving import Server
 

@@ -33,7 +33,7 @@ from seerob.commands.progress import progress
 from seerob.commands.sinks import refuse_existing, sinks_of, tell_files
 
 if TYPE_CHECKING:
-    from seerob.results import Series
+    from seerob.results.result_log import Series
 
 HELP = "compute a recording again from its samples; write report and tables"
 EXAMPLE = "seerob report runs/2026-11-21T10-12-00/run.mcap"
@@ -49,8 +49,8 @@ def add(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Recompute, write, print what changed, and return the exit code of the verdict."""
-    from seerob.recording import Recording
-    from seerob.results import log_of
+    from seerob.recordings.recording import Recording
+    from seerob.results.result_log import log_of
 
     recording = Recording.open(options.recording)
     if options.workstation is not None:

@@ -65,7 +65,7 @@ def _sort(variable: Variable) -> str:
 
 def _listen(station: Station, wait: float) -> dict[str, str]:
     """What was heard of each variable, in words."""
-    from seerob.live import Listener, LiveSource
+    from seerob.live.listening import Listener, LiveSource
     from seerob.run import source_target
     from seerob.samples import SignalSample
 
@@ -110,7 +110,7 @@ def _browse(path: Path, name: str) -> int:
     import asyncio
 
     from seerob.errors import suggestion
-    from seerob.live import because
+    from seerob.live.listening import because
     from seerob.reading import readable
     from seerob.sources._variables import VariablesSource
     from seerob.variables.skeleton import skeleton

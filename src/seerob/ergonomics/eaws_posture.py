@@ -9,9 +9,9 @@ from msgspec.structs import asdict
 
 from seerob import provenance
 from seerob.criterion import Evaluate, judge_interval
-from seerob.ergonomic_posture import bind_posture
 from seerob.model import Model
-from seerob.posture_rule import PostureRule
+from seerob.postures.ergonomic_posture import bind_posture
+from seerob.postures.rule import PostureRule
 from seerob.scoring import eaws_posture as method
 from seerob.scoring.basis import chosen, entered, posture_quality
 from seerob.scoring.eaws_screening import Points, Screening

@@ -10,10 +10,10 @@ from typing import Annotated
 from msgspec import Meta
 
 from seerob.model import Model
-from seerob.posture_file import ZoneTable, read_zones, zones_of
+from seerob.postures.zone_file import ZoneTable, read_zones, zones_of
+from seerob.postures.zone_rule import ZoneRule
 from seerob.scoring.published import published
 from seerob.snapshot import Level
-from seerob.zone_rule import ZoneRule
 
 
 class En10054(ZoneRule, frozen=True, kw_only=True):

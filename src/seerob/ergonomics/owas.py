@@ -9,12 +9,12 @@ import numpy as np
 
 from seerob import provenance
 from seerob.criterion import Evaluate, judge, judge_interval
-from seerob.ergonomic_posture import bind_posture
 from seerob.figures import whatever_is_missing
 from seerob.human.angles import Angles
 from seerob.human.skeleton import SIDES
 from seerob.model import Model
-from seerob.posture_rule import PostureRule
+from seerob.postures.ergonomic_posture import bind_posture
+from seerob.postures.rule import PostureRule
 from seerob.scoring import owas as method
 from seerob.scoring.basis import ACCURACY_NOTE, chosen, entered, posture_quality
 from seerob.scoring.measured import Accuracy

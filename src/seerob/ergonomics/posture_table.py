@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 from seerob.model import Model
-from seerob.posture_file import ZoneTable, read_zones
-from seerob.zone_rule import ZoneRule
+from seerob.postures.zone_file import ZoneTable, read_zones
+from seerob.postures.zone_rule import ZoneRule
 
 
 class PostureTable(ZoneRule, frozen=True, kw_only=True):

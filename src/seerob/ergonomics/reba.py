@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from seerob.human.angles import Angles
 from seerob.model import Model
-from seerob.posture_rule import ScoredPosture
+from seerob.postures.rule import ScoredPosture
 from seerob.scoring import reba as method
 from seerob.scoring.bands import reba_edges
 from seerob.scoring.held_work import Watch, activity

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from seerob.human.angles import Angles
 from seerob.model import Model
-from seerob.posture_rule import ScoredPosture
+from seerob.postures.rule import ScoredPosture
 from seerob.scoring import rula as method
 from seerob.scoring.bands import rula_edges
 from seerob.scoring.held_work import Watch, muscle_use

@@ -16,7 +16,6 @@ from seerob.by_hand import by_hand, home
 from seerob.chains import assumed, payload, placeholder
 from seerob.distances.least import Shapes
 from seerob.errors import InputError, Problem, UnknownName
-from seerob.filing import filed
 from seerob.human import posture
 from seerob.machines import mounting as machine_mounting
 from seerob.model import Body, Frame, Mechanism, Model
@@ -32,6 +31,7 @@ from seerob.mounting.picked_up import picked_up
 from seerob.mounting.specification import Mounting
 from seerob.mounting.specification import pose_matrix as pose_matrix  # noqa: PLC0414
 from seerob.mounting.things import AREA_COLOR, PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, MadeArea, load_thing
+from seerob.recordings.filing import filed
 from seerob.snapshot import Finding
 from seerob.transforms import Array
 from seerob.variables.binding import Bound, bound

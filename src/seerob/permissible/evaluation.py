@@ -21,13 +21,13 @@ from seerob.permissible.speed_map import SpeedMap, Stations
 from seerob.permissible.survey import SPACING, Survey
 from seerob.permissible.verification import Verified, verify
 from seerob.permissible.witness import Clock, Witness
-from seerob.results import ResultLog
+from seerob.results.result_log import ResultLog
+from seerob.results.series import worst_verdict
 from seerob.run import Bound, Feed, Judge, Summary, coarse, pump, signal_timeouts, ticks
 from seerob.samples import JointSample, PoseSample, Sample
-from seerob.series import worst_verdict
 from seerob.snapshot import CriterionInfo, Finding, Snapshot, Verdict
 from seerob.source import HOLD, Opened, Source
-from seerob.trajectory import TrajectorySamples
+from seerob.trajectories.trajectory import TrajectorySamples
 
 Sources = Sequence[tuple[Source, Opened]]
 Say = Callable[[str, float], None]

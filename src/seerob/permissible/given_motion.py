@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from seerob.errors import InputError
 from seerob.samples import JointSample, Quality
-from seerob.trajectory import derive_velocities
+from seerob.trajectories.trajectory import derive_velocities
 from seerob.transforms import Array
 
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import starmap
 
-from seerob.path_markers import Place, path_markers
 from seerob.permissible.evaluation import PermissibleSpeed
 from seerob.permissible.segments import PathSegment
 from seerob.permissible.speed_map import SpeedMap
 from seerob.snapshot import Result, Scene
+from seerob.trajectories.path_markers import Place, path_markers
 
 
 @dataclass(frozen=True, eq=False)

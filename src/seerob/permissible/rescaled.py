@@ -10,7 +10,7 @@ import numpy as np
 from seerob.errors import InputError
 from seerob.permissible.speed_map import SpeedMap, Stations
 from seerob.permissible.timing import CHECK, Ceiling, Timed, timed
-from seerob.trajectory import Trajectory
+from seerob.trajectories.trajectory import Trajectory
 from seerob.transforms import Array
 
 BLOCKED = "change the path or the cell there; where contact may be permitted, power_and_force, --by either"

@@ -22,8 +22,8 @@ from seerob.model import Model
 from seerob.permissible.ceiling import Answer, Ceiling, Look
 from seerob.safety.separation import Separation
 from seerob.state import State
-from seerob.tracking_error import TrackingError
 from seerob.transforms import Array
+from seerob.whereabouts.tracking_error import TrackingError
 
 
 def separation(criterion: Separation, model: Model, robot: str) -> tuple[Answer, Look | None]:

@@ -9,7 +9,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from seerob.path_map import (
+from seerob.permissible.ceiling import Ceiling
+from seerob.permissible.evaluation import PermissibleSpeed
+from seerob.permissible.segments import PathSegment
+from seerob.permissible.speed_map import SpeedMap
+from seerob.trajectories.path_map import (
     GIVEN,
     PERMISSIBLE,
     PIECE,
@@ -20,11 +24,7 @@ from seerob.path_map import (
     WHY,
     joint_columns,
 )
-from seerob.permissible.ceiling import Ceiling
-from seerob.permissible.evaluation import PermissibleSpeed
-from seerob.permissible.segments import PathSegment
-from seerob.permissible.speed_map import SpeedMap
-from seerob.trajectory import Trajectory
+from seerob.trajectories.trajectory import Trajectory
 
 Cell = str | float | int | None
 

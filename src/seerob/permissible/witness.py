@@ -17,7 +17,7 @@ from seerob.variables.dictionary import Value
 
 
 class Seen(NamedTuple):
-    """How far bones of a person may be from where the twin has them; see `seerob.hearing.Hearing`."""
+    """How far bones may be from where the twin has them; see `seerob.whereabouts.hearing.Hearing`."""
 
     bones: dict[str, tuple[float | None, float | None]]
     unaimed: Mapping[str, float]

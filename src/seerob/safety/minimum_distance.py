@@ -14,12 +14,12 @@ from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge_interval
 from seerob.distances.least import Reach
 from seerob.errors import InputError
 from seerob.model import Gap, Model
-from seerob.partly_seen import partly_seen
 from seerob.snapshot import Basis, Result, Segment, Verdict
 from seerob.state import State
 from seerob.states import States
 from seerob.tolerances import Tolerance, deciding
-from seerob.tracking_error import TrackingError, tracking
+from seerob.whereabouts.partly_seen import partly_seen
+from seerob.whereabouts.tracking_error import TrackingError, tracking
 
 
 class MinimumDistance(Criterion, frozen=True, kw_only=True):

@@ -16,10 +16,10 @@ from seerob.criterion import Criterion, Evaluate
 from seerob.errors import InputError, Undecided
 from seerob.markers import Marker
 from seerob.model import Model
-from seerob.path_map import MAX_SIZE, PathMap, read_map
-from seerob.path_markers import Place, path_markers
 from seerob.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.state import State
+from seerob.trajectories.path_map import MAX_SIZE, PathMap, read_map
+from seerob.trajectories.path_markers import Place, path_markers
 from seerob.transforms import Array
 
 SAME = 1e-3

@@ -29,12 +29,12 @@ from seerob.model import Model
 from seerob.norms import body_limits
 from seerob.norms.crushing_gaps import NOT_VERIFIED, gap_inputs
 from seerob.norms.limit_inputs import excluded_input, limit_inputs, table_input
-from seerob.partly_seen import seen_first
 from seerob.quantities import Coordinate, Tolerance
 from seerob.snapshot import Arrow, Basis, Highlight, Input, Result, Verdict
 from seerob.state import State
 from seerob.tolerances import Spread, deciding
 from seerob.transforms import Array
+from seerob.whereabouts.partly_seen import seen_first
 
 STANDSTILL = 1e-3
 """Speed below which a part of the robot hits nobody [m/s]."""

@@ -16,11 +16,11 @@ from seerob.distances.depth import Depth, Depths
 from seerob.distances.least import Closests
 from seerob.errors import InputError, UnknownName
 from seerob.model import Gap, Model
-from seerob.partly_seen import seen_first
 from seerob.snapshot import Basis, Highlight, Marker, Result, Segment, Verdict
 from seerob.state import State
-from seerob.tracking_error import TrackingError
 from seerob.transforms import Array
+from seerob.whereabouts.partly_seen import seen_first
+from seerob.whereabouts.tracking_error import TrackingError
 
 CELLS, FEWEST = 130, 5
 """Of the search for depths at one tick, shared by all that is inside; the interval says what it left open."""

@@ -15,7 +15,6 @@ from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge_interval, 
 from seerob.errors import InputError
 from seerob.model import Gap, Model
 from seerob.norms import iso_13855
-from seerob.partly_seen import partly_seen
 from seerob.sensors.detection import Detection, device_of
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.state import State
@@ -27,8 +26,9 @@ from seerob.stopping.search import TOP, factor_by_search
 from seerob.stopping.terms import At, Course, separation_distance, way_of_person
 from seerob.stopping.tolerances import SIMULATED, SeparationEnds, intervals, shifted, tolerances
 from seerob.tolerances import Shifts, Tolerance, deciding
-from seerob.tracking_error import TrackingError, tracking
 from seerob.transforms import Array
+from seerob.whereabouts.partly_seen import partly_seen
+from seerob.whereabouts.tracking_error import TrackingError, tracking
 
 __all__ = ["Detection", "Separation", "Stop", "separation_bound"]
 

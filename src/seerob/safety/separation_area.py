@@ -20,13 +20,13 @@ from seerob.criterion import Criterion, Evaluate
 from seerob.distances.least import Per
 from seerob.errors import InputError, UnknownName
 from seerob.model import Model
-from seerob.partly_seen import seen_first
 from seerob.sensors.sensing import Names, bodies_of, names_of
 from seerob.snapshot import Basis, Highlight, Hull, Marker, Result, Segment, Verdict
 from seerob.state import State
-from seerob.tracking_error import TrackingError
 from seerob.transforms import Array
 from seerob.volumes.offset_shell import offset_shell
+from seerob.whereabouts.partly_seen import seen_first
+from seerob.whereabouts.tracking_error import TrackingError
 
 
 class SeparationArea(Criterion, frozen=True, kw_only=True):

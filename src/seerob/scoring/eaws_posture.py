@@ -15,11 +15,11 @@ import numpy as np
 from msgspec import Struct
 
 from seerob.human.angles import Angles
+from seerob.postures.task_phase import Stance
 from seerob.scoring.measured import Accuracy, Measured
 from seerob.scoring.published import published
 from seerob.scoring.spans import Span
 from seerob.scoring.thresholds import Angle
-from seerob.task_phase import Stance
 
 _ROUNDING = 1e-9
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from seerob.errors import InputError
 from seerob.model import Model
-from seerob.scoring.spans import Span, between, exactly
-from seerob.task_phase import (
+from seerob.postures.task_phase import (
     Kilograms,
     Period,
     Phase,
@@ -21,6 +20,7 @@ from seerob.task_phase import (
     check_order,
     phase_at,
 )
+from seerob.scoring.spans import Span, between, exactly
 
 __all__ = [
     "Kilograms",

@@ -17,9 +17,9 @@ from msgspec import Meta, Struct
 
 from seerob.errors import UnknownName
 from seerob.human.angles import NEEDS, SIDED, Angles
+from seerob.postures.task_phase import Period, Seconds
 from seerob.scoring.measured import Accuracy, Measured
 from seerob.scoring.repetition import GAP, WINDOW
-from seerob.task_phase import Period, Seconds
 
 _ROUNDING = 1e-9
 ZoneAngle = Annotated[

@@ -14,12 +14,12 @@ from seerob.criterion import Evaluate
 from seerob.distances.least import Closests
 from seerob.errors import InputError, UnknownName
 from seerob.model import Gap, Model
-from seerob.partly_seen import seen_first
 from seerob.sensors.tables import Sensor
 from seerob.snapshot import Highlight, Input, Label, Marker, Origin, Result, Verdict
 from seerob.state import State
-from seerob.tracking_error import TrackingError
 from seerob.transforms import Array
+from seerob.whereabouts.partly_seen import seen_first
+from seerob.whereabouts.tracking_error import TrackingError
 
 Names = str | tuple[str, ...]
 

@@ -13,8 +13,8 @@ import msgspec
 from msgspec.structs import replace
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from seerob import headset_offers
-from seerob.headset_offers import OFFERS
+from seerob.live import headset_offers
+from seerob.live.headset_offers import OFFERS
 from seerob.server.client import Client, Closing
 from seerob.server.feed import KNOWN_ACTIONS, Feed
 from seerob.snapshot import (

@@ -8,7 +8,7 @@ from math import ceil, log2, nan
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.series import CODES
+from seerob.results.series import CODES
 from seerob.snapshot import History, Result, Snapshot, Trace
 from seerob.transforms import Array
 

@@ -10,7 +10,7 @@ from math import inf, nextafter
 from time import monotonic
 from typing import Protocol
 
-from seerob.results import ResultLog
+from seerob.results.result_log import ResultLog
 from seerob.server.feed import Audience
 from seerob.snapshot import Command, History, Scene, Snapshot, Transport
 
@@ -24,7 +24,7 @@ _TELL_EVERY = 1.0
 
 
 class Recorded(Protocol):
-    """What the player needs of a recording; `seerob.recording.Recording` is one."""
+    """What the player needs of a recording; `seerob.recordings.recording.Recording` is one."""
 
     start: float
     """Run time of the first tick [s]."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Self
 
-from seerob.results import ResultLog
+from seerob.results.result_log import ResultLog
 from seerob.snapshot import CriterionInfo
 
 Progress = Callable[[int, int], None]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from seerob.bone_errors import BoneErrors
 from seerob.human.skeleton import BONES
+from seerob.results.bone_errors import BoneErrors
 from seerob.sinks._html import Html, joined, table, tag
 from seerob.sinks._sentences import number
 

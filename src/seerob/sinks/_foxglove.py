@@ -28,7 +28,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from seerob.errors import InputError
-from seerob.recording_format import nanoseconds
+from seerob.recordings.format import nanoseconds
 from seerob.sinks._glb_reader import read_glb
 from seerob.sinks._marker_shapes import prism
 from seerob.snapshot import (

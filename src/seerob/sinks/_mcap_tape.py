@@ -1,4 +1,4 @@
-"""Writes one recording: what `seerob.recording` reads back, and what foreign viewers show."""
+"""Writes one recording: what `seerob.recordings.recording` reads back, and what foreign viewers show."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import register_schema
 from msgspec.structs import replace
 
-from seerob.recording_format import (
+from seerob.recordings.format import (
     BASIS,
     END_METADATA,
     FILE_PREFIX,

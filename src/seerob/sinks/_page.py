@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 
-from seerob.series import Series
+from seerob.results.series import Series
 from seerob.sinks import _plots
 from seerob.sinks._added import added
 from seerob.sinks._evidence import assumed, evaluated, not_covered

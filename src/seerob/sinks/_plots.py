@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from seerob.series import CODES, Series
+from seerob.results.series import CODES, Series
 from seerob.sinks._html import Html
 from seerob.sinks._palette import DARK_HEX, HEX, MARK, WORD
 from seerob.snapshot import Verdict

@@ -13,8 +13,8 @@ import numpy as np
 
 from seerob.figures import figure
 from seerob.human.body_area import area_in
-from seerob.results import ResultLog
-from seerob.series import CODES, Series
+from seerob.results.result_log import ResultLog
+from seerob.results.series import CODES, Series
 from seerob.sinks._html import Html, joined, table, tag
 from seerob.sinks._palette import WORD
 from seerob.snapshot import CriterionInfo, Scene

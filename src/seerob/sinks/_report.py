@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from seerob.report_section import ReportSection
-from seerob.results import ResultLog
+from seerob.results.result_log import ResultLog
 from seerob.sinks._html import Html, tag
 from seerob.sinks._palette import MARK, WORD
 from seerob.sinks._sentences import number

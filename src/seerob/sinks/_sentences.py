@@ -7,8 +7,8 @@ import re
 from collections.abc import Sequence
 
 from seerob.figures import against, figure, margin, with_unit
-from seerob.results import ResultLog
-from seerob.series import CODES, Series, Worst
+from seerob.results.result_log import ResultLog
+from seerob.results.series import CODES, Series, Worst
 from seerob.snapshot import Verdict
 
 _NUMBERS = (

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from seerob.distribution import distribution
 from seerob.figures import figure
-from seerob.results import ResultLog
-from seerob.series import Series
+from seerob.results.distribution import distribution
+from seerob.results.result_log import ResultLog
+from seerob.results.series import Series
 from seerob.sinks._html import Html, joined, table, tag
 from seerob.sinks._sentences import percent
 from seerob.sinks._sheet_rows import Cell

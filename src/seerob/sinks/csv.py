@@ -10,8 +10,8 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from seerob.bone_errors import BoneErrors
 from seerob.errors import InputError
+from seerob.results.bone_errors import BoneErrors
 from seerob.samples import Sample
 from seerob.sink import Sink
 from seerob.sinks import _sample_cells

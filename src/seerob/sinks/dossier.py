@@ -12,7 +12,7 @@ from msgspec import Meta
 
 from seerob.errors import InputError
 from seerob.report_section import ReportSection
-from seerob.results import result_named
+from seerob.results.result_log import result_named
 from seerob.samples import Sample
 from seerob.sink import Sink
 from seerob.sinks._at_end import AtEndWithResults

@@ -12,9 +12,9 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from seerob.errors import InputError
-from seerob.results import result_named
+from seerob.results.result_log import result_named
+from seerob.results.series import CODES, Series
 from seerob.samples import Sample
-from seerob.series import CODES, Series
 from seerob.sink import Sink
 from seerob.sinks import _posture_safety
 from seerob.sinks._at_end import AtEndWithResults

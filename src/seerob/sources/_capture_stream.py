@@ -16,7 +16,7 @@ from seerob.human.calibration import Calibrated, CalibrationPose
 from seerob.human.captured import CaptureFrame, Layout
 from seerob.human.observing import Observer
 from seerob.human.smoothing import group_delay
-from seerob.live import LiveSource, say_once
+from seerob.live.listening import LiveSource, say_once
 from seerob.model_io.description import Description
 from seerob.quantities import Pose
 from seerob.samples import BodyPoint, BodySample, Quality, Sample, SignalSample

@@ -9,7 +9,7 @@ from seerob.source import Target
 from seerob.sources._trajectory_file import TrajectoryFile, notes
 from seerob.tables.mapping import Mapping
 from seerob.tables.motion import read_motion
-from seerob.trajectory import Trajectory
+from seerob.trajectories.trajectory import Trajectory
 
 
 class MappedTable(TrajectoryFile, frozen=True, kw_only=True):

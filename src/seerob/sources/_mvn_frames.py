@@ -14,7 +14,7 @@ from enum import StrEnum
 import numpy as np
 
 from seerob.human.captured import CaptureFrame, Layout, Seen
-from seerob.live import say_once
+from seerob.live.listening import say_once
 from seerob.protocols import ProtocolError
 from seerob.protocols.mvn import Items, Kind, Scale, Tags, decode
 from seerob.protocols.mvn_assembly import Assembly

@@ -14,7 +14,7 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from seerob.errors import InputError
-from seerob.live import LiveSource
+from seerob.live.listening import LiveSource
 from seerob.protocols import ProtocolError
 from seerob.protocols.ros_messages import Content, Joints, Plan, Said
 from seerob.protocols.rosbridge_client import SILENCE, Heard
@@ -24,7 +24,7 @@ from seerob.source import Opened, Target
 from seerob.sources._ros_frames import STATIC, FrameTree, driven, world_from_parent
 from seerob.sources._ros_joints import JointGather, PlayedPlan
 from seerob.sources.tool_path import PoseFrame
-from seerob.trajectory import MotionOrigin, origin_finding
+from seerob.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.transforms import Array, wxyz_from_rotation
 
 ASKED = 1.2

@@ -8,19 +8,19 @@ from pathlib import Path
 from seerob.errors import InputError
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
-from seerob.trajectory import (
-    MotionOrigin,
-    Trajectory,
-    TrajectorySamples,
-    derive_velocities,
-    origin_finding,
-)
-from seerob.trajectory_checks import (
+from seerob.trajectories.checks import (
     Beyond,
     joint_count_check,
     limit_check,
     sampling_findings,
     velocity_check,
+)
+from seerob.trajectories.trajectory import (
+    MotionOrigin,
+    Trajectory,
+    TrajectorySamples,
+    derive_velocities,
+    origin_finding,
 )
 from seerob.transforms import Array
 

@@ -17,7 +17,7 @@ from typing import ClassVar, NamedTuple, Self
 from msgspec.structs import replace
 
 from seerob.errors import SeerobError
-from seerob.live import ASK_WITHIN, LiveSource, because
+from seerob.live.listening import ASK_WITHIN, LiveSource, because
 from seerob.quantities import Seconds
 from seerob.samples import Sample, SignalSample
 from seerob.snapshot import Finding

@@ -21,9 +21,9 @@ from seerob.sources._ros_frames import STATIC, FrameTree, driven, world_from_par
 from seerob.sources._ros_joints import JointGather
 from seerob.sources._trajectory_file import TrajectoryFile
 from seerob.sources.tool_path import PoseFrame
-from seerob.tool_trajectory import PoseSamples, ToolTrajectory, plausible
-from seerob.trajectory import MAX_SAMPLES, Trajectory, origin_finding
-from seerob.trajectory_checks import sampling_findings
+from seerob.trajectories.checks import sampling_findings
+from seerob.trajectories.tool_trajectory import PoseSamples, ToolTrajectory, plausible
+from seerob.trajectories.trajectory import MAX_SAMPLES, Trajectory, origin_finding
 from seerob.transforms import Array, wxyz_from_rotation
 
 SAME_INSTANT = 1e-6

@@ -15,14 +15,14 @@ from typing import Annotated
 from msgspec import Meta
 
 from seerob.errors import InputError
-from seerob.live import LiveSource
+from seerob.live.listening import LiveSource
 from seerob.protocols import doosan_drfl
 from seerob.protocols.datagrams import listening
 from seerob.protocols.doosan_drfl import DOUBTFUL, JOINTS, UNSURE, Message, RobotMode, RobotState, decode
 from seerob.samples import JointSample, Quality, Sample, SignalSample
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
-from seerob.trajectory import MotionOrigin, origin_finding
+from seerob.trajectories.trajectory import MotionOrigin, origin_finding
 
 SILENCE = 1.0
 """Longest pause before the bridge is taken for gone [s]."""

@@ -9,7 +9,7 @@ from seerob.snapshot import Finding
 from seerob.source import Target
 from seerob.sources._mapped_table import MappedTable
 from seerob.tables.candidates import WORKBOOKS
-from seerob.trajectory import Trajectory
+from seerob.trajectories.trajectory import Trajectory
 
 
 class Excel(MappedTable, frozen=True, kw_only=True):

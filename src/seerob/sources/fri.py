@@ -16,17 +16,17 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from seerob.device_clock import RESTART
-from seerob.differentiation import SAMPLES, Differentiator
 from seerob.errors import InputError
-from seerob.live import LiveSource
+from seerob.live.device_clock import RESTART
+from seerob.live.differentiation import SAMPLES, Differentiator
+from seerob.live.listening import LiveSource
 from seerob.protocols import ProtocolError, fri
 from seerob.protocols.datagrams import listening
 from seerob.protocols.fri import Monitoring, SessionState
 from seerob.samples import JointSample, Sample, SignalSample
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
-from seerob.trajectory import MotionOrigin, origin_finding
+from seerob.trajectories.trajectory import MotionOrigin, origin_finding
 
 JOINTS = 7
 """Of every LBR."""

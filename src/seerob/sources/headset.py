@@ -18,10 +18,10 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta
 
-from seerob.headset_offers import OFFERS, Offer
 from seerob.human.captured import CaptureFrame, Layout, Seen
 from seerob.human.mapping import conventions, plain
-from seerob.live import say_once
+from seerob.live.headset_offers import OFFERS, Offer
+from seerob.live.listening import say_once
 from seerob.protocols.xr_axes import world_positions, world_turns
 from seerob.snapshot import Finding
 from seerob.sources._capture_stream import CaptureStream

@@ -17,7 +17,7 @@ from seerob.source import Target
 from seerob.sources._log_columns import Joints, Log, missing, open_log
 from seerob.sources._trajectory_file import TrajectoryFile, notes
 from seerob.tables.mapping import AngleUnit
-from seerob.trajectory import MotionOrigin, Trajectory
+from seerob.trajectories.trajectory import MotionOrigin, Trajectory
 
 JOINT = re.compile(r"(axisQ(?:Msr|Cmd\w*?))_(.+)\[(\d{1,2})\]")
 

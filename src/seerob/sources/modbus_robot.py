@@ -17,7 +17,7 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from seerob.errors import InputError
-from seerob.live import LiveSource
+from seerob.live.listening import LiveSource
 from seerob.protocols import ProtocolError, modbus
 from seerob.protocols.modbus import Block
 from seerob.protocols.modbus_client import Device, Refused, connect, take
@@ -26,7 +26,7 @@ from seerob.quantities import Seconds
 from seerob.samples import JointSample, Quality, Sample, SignalSample
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
-from seerob.trajectory import MotionOrigin, origin_finding
+from seerob.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.variables.dictionary import BadValue
 
 Values = Mapping[str, int | float | bool]

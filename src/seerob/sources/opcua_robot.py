@@ -12,7 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from seerob.errors import InputError, Problem
-from seerob.live import LiveSource
+from seerob.live.listening import LiveSource
 from seerob.protocols import ProtocolError
 from seerob.protocols.opcua_client import Changes, Said, Security, Way, connect, needed
 from seerob.protocols.opcua_robotics import MODES, Robot, robots
@@ -22,7 +22,7 @@ from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.sources._opcua_files import at_home, missing
 from seerob.sources._variables import PULSES
-from seerob.trajectory import MotionOrigin, origin_finding
+from seerob.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.variables.units import unit
 
 SIGNAL_PERIOD = 0.1

@@ -20,11 +20,11 @@ from seerob.errors import InputError, suggestion
 from seerob.samples import JointSample, Sample
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
-from seerob.trajectory import MAX_SAMPLES, MotionOrigin, Trajectory, origin_finding
-from seerob.trajectory_checks import Beyond, joint_count_check, limit_check, sampling_findings
+from seerob.trajectories.checks import Beyond, joint_count_check, limit_check, sampling_findings
+from seerob.trajectories.trajectory import MAX_SAMPLES, MotionOrigin, Trajectory, origin_finding
 
 if TYPE_CHECKING:
-    from seerob.recording import Recording
+    from seerob.recordings.recording import Recording
 
 
 class RecordedMotion(Source, frozen=True, kw_only=True):
@@ -47,7 +47,7 @@ class RecordedMotion(Source, frozen=True, kw_only=True):
 
     def coarse(self, folder: Path) -> str:
         """What was too coarse when it was recorded is so now."""
-        from seerob.recording import Recording
+        from seerob.recordings.recording import Recording
 
         path, recorded = folder / self.file, self.recorded or self.drives
         if not path.is_file():
@@ -61,7 +61,7 @@ class RecordedMotion(Source, frozen=True, kw_only=True):
         Raises:
             InputError: No recording of ours, nobody of that name in it, or a motion that does not fit.
         """
-        from seerob.recording import Recording
+        from seerob.recordings.recording import Recording
 
         if target is None:
             raise InputError.at(

@@ -21,7 +21,7 @@ from seerob.source import Target
 from seerob.sources._trajectory_file import TrajectoryFile, notes
 from seerob.tables.grid import Numbers, blank, number, read_numbers
 from seerob.tables.text import BLANKS, TextGrid, encoding_of
-from seerob.trajectory import Trajectory
+from seerob.trajectories.trajectory import Trajectory
 from seerob.transforms import Array
 
 FIXED = ("ERROR", "MM_STEP", "DEG_STEP", "MOVE_ID")

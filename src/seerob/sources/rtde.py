@@ -17,7 +17,7 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from seerob.errors import InputError
-from seerob.live import LiveSource, at_start, because
+from seerob.live.listening import LiveSource, at_start, because
 from seerob.model_io.calibration import Calibration, off_by
 from seerob.protocols import ProtocolError, rtde, rtde_client, ur_primary
 from seerob.protocols.rtde import ControllerVersion, Level, TextMessage, Value
@@ -25,7 +25,7 @@ from seerob.protocols.rtde_states import RobotMode, SafetyStatus, name, quality
 from seerob.samples import JointSample, Sample, SignalSample
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
-from seerob.trajectory import MotionOrigin, origin_finding
+from seerob.trajectories.trajectory import MotionOrigin, origin_finding
 
 _log = logging.getLogger(__name__)
 

@@ -16,9 +16,9 @@ from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
 from seerob.tables.mapping import Mapping
 from seerob.tables.motion import read_tool_motion
-from seerob.tool_trajectory import PoseSamples, ToolTrajectory, plausible
-from seerob.trajectory import MotionOrigin, origin_finding
-from seerob.trajectory_checks import sampling_findings
+from seerob.trajectories.checks import sampling_findings
+from seerob.trajectories.tool_trajectory import PoseSamples, ToolTrajectory, plausible
+from seerob.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.transforms import Array
 
 FARTHEST = 30.0

@@ -17,7 +17,7 @@ from seerob.snapshot import Finding
 from seerob.source import Target
 from seerob.sources._log_columns import Joints, Log, LogValues, open_log
 from seerob.sources._trajectory_file import TrajectoryFile, notes
-from seerob.trajectory import MotionOrigin, Trajectory
+from seerob.trajectories.trajectory import MotionOrigin, Trajectory
 
 PREFIX = {Joints.MEASURED: "actual", Joints.COMMANDED: "target"}
 

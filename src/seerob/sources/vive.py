@@ -22,7 +22,7 @@ from msgspec.structs import replace as changed
 from seerob.errors import InputError
 from seerob.human.calibration import CalibrationPose
 from seerob.human.captured import CaptureFrame, Layout
-from seerob.live import say_once
+from seerob.live.listening import say_once
 from seerob.protocols.live_messages import Sieve, from_datagrams, from_websocket
 from seerob.protocols.vive import PORT, Device, Devices, decode
 from seerob.snapshot import Finding

@@ -16,7 +16,7 @@ import numpy as np
 from msgspec import Meta, field
 
 from seerob.human.captured import CaptureFrame, Layout, Seen
-from seerob.live import say_once
+from seerob.live.listening import say_once
 from seerob.motion_io.upright import Up, world_from_file
 from seerob.protocols import ProtocolError, vrpn
 from seerob.protocols.vrpn import TrackerPose

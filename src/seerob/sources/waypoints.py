@@ -14,7 +14,7 @@ from seerob.snapshot import Finding
 from seerob.source import Target
 from seerob.sources._logged_program import log_kind, logged_program
 from seerob.sources._trajectory_file import TrajectoryFile, notes
-from seerob.trajectory import MotionOrigin, Trajectory
+from seerob.trajectories.trajectory import MotionOrigin, Trajectory
 from seerob.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
 from seerob.waypoints.arm import Arm
 from seerob.waypoints.branches import parse

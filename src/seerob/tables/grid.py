@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.errors import InputError, Problem
-from seerob.trajectory import MAX_SAMPLES
+from seerob.trajectories.trajectory import MAX_SAMPLES
 from seerob.transforms import Array
 
 Cell = object

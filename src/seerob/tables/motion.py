@@ -15,8 +15,8 @@ from seerob.tables.guess import Guess, guess
 from seerob.tables.layout import Layout
 from seerob.tables.mapping import SI, Mapping, Motion
 from seerob.tables.orientation import wxyz_from
-from seerob.tool_trajectory import ToolTrajectory
-from seerob.trajectory import Trajectory
+from seerob.trajectories.tool_trajectory import ToolTrajectory
+from seerob.trajectories.trajectory import Trajectory
 from seerob.transforms import Array
 
 KEYS = ("time", "joints", "velocities", "torques", "tcp_position", "tcp_orientation")

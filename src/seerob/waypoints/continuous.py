@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from seerob.errors import InputError, Problem
-from seerob.trajectory import MAX_SAMPLES, Trajectory
+from seerob.trajectories.trajectory import MAX_SAMPLES, Trajectory
 from seerob.transforms import Array, rotation_from_wxyz
 from seerob.waypoints.arm import Arm
 from seerob.waypoints.blending import Leg, meet, rounded

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from seerob.errors import InputError
-from seerob.trajectory import Trajectory
+from seerob.trajectories.trajectory import Trajectory
 from seerob.transforms import Array
 from seerob.waypoints.waypoint import MAX_WAYPOINTS, Program, Waypoint
 

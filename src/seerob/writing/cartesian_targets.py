@@ -20,7 +20,7 @@ from typing import Any, Self
 import numpy as np
 
 from seerob.errors import InputError, SeerobError, UnknownName
-from seerob.live import because
+from seerob.live.listening import because
 from seerob.model import Model
 from seerob.run import target
 from seerob.samples import PoseSample, Quality, Sample

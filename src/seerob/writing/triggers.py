@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from seerob.errors import InputError, SeerobError
-from seerob.live import because
+from seerob.live.listening import because
 from seerob.model import Model
 from seerob.samples import Sample
 from seerob.snapshot import Snapshot

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.column import Column, Spill
 from seerob.errors import Undecided
+from seerob.results.column import Column, Spill
 from seerob.snapshot import Result, Snapshot, Trace, Verdict
 from seerob.transforms import Array
 

@@ -9,9 +9,9 @@ import numpy as np
 from seerob.human.skeleton import BONES
 from seerob.model import Model
 from seerob.state import State
-from seerob.told_bones import told_between, told_errors
 from seerob.tolerances import Tolerance
 from seerob.transforms import Array
+from seerob.whereabouts.told_bones import told_between, told_errors
 
 
 class TrackingError:
@@ -22,7 +22,7 @@ class TrackingError:
     by φ (`seerob.human.ends`), and the chord :math:`2 ρ \sin(φ/2)` takes its place. What no device sees adds
     what the file accepts (``unseen_uncertainty``), else nothing: how wrong it is nobody knows, and
     `State.require_bodies` leaves it undecided. A bone between two that are seen adds how far the lengths of
-    bones let its ends be (`seerob.told_bones`).
+    bones let its ends be (`seerob.whereabouts.told_bones`).
 
     Args:
         model: The compiled workstation.
@@ -69,7 +69,7 @@ class TrackingError:
     def _told(
         self, state: State, person: str, errors: Mapping[str, tuple[float | None, float | None]]
     ) -> dict[str, float]:
-        """Of bones between two that are seen [m], see `seerob.told_bones`."""
+        """Of bones between two that are seen [m], see `seerob.whereabouts.told_bones`."""
         where = self._joints[person]
         seen = {bone for bone, error in errors.items() if error != (None, None) and bone in where}
         if not told_between(seen):

@@ -4,8 +4,8 @@ from msgspec.structs import replace
 
 from seerob.errors import InputError
 from seerob.source import Target
-from seerob.trajectory import Trajectory
-from seerob.trajectory_checks import Beyond, limit_check, sampling_findings, velocity_check
+from seerob.trajectories.checks import Beyond, limit_check, sampling_findings, velocity_check
+from seerob.trajectories.trajectory import Trajectory
 
 TARGET = Target(
     name="ur10",

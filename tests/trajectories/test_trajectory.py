@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from seerob.errors import InputError
 from seerob.samples import Quality
-from seerob.trajectory import (
+from seerob.trajectories.trajectory import (
     MotionOrigin,
     Trajectory,
     TrajectorySamples,

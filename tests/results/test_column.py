@@ -7,9 +7,9 @@ import threading
 import numpy as np
 import pytest
 
-from seerob import column
-from seerob.column import BLOCK, Column, Spill
-from seerob.results import ResultLog, log_of
+from seerob.results import column
+from seerob.results.column import BLOCK, Column, Spill
+from seerob.results.result_log import ResultLog, log_of
 from seerob.sink import KeepsResults
 from seerob.snapshot import Result, Snapshot, Verdict
 

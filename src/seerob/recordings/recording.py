@@ -14,8 +14,7 @@ import msgspec
 from msgspec.structs import replace
 
 from seerob.errors import InputError
-from seerob.mcap_index import ChunkPlace, Damaged, McapIndex, Message, read_attachment, read_chunk, scan
-from seerob.recording_format import (
+from seerob.recordings.format import (
     BASIS,
     END_METADATA,
     FILE_PREFIX,
@@ -30,6 +29,15 @@ from seerob.recording_format import (
     BasisChange,
     Tick,
     nanoseconds,
+)
+from seerob.recordings.mcap_index import (
+    ChunkPlace,
+    Damaged,
+    McapIndex,
+    Message,
+    read_attachment,
+    read_chunk,
+    scan,
 )
 from seerob.snapshot import Basis, Finding, Scene, Snapshot
 

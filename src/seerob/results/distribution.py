@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seerob.series import Series
+from seerob.results.series import Series
 from seerob.snapshot import Level
 
 

@@ -9,10 +9,10 @@ from msgspec import Meta
 
 from seerob import provenance
 from seerob.criterion import Criterion, Evaluate
-from seerob.ergonomic_posture import bind_posture
 from seerob.errors import InputError
 from seerob.human.angles import Angles
 from seerob.model import Model
+from seerob.postures.ergonomic_posture import bind_posture
 from seerob.scoring.basis import (
     ACCURACY_NOTE,
     PROJECTION_NOTE,

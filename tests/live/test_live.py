@@ -14,7 +14,7 @@ import msgspec
 import pytest
 
 from seerob.errors import InputError, SeerobError
-from seerob.live import (
+from seerob.live.listening import (
     FIRST_PAUSE,
     LONGEST_PAUSE,
     MARGIN,
@@ -25,7 +25,7 @@ from seerob.live import (
     delay_of,
     say_once,
 )
-from seerob.real_time import Clock, hear, require_recorded
+from seerob.live.real_time import Clock, hear, require_recorded
 from seerob.samples import JointSample, SignalSample
 from seerob.source import Source
 from seerob.workstation import Workstation
@@ -111,7 +111,7 @@ def test_one_line_per_loss_and_one_per_return_whatever_ends_it(caplog, error):
         if error:
             raise error
 
-    with caplog.at_level(logging.INFO, "seerob.live"), Ears(script) as ears:
+    with caplog.at_level(logging.INFO, "seerob.live.listening"), Ears(script) as ears:
         until(lambda: len(ears.samples) == 2)
     lines = [r.getMessage() for r in caplog.records if "mistake in the source" not in r.getMessage()]
     assert len(lines) == 2
@@ -121,8 +121,8 @@ def test_one_line_per_loss_and_one_per_return_whatever_ends_it(caplog, error):
 
 
 def test_it_is_tried_again_less_and_less_often(monkeypatch):
-    monkeypatch.setattr("seerob.live.FIRST_PAUSE", 0.01)
-    monkeypatch.setattr("seerob.live.LONGEST_PAUSE", 0.08)
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.01)
+    monkeypatch.setattr("seerob.live.listening.LONGEST_PAUSE", 0.08)
     tried = []
 
     async def script():

@@ -8,8 +8,8 @@ from made_cell import FLOATING, TWO_R, heard, made, state_at, two_r
 from seerob.engine import Engine
 from seerob.errors import Undecided
 from seerob.human.skeleton import BONES
-from seerob.in_doubt import in_doubt
 from seerob.run import Judge, bind, ticks
+from seerob.whereabouts.in_doubt import in_doubt
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 KNIFE = '[[tools]]\nname = "knife"\non = "op/right_hand"\nshape = { box = [0.02, 0.02, 0.2] }\nmass = 0.1\n'

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.arrivals import Arrivals
-from seerob.device_clock import WINDOW, DeviceClock
+from seerob.live.arrivals import Arrivals
+from seerob.live.device_clock import WINDOW, DeviceClock
 
 
 @given(st.floats(-1e6, 1e6), st.lists(st.floats(0, 0.5), min_size=1, max_size=80))

@@ -8,7 +8,7 @@ import pytest
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
 from seerob.human.skeleton import BONES
 from seerob.judging import Judge
-from seerob.tracking_error import TrackingError, tracking
+from seerob.whereabouts.tracking_error import TrackingError, tracking
 
 PEOPLE = "".join(
     f'[[humans]]\nname = "{name}"\nstature = 1.75\nmass = 75\nsex = "male"\n'

@@ -28,9 +28,9 @@ from typing import Annotated, Any, Self, TypeVar
 from msgspec import Meta
 from msgspec.structs import replace
 
-from seerob.arrivals import Arrivals, Statistics
-from seerob.device_clock import DeviceClock
 from seerob.errors import InputError, SeerobError
+from seerob.live.arrivals import Arrivals, Statistics
+from seerob.live.device_clock import DeviceClock
 from seerob.samples import Mailbox, Sample, SignalSample, key
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target

@@ -61,7 +61,7 @@ def partly_seen(model: Model, gap: Gap, bind: Callable[[Gap], Evaluate]) -> Eval
         model: The compiled workstation.
         gap: Between the two sets of bodies.
         bind: Makes the criterion for a part of the gap. It asks for distances with ``estimates`` and widens
-            them by `seerob.tracking_error.TrackingError`.
+            them by `seerob.whereabouts.tracking_error.TrackingError`.
     """
 
     def without(lost: tuple[int, ...]) -> Evaluate | None:

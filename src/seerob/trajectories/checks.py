@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from seerob.errors import InputError, Problem
 from seerob.snapshot import Finding
 from seerob.source import Target
-from seerob.trajectory import Timed, Trajectory
+from seerob.trajectories.trajectory import Timed, Trajectory
 from seerob.transforms import Array
 
 TOLERANCE = 1e-6

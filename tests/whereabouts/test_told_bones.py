@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seerob.human.skeleton import BONES, PARENTS
-from seerob.told_bones import told_between, told_bound, told_errors
+from seerob.whereabouts.told_bones import told_between, told_bound, told_errors
 
 
 def elbow(P, C, a, b, angle, rng):

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from seerob.errors import InputError
-from seerob.tool_trajectory import PoseSamples, ToolTrajectory, plausible
+from seerob.trajectories.tool_trajectory import PoseSamples, ToolTrajectory, plausible
 from seerob.transforms import transform
 
 RNG = np.random.default_rng(3)

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seerob.errors import Undecided, UnknownName
-from seerob.results import ResultLog, log_of, result_named
-from seerob.series import CODES, MAX_REASONS, severity, worst_verdict
+from seerob.results.result_log import ResultLog, log_of, result_named
+from seerob.results.series import CODES, MAX_REASONS, severity, worst_verdict
 from seerob.snapshot import CriterionInfo, Result, Snapshot, Verdict
 
 W, E, U = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED

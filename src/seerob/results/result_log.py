@@ -11,10 +11,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from seerob.bone_errors import BoneErrors
-from seerob.column import Spill
 from seerob.errors import UnknownName
-from seerob.series import Series, Spread, Worst, WorstTracker, worst_verdict
+from seerob.results.bone_errors import BoneErrors
+from seerob.results.column import Spill
+from seerob.results.series import Series, Spread, Worst, WorstTracker, worst_verdict
 from seerob.snapshot import CriterionInfo, History, Result, Snapshot, Verdict
 
 __all__ = ["JointLog", "ResultLog", "Series", "Spread", "Worst"]

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from msgspec.structs import replace
 
 from seerob.errors import InputError, Problem
-from seerob.live import Listening, LiveSource
+from seerob.live.listening import Listening, LiveSource
 from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample, key
 from seerob.workstation import Workstation
 

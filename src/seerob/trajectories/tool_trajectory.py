@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seerob.errors import InputError, Problem
 from seerob.samples import PoseSample
-from seerob.trajectory import Timed
+from seerob.trajectories.trajectory import Timed
 from seerob.transforms import Array, apply, wxyz_from_rotation
 
 UNIT_TOLERANCE = 1e-3

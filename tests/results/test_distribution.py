@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from seerob.distribution import distribution
-from seerob.series import Series
+from seerob.results.distribution import distribution
+from seerob.results.series import Series
 from seerob.snapshot import Level, Result
 
 LEVELS = (Level(up_to=2, name="one"), Level(up_to=4, name="two"), Level(up_to=7, name="three"))

@@ -9,13 +9,13 @@ from msgspec import Meta
 
 from seerob import provenance
 from seerob.criterion import Evaluate, judge, judge_interval
-from seerob.ergonomic_posture import bind_posture
 from seerob.figures import whatever_is_missing
 from seerob.human.angles import NEEDS, Angles
 from seerob.human.skeleton import SIDES
 from seerob.model import Model
-from seerob.posture_file import ZoneTable
-from seerob.posture_rule import PostureRule
+from seerob.postures.ergonomic_posture import bind_posture
+from seerob.postures.rule import PostureRule
+from seerob.postures.zone_file import ZoneTable
 from seerob.scoring.basis import ACCURACY_NOTE, entered, posture_quality
 from seerob.scoring.phases import Phase, Sides, on_sides, phase_at, shared_phases
 from seerob.scoring.score_rows import total_row

@@ -1,0 +1,1 @@
+"""What all live sources share: thread, back-off, clocks, real time."""

@@ -1,0 +1,1 @@
+"""What a run said over time, in bounded memory."""

@@ -27,13 +27,14 @@ from made_cell import FLOATING, heard, hinge_limits, made, state_at
 from oracles import pinocchio_oracle as oracle
 from seerob.engine import Engine
 from seerob.model_io import library
+from seerob.recorded_station import load_recorded
 from seerob.recordings.recording import Recording
 from seerob.run import pump
 from seerob.safety.kinetic_energy import kinetic_energy
 from seerob.sinks.recorder import Recorder
 from seerob.source import Opened, Source
 from seerob.state import State
-from seerob.station import Station, load, load_recorded
+from seerob.station import Station, load
 from seerob.transforms import Array
 
 Motion = Callable[[float], tuple[Array, Array]]

@@ -3,7 +3,9 @@
 A UR10 over RTDE, a 7-axis arm over FRI and the variables of a cell over OPC UA at once, each emulated by a
 process of its own, beside a person with distances between all of them. A packet is as old as the kernel of
 this machine says. Of a stream (RTDE) the kernel keeps the stamp of the newest packet that it holds: those
-before it that are read together with it count as old as they can be, which is as what was read before them.
+before it that are read together with it count as old as they can be: as when the emulator wrote them, which
+it notes on the clock that both share. The emulators stand for other machines and leave this one's time to the
+twin (``nice``).
 The peer is the same listeners with no twin beside them: what this machine makes late. A machine that does
 other things beside makes everything late: ``chrt -f 1 python benchmarks/live.py`` goes before them.
 
@@ -18,6 +20,7 @@ import contextlib
 import os
 import re
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -29,7 +32,8 @@ from pathlib import Path
 import numpy as np
 
 import seerob as sr
-from seerob import run
+from seerob import cli, run
+from seerob.emulators.rtde import RtdeServer
 from seerob.live import listening as live
 from seerob.samples import SignalSample, key
 
@@ -67,8 +71,8 @@ class Post:
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
-        self.came: dict[tuple[str, bool], list[tuple[int, float, float]]] = defaultdict(list)
-        """Sequence number, arrival and posting of each sample, by source and whether it is of signals."""
+        self.came: dict[tuple[str, bool], list[tuple[int, float, float | None]]] = defaultdict(list)
+        """Sequence number, arrival and device's time of samples, by source and whether they are signals."""
         self.posted: dict[tuple[str, int], float] = {}
         self.taken: list[tuple[float, tuple]] = []
 
@@ -85,7 +89,8 @@ class Post:
                 return
             with self.lock:
                 self.posted[listener.name, before] = posted
-                self.came[listener.name, isinstance(sample, SignalSample)].append((before, sample.t, posted))
+                signals = isinstance(sample, SignalSample)
+                self.came[listener.name, signals].append((before, sample.t, sample.t_device))
 
         def taking(listening):
             now, found = time.monotonic(), take(listening)
@@ -103,27 +108,29 @@ class Post:
         with self.lock:
             return {source for source, _ in self.came} >= names
 
-    def arrived(self) -> dict[tuple[str, int], float]:
+    def arrived(self, written: dict[float, float]) -> dict[tuple[str, int], float]:
         """When each sample came in at the earliest, by source and sequence number [s].
 
         Signals that are told again while nothing is heard are no packet.
+
+        Args:
+            written: When the emulator of a stream wrote each packet, by the device's time.
         """
         found = {}
         for (source, signals), said in self.came.items():
-            firsts: dict[float, tuple[int, float, float]] = {}
+            firsts: dict[float, tuple[int, float, float | None]] = {}
             for one in said:
                 firsts.setdefault(one[1], one)
-            came, before = list(firsts.values()) if signals else said, said[0][1]
-            for k, (seq, instant, _) in enumerate(came):
+            came = list(firsts.values()) if signals else said
+            for k, (seq, instant, device) in enumerate(came):
                 together = k + 1 < len(came) and came[k + 1][1] == instant
-                found[source, seq] = before if together else instant
-                before = before if together else instant
+                found[source, seq] = min(instant, written[device]) if together else instant
         return found
 
-    def mailbox(self) -> dict[str, list[float]]:
+    def mailbox(self, written: dict[float, float]) -> dict[str, list[float]]:
         """Between arrival and mailbox, by source [s]."""
         found = defaultdict(list)
-        for (source, seq), instant in self.arrived().items():
+        for (source, seq), instant in self.arrived(written).items():
             found[source].append(self.posted[source, seq] - instant)
         return found
 
@@ -154,9 +161,9 @@ class States:
         """Whether it has lasted long enough; who is not heard yet is waited for a while."""
         return self.now >= self.end + (0.0 if all_heard else PATIENCE)
 
-    def ages(self, post: Post) -> dict[str, list[float]]:
+    def ages(self, post: Post, written: dict[float, float]) -> dict[str, list[float]]:
         """Between the arrival of samples and the State with its results, by source [s]."""
-        found, arrived = defaultdict(list), post.arrived()
+        found, arrived = defaultdict(list), post.arrived(written)
         for instant, samples in self.ticks[1:]:  # the first waits for the beginning
             for sample in samples:
                 came = arrived.get((sample.source, sample.seq))
@@ -172,13 +179,36 @@ class States:
     def __exit__(self, *_) -> None: ...
 
 
+NOTED = struct.Struct("<dd")
+"""Device's time and the machine's monotonic one, of a packet that is written to a stream."""
+
+
+def emulate(notes: str, command: list[str]) -> int:
+    """``seerob emulate``, with a note of when each RTDE packet was made, just before it is written."""
+    os.nice(10)
+    at = RtdeServer.at
+    with Path(notes).open("ab", buffering=0) as file:
+
+        def noted(server, t):
+            file.write(NOTED.pack(t, time.monotonic()))
+            return at(server, t)
+
+        RtdeServer.at = noted
+        return cli.main(["emulate", *command])
+
+
+def written(notes: Path) -> dict[float, float]:
+    """When each packet was written, by the device's time."""
+    return dict(NOTED.iter_unpack(notes.read_bytes()))
+
+
 @contextlib.contextmanager
-def emulators(*commands: list[str]):
+def emulators(notes: Path, *commands: list[str]):
     """Emulators, and the port of each."""
     with contextlib.ExitStack() as stack:
         ports = []
         for command in commands:
-            whole = [sys.executable, "-m", "seerob.cli", "emulate", *command]
+            whole = [sys.executable, __file__, "--emulate", str(notes), *command]
             process = stack.enter_context(subprocess.Popen(whole, stdout=subprocess.PIPE, text=True))
             stack.callback(process.terminate)
             ports.append(int([re.search(r":(\d+)", process.stdout.readline()) for _ in range(2)][1][1]))
@@ -230,14 +260,20 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--switch", type=float)
     parser.add_argument("--smoke", action="store_true")
+    parser.add_argument("--emulate", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
     options = parser.parse_args()
+    if options.emulate:
+        sys.exit(emulate(options.emulate[0], options.emulate[1:]))
     seconds = 0.5 if options.smoke else options.seconds
     if options.switch is not None:
         live.PROMPT = options.switch
     print(f"work that waits on this machine before: {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores")
     fri = free_port()
     commands = [["rtde", "--port", "0"], ["opcua", "--port", "0"], ["fri", "--port", str(fri)]]
-    with emulators(*commands) as (rtde, opcua, _), tempfile.TemporaryDirectory() as folder:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        emulators(Path(folder, "written"), *commands) as (rtde, opcua, _),
+    ):
         station = cell(folder, rtde, fri, opcua)
         sources = [s for s in station.workstation.sources if isinstance(s, live.LiveSource)]
         _ = station.sources
@@ -253,10 +289,11 @@ def main() -> None:
         with Post().watching() as post:
             states = States(seconds)
             summary = station.run(live=True, writers=[states], stop=lambda: states.over(post.heard(names)))
+        made = written(Path(folder, "written"))
     period = station.workstation.engine.tick
-    base = table("packet to mailbox, listeners alone", alone.mailbox())
-    own = table("packet to mailbox, beside the twin", post.mailbox())
-    state = table("packet to State and results", states.ages(post))
+    base = table("packet to mailbox, listeners alone", alone.mailbox(made))
+    own = table("packet to mailbox, beside the twin", post.mailbox(made))
+    state = table("packet to State and results", states.ages(post, made))
     for name, share in post.together().items():
         print(f"{name}: {100 * share:.2f} % were read together with a later one and count as old as can be")
     for name in sorted(own.keys() & base):

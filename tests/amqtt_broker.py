@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
-import threading
 from contextlib import contextmanager
+
+from in_a_loop import in_a_loop
 
 
 @contextmanager
@@ -19,24 +19,13 @@ def broker(port):
         "listeners": {"default": {"type": "tcp", "bind": f"127.0.0.1:{port}"}},
         "plugins": {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}},
     }
-    up, over, loops = threading.Event(), [], []
 
-    async def serve():
+    async def serve(ready, over):
         found = Broker(config)
         await found.start()
-        stop = asyncio.Event()
-        loops.append(asyncio.get_running_loop())
-        over.append(stop)
-        up.set()
-        await stop.wait()
+        ready.set()
+        await over.wait()
         await found.shutdown()
 
-    thread = threading.Thread(target=lambda: asyncio.run(serve()), daemon=True)
-    thread.start()
-    assert up.wait(20)
-    try:
+    with in_a_loop(serve):
         yield
-    finally:
-        loops[0].call_soon_threadsafe(over[0].set)
-        thread.join(20)
-        assert not thread.is_alive()

@@ -5,6 +5,7 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from seerob.distances.least import Shapes
 from seerob.geometry import Mesh, Solid, capsule, dilated_rectangle
 
 IDENTITY = np.eye(3)
@@ -62,3 +63,25 @@ SOLIDS = {
     "rectangle": dilated_rectangle([0.1, 0, 0.2], [0.5, 0, 0], [0, 0.2, 0.3], 0.06),
     "narrow rectangle": dilated_rectangle([0, 0, 0], [0, 0, 0], [0, 0.6, 0], 0.03),
 }
+
+
+def made_crowd() -> Shapes:
+    """Two robots' worth of meshes, one of them open, and a few parts of a person."""
+    open_ball = bumpy_ball(12, 0.5)
+    open_ball = Mesh(open_ball.vertices, open_ball.faces[: len(open_ball.faces) * 2 // 3])
+    return Shapes.build(
+        [
+            ("link 0", [Solid(mesh=bumpy_ball(10, 0.4))]),
+            ("link 1", [Solid(mesh=bumpy_ball(11, 0.3)), Solid(mesh=boxes(*U_BOXES), radius=0.01)]),
+            ("link 2", [Solid(mesh=open_ball)]),
+            ("hand", [SOLIDS["capsule"], SOLIDS["ball"]]),
+            ("chest", [SOLIDS["rectangle"]]),
+            ("ghost", []),
+            ("tool", [Solid(mesh=bumpy_ball(13, 0.2, 1))]),
+        ]
+    )
+
+
+def said(found) -> list[np.ndarray]:
+    """All that an answer says."""
+    return [found.distance, found.point_a, found.point_b, found.body_a, found.body_b, found.reach]

@@ -9,12 +9,13 @@ URI = "urn:another:maker"
 
 
 @contextmanager
-def foreign_opcua(values, writable=()):
+def foreign_opcua(values, writable=(), more=lambda server: None):
     """A PLC of another maker.
 
     Args:
         values: First value of each node, by name.
         writable: Those that clients may write.
+        more: Adds what else there is to the server (`asyncua.sync.Server`).
 
     Yields:
         Address, and nodes by name: ``nodes["lamp"].write_value(True)``.
@@ -33,6 +34,7 @@ def foreign_opcua(values, writable=()):
             nodes[name] = server.nodes.objects.add_variable(f"ns={index};s={name}", f"{index}:{name}", value)
             if name in writable:
                 nodes[name].set_writable()
+        more(server)
         server.start()
         yield f"opc.tcp://127.0.0.1:{port}", nodes
     finally:

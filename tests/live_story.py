@@ -5,22 +5,25 @@ from __future__ import annotations
 import math
 import os
 import time
+from contextlib import contextmanager
 
 import numpy as np
 
+from kept_run import Kept
+from seerob.live.listening import Listener
 from seerob.samples import JointSample
 
 
-class Story:
+class Story(Kept):
     """Keeps what goes out, and does things to the server at given ticks."""
 
     def __init__(self, ticks, enough=lambda story: True, **deeds):
         self.ticks, self.deeds = ticks, {int(k.removeprefix("at_")): deed for k, deed in deeds.items()}
-        self.snapshots, self.heard, self.enough = [], [], enough
+        super().__init__()
+        self.enough = enough
 
     def write(self, snapshot, samples):
-        self.snapshots.append(snapshot)
-        self.heard.append(samples)
+        super().write(snapshot, samples)
         self.deeds.get(len(self.snapshots), lambda: None)()
 
     def stop(self):
@@ -29,15 +32,6 @@ class Story:
             return False
         # Asked now and then: it looks at everything that was heard.
         return ticks >= 30 * self.ticks or (ticks % 20 == 0 and self.enough(self))
-
-    def close(self):
-        pass
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
 
     def joints(self):
         return [s for samples in self.heard for s in samples if isinstance(s, JointSample)]
@@ -103,6 +97,19 @@ class Story:
 def lived(station, story, **more):
     station.run(live=True, writers=[story], stop=story.stop, **more)
     return story
+
+
+@contextmanager
+def listening(source, target=None):
+    """What a source says while it is listened to; its end is waited for."""
+    heard = []
+    listener = Listener(source, target, heard.append)
+    listener.start()
+    try:
+        yield heard
+    finally:
+        listener.ask_to_stop()
+        assert listener.join(30)
 
 
 def open_files():

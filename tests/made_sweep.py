@@ -24,12 +24,12 @@ def points_of(solid, count, rng):
     return np.einsum("nc,ncx->nx", weights, chosen) + outward
 
 
-def missed(model, bodies, motion, contained, count, rng):
+def missed(model, bodies, motion, contained, count, rng, each=64):
     """How many of ``count`` points of bodies, at random times on straight joint ways, are not contained."""
     qpos = posed(model, motion)
     data = mujoco.MjData(model.mj)
     solids = [(model.bodies[i].mj, solid) for i in bodies for solid in model.bodies[i].solids]
-    instants = max(count // (64 * len(solids)), 1)
+    instants = max(count // (each * len(solids)), 1)
     wrong = 0
     for _ in range(instants):
         i = rng.integers(0, len(qpos) - 1)
@@ -37,7 +37,7 @@ def missed(model, bodies, motion, contained, count, rng):
         data.qpos[:] = (1 - share) * qpos[i] + share * qpos[i + 1]
         mujoco.mj_kinematics(model.mj, data)
         points = [
-            points_of(solid, 64, rng) @ data.xmat[body].reshape(3, 3).T + data.xpos[body]
+            points_of(solid, each, rng) @ data.xmat[body].reshape(3, 3).T + data.xpos[body]
             for body, solid in solids
         ]
         wrong += int((~contained(np.vstack(points))).sum())

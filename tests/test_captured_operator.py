@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kept_run import Kept
 from seerob.results.result_log import log_of
 from seerob.sinks import _posture_safety
 from seerob.snapshot import Verdict
@@ -15,25 +16,6 @@ from seerob.station import load
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "workstations/captured_operator"
-
-
-class Kept:
-    """A writer that keeps what it is given."""
-
-    def __init__(self):
-        self.snapshots = []
-
-    def write(self, snapshot, samples):
-        self.snapshots.append(snapshot)
-
-    def close(self):
-        pass
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
 
 
 @pytest.fixture(scope="module")

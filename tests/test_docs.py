@@ -69,6 +69,27 @@ def command_lines(path: Path) -> Iterator[list[str]]:
     yield from (shlex.split(code)[1:] for code in inline(path) if code.startswith("seerob "))
 
 
+TO_BE_WRITTEN = {"brake_distance.py", "ocra.py", "fanuc.py", "influx.py"}
+"""Of CONTRIBUTING.md: what somebody will add."""
+
+
+@pytest.mark.parametrize("path", pages())
+def test_files_that_are_named_exist(path: Path) -> None:
+    named = {code for code in inline(path) if re.fullmatch(r"[\w./-]+/[\w.-]+\.(py|ts|tsx|mjs)", code)}
+    places = (ROOT, ROOT / "src/seerob", path.parent)
+    lost = {n for n in named if not any((place / n).is_file() for place in places)}
+    assert {n for n in lost if Path(n).name not in TO_BE_WRITTEN} == set()
+
+
+def test_there_is_something_to_check() -> None:
+    """What the tests below look at, a page may lack, but not all of them."""
+    assert len(PAGES) > 8
+    for language in ("toml", "python", ""):
+        assert any(blocks(path, language) for path in PAGES), language
+    assert any(True for path in PAGES for _ in command_lines(path))
+    assert any(text.startswith("[") for path in PAGES for text in blocks(path, "toml"))
+
+
 @pytest.mark.parametrize("path", pages())
 def test_command_lines_are_understood(path: Path) -> None:
     known = {name.replace("_", "-") for name in cli.COMMANDS}

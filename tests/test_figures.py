@@ -1,11 +1,12 @@
 """Text of numbers keeps the side of the limit that the numbers are on, and is never kinder."""
 
 import math
+from decimal import Context, Decimal
 
 import numpy as np
 import pytest
 
-from seerob.figures import DECIMALS, against, figure, margin, told
+from seerob.figures import DECIMALS, against, figure, margin, told, with_unit
 
 
 def back(text):
@@ -70,3 +71,19 @@ def test_a_label_is_not_kinder_than_the_verdict_and_has_its_unit():
     assert told(0.9996, 1.0, "m/s", at_most=True) == "1 m/s"
     assert told(1.00001, 1.0, "m/s", at_most=True) == "1.001 m/s"
     assert told(0.055751, None, "m", at_most=False) == figure(0.055751, "m")
+
+
+@pytest.mark.parametrize("unit", ["m", "m/s", "N", ""])
+def test_a_label_is_the_text_of_the_pair_and_a_figure_that_of_decimal_arithmetic(unit):
+    rng = np.random.default_rng(6)
+    ten = Context(prec=60)
+    for scale in 10.0 ** np.arange(-6, 15):
+        near = np.round(rng.normal(0, scale, 40), int(rng.integers(0, 6)))
+        limits = near + rng.normal(0, 1, 40) * scale * 10.0 ** rng.integers(-14, 1, 40)
+        for value, limit in zip(near.tolist(), limits.tolist(), strict=True):
+            for at_most in (True, False):
+                shown = with_unit(against(value, limit, unit, at_most=at_most).value, unit)
+                assert told(value, limit, unit, at_most=at_most) == shown
+            if unit and 1e-3 < abs(value) < 1e6:
+                exact = Decimal(f"{value:.11e}").quantize(Decimal(1).scaleb(-DECIMALS[unit]), context=ten)
+                assert back(figure(value, unit)) == float(exact)

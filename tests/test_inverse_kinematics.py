@@ -37,9 +37,9 @@ def test_poses_of_random_joint_positions_are_reached_from_nearby(tmp_path, name)
         q = rng.uniform(0.8 * low, 0.8 * high)
         rotation, position = placed(station, "arm", q)
         start = np.clip(q + rng.uniform(-0.05, 0.05, len(q)), low, high)
-        found, error = solved(station, "arm", rotation, position, start)
+        found, miss = solved(station, "arm", rotation, position, start)
         R, p = placed(station, "arm", found)
-        assert error < 1e-6
+        assert miss.larger < 1e-6
         assert np.linalg.norm(p - position) < 1e-6
         assert np.abs(R - rotation).max() < 1e-6
         assert (found >= low - 1e-12).all()
@@ -50,16 +50,17 @@ def test_mimic_joints_follow(tmp_path):
     follow = '<mimic joint="j1" multiplier="2" offset="0.1"/>'
     station = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r(mimic=follow)})
     rotation, position = placed(station, "arm", np.array([0.7]))
-    found, error = solved(station, "arm", rotation, position, [0.5])
-    assert error < 1e-9
+    found, miss = solved(station, "arm", rotation, position, [0.5])
+    assert miss.larger < 1e-9
     assert found == pytest.approx([0.7])
 
 
 def test_out_of_reach_tells_how_far_off(tmp_path):
     station = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()})
     rotation, _ = placed(station, "arm", np.zeros(2))
-    found, error = solved(station, "arm", rotation, np.array([3.0, 0, 0]), [0.01, -0.01])
-    assert 0.99 < error < 1.2
+    found, miss = solved(station, "arm", rotation, np.array([3.0, 0, 0]), [0.01, -0.01])
+    assert 0.99 < miss.distance < 1.2
+    assert f"{miss.distance:.3g} m and" in str(miss)
     assert np.isfinite(found).all()
 
 
@@ -68,9 +69,9 @@ def test_a_limit_is_not_passed_to_reach_a_pose(tmp_path):
     urdf = urdf.replace('velocity="10"', 'velocity="10" lower="-1" upper="1"')
     station = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": urdf})
     rotation, position = placed(station, "arm", np.array([1.4, 0.2]))
-    found, error = solved(station, "arm", rotation, position, [0.9, 0.2])
+    found, miss = solved(station, "arm", rotation, position, [0.9, 0.2])
     assert (np.abs(found) <= 1).all()
-    assert error > 0.1
+    assert miss.larger > 0.1
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.3, 3.0, np.pi - 1e-7, np.pi])

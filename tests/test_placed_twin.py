@@ -7,7 +7,8 @@ import pytest
 
 from made_cell import AMPLITUDE, Q0, UR10, heard, made
 from seerob.engine import Engine
-from seerob.run import Judge, scene
+from seerob.run import Judge
+from seerob.scene import scene_of
 
 MORE = """
 [[parts]]
@@ -89,7 +90,7 @@ def test_the_results_of_one_state_do_not_depend_on_how_it_was_reached(cells):
 def test_a_run_without_physics_says_so(cells):
     def notes(station):
         return [
-            f.text for f in scene(station.model, station.bound, files={}).findings if f.subject == "engine"
+            f.text for f in scene_of(station.model, station.bound, files={}).findings if f.subject == "engine"
         ]
 
     assert notes(cells["true"]) == []

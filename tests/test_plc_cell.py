@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import shutil
-import time
 from pathlib import Path
 
+from kept_run import Chapters
 from seerob import load
 from seerob.cli import parser
 from seerob.commands.emulating import opcua, rtde
@@ -13,8 +13,6 @@ from seerob.recordings.recording import Recording
 from seerob.sinks.recorder import Recorder
 
 SHIPPED = Path(__file__).parents[1] / "workstations" / "plc_cell"
-PATIENCE = 60.0
-"""With one chapter [s]; on an idle machine all of them take 3 s."""
 
 
 def here(folder, robot, plc):
@@ -29,42 +27,14 @@ def here(folder, robot, plc):
     return load(folder)
 
 
-class Chapters:
-    """Waits for what a chapter is to show, then does what begins the next."""
-
-    def __init__(self, *chapters):
-        self._chapters = list(chapters)
-        self._end = time.monotonic() + PATIENCE
-        self.results, self.reasons = {}, {}
-
-    def write(self, snapshot, samples):
-        self.results = {r.name: r for r in snapshot.results}
-        if self._chapters and self._chapters[0][0](self.results):
-            _, deed = self._chapters.pop(0)
-            self.reasons |= {n: r.reason for n, r in self.results.items() if r.verdict == "undecided"}
-            deed()
-            self._end = time.monotonic() + PATIENCE
-
-    def stop(self):
-        assert time.monotonic() < self._end, {n: (r.verdict, r.reason) for n, r in self.results.items()}
-        return not self._chapters
-
-    def close(self):
-        pass
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
-
-
-def known(results):
+def known(snapshot):
+    results = {r.name: r for r in snapshot.results}
     names = ("robot – operator", "crate speed", "light curtain")
     return all(results[name].verdict != "undecided" for name in names)
 
 
-def only_the_robot_is_known(results):
+def only_the_robot_is_known(snapshot):
+    results = {r.name: r for r in snapshot.results}
     silent = ("crate – operator", "crate speed", "door – operator", "light curtain")
     return results["robot – operator"].verdict == "within" and all(
         results[n].verdict == "undecided" for n in silent

@@ -8,13 +8,16 @@ import math
 import tomllib
 from datetime import date
 from importlib import resources
+from typing import get_args, get_type_hints
 
+import msgspec
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from seerob import plugin
 from seerob.errors import InputError
-from seerob.reading import convert_workstation, read, readable
+from seerob.reading import BASES, convert_workstation, read, readable
 from seerob.toml_file import MAX_FILE_SIZE
 from seerob.workstation import TABLES, Workstation
 
@@ -56,6 +59,11 @@ WRONG = {
         HUMAN.replace("mass = 75", "mass = '75 kg'"),
         "humans[0].mass",
         "'75 kg' is wrong; expected a number",
+    ),
+    "text for a number or a percentile": (
+        HUMAN.replace("1.75", "'tall'"),
+        "humans[0].stature",
+        "'tall' is wrong; expected metres, or a population and percentile",
     ),
     "number for text": ("title = 3", "title", "3 is wrong; expected text"),
     "true for a number": (
@@ -400,3 +408,24 @@ def test_a_damaged_file_is_read_or_refused(tmp_path_factory, at, put):
     file.write_bytes(raw[:at] + put + raw[at + 1 :])
     with contextlib.suppress(InputError):
         assert isinstance(read(file), Workstation)
+
+
+def _patterns(wanted, seen):
+    """Every metadata with a pattern in a type, at any depth."""
+    yield from (m for m in getattr(wanted, "__metadata__", ()) if getattr(m, "pattern", None))
+    inner = [getattr(wanted, "__origin__", None), *get_args(wanted)]
+    if isinstance(wanted, type) and issubclass(wanted, msgspec.Struct) and wanted not in seen:
+        seen.add(wanted)
+        inner += get_type_hints(wanted, include_extras=True).values()
+    for item in inner:
+        if item is not None:
+            yield from _patterns(item, seen)
+
+
+@pytest.mark.parametrize("group", BASES)
+def test_no_user_reads_a_regular_expression(group):
+    kinds = [plugin.load(group, kind, BASES[group]) for kind in plugin.kinds(group)]
+    silent = [
+        m.pattern for kind in (*kinds, Workstation) for m in _patterns(kind, set()) if not m.description
+    ]
+    assert not silent

@@ -51,3 +51,13 @@ def test_transforms_chain_right_to_left_and_invert():
     stack = np.stack([a_from_b, b_from_c])
     np.testing.assert_allclose(tf.inverse(stack) @ stack, np.broadcast_to(np.eye(4), (2, 4, 4)), atol=1e-15)
     np.testing.assert_array_equal(tf.transform(), np.eye(4))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e308])
+@pytest.mark.parametrize("place", range(4))
+def test_a_quaternion_without_direction_becomes_nan_and_changes_no_other(bad, place):
+    rotation = Rotation.from_rotvec([0.3, -0.4, 0.5])
+    broken = np.array([bad if k == place else -bad if k == (place + 1) % 4 else 0.5 for k in range(4)])
+    found = tf.turned(rotation.as_matrix(), [[1, 0, 0, 0], broken])
+    assert found[0] == pytest.approx(rotation.as_quat(scalar_first=True))
+    assert np.isnan(found[1]).all()

@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     from seerob.errors import InputError, SeerobError, Undecided, UnknownName
     from seerob.model import Model
     from seerob.reading import read
+    from seerob.recorded_station import load_recorded
     from seerob.recordings.recording import Recording
     from seerob.results.result_log import ResultLog, Series
     from seerob.run import Summary
     from seerob.snapshot import Origin, Result, Snapshot, Verdict
-    from seerob.station import Station, load, load_recorded
+    from seerob.station import Station, load
     from seerob.workstation import Workstation
 
 _HOMES = {
@@ -34,7 +35,8 @@ _HOMES = {
     "results.result_log": ("ResultLog", "Series"),
     "run": ("Summary",),
     "snapshot": ("Origin", "Result", "Snapshot", "Verdict"),
-    "station": ("Station", "load", "load_recorded"),
+    "recorded_station": ("load_recorded",),
+    "station": ("Station", "load"),
     "workstation": ("Workstation",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -30,6 +30,8 @@ MAX_ENTRIES = 20_000
 """Files in a container."""
 MAX_UNPACKED = 1 << 30
 """All of them together [byte]."""
+RELATIONSHIPS = "_rels/.rels"
+"""Where a container says what its files are."""
 LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
 ANGLES = {"": math.pi / 180, "deg": math.pi / 180, "degree": math.pi / 180, "°": math.pi / 180, "rad": 1.0}
 
@@ -57,7 +59,7 @@ class Interface:
     @property
     def kind(self) -> str:
         """Last part of the path."""
-        return self.classes.rpartition("/")[2]
+        return _last(self.classes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +78,7 @@ class Element:
 
     def has_role(self, role: str) -> bool:
         """Whether one of its roles is, or ends with, a name."""
-        return any(path.rpartition("/")[2] == role for path in self.roles)
+        return any(_last(path) == role for path in self.roles)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +110,10 @@ class Plant:
             InputError: It is not there, leads out of the plant's folder, or is too large.
         """
         path = unquote(uri.partition("#")[0]).replace("\\", "/").removeprefix("file:///")
-        name = posixpath.normpath(posixpath.join(self.inside, path))
+        # In a container a path from the root is one from the container's own.
+        inside = "" if self.container is not None and path.startswith("/") else self.inside
+        path = path.lstrip("/") if self.container is not None else path
+        name = posixpath.normpath(posixpath.join(inside, path))
         if path.startswith("/") or ":" in path or name.startswith(".."):
             what = "leads out of the plant's folder"
             raise InputError.at(
@@ -140,11 +145,13 @@ def read(path: Path) -> Plant:
         InputError: It is missing, too large, no CAEX, or hostile.
     """
     if not path.is_file():
-        raise InputError.at(path, "", "no such file", "give an .aml or .amlx file")
+        what = "is a folder" if path.is_dir() else "no such file"
+        raise InputError.at(path, "", what, "give an .aml or .amlx file")
     container, inside = None, ""
+    reader = _Reader(str(path))
     if path.suffix.lower() == ".amlx" or zipfile.is_zipfile(path):
         container = path
-        name = _main_part(path)
+        name = _main_part(path, reader)
         data, inside = _unpack(path, name), posixpath.dirname(name)
     elif path.stat().st_size > MAX_BYTES:
         raise InputError.at(path, "", f"larger than {MAX_BYTES >> 20} MiB", "export the cell alone")
@@ -153,7 +160,6 @@ def read(path: Path) -> Plant:
     root = parse_xml(data, str(path))
     if _local(root.tag) != "CAEXFile":
         raise InputError.at(path, _local(root.tag), "is no CAEXFile", "give an AutomationML file")
-    reader = _Reader(str(path))
     roots = tuple(
         reader.element(node, MAX_DEPTH, group=True)
         for node in root
@@ -175,17 +181,41 @@ def _open(path: Path) -> zipfile.ZipFile:
         raise InputError.at(path, "", f"no readable container: {error}", "export it again") from error
 
 
-def _main_part(path: Path) -> str:
+def _main_part(path: Path, reader: _Reader) -> str:
+    """The document that the container says is its root, else the one nearest the top."""
     with _open(path) as archive:
         entries = archive.infolist()
         if len(entries) > MAX_ENTRIES or sum(e.file_size for e in entries) > MAX_UNPACKED:
             what = f"{len(entries)} files of {sum(e.file_size for e in entries) >> 20} MiB"
             raise InputError.at(path, "", what, f"at most {MAX_ENTRIES} of {MAX_UNPACKED >> 20} MiB")
-        found = sorted((e.filename for e in entries if e.filename.lower().endswith(".aml")), key=len)
+        names = {e.filename for e in entries}
+    roots = _root_documents(path) if RELATIONSHIPS in names else []
+    if missing := [name for name in roots if name not in names]:
+        what = f"its root document {missing[0]!r} is not in the container"
+        raise InputError.at(path, RELATIONSHIPS, what, "export it again")
+    if len(roots) > 1:
+        reader.note("warning", f"has several root documents, read is the first: {', '.join(roots)}")
+    if roots:
+        return roots[0]
+    found = sorted((name for name in names if name.lower().endswith(".aml")), key=lambda n: (len(n), n))
     if not found:
         raise InputError.at(path, "", "contains no .aml file", "export it again")
-    # Libraries lie in folders below; the plant is the one nearest the top.
+    if len(found) > 1:
+        # Libraries lie in folders below; the plant is the one nearest the top.
+        text = f"names no root document; of {len(found)} files the one nearest the top is read: {found[0]}"
+        reader.note("assumed", text)
     return found[0]
+
+
+def _root_documents(path: Path) -> list[str]:
+    """What the relationships of a container call its root ([OPC-10000-83]_, 7.4), in any case of letters."""
+    root = parse_xml(_unpack(path, RELATIONSHIPS), f"{path}: {RELATIONSHIPS}")
+    targets = [
+        unquote(str(node.get("Target", ""))).lstrip("/")
+        for node in root
+        if str(node.get("Type", "")).lower().endswith("/relationship/rootdocument")
+    ]
+    return list(dict.fromkeys(posixpath.normpath(target) for target in targets if target))
 
 
 def _unpack(path: Path, name: str) -> bytes:
@@ -326,6 +356,11 @@ class _Reader:
                 self.file, key, f"{attribute.value[:40]!r} is no length or angle", "correct it"
             )
         return value
+
+
+def _last(path: str) -> str:
+    """The last name of a path; CAEX 3.0 puts names with a slash or the like into brackets."""
+    return path.rpartition("[")[2][:-1] if path.endswith("]") else path.rpartition("/")[2]
 
 
 def _plain(identifier: str) -> str:

@@ -45,7 +45,7 @@ def by_hand(description: Description, robot: Robot, file: str) -> Description:
         ("acceleration_limits", robot.acceleration_limits),
         ("jerk_limits", robot.jerk_limits),
     ):
-        # Nothing but a rescaled motion reads them, and one for all joints will do.
+        # One for all joints will do: they are read where motions are timed, not by the model.
         if values is not None and (len(values) not in (1, len(names)) or min(values) <= 0):
             what = f"{list(values)} does not fit"
             remedy = f"give one value above 0, or one for each of {', '.join(names)}"

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from msgspec import Meta, Struct
+from msgspec import Struct
 
+from seerob.quantities import Seconds
 from seerob.snapshot import Basis, Result, Verdict
 
 if TYPE_CHECKING:
@@ -25,8 +26,6 @@ EvaluateMany = Callable[["States"], "Answers"]
 # To ask an enumeration for a member takes longer than all the rest of a judgement.
 _WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 
-_seconds = Meta(gt=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})
-
 
 class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Base of every safety criterion and ergonomics rule: one file, one class, one ``kind``.
@@ -42,7 +41,7 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     name: str = ""
     """What results are called; made from the kind and the subject when not given."""
-    every: Annotated[float, _seconds] | None = None
+    every: Seconds | None = None
     """Period [s]; each tick when not given."""
     active: str | None = None
     """Variable of the dictionary, a bool: while it is false, it is not asked (muted, another mode of

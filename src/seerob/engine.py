@@ -30,7 +30,7 @@ from seerob.model import Mechanism, Model
 from seerob.mounting.compilation import pose_matrix
 from seerob.moving_base import moved_by_poses
 from seerob.reference import Course, Reference
-from seerob.sample_values import is_finite, largest_speed, torques_of
+from seerob.sample_values import beyond_limits, is_finite, largest_speed, torques_of
 from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
 from seerob.state import Hearing, State
 from seerob.task_space import TaskPull
@@ -103,6 +103,7 @@ class Engine:
         }
         # What a variable says of a machine stands until it says something else.
         coasting = set(live) - {machine.name for machine in model.workstation.machines}
+        self._unread = coasting  # what a file says was looked at when it was read
         self._references = {
             m.name: Reference(m.home, largest_speed(m), coast=driven[m.name] if m.name in coasting else 0.0)
             for m in self._mechanisms
@@ -163,15 +164,18 @@ class Engine:
             reference = self._references[mechanism.name]
             if not is_finite(sample):
                 # Nothing to be pulled to; not knowing where it is must show all the same.
-                taken, reason = bool(np.isfinite(sample.t)), "its source sends values that are not finite"
+                taken, reason = (
+                    bool(np.isfinite(sample.t)),
+                    "its source sends values that are not finite, or beyond 10⁶",
+                )
             elif isinstance(sample, JointSample):
                 qd = None if sample.qd is None else np.array(sample.qd)
+                if mechanism.name in self._unread:
+                    reason = reason or beyond_limits(sample, mechanism)
                 taken = reference.take(sample.t, np.array(sample.q), qd, anew=self._silent(mechanism.name))
             else:
-                taken, reached = self._take_pose(mechanism, sample)
-                reason = reason or (
-                    "" if reached else f"{sample.target} cannot reach the pose that was heard"
-                )
+                taken, missed = self._take_pose(mechanism, sample)
+                reason = reason or missed
             self._note(mechanism.name, sample.t, reason, torques_of(sample), taken=taken)
 
         for name, following in self._followings.items():
@@ -236,11 +240,11 @@ class Engine:
             raise InputError.at(sample.source, sample.target, heard, f"{sample.target} has {n} joints")
         return mechanism
 
-    def _take_pose(self, mechanism: Mechanism, sample: PoseSample) -> tuple[bool, bool]:
-        """Resolve a Cartesian target into joint positions; whether it was taken, and can be reached."""
+    def _take_pose(self, mechanism: Mechanism, sample: PoseSample) -> tuple[bool, str]:
+        """Resolve a Cartesian target into joint positions: whether it was taken, why it is not reached."""
         frame = self.model.frame(sample.target)
         reference = self._references[mechanism.name]
-        q, error = solve_pose(
+        q, miss = solve_pose(
             self._mj,
             self._wanted,
             mechanism,
@@ -249,7 +253,8 @@ class Engine:
             np.array(sample.position),
             start=reference.newest,
         )
-        return reference.take(sample.t, q, None), error <= POSE_TOLERANCE
+        missed = f"{sample.target} cannot reach the pose that was heard: the nearest that was found is {miss}"
+        return reference.take(sample.t, q, None), "" if miss.larger <= POSE_TOLERANCE else missed
 
     # -- time -------------------------------------------------------------------------------
 

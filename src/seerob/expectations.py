@@ -58,11 +58,13 @@ def choices(wanted: Any) -> tuple[str, ...]:
 
 
 def _described(wanted: Any) -> str | None:
-    """What the metadata of a text's pattern say in words."""
-    metas = getattr(wanted, "__metadata__", ())
-    return next(
-        (meta.description for meta in metas if isinstance(meta, msgspec.Meta) and meta.description), None
-    )
+    """What the metadata of a text's pattern say in words, also inside ``X | Y``."""
+    for meta in getattr(wanted, "__metadata__", ()):
+        if isinstance(meta, msgspec.Meta) and meta.description:
+            return str(meta.description)
+    if get_origin(wanted) in (Union, types.UnionType):
+        return next((found for item in get_args(wanted) if (found := _described(item))), None)
+    return None
 
 
 def expected(wanted: Any, complaint: str) -> str:

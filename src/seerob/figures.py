@@ -39,6 +39,13 @@ _UNITS = [Decimal(1).scaleb(-places) for places in range(_SMALLEST + _MOST + 1)]
 """Of the last place, by places after the point."""
 _NOISE = [unit / 1000 for unit in _UNITS]
 """That directed rounding must not lift to a whole unit."""
+_SCALES = [10.0**places for places in range(_SMALLEST + _MOST + 1)]
+_PLAIN = 1e8
+"""Units of the last place below which 12 digits leave more than `_CLEAR` of one."""
+_CLEAR = 1e-3
+"""Share of a unit, beside which way to round is beyond doubt without decimal arithmetic."""
+_APART = 3
+"""Units of the last place beyond which rounding carries no value past its limit."""
 
 
 class Pair(NamedTuple):
@@ -76,6 +83,10 @@ def against(value: float | None, limit: float | None, unit: str = "", *, at_most
 
 def told(value: float, limit: float | None, unit: str = "", *, at_most: bool) -> str:
     """A value with its unit, on its side of the limit where there is one: what a label in a picture says."""
+    if limit is not None and math.isfinite(value) and math.isfinite(limit):
+        places = _places(unit, value, limit)
+        if abs(value - limit) * _SCALES[places] > _APART and abs(value) * _SCALES[places] < _PLAIN:
+            return with_unit(_text(value, places, ROUND_CEILING if at_most else ROUND_FLOOR), unit)
     return with_unit(against(value, limit, unit, at_most=at_most).value, unit)
 
 
@@ -111,6 +122,13 @@ def _places(unit: str, *values: float) -> int:
 
 
 def _text(value: float, places: int, rounding: str) -> str:
+    units = value * _SCALES[places]
+    if -_PLAIN < units < _PLAIN:
+        whole = math.floor(units)
+        rest = units - whole
+        if _CLEAR < rest < 1 - _CLEAR and abs(rest - 0.5) > _CLEAR:
+            up = rest > 0.5 if rounding == ROUND_HALF_EVEN else rounding == ROUND_CEILING
+            return _short(f"{(whole + up) / _SCALES[places]:.{places}f}")
     if not math.isfinite(value):
         return "∞" if value > 0 else "−∞"
     if abs(value) >= _HUGE:
@@ -118,7 +136,10 @@ def _text(value: float, places: int, rounding: str) -> str:
     exact = Decimal(f"{value:.{_EXACT - 1}e}")
     if abs(exact) < _NOISE[places]:
         exact = Decimal(0)
-    text = f"{exact.quantize(_UNITS[places], rounding, _ARITHMETIC):f}"
+    return _short(f"{exact.quantize(_UNITS[places], rounding, _ARITHMETIC):f}")
+
+
+def _short(text: str) -> str:
     if "." in text:
         text = text.rstrip("0").rstrip(".")
     if text in ("-0", ""):

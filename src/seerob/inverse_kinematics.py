@@ -8,7 +8,8 @@ near the start. Real controllers may choose otherwise, so a pose-driven twin is 
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -22,6 +23,23 @@ LARGEST_STEP = 0.3
 """Of one iteration and joint [rad or m]."""
 
 
+class Miss(NamedTuple):
+    """How far a frame stays from where it is to be."""
+
+    distance: float
+    """[m]"""
+    angle: float
+    """[rad]"""
+
+    @property
+    def larger(self) -> float:
+        """The larger of both [m, rad]."""
+        return max(self)
+
+    def __str__(self) -> str:
+        return f"{self.distance:.3g} m and {math.degrees(self.angle):.2g}° away"
+
+
 def solve_pose(
     mj: Any,
     data: Any,
@@ -31,7 +49,7 @@ def solve_pose(
     position: Array,
     *,
     start: Array,
-) -> tuple[Array, float]:
+) -> tuple[Array, Miss]:
     """Joint positions that bring a frame to a pose.
 
     Args:
@@ -44,12 +62,11 @@ def solve_pose(
         start: Joint positions to start from, shape (n,) [rad or m].
 
     Returns:
-        Joint positions, shape (n,), within their limits, and the larger of the errors in position
-        [m] and orientation [rad] that is left.
+        Joint positions, shape (n,), within their limits, and what is left to the pose.
     """
     q = start.astype(float).copy()
     jacobian_p, jacobian_r = np.zeros((3, mj.nv)), np.zeros((3, mj.nv))
-    error = np.inf
+    miss = Miss(np.inf, np.inf)
     for _ in range(ITERATIONS):
         data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
         mujoco.mj_kinematics(mj, data)
@@ -59,17 +76,17 @@ def solve_pose(
         twist = np.concatenate(
             [position - at, _rotation_vector(rotation @ (body @ frame.body_from_frame[:3, :3]).T)]
         )
-        error = float(max(np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])))
-        if error < 1e-10:
+        miss = Miss(float(np.linalg.norm(twist[:3])), float(np.linalg.norm(twist[3:])))
+        if miss.larger < 1e-10:
             break
         mujoco.mj_jac(mj, data, jacobian_p, jacobian_r, at, frame.mj)
         J = np.vstack([jacobian_p, jacobian_r])[:, mechanism.v_address] @ mechanism.coupling
         # The damping fades with the error, so that convergence is quadratic in the end.
-        damping = min(DAMPING, error**2)
+        damping = min(DAMPING, miss.larger**2)
         step = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), twist)
         step *= min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), 1e-12))
         q = np.clip(q + step, mechanism.lower, mechanism.upper)
-    return q, error
+    return q, miss
 
 
 def _rotation_vector(rotation: Array) -> Array:

@@ -12,7 +12,6 @@ def unit(symbol: str, **limits: Any) -> Any:
     return Meta(extra={"unit": symbol}, extra_json_schema={"x-unit": symbol}, **limits)
 
 
-Metre = Annotated[float, unit("m")]
 Length = Annotated[float, unit("m", gt=0, le=1000)]
 Mass = Annotated[float, unit("kg", gt=0, le=1e6)]
 Density = Annotated[float, unit("kg/m³", gt=0, le=1e5)]

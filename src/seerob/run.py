@@ -7,12 +7,9 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from importlib.metadata import version
-
-from msgspec.structs import replace
 
 from seerob.engine import Engine
 from seerob.errors import InputError, Problem, SeerobError
@@ -22,25 +19,14 @@ from seerob.live.listening import LiveSource, delay_of
 from seerob.live.real_time import Clock
 from seerob.machines.displays import Looks
 from seerob.model import Model
-from seerob.mounting.compilation import pose_matrix
+from seerob.opening import coarse, signal_timeouts
 from seerob.results.result_log import ResultLog
 from seerob.samples import Sample
 from seerob.sink import KeepsResults, Writer
-from seerob.snapshot import (
-    CriterionInfo,
-    Finding,
-    JointInfo,
-    MechanismInfo,
-    Node,
-    Result,
-    Scene,
-    Snapshot,
-    Verdict,
-)
-from seerob.source import Matrix4, Opened, Pump, Source, Target
+from seerob.snapshot import Result, Scene, Snapshot, Verdict
+from seerob.source import Opened, Pump, Source
 from seerob.state import State
 from seerob.whereabouts.in_doubt import in_doubt
-from seerob.workstation import content_hash
 
 Feed = Iterator[tuple[Sample, ...]]
 """For each tick, from t = 0 on, the samples that were heard for it; ends when the run does."""
@@ -74,152 +60,6 @@ def bind(model: Model) -> tuple[Bound, ...]:
     if problems:
         raise InputError(problems)
     return tuple(bound)
-
-
-def target(model: Model, name: str) -> Target | None:
-    """What a source needs to know of the robot or human it drives; None for no name."""
-    if not name:
-        return None
-    mechanism = model.mechanism(name)
-    return Target(
-        name=name,
-        joints=tuple(joint.name for joint in mechanism.joints),
-        units=mechanism.units,
-        lower=tuple(mechanism.lower.tolist()),
-        upper=tuple(mechanism.upper.tolist()),
-        velocity=tuple(None if v is None else v.value for v in mechanism.velocity_limits),
-        description=mechanism.description,
-        world_from_base=_world_from_base(model, name),
-        frames=tuple(f.name for f in model.frames.values() if f.mj in mechanism.mj_bodies),
-    )
-
-
-def source_target(model: Model, source: Source) -> Target | None:
-    """What a source needs to know: of what it drives, or of the variables that it reads."""
-    driven = target(model, source.target())
-    variables = tuple(v for v in model.dictionary.values() if v.source == source.name)
-    if not source.reads_variables:
-        return driven
-    return replace(driven or Target(), variables=variables, folder=str(model.folder))
-
-
-def signal_timeouts(model: Model) -> tuple[dict[str, float], dict[str, float]]:
-    """Time-outs [s] of the sources of variables, and of the machines that follow those, by name."""
-    delay = delay_of(model.workstation.sources)
-    sources = {
-        s.name: s.timeout - (delay if isinstance(s, LiveSource) else 0.0)
-        for s in model.workstation.sources
-        if s.reads_variables
-    }
-    followed = {
-        machine.name: {model.dictionary[name].source for name in names}
-        for machine in model.workstation.machines
-        if (names := machine.motion.variables())
-    }
-    return sources, {name: min(sources[s] for s in by) for name, by in followed.items()}
-
-
-def _world_from_base(model: Model, name: str) -> Matrix4 | None:
-    station = model.workstation
-    standing = {r.name: r.base for r in station.robots if r.on is None}
-    places = {**standing, **{h.name: h.at for h in station.humans}}
-    if name not in places:
-        return None
-    a, b, c, d = (tuple(row) for row in pose_matrix(places[name]).tolist())
-    return a, b, c, d
-
-
-def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
-    """Open every source of the workstation and check it against what it drives.
-
-    Raises:
-        InputError: With every mistake in every file.
-    """
-    opened: list[tuple[Source, Opened]] = []
-    problems: list[Problem] = []
-    file = next(iter(model.workstation.files), "workstation")
-    delay = delay_of(model.workstation.sources)
-    for i, source in enumerate(model.workstation.sources):
-        if isinstance(source, LiveSource) and source.timeout <= delay:
-            what = (
-                f"{source.timeout:g} s is not longer than the delay of {delay:g} s of the slowest live source"
-            )
-            problems.append(Problem(file, f"sources[{i}].timeout", what, "give a longer one"))
-        try:
-            opened.append((source, source.open(model.folder, source_target(model, source))))
-        except InputError as error:
-            problems += error.problems
-    if problems:
-        raise InputError(problems)
-    return tuple(opened)
-
-
-def scene(
-    model: Model, bound: Sequence[Bound], findings: Iterable[Finding] = (), *, files: dict[str, bytes]
-) -> Scene:
-    """What sinks and the page need to know once; ``files`` are what the hash is of."""
-    station = model.workstation
-    too_coarse = coarse(model)
-    return Scene(
-        title=station.title,
-        edition=station.edition,
-        version=version("seerob"),
-        workstation_hash=content_hash(files),
-        period=station.engine.tick,
-        nodes=tuple(
-            Node(
-                name=body.name,
-                role=body.role,
-                owner=body.owner,
-                mesh=body.mesh,
-                triangles=body.triangles,
-                moves=bool(body.mover),
-                mover=body.mover,
-                mass=None if body.mass is None else body.mass.value,
-                mass_origin=model.mass_origin(body),
-                note=body.note,
-            )
-            for body in model.bodies
-        ),
-        mechanisms=tuple(
-            MechanismInfo(
-                name=m.name,
-                role=m.role,
-                joints=tuple(
-                    JointInfo(name=joint.name, unit=unit, lower=joint.lower, upper=joint.upper)
-                    for joint, unit in zip(m.joints, m.units, strict=True)
-                ),
-                coarse=too_coarse.get(m.name, ""),
-            )
-            for m in model.mechanisms.values()
-        ),
-        criteria=tuple(
-            CriterionInfo(
-                name=b.criterion.name,
-                kind=type(b.criterion).__module__.removeprefix(f"seerob.{b.group}."),
-                group=b.group,
-                title=(type(b.criterion).__doc__ or "").strip().split("\n")[0],
-                subjects=b.criterion.subjects(),
-                unit=b.criterion.unit,
-                limit=getattr(b.criterion, "limit", None),
-                at_most=b.criterion.at_most,
-                basis=b.basis,
-                levels=getattr(b.criterion, "levels", ()),
-            )
-            for b in bound
-        ),
-        findings=tuple(dict.fromkeys((*model.findings, *_without_physics(model), *findings))),
-    )
-
-
-def _without_physics(model: Model) -> tuple[Finding, ...]:
-    if model.workstation.engine.physics:
-        return ()
-    text = (
-        "engine.physics = false: the twin is put where the samples say; whether torque limits and contacts "
-        "allow that motion is not looked at"
-    )
-    return (Finding(level="note", subject="engine", text=text),)
 
 
 # -- feeds: what is heard for each tick ---------------------------------------------------------
@@ -270,12 +110,6 @@ def warm_up(model: Model) -> None:
     judge = Judge(bind(model))
     judge(engine.start())
     Engine(model).tick()
-
-
-def coarse(model: Model) -> dict[str, str]:
-    """Robots and humans that are heard too coarsely for energies and forces, and why."""
-    said = ((source.target(), source.coarse(model.folder)) for source in model.workstation.sources)
-    return {name: why for name, why in said if why}
 
 
 def engine_of(model: Model) -> Engine:
@@ -355,7 +189,7 @@ def run(
         model: The compiled workstation.
         feed: Samples per tick.
         bound: Criteria, from `bind`.
-        scene: From `scene`, the same that the writers were opened with.
+        scene: The same that the writers were opened with.
         writers: Open sinks; they are closed at the end, whatever happens.
         clock: Real time; as fast as possible when None.
         stop: Asked once per tick.

@@ -29,6 +29,21 @@ class Writer(Protocol):
     ) -> None: ...
 
 
+class Closing:
+    """What most writers do alike: they are closed at the end, however it comes."""
+
+    def close(self) -> None:
+        """Nothing to finish."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
 @runtime_checkable
 class KeepsResults(Protocol):
     """A writer that needs every result of the run: hours of them are kept once, not once per writer."""

@@ -10,18 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
-from msgspec import Meta, Struct
+from msgspec import Struct
 from msgspec.structs import replace
 
 from seerob.model_io.description import Description
+from seerob.quantities import Seconds
 from seerob.samples import JointSample, PoseSample, Quality, Sample
 from seerob.snapshot import Finding
 from seerob.variables.dictionary import Variable
-
-_seconds = Meta(gt=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})
-
 
 Row4 = tuple[float, float, float, float]
 Matrix4 = tuple[Row4, Row4, Row4, Row4]
@@ -42,6 +40,10 @@ class Target(Struct, frozen=True, kw_only=True):
     upper: tuple[float, ...] = ()
     velocity: tuple[float | None, ...] = ()
     """Speed limits [rad/s or m/s]; None where nobody stated one."""
+    acceleration: tuple[float, ...] = ()
+    """Acceleration limits [rad/s² or m/s²], one for each joint or for all; empty where nobody stated any."""
+    jerk: tuple[float, ...] = ()
+    """Jerk limits [rad/s³ or m/s³], likewise."""
     description: Description | None = None
     """Its links and joints, for sources that need lengths (where a person's feet are)."""
     world_from_base: Matrix4 | None = None
@@ -75,12 +77,12 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     reads_variables: ClassVar[bool] = False
     """Whether it reads variables of the workstation's dictionary."""
 
-    timeout: Annotated[float, _seconds] = 0.2
+    timeout: Seconds = 0.2
     """Age at which what it said no longer counts [s]: dependent verdicts turn UNDECIDED."""
     loop: bool = False
     """Start again at the end. Where the ends are the same place, it stands still for ``loop_pause``;
     where they differ, the way back takes as long and is UNDECIDED: nobody drove it."""
-    loop_pause: Annotated[float, _seconds] = 1.0
+    loop_pause: Seconds = 1.0
     """[s]"""
 
     def target(self) -> str:

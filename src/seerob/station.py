@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from msgspec.structs import replace
 from numpy.typing import ArrayLike
@@ -16,24 +15,26 @@ from seerob import batch
 from seerob import run as road
 from seerob.batch import Batch
 from seerob.criterion import Criterion
-from seerob.errors import InputError, Problem
+from seerob.errors import InputError
 from seerob.given_states import motion_of
 from seerob.live.listening import Listening, LiveSource
 from seerob.live.real_time import Clock, hear, require_recorded
 from seerob.model import Model
 from seerob.mounting.compilation import Progress, compile_workstation
 from seerob.mounting.things import MadeArea
+from seerob.opening import open_sources, source_target
 from seerob.permissible import evaluation
 from seerob.permissible.evaluation import PermissibleSpeed, Say, Wish
 from seerob.permissible.joint_limits import Given, joint_limits
 from seerob.reading import read
-from seerob.recordings.filing import SOURCES, source_files
+from seerob.recordings.filing import source_files
 from seerob.recordings.recording import Recording
 from seerob.run import Bound, Feed, Summary
+from seerob.scene import scene_of
 from seerob.sink import Sink, Writer
 from seerob.snapshot import Scene
 from seerob.source import Opened, Source
-from seerob.workstation import FILE_NAME, Workstation
+from seerob.workstation import Workstation
 
 
 class Station:
@@ -78,7 +79,7 @@ class Station:
     @cached_property
     def sources(self) -> tuple[tuple[Source, Opened], ...]:
         """Its sources, opened and checked."""
-        return road.open_sources(self.model)
+        return open_sources(self.model)
 
     @property
     def duration(self) -> float:
@@ -88,9 +89,7 @@ class Station:
     def scene(self, *, with_sources: bool = True) -> Scene:
         """What sinks and the page need to know once."""
         opened = self.sources if with_sources else ()
-        return road.scene(
-            self.model, self.bound, [f for _, o in opened for f in o.findings], files=self.files
-        )
+        return scene_of(self.model, self.bound, [f for _, o in opened for f in o.findings], files=self.files)
 
     @cached_property
     def files(self) -> dict[str, bytes]:
@@ -184,7 +183,7 @@ class Station:
         with ExitStack() as until_the_end:
             if clock and heard:
                 road.warm_up(self.model)
-                targets = [(source, road.source_target(self.model, source)) for source in heard]
+                targets = [(source, source_target(self.model, source)) for source in heard]
                 feed = hear(feed, until_the_end.enter_context(Listening(targets)), clock)
             opened = self.open_sinks(sinks, Path(folder or "."), scene) if sinks else []
             return road.run(
@@ -316,7 +315,7 @@ class Station:
     def replay_scene(self, recording: Recording) -> Scene:
         """The scene of a recording that is computed again, with what was found when it was made."""
         findings = [f for f in recording.scene.findings if f not in self.model.findings]
-        return road.scene(self.model, self.bound, findings, files=self.files)
+        return scene_of(self.model, self.bound, findings, files=self.files)
 
     def replay(
         self,
@@ -364,37 +363,3 @@ def load(path: Path | str, *, cache: Path | None = None) -> Station:
         InputError: With every mistake in the file and in the files it names.
     """
     return Station(read(path), cache=cache)
-
-
-def load_recorded(recording: Recording, *, cache: Path | None = None) -> Station:
-    """The workstation that a recording was made with, from the files inside it.
-
-    Raises:
-        InputError: It needs files that the recording does not carry, or that have changed since.
-    """
-    with TemporaryDirectory(prefix="seerob-") as folder:
-        recording.extract(Path(folder))
-        try:
-            station = Station(read(Path(folder) / _workstation_file(recording)), cache=cache)
-        except InputError as error:
-            problems = [p._replace(file=p.file.removeprefix(f"{folder}/")) for p in error.problems]
-            raise InputError(
-                [*problems, Problem(str(recording.path), "", "cannot be computed from itself", _REMEDY)]
-            ) from error
-        # Read while the folder is there.
-        now, then = station.files, recording.files
-        _ = station.bound
-    compared = (name for name in {*now, *then} if not name.startswith(SOURCES))
-    changed = sorted(name for name in compared if now.get(name) != then.get(name))
-    if changed:
-        what = f"was made with other files than are found now: {', '.join(changed[:6])}"
-        raise InputError.at(recording.path, "", what, _REMEDY)
-    return station
-
-
-def _workstation_file(recording: Recording) -> str:
-    names = [name for name in recording.files if "/" not in name and name.endswith(".toml")]
-    return FILE_NAME if FILE_NAME in names or len(names) != 1 else names[0]
-
-
-_REMEDY = "give the workstation that it was made with (--workstation)"

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+_VAST = 1e150
+"""A component of a quaternion beyond this has no direction, and its square no number."""
 
 
 def rotation_from_wxyz(wxyz: ArrayLike) -> Array:
@@ -65,14 +67,16 @@ def turned(rotation: ArrayLike, wxyz: ArrayLike) -> Array:
 
     Args:
         rotation: Rotation matrix, shape (3, 3).
-        wxyz: Quaternions, w first, shape (..., 4); NaN stays NaN.
+        wxyz: Quaternions, w first, shape (..., 4); one that is not finite, or vast, becomes NaN.
 
     Returns:
         Quaternions, w first, of the same lengths, shape (..., 4).
     """
     a, b, c, d = wxyz_from_rotation(rotation)
     left = np.array([[a, -b, -c, -d], [b, a, -d, c], [c, d, a, -b], [d, -c, b, a]])
-    return np.asarray(np.asarray(wxyz, float) @ left.T)
+    given = np.asarray(wxyz, float)
+    known = (np.abs(given) < _VAST).all(axis=-1, keepdims=True)
+    return np.where(known, np.where(known, given, 0.0) @ left.T, np.nan)
 
 
 def rotation_from_rpy(rpy: ArrayLike) -> Array:

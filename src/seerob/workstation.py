@@ -100,7 +100,8 @@ class Robot(_Table, frozen=True, kw_only=True):
     velocity_limits: Annotated[tuple[float, ...], unit("rad/s")] | None = None
     """Largest speed per joint [rad/s], instead of the description's."""
     acceleration_limits: Annotated[tuple[float, ...], unit("rad/s²")] | None = None
-    """Largest acceleration per joint [rad/s²], for a rescaled motion; never assumed."""
+    """Largest acceleration per joint [rad/s²], of a rescaled motion and of moves between waypoints; never
+    assumed."""
     jerk_limits: Annotated[tuple[float, ...], unit("rad/s³")] | None = None
     """Largest jerk per joint [rad/s³], likewise."""
     masses: dict[str, Body] = {}

@@ -370,6 +370,7 @@ def test_live_for_a_while_writes_everything_and_ends_with_the_verdict(capsys, tm
     code, out, err = seerob(capsys, "run", cell, "--port", "0", "--seconds", "0.3", "-o", tmp_path / "out")
     assert (code, err) == (1, "")
     assert "http://127.0.0.1:" in out
+    assert "ends at 0.3 s; what depends on it is undecided from then on" in " ".join(out.split())
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == FILES
 
 

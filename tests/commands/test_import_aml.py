@@ -125,6 +125,58 @@ def test_turns_about_several_axes_are_about_fixed_ones_and_said(tmp_path):
     assert "fixed axes" in found.findings[0].text
 
 
+ROOT = "http://schemas.automationml.org/container/relationship/RootDocument"
+
+
+def related(*targets, kind=ROOT):
+    rows = "".join(f'<Relationship Type="{kind}" Target="{t}" Id="R{i}"/>' for i, t in enumerate(targets))
+    return f'<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">{rows}</Relationships>'
+
+
+def container(file, **parts):
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, data in parts.items():
+            archive.writestr(name, data)
+    return file
+
+
+@pytest.mark.parametrize("kind", [ROOT, ROOT.lower()])
+def test_a_container_says_which_document_is_its_root(tmp_path, kind):
+    deep = NEW.format('<InstanceHierarchy Name="deep"/>')
+    near = NEW.format('<InstanceHierarchy Name="near"/>')
+    files = {"a.aml": near, "plants/cell.aml": deep}
+    told = container(tmp_path / "a.amlx", **files, **{"_rels/.rels": related("/plants/cell.aml", kind=kind)})
+    assert [root.name for root in read(told).roots] == ["deep"]
+    assert read(told).findings == ()
+    untold = read(container(tmp_path / "b.amlx", **files))
+    assert [root.name for root in untold.roots] == ["near"]
+    assert "names no root document" in untold.findings[0].text
+    both = read(
+        container(tmp_path / "c.amlx", **files, **{"_rels/.rels": related("a.aml", "plants/cell.aml")})
+    )
+    assert [root.name for root in both.roots] == ["near"]
+    assert "several root documents" in both.findings[0].text
+    gone = container(tmp_path / "d.amlx", **files, **{"_rels/.rels": related("/gone.aml")})
+    with pytest.raises(InputError, match=r"'gone\.aml' is not in the container"):
+        read(gone)
+
+
+def test_names_in_brackets_other_geometry_and_paths_from_the_root_of_a_container(tmp_path, capsys, box):
+    text = NEW.format(
+        '<InstanceHierarchy Name="Plant"><InternalElement Name="Arm" ID="a">'
+        '<RoleRequirements RefBaseRoleClassPath="[http://vendor/roles]/[Robot]"/>'
+        f'<ExternalInterface Name="Shape" ID="g" RefBaseClassPath="{INTERFACE}/GeometryDataConnector">'
+        '<Attribute Name="refURI"><Value>/geometry/box.dae</Value></Attribute></ExternalInterface>'
+        "</InternalElement></InstanceHierarchy>"
+    )
+    file = container(
+        tmp_path / "a.amlx",
+        **{"plants/cell.aml": text, "geometry/box.dae": box, "_rels/.rels": related("plants/cell.aml")},
+    )
+    assert cli.main(["import-aml", str(file), str(tmp_path / "made")]) == Exit.WITHIN
+    assert "1 parts with a shape, 1 robots" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [

@@ -80,13 +80,14 @@ def test_mistakes_of_every_stage_come_together_and_none_follows_from_another(cap
         "robots[3].basis",
         "safety[2]",
         "safety[3]",
+        "sources[0].file",
         "sources[1].file",
         "tools[1].on",
         "tools[2].mesh",
     ], err
     for word in ("'lying'", "in the library named 'odd'", "table.stl", "motion.csv"):
         assert sum(word in line for line in err.splitlines()) == 1, err
-    assert len(err.splitlines()) == len(places) + 2, err
+    assert len(err.splitlines()) == len(places) + 1, err
 
 
 def test_missing_files_and_unknown_links_come_in_one_go(capsys, tmp_path):
@@ -95,7 +96,7 @@ def test_missing_files_and_unknown_links_come_in_one_go(capsys, tmp_path):
     (cell / "motion.csv").unlink()
     code, _, err = seerob(capsys, "assess", cell)
     assert code == 3
-    assert all(name in err for name in ("b.urdf", "p.stl", "motion.csv"))
+    assert all(name in err for name in ("b.urdf", "p.stl", "sources[0].file: motion.csv: no such file"))
     assert not (cell / "runs").exists()
 
 
@@ -106,3 +107,28 @@ def test_mistakes_of_criteria_and_of_sources_come_together(capsys, tmp_path):
     assert code == 3
     assert "'ur5e/elbow'" in err
     assert "motion.csv" in err
+
+
+def test_a_data_file_that_cannot_be_read_is_said_where_the_workstation_names_it(capsys, tmp_path):
+    cell = make_cell(tmp_path / "cell")
+    (cell / "motion.csv").unlink()
+    (cell / "motion.csv").mkdir()
+    code, out, err = seerob(capsys, "check-file", cell)
+    assert (code, out, err.count("\n")) == (3, "", 1)
+    assert err.startswith(f"{cell / 'workstation.toml'}: sources[0].file: motion.csv: is a folder")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "place", "remedy"),
+    [
+        (("csv", "x"), ": kind: csv plays a file", "check-file"),
+        (("rtde", "h", "--set", "tmeout=1"), " rtde: tmeout: unknown key", "did you mean 'timeout'?"),
+        (("rtde", "h", "--set", "timeout=nan"), " rtde: timeout: nan is wrong", "a finite number"),
+        (("opcua", "http://h"), " opcua: url: 'http://h' is wrong", "opc.tcp://"),
+    ],
+)
+def test_options_of_a_probe_are_read_as_those_of_a_workstation_file(capsys, arguments, place, remedy):
+    code, out, err = seerob(capsys, "probe", *arguments)
+    assert (code, out) == (3, "")
+    assert f"seerob probe{place}" in err
+    assert remedy in err

@@ -4,35 +4,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from concave import SOLIDS, U_BOXES, boxes, bumpy_ball, walk
-from seerob.distances.least import Per, Query, Reach, Shapes
+from concave import made_crowd, said, walk
+from seerob.distances.least import Per, Query, Reach
 from seerob.errors import InputError, SimulationDiverged, UnknownName
-from seerob.geometry import Mesh, Solid
 
 
 @pytest.fixture(scope="module")
-def crowd() -> Shapes:
-    """Two robots' worth of meshes, one of them open, and a few parts of a person."""
-    open_ball = bumpy_ball(12, 0.5)
-    open_ball = Mesh(open_ball.vertices, open_ball.faces[: len(open_ball.faces) * 2 // 3])
-    return Shapes.build(
-        [
-            ("link 0", [Solid(mesh=bumpy_ball(10, 0.4))]),
-            ("link 1", [Solid(mesh=bumpy_ball(11, 0.3)), Solid(mesh=boxes(*U_BOXES), radius=0.01)]),
-            ("link 2", [Solid(mesh=open_ball)]),
-            ("hand", [SOLIDS["capsule"], SOLIDS["ball"]]),
-            ("chest", [SOLIDS["rectangle"]]),
-            ("ghost", []),
-            ("tool", [Solid(mesh=bumpy_ball(13, 0.2, 1))]),
-        ]
-    )
+def crowd():
+    return made_crowd()
 
 
 SETS = (0, 1, 2), (3, 4, 6)
-
-
-def fields(found):
-    return [found.distance, found.point_a, found.point_b, found.body_a, found.body_b, found.reach]
 
 
 @pytest.mark.parametrize("cap", [np.inf, 0.3])
@@ -50,7 +32,7 @@ def test_the_answer_is_a_function_of_the_poses_alone(crowd, cap):
         fresh = Query(crowd, *SETS, cap=cap).per_body(R[k], x[k])
         answers = [in_order[k], mixed.per_body(R[k], x[k]), fresh]
         for answer in answers:
-            for one, other in zip(fields(answer), fields(batch), strict=True):
+            for one, other in zip(said(answer), said(batch), strict=True):
                 np.testing.assert_array_equal(one, other[k])
 
 
@@ -73,7 +55,7 @@ def test_a_cap_changes_nothing_below_it(crowd):
     capped = Query(crowd, *SETS, cap=0.2).batch(R, x, Per.BODY)
     near = free.distance < 0.2
     assert 50 < near.sum() < near.size - 50
-    for one, other in zip(fields(free), fields(capped), strict=True):
+    for one, other in zip(said(free), said(capped), strict=True):
         np.testing.assert_array_equal(one[near], other[near])
     assert (capped.distance[~near] == 0.2).all()
     assert (capped.reach[~near] == Reach.BEYOND_CAP).all()

@@ -5,27 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from concave import SOLIDS, U_BOXES, boxes, bumpy_ball, walk
-from seerob.distances.least import Per, Query, Reach, Shapes, Survey
+from concave import made_crowd, said, walk
+from seerob.distances.least import Per, Query, Reach, Survey
 from seerob.distances.surveying import Surveyor
-from seerob.geometry import Mesh, Solid
 
 
 @pytest.fixture(scope="module")
-def crowd() -> Shapes:
-    open_ball = bumpy_ball(12, 0.5)
-    open_ball = Mesh(open_ball.vertices, open_ball.faces[: len(open_ball.faces) * 2 // 3])
-    return Shapes.build(
-        [
-            ("link 0", [Solid(mesh=bumpy_ball(10, 0.4))]),
-            ("link 1", [Solid(mesh=bumpy_ball(11, 0.3)), Solid(mesh=boxes(*U_BOXES), radius=0.01)]),
-            ("link 2", [Solid(mesh=open_ball)]),
-            ("hand", [SOLIDS["capsule"], SOLIDS["ball"]]),
-            ("chest", [SOLIDS["rectangle"]]),
-            ("ghost", []),
-            ("tool", [Solid(mesh=bumpy_ball(13, 0.2, 1))]),
-        ]
-    )
+def crowd():
+    return made_crowd()
 
 
 def questions(crowd):
@@ -38,12 +25,8 @@ def questions(crowd):
     ]
 
 
-def fields(found):
-    return [found.distance, found.point_a, found.point_b, found.body_a, found.body_b, found.reach]
-
-
 def same(one, other):
-    for a, b in zip(fields(one), fields(other), strict=True):
+    for a, b in zip(said(one), said(other), strict=True):
         np.testing.assert_array_equal(a, b)
 
 

@@ -102,7 +102,13 @@ def test_a_run_prints_shares_percentiles_and_maxima_with_their_instants(tmp_path
     assert sum(shares.values()) == pytest.approx(100)
     at_least = np.mean(series.values <= 2) * 100
     assert shares["action level 1"] == pytest.approx(at_least)
-    assert {row[1] or "whole" for row in rows if row[0] == "rula"} == {"whole", "right", "left"}
+    assert {row[1] or "whole" for row in rows if row[0] == "rula"} == {"whole", *series.parts}
+    for rule, part in (("owas", "back"), ("rula", "right upper arm")):
+        values = done.results[rule].parts[part].values
+        shares = {row[3]: row[6] for row in rows if row[:2] == (rule, part) and row[6] is not None}
+        assert sum(shares.values()) == pytest.approx(100)
+        for code in np.unique(values):
+            assert shares[f"score {code:.0f}"] == pytest.approx(np.mean(values == code) * 100)
     (page,) = (tmp_path / "out").glob("*.html")
     text = page.read_text(encoding="utf-8")
     assert "Over time" in text

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from made_postures import made_angles
 
 from seerob.scoring.held_work import Hold, Moves, Watch, WorkDetection, activity, muscle_use
@@ -87,6 +89,15 @@ def test_cycles_per_minute(cycles, amplitude):
         moves.add(t, np.radians(amplitude * np.sin(2 * np.pi * cycles * t / 60)))
         if t > 75:
             assert moves.count == cycles
+
+
+@given(st.lists(st.integers(-30, 30), min_size=2, max_size=40))
+def test_moving_to_the_left_is_moving_to_the_right(angles):
+    one, other = Moves(np.radians(10)), Moves(np.radians(10))
+    for t, angle in enumerate(np.radians(angles)):
+        one.add(float(t), angle)
+        other.add(float(t), -angle)
+        assert one.count == other.count
 
 
 def test_trembling_is_no_movement():

@@ -264,6 +264,23 @@ def test_the_norms_figures_show_their_confidence_and_can_be_replaced(tmp_path, k
     assert said(own, pelvis_tilt_forward=30).value == 2
 
 
+@pytest.mark.parametrize(
+    ("kind", "joints", "verdict", "remembered"),
+    [
+        ("iso_11226", {}, Verdict.WITHIN, True),
+        ("en_1005_4", {}, Verdict.WITHIN, True),
+        ("en_1005_4", {"pelvis_tilt_forward": 70}, Verdict.EXCEEDED, True),
+        ("en_1005_4", {"lumbar_turn_left": 5, "thorax_turn_left": 15}, Verdict.EXCEEDED, False),
+    ],
+)
+def test_a_verdict_says_when_it_rests_on_memory(tmp_path, kind, joints, verdict, remembered):
+    """Twist has a public source, the trunk's flexion has none; what is within is so by every row."""
+    more = 'limit = 0\nfrom_rest = true\nphases = [{ supported_arms = "none", back_supported = false }]'
+    found = said(station(tmp_path, more, kind), **joints)
+    assert found.verdict is verdict
+    assert ("from memory" in found.reason) == remembered
+
+
 def test_standing_upright_is_acceptable_by_both_norms_and_a_deep_bend_is_not(tmp_path):
     for kind, bent in (("iso_11226", 0), ("en_1005_4", 1)):
         support = 'from_rest = true\nphases = [{ supported_arms = "none", back_supported = false }]'

@@ -26,6 +26,14 @@ GUIDE_REBA = "https://www.scribd.com/presentation/331248872/Rapid-Entire-Body-As
 THESIS_OWAS = "https://text-id.123dok.com/document/oy83xgo2q-pada-stasiun-pemotongan-pengolahan-data.html"
 PROPOSAL_OWAS = "https://text-id.123dok.com/document/wyerwv40q-postur-2-aktivitas-2-stasiun-1-postur-3-aktivitas-2-stasiun-1.html"
 LAUNDRY_OWAS = "https://idoc.tips/proyecto-ergonomia-segunda-entrega-pdf-free.html"
+SHEET_RULA = "https://es.scribd.com/document/525897941/Metodo-Rula"
+OFFICE_RULA = (
+    "https://123dok.com/document/y6914j4y-analisa-postur-dengan-metode-rula-untuk-kerja-administrasi.html"
+)
+CASES_REBA = "https://es.scribd.com/document/587736423/Metodo-REBA-Ejemplos-Reales"
+SHEET_REBA = "https://fdocuments.es/document/ejercicio-reba.html"
+BOX_REBA = "Ellestir/AutoREBA, Documentation/Ground_Truth.md at 0de0345"
+POSE_REBA = "rs9000/ergonomics, README.md"
 TABLE_B = (
     "https://text-id.123dok.com/document/7qvlnd5dy-faktor-pekerjaan-faktor-resiko-nyeri-punggung-bawah.html"
 )
@@ -52,6 +60,11 @@ def reba_scores(legs=1, **given):
     )
 
 
+def level(method, score):
+    """Action level; RULA's begin at 1, REBA's at 0."""
+    return int(np.searchsorted(published(method)["levels"], score)) + (method == "rula")
+
+
 def test_rula_taking_cartons():
     """Shoulder in the band from 20 to 45°, elbow below 60°, all else neutral; six times a minute, 250 g.
 
@@ -63,7 +76,7 @@ def test_rula_taking_cartons():
         assert rula.force(0.25, rula.LoadUse.REPEATED, profile) == exactly(0)
     scores = rula.rula(*found.values(), muscle_arms=1, muscle_body=1)
     assert tuple(map(int, scores)) == (3, 1, 4, 2, 3)
-    assert int(np.searchsorted(published("rula")["levels"], scores.grand)) + 1 == 2
+    assert level("rula", scores.grand) == 2
 
 
 def test_rula_lifting_a_product():
@@ -74,6 +87,36 @@ def test_rula_lifting_a_product():
     found = rula_scores(shoulder_flexion=58, elbow_flexion=65, wrist_flexion=20)
     assert [found[key] for key in ("upper arm", "lower arm", "wrist", "wrist twist")] == [3, 1, 3, 1]
     assert int(cells("rula", "C")[5 - 1, 5 - 1]) == 6
+
+
+def test_rula_of_a_filled_sheet():
+    """`SHEET_RULA`: arm 4, forearm 3, wrist 3, twist 1: A 5; neck 3, trunk 4, legs 2: B 6; one more each
+    for the activity: C 6, D 7, grand score 7. Its force above 10 kg is 2 intermittent and 3 otherwise.
+    """
+    scores = rula.rula(4, 3, 3, 1, 3, 4, 2, muscle_arms=1, muscle_body=1)
+    assert tuple(map(int, scores)) == (5, 6, 6, 7, 7)
+    uses = (rula.LoadUse.INTERMITTENT, rula.LoadUse.STATIC, rula.LoadUse.REPEATED, rula.LoadUse.SHOCK)
+    scored = [rula.force(11, use, rula.Profile.ORIGINAL_1993) for use in uses]
+    assert scored == [exactly(k) for k in (2, 3, 3, 3)]
+
+
+def test_rula_carrying_files():
+    """`OFFICE_RULA`: upper arm at 18°, lower arm 45°, wrist 80°, neck 12°, trunk 22°, 3 kg carried: 7.
+
+    Twist and muscle use are not told; the score is 7 whatever they are.
+    """
+    found = rula_scores(
+        shoulder_flexion=18, elbow_flexion=45, wrist_flexion=80, neck_flexion=12, trunk_flexion=22
+    )
+    assert tuple(found.values()) == (1, 2, 3, 1, 2, 3, 1)
+    assert rula.force(3, rula.LoadUse.STATIC, rula.Profile.WORKSHEET) == exactly(2)
+    grand = {
+        int(rula.rula(1, 2, 3, twist, 2, 3, 1, arms, 2, body, 2).grand)
+        for twist in (1, 2)
+        for arms in (0, 1)
+        for body in (0, 1)
+    }
+    assert grand == {7}
 
 
 def test_rulas_table_c_as_printed():
@@ -133,6 +176,54 @@ def test_reba_reaching_overhead():
     assert [found[key] for key in ("trunk", "upper arm", "lower arm", "wrist")] == [3, 6, 2, 3]
     finals = {int(reba.reba(n, 3, 1, 6, 2, 3, 0, 0, a).final) for n in (1, 2, 3) for a in range(4)}
     assert 9 in finals
+
+
+def test_reba_lifting_more_than_ten_kilograms():
+    """`CASES_REBA`, example 1, from postures to the end: neck 1, knees between 30 and 60° 2, trunk at about
+    20° 2, A 3 and 2 for the load; forearm 1, wrist 1, arms at about 20° and abducted 2; final score 4.
+    """
+    found = reba_scores(
+        neck_flexion=10, knee_flexion=45, trunk_flexion=20, shoulder_flexion=20, shoulder_abduction=30
+    )
+    assert tuple(found.values()) == (1, 2, 2, 2, 1, 1)
+    assert reba.load(11, False) == exactly(2)
+    scores = reba.reba(*found.values(), 2, 0, 0)
+    assert tuple(map(int, scores)) == (3, 1, 5, 1, 4, 4)
+    assert level("reba", scores.final) == 2
+
+
+def test_reba_holding_a_light_box():
+    """`BOX_REBA`: the authors' measured good posture: all six parts 1, no force, coupling 2, activity 0: 1.
+
+    They give score B as 1, before the coupling; with it B is 3, and table C says 1 for both.
+    """
+    found = reba_scores(neck_flexion=5, shoulder_flexion=15, elbow_flexion=90)
+    assert set(found.values()) == {1}
+    assert reba.load(4.9, False) == exactly(0)
+    assert reba.coupling(reba.Coupling.POOR) == exactly(2)
+    scores = reba.reba(*found.values(), 0, 2, 0)
+    assert tuple(map(int, scores)) == (1, 1, 1, 3, 1, 1)
+    assert int(cells("reba", "C")[0, 0]) == 1
+
+
+def test_reba_of_a_filled_sheet():
+    """`SHEET_REBA`: table A 4 and a load of 2: 6; arms 4, forearms 2, wrists 2: table B 6, with the grip 9;
+    C 10, activity 1: 11, action level 4. Which trunk, neck and legs make its 4 cannot be read.
+    """
+    scores = reba.reba(2, 3, 1, 4, 2, 2, 2, 3, 1)
+    assert tuple(map(int, scores)) == (4, 6, 6, 9, 10, 11)
+    assert level("reba", scores.final) == 4
+
+
+def test_reba_of_both_sides_of_a_pose():
+    """`POSE_REBA`: neck 2, trunk 2, legs 2, upper arm 1, lower arm 2, wrist 3 left and 2 right."""
+    scores = reba.reba(2, 2, 2, 1, 2, [3, 2])
+    assert [np.broadcast_to(x, 2).tolist() for x in (scores.A, scores.B, scores.C, scores.final)] == [
+        [4, 4],
+        [3, 2],
+        [4, 4],
+        [4, 4],
+    ]
 
 
 def test_rebas_table_c_as_printed():

@@ -141,7 +141,8 @@ def test_an_accepted_estimate_widens_the_distance_by_its_uncertainty():
     criteria = (distance(), distance("operator/right_hand"))
     _, (whole, hand) = seen_only(UPPER, person={"unseen_uncertainty": 0.3}, criteria=criteria)
     assert whole.verdict is hand.verdict is Verdict.WITHIN
-    assert whole.interval[0] == pytest.approx(whole.value - 0.3, abs=1e-9)
+    # The nearest bone is one of those that nobody sees, but for a micrometre.
+    assert whole.interval[0] == pytest.approx(whole.value - 0.3, abs=1e-5)
     assert hand.interval is None or hand.interval[0] > hand.value - 0.1
     near = (distance(limit=whole.value - 0.1),)
     _, (open_,) = seen_only(UPPER, person={"unseen_uncertainty": 0.3}, criteria=near)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import time
 
 import pytest
 
 from foreign_opcua import URI, foreign_opcua
+from kept_run import Chapters
 from seerob import load
 
 STATION = """
@@ -34,6 +34,16 @@ at = { position = [0, 6, 0] }
 shape = { box = [0.2, 0.2, 0.2] }
 vehicle = { x = "x", y = "y", heading = "heading" }
 [[machines]]
+name = "table"
+at = { position = [-6, 0, 0] }
+shape = { box = [1, 0.2, 0.2] }
+turn = { angle = "turned" }
+[[machines]]
+name = "agv"
+at = { position = [0, 12, 0] }
+shape = { box = [0.2, 0.2, 0.2] }
+route = { points = [[0, 0], [4, 0]], position = "way" }
+[[machines]]
 name = "hand"
 on = "axis"
 at = { position = [0, 0, 1] }
@@ -47,6 +57,14 @@ rest = { position = [1, 0, 1] }
 [[parts]]
 name = "post"
 at = { position = [-1, 0, 0] }
+shape = { box = [0.2, 0.2, 0.2] }
+[[parts]]
+name = "corner"
+at = { position = [-6, 2, 0] }
+shape = { box = [0.2, 0.2, 0.2] }
+[[parts]]
+name = "dock"
+at = { position = [5, 12, 0] }
 shape = { box = [0.2, 0.2, 0.2] }
 [[parts]]
 name = "lamp"
@@ -85,6 +103,21 @@ kind = "minimum_distance"
 name = "held"
 between = ["nut", "post"]
 [[safety]]
+kind = "minimum_distance"
+name = "turned"
+between = ["table", "corner"]
+[[safety]]
+kind = "minimum_distance"
+name = "way"
+between = ["agv", "dock"]
+[[safety]]
+kind = "sensor_agreement"
+name = "sensor"
+variable = "clear"
+field = "loading"
+of = "cart"
+limit = 1000
+[[safety]]
 kind = "variable"
 name = "curtain"
 variable = "clear"
@@ -97,7 +130,9 @@ of = "cart"
 active = "armed"
 """
 NUMBERS = {"axis": ("mm", 1000.0), "belt": ("mm", 500.0), "x": ("m", 0.0), "y": ("m", 0.0)}
-NUMBERS |= {"heading": ("deg", 90.0), "hand": ("mm", 100.0)}
+NUMBERS |= {"heading": ("deg", 90.0), "hand": ("mm", 100.0), "turned": ("deg", 0.0), "way": ("mm", 1000.0)}
+DEVICE_FREE = "the device says free, the twin interrupted"
+DEVICE_INTERRUPTED = "the device says interrupted, the twin free"
 
 
 def dictionary():
@@ -108,44 +143,21 @@ def dictionary():
         yield f'[[variables]]\nname = "{name}"\nsource = "plc"\naddress = "nsu={URI};s={name}"\n{what}\n'
 
 
-class Waiting:
-    """Goes on to the next chapter once what it expects is so."""
-
-    def __init__(self, *chapters):
-        self._chapters, self._end, self.last = list(chapters), time.monotonic() + 60, None
-
-    def write(self, snapshot, samples):
-        self.last = snapshot
-        if self._chapters and self._chapters[0][0](snapshot):
-            self._chapters.pop(0)[1]()
-
-    def stop(self):
-        assert time.monotonic() < self._end, [
-            (r.name, r.value, r.verdict, r.reason) for r in self.last.results
-        ]
-        return not self._chapters
-
-    def close(self):
-        pass
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
-
-
 def says(snapshot, **expected):
     """Whether results have these values, to a tenth of a millimetre."""
     found = {r.name: r.value for r in snapshot.results}
     return all(found[n] is not None and abs(found[n] - v) < 1e-4 for n, v in expected.items())
 
 
+def reason(snapshot, name):
+    return next(r.reason for r in snapshot.results if r.name == name)
+
+
 def verdicts(snapshot):
     return {r.name: r.verdict for r in snapshot.results}
 
 
-def test_joints_belts_poses_fingers_sensors_areas_and_lamps(tmp_path):
+def test_joints_belts_poses_routes_turns_fingers_sensors_areas_and_lamps(tmp_path):
     pytest.importorskip("asyncua")
     first = {name: value for name, (_, value) in NUMBERS.items()}
     first |= {"clear": True, "armed": False, "mode": 1}
@@ -157,29 +169,34 @@ def test_joints_belts_poses_fingers_sensors_areas_and_lamps(tmp_path):
             for name, value in values.items():
                 nodes[name].write_value(value)
 
-        story = Waiting(
+        story = Chapters(
             (
                 lambda s: (
                     says(s, joint=1.8, conveyor=math.hypot(1.3, 2.8), pose=0.8, fingers=0.1)
+                    and says(s, turned=1.8, way=3.8)
+                    and reason(s, "sensor") == DEVICE_FREE
                     and verdicts(s)["curtain"] == "within"
                     and verdicts(s)["area"] is None
                     and s.looks == {"lamp": (1.0, 0.0, 0.0)}
                 ),
-                lambda: tell(armed=True, clear=False, mode=2, hand=45.0),
+                lambda: tell(armed=True, clear=False, mode=2, hand=45.0, turned=90.0),
             ),
             (
                 lambda s: (
-                    says(s, fingers=0.045)
+                    says(s, fingers=0.045, turned=1.4, sensor=0.0)
+                    and reason(s, "sensor") == ""
                     and verdicts(s)["curtain"] == verdicts(s)["area"] == "exceeded"
                     and s.looks == {"lamp": (0.0, 1.0, 0.0), "post": None}
                 ),
-                lambda: tell(axis=500.0, x=3.0, belt=1000.0),
+                lambda: tell(axis=500.0, x=3.0, belt=1000.0, way=3000.0),
             ),
             (
                 # The cart has left the area; the workpiece went with the hand.
                 lambda s: (
                     says(s, joint=1.3, conveyor=math.hypot(1.8, 2.8), pose=3.8, held=math.hypot(1.38, 0.88))
+                    and says(s, way=1.8)
                     and verdicts(s)["area"] == "within"
+                    and reason(s, "sensor") == DEVICE_INTERRUPTED
                 ),
                 lambda: None,
             ),

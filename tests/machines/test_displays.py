@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from kept_run import Kept
 from seerob import load
 from seerob.engine import Engine
 from seerob.errors import InputError
@@ -48,38 +49,30 @@ choices = { 0 = "gone", 1 = "here" }
 """
 
 
-def made(folder, station=STATION):
+def made(folder, station=STATION, variables=VARIABLES):
     (folder / "workstation.toml").write_text(station)
-    (folder / "variables.toml").write_text(VARIABLES)
+    (folder / "variables.toml").write_text(variables)
     (folder / "signals.csv").write_text("t,lamp,pallet\n0,1,0\n0.1,0,1\n0.2,1,7\n0.3,,\n")
     return load(folder)
 
 
 def test_lamps_are_lit_and_things_come_and_go(tmp_path):
-    class Kept(list):
-        def write(self, snapshot, samples):
-            self.append(snapshot)
-
-        def close(self):
-            pass
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            pass
-
-    shown = Kept()
-    made(tmp_path).run(writers=[shown])
-    looks = {round(s.t, 2): s.looks for s in shown}
+    kept = Kept()
+    made(tmp_path).run(writers=[kept])
+    looks = {round(s.t, 2): s.looks for s in kept.snapshots}
     assert looks[0.0] == {"lamp": (1.0, 0.0, 0.0), "pallet": None}
     assert looks[0.1] == {}
     # A value that cannot be hides nothing.
     assert looks[0.2] == {"lamp": (1.0, 0.0, 0.0)}
 
 
-def test_what_nobody_knows_looks_so(tmp_path):
-    model = made(tmp_path).model
+@pytest.mark.parametrize(
+    ("when_stale", "later"),
+    [("undecided", {"lamp": UNKNOWN}), ("hold", {"lamp": (1.0, 0.0, 0.0), "pallet": None})],
+)
+def test_what_nobody_knows_looks_so_unless_it_is_held(tmp_path, when_stale, later):
+    held = VARIABLES.replace("type =", f'when_stale = "{when_stale}"\ntype =')
+    model = made(tmp_path, variables=held).model
     engine = Engine(model, signals={"plc": 0.2})
     looks = Looks(model)
     assert looks.at(engine.start()) == {"lamp": UNKNOWN}
@@ -88,7 +81,8 @@ def test_what_nobody_knows_looks_so(tmp_path):
     assert looks.at(engine.tick()) == {"lamp": (1.0, 0.0, 0.0), "pallet": None}
     for _ in range(25):
         state = engine.tick()
-    assert looks.at(state) == {"lamp": UNKNOWN}
+    assert looks.at(state) == later
+    assert state.signals.at("lamp/on", state.t).doubt
 
 
 def test_a_display_of_nothing_is_an_error(tmp_path):

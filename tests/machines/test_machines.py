@@ -12,7 +12,7 @@ from seerob.engine import Engine
 from seerob.errors import InputError, Undecided
 from seerob.machines.following import carried, follow, nearest_turn
 from seerob.machines.tables import AtEnd, Belt, Slide, Turn, Vehicle
-from seerob.run import signal_timeouts
+from seerob.opening import signal_timeouts
 from seerob.samples import SignalSample
 
 PERSON = """
@@ -112,7 +112,7 @@ def test_silence_of_its_source_shows_within_the_time_out(tmp_path):
     for _ in range(4):
         state = engine.tick()
     assert not state.doubt("gate")
-    assert state.data.qpos[0] == pytest.approx(0.75, abs=1e-6) or 0.75 in np.round(state.data.qpos, 6)
+    assert state.q(station.model.mechanism("gate")) == pytest.approx([0.75], abs=1e-6)
 
 
 def test_a_belt_carries_its_part_around_and_stops_it():

@@ -94,6 +94,7 @@ def test_limits_are_those_of_pinocchios_own_reader():
     path = installed("/ur10_robot.urdf")
     robot = robot_of(path)
     model = pin.buildModelFromUrdf(str(path))
+    assert len(robot.joints()) == model.nq == 6
     for i, joint in enumerate(robot.joints()):
         assert joint.lower == model.lowerPositionLimit[i]
         assert joint.upper == model.upperPositionLimit[i]

@@ -86,3 +86,39 @@ def test_who_is_in_a_machine_that_is_split_by_colour_is_not_outside(tmp_path, pi
     found = results_at(made(tmp_path, text, {"m.obj": split(pieces)}))["S"]
     assert found.verdict == "exceeded"
     assert found.value <= -1
+
+
+FIXED = '<link name="base"/><joint name="j" type="revolute"><parent link="base"/><child link="l"/>\
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+HALVES = [range(4), range(4, 12)]
+
+
+@pytest.mark.parametrize("description", ["one file", "two files", "rounded otherwise", "mjcf"])
+def test_who_is_in_a_link_that_is_split_is_not_outside(tmp_path, description):
+    """Also where corners of the pieces are rounded differently; and no link is called open then."""
+    files = {"m.obj": split(HALVES)}
+    if description != "one file":
+        files = {f"m{k}.obj": split([rows]) for k, rows in enumerate(HALVES)}
+    if description == "rounded otherwise":
+        faces = files["m1.obj"].splitlines()[len(BOX.vertices) :]
+        corners = ["v {:.7f} {:.7f} {:.7f}".format(*(v * (1 + 1e-7))) for v in BOX.vertices]
+        files["m1.obj"] = "\n".join([*corners, *faces])
+    if description == "mjcf":
+        meshes = "".join(f'<mesh name="g{k}" file="m{k}.obj"/>' for k in range(2))
+        geoms = "".join(f'<geom type="mesh" mesh="g{k}"/>' for k in range(2))
+        files["arm.xml"] = f"""<mujoco><asset>{meshes}</asset><worldbody><body name="base"><body name="l">
+        <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><joint name="j" axis="0 0 1" range="-1 1"/>{geoms}
+        </body></body></worldbody></mujoco>"""
+    else:
+        shown = "".join(
+            f'<collision><geometry><mesh filename="{name}"/></geometry></collision>' for name in files
+        )
+        files["arm.urdf"] = f'<robot name="r">{FIXED}<link name="l">{shown}</link></robot>'
+    model = "arm.xml" if description == "mjcf" else "arm.urdf"
+    text = f'{PERSON}[[robots]]\nname = "arm"\nmodel = "{model}"\nq = [0]\n'
+    text += '[[safety]]\nname = "S"\nkind = "minimum_distance"\nbetween = ["op", "arm"]\nlimit = 0.1\n'
+    station = made(tmp_path, text, files)
+    found = results_at(station)["S"]
+    assert found.verdict == "exceeded"
+    assert found.value <= -1
+    assert not [f.text for f in station.model.findings if "is open" in f.text]

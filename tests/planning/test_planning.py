@@ -118,7 +118,7 @@ def test_it_stops_when_asked_and_does_not_claim_that_there_is_no_path(model):
 
 
 def test_the_planned_file_is_a_motion_that_keeps_the_margin(model, tmp_path):
-    from seerob.run import target
+    from seerob.opening import target
     from seerob.sources.waypoints import Waypoints
 
     found = plan(model, "arm", [[1.2, 0.0]], margin=0.03, seed=3)

@@ -12,7 +12,7 @@ from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.contact.clamped_regions import FloorGap
 from seerob.kernels.approach import lowest_and_falling
 from seerob.snapshot import Origin, Result
-from seerob.station import Station
+from seerob.station import Station, load
 
 HAND = "Hands and fingers"
 
@@ -144,6 +144,34 @@ def test_floor_counts_where_the_arm_may_be_by_the_next_instant(tmp_path: Path) -
         assert floor.clamped(state, thickness, wanted)[1, 0] == expected, t
 
 
+def test_a_gap_exactly_as_wide_as_the_body_part_clamps_it(tmp_path: Path) -> None:
+    station = over_floor(tmp_path, 0.16)
+    state = state_at(station, arm=((0.0, 0.0), (0.2, 0.0)))
+    floor = FloorGap(station.model, station.model.robot("arm").moving, 0.0)
+    gap, fall = floor.lowest_and_falling(state)[1]
+    exactly = gap - fall * station.model.workstation.engine.tick
+    thickness, wanted = np.array([exactly, np.nextafter(exactly, 0)]), np.ones((2, 2), bool)
+    assert floor.clamped(state, thickness, wanted)[1].tolist() == [True, False]
+
+
+@pytest.mark.parametrize(("z", "expected"), [(0.19, True), (0.20, False)])
+def test_twice_what_surfaces_may_stick_out_is_added_to_body_parts(
+    tmp_path: Path, z: float, expected: bool
+) -> None:
+    """Of two surfaces; the arm's visual is 20 mm thicker to either side: 100 mm of the hand become 140 mm.
+
+    The gap is z - 50 mm, at the next instant 4 mm less.
+    """
+    thicker = '<visual><origin xyz="0.5 0 0"/><geometry><box size="1 0.1 0.14"/></geometry></visual>'
+    station = over_floor(tmp_path, z)
+    urdf = tmp_path.joinpath("arm.urdf").read_text()
+    at = urdf.rindex("</link>", 0, urdf.index('name="j1"'))
+    tmp_path.joinpath("arm.urdf").write_text(urdf[:at] + thicker + urdf[at:])
+    station = load(tmp_path)
+    assert max(b.deviation for b in station.model.bodies) == pytest.approx(0.02, abs=1e-3)
+    assert clamped(regions(station)[HAND]) == expected
+
+
 def test_what_moves_along_the_floor_does_not_come_down_on_it(tmp_path: Path) -> None:
     assert not clamped(regions(cell(tmp_path, ""))["Chest"])
 
@@ -160,6 +188,7 @@ def test_basis_says_what_the_floor_is(tmp_path: Path, options: str, value: objec
     inputs = {i.name: i for i in cell(tmp_path, "", options).bound[0].basis.inputs}
     found = inputs["floor as a surface that clamps"]
     assert (found.value, found.origin) == (value, origin)
+    assert found.unit == ("" if value == "left out" else "m")
 
 
 def test_lowest_point_and_fall_of_a_dilated_mesh_are_those_of_its_vertices() -> None:

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from msgspec.structs import replace
 
-from made_cell import FLOATING, TWO_R, made, results_at, two_r
+from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob.contact.limits import Judged
+from seerob.contact.regions import REGIONS
+from seerob.safety.power_and_force import Contacts
 from seerob.snapshot import Result, Row, RowState, Verdict
 from seerob.station import Station
 
@@ -23,6 +28,13 @@ def pfl(station: Station, speed: float = 0.1) -> Result:
     return results_at(station, arm=([0.0, 0.0], [speed / 2, 0]))["pfl"]
 
 
+def judged_of(rows: tuple[Row, ...]) -> list[Row]:
+    """The 26 areas that may be hit."""
+    judged = [row for row in rows if row.state is RowState.JUDGED]
+    assert len(judged) == 26
+    return judged
+
+
 def test_every_one_of_the_29_areas_has_a_row_and_the_feet_too(tmp_path: Path) -> None:
     rows = pfl(cell(tmp_path)).rows
     assert sorted(n for row in rows for n in row.areas) == list(range(1, 30))
@@ -37,9 +49,9 @@ def test_every_one_of_the_29_areas_has_a_row_and_the_feet_too(tmp_path: Path) ->
 @pytest.mark.parametrize("speed", [0.05, 0.4, 1.5])
 def test_rows_say_what_the_parts_say(tmp_path: Path, speed: float) -> None:
     result = pfl(cell(tmp_path), speed)
-    judged = [row for row in result.rows if row.state is RowState.JUDGED]
+    judged = judged_of(result.rows)
     areas = [(part, area) for part in result.parts for area in part.parts]
-    assert len(judged) == len(areas) == 26
+    assert len(areas) == 26
     for row, (part, area) in zip(judged, areas, strict=True):
         assert (row.group, row.name) == (part.name, area.name)
         assert (row.value, row.limit, row.verdict) == (area.value, area.limit, area.verdict)
@@ -51,10 +63,11 @@ def test_rows_say_what_the_parts_say(tmp_path: Path, speed: float) -> None:
 
 def test_the_least_row_of_a_region_is_the_regions_limit(tmp_path: Path) -> None:
     result = pfl(cell(tmp_path))
-    for part in result.parts:
-        if part.limit is not None:
-            least = min(row.limit for row in result.rows if row.group == part.name)
-            assert least == pytest.approx(part.limit, rel=1e-12)
+    limited = [part for part in result.parts if part.limit is not None]
+    assert len(limited) > 5
+    for part in limited:
+        least = min(row.limit for row in result.rows if row.group == part.name)
+        assert least == pytest.approx(part.limit, rel=1e-12)
 
 
 def test_limits_can_be_looked_up_in_the_basis(tmp_path: Path) -> None:
@@ -62,19 +75,18 @@ def test_limits_can_be_looked_up_in_the_basis(tmp_path: Path) -> None:
     known = {
         i.name: i for criterion in station.scene(with_sources=False).criteria for i in criterion.basis.inputs
     }
-    for row in pfl(station).rows:
-        assert all(known[name].source for name in row.inputs)
-        if row.state is RowState.JUDGED:
-            force, pressure, _ = (known[name] for name in row.inputs)
-            assert (force.unit, pressure.unit) == ("N", "Pa")
+    rows = pfl(station).rows
+    assert all(known[name].source for row in rows for name in row.inputs)
+    for row in judged_of(rows):
+        force, pressure, _ = (known[name] for name in row.inputs)
+        assert (force.unit, pressure.unit) == ("N", "Pa")
 
 
 def test_sharp_edges_leave_the_pressure_open(tmp_path: Path) -> None:
-    for row in pfl(cell(tmp_path, "")).rows:
-        if row.state is RowState.JUDGED:
-            assert {a.name: a.value for a in row.aspects}["allowed by pressure"] is None
-            assert row.verdict is Verdict.UNDECIDED
-            assert row.reason.startswith("contact pressure of arm/")
+    for row in judged_of(pfl(cell(tmp_path, "")).rows):
+        assert {a.name: a.value for a in row.aspects}["allowed by pressure"] is None
+        assert row.verdict is Verdict.UNDECIDED
+        assert row.reason.startswith("contact pressure of arm/")
 
 
 def near(folder: Path, hand: str, horizon: float = 0.3) -> dict[str, Row]:
@@ -101,6 +113,47 @@ def test_hands_are_told_apart_by_the_dominant_one(tmp_path: Path) -> None:
 
 
 def test_excluded_regions_stay_visible_as_excluded(tmp_path: Path) -> None:
-    rows = pfl(cell(tmp_path, FLAT + 'excluded = ["Face"]')).rows
-    (face,) = [row for row in rows if row.group == "Face"]
-    assert (face.state, face.verdict, face.areas) == (RowState.EXCLUDED, None, (3,))
+    rows = pfl(cell(tmp_path, FLAT + 'excluded = ["Face", "Chest"]')).rows
+    excluded = [row for row in rows if row.group in ("Face", "Chest")]
+    assert [row.areas for row in excluded] == [(3,), (8,), (9,)]
+    assert {(row.state, row.verdict, row.limit) for row in excluded} == {(RowState.EXCLUDED, None, None)}
+
+
+def judged_chest(folder: Path) -> tuple[Contacts, Judged, Result, int]:
+    station = cell(folder)
+    contacts = Contacts(station.bound[0].criterion, station.model)
+    judged = contacts.judge(state_at(station, arm=([0.0, 0.0], [0.05, 0])))
+    chest = next(part for part in pfl(station).parts if part.name == "Chest")
+    return contacts, judged, chest, int(judged.rows[REGIONS.index("Chest")])
+
+
+def test_a_value_on_its_limit_is_within_and_one_beside_it_is_not(tmp_path: Path) -> None:
+    contacts, judged, chest, row = judged_chest(tmp_path)
+    for least in chest.parts:
+        for value, expected in ((least.limit, "within"), (np.nextafter(least.limit, 9), "exceeded")):
+            rows = contacts.rows.of([(replace(chest, value=value), row)], judged, lambda _: ())
+            (found,) = [r for r in rows if r.name == least.name]
+            assert (found.limit, found.verdict) == (least.limit, expected)
+
+
+def test_what_a_tolerance_leaves_open_says_which(tmp_path: Path) -> None:
+    station = cell(tmp_path, FLAT + "stiffness_tolerance = 0.5\n")
+    result = pfl(station, pfl(station).parts[3].limit)
+    decided = {part.name: part.reason for part in result.parts if "decided by" in part.reason}
+    rows = [row for row in result.rows if row.group in decided]
+    assert decided
+    assert {row.reason for row in rows if row.verdict == "undecided"} == set(decided.values())
+
+
+def test_the_side_of_a_row_is_that_of_all_its_bones(tmp_path: Path) -> None:
+    contacts, judged, chest, row = judged_chest(tmp_path)
+    for bones, side in (
+        ((), ""),
+        (("op/right_hand",), "right"),
+        (("op/left_hand", "op/left_forearm"), "left"),
+        (("op/left_hand", "op/right_hand"), ""),
+        (("op/right_hand", "op/thorax"), ""),
+        (("op/thorax",), ""),
+    ):
+        rows = contacts.rows.of([(chest, row)], judged, lambda _, bones=bones: bones)
+        assert {found.side for found in rows} == {side}, bones

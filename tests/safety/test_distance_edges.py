@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from made_cell import TWO_R, made, results_at, state_at, two_r
+from seerob.human.skeleton import BONES
 from seerob.judging import Judge
 from seerob.results.series import CODES, NO_VERDICT
 
@@ -82,7 +83,7 @@ def test_shapes_that_cross_exceed_whatever_is_uncertain(tmp_path, more, verdict,
     assert asked(tmp_path, more + uncertainty, x=1.5).verdict == verdict
 
 
-def test_the_bone_that_is_off_the_most_counts_with_the_uncertainty(tmp_path):
+def test_what_bones_are_off_by_counts_with_the_uncertainty(tmp_path):
     person = (
         '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [4, 0, -1] }\n'
     )
@@ -90,8 +91,12 @@ def test_the_bone_that_is_off_the_most_counts_with_the_uncertainty(tmp_path):
     station = made(tmp_path, text, {"arm.urdf": two_r()})
     state = state_at(station, arm=(ZERO, ZERO))
     (exact,) = Judge(station.bound)(state)
-    state.hearings["op"].bones = {"head": (0.05, None), "left_hand": (0.3, None)}
+    state.hearings["op"].bones = dict.fromkeys(BONES, (0.3, None))
     (found,) = Judge(station.bound)(state)
     assert found.value == exact.value
     assert exact.interval == pytest.approx((exact.value - 0.1, exact.value + 0.1))
     assert found.interval == pytest.approx((exact.value - 0.4, exact.value + 0.4))
+    # One that is farther than it is off changes nothing.
+    state.hearings["op"].bones = {"right_toes": (0.05, None)}
+    (found,) = Judge(station.bound)(state)
+    assert found.interval == exact.interval

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -11,10 +13,12 @@ from scipy.spatial import HalfspaceIntersection
 from made_cell import FLOATING, TWO_R, UR10, made, results_at, state_at, two_r
 from oracles import pinocchio_oracle as oracle
 from seerob import joint_torques
-from seerob.errors import InputError
+from seerob.errors import InputError, UnknownName
 from seerob.model_io import library
+from seerob.norms.body_limits import SHIPPED
 from seerob.polytope import zero_moment
 from seerob.snapshot import Hull, Origin, Sphere, Verdict
+from seerob.station import load
 
 J = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 0.0]])
 """Of the planar arm at (0, 90°)."""
@@ -210,3 +214,54 @@ def test_torque_limits_that_cannot_be_are_named(tmp_path, wrong):
     station = made(tmp_path, FLOATING + TWO_R + ARM + f"torque_limits = {wrong}\n", {"arm.urdf": two_r()})
     with pytest.raises(InputError, match=r"torque_limits.*j1, j2"):
         _ = station.bound
+
+
+# -- the sphere of a body region ----------------------------------------------------------------
+
+LIMITS = files("seerob.norms").joinpath(SHIPPED).read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("region", "limit", "verdict"),
+    [("Face", None, None), ("Lower legs", 130, "exceeded"), ("Neck", 150, "within")],
+)
+def test_the_sphere_of_a_body_region_is_its_quasi_static_force(tmp_path, region, limit, verdict):
+    """The crane pushes 80 N along each axis: up to √3 · 80 N = 138.6 N."""
+    options = f'body_region = "{region}"\ntorque_limits = [[-80, 80], [-80, 80], [-80, 80]]\nload = "none"\n'
+    if limit is None:
+        with pytest.raises(InputError, match=r"Face.*contact is not permitted"):
+            arm(tmp_path, options, TWO_R, ((0,) * 3, (0,) * 3), crane())
+        return
+    found = arm(tmp_path, options, TWO_R, ((0,) * 3, (0,) * 3), crane())
+    assert found.value == pytest.approx(80 * np.sqrt(3))
+    assert (found.limit, found.verdict) == (limit, verdict)
+    assert f"limit {limit} N" in [m.label for m in found.markers if isinstance(m, Sphere)]
+    sources = {i.name: (i.value, i.unit, i.origin) for i in found.basis.inputs}
+    assert sources[f"{region}: F_s"] == (limit, "N", Origin.STATED)
+    assert sources["limits"][0] == SHIPPED
+    batch = load(tmp_path).batch({"arm": np.zeros((2, 3))}, {"arm": np.zeros((2, 3))})
+    (answer,) = batch.values()
+    assert answer.answers.limit.tolist() == [limit, limit]
+
+
+def test_limits_of_body_regions_can_be_ones_own(tmp_path):
+    tmp_path.joinpath("own.toml").write_text(LIMITS.replace("[150, ", "[120, "))
+    options = 'body_region = "Neck"\nlimits = "own.toml"\nload = "none"\n'
+    options += "torque_limits = [[-80, 80], [-80, 80], [-80, 80]]\n"
+    found = arm(tmp_path, options, TWO_R, ((0,) * 3, (0,) * 3), crane())
+    assert (found.limit, found.verdict) == (120, "exceeded")
+    assert {i.name: i.origin for i in found.basis.inputs}["Neck: F_s"] is Origin.GIVEN
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ('body_region = "Chest"\nlimit = 140', "either limit or body_region"),
+        ('limits = "own.toml"', "name one"),
+        ('body_region = "Feet"', "no body region"),
+        ('body_region = "Elbow"', "no body region"),
+    ],
+)
+def test_spheres_that_cannot_be_are_refused(tmp_path, options, words):
+    with pytest.raises((InputError, UnknownName), match=words):
+        arm(tmp_path, options + "\n")

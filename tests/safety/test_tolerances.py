@@ -9,9 +9,13 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.contact.impact_mass import simplified_mass
+from seerob.distances.least import Query
 from seerob.errors import InputError
+from seerob.human.skeleton import BONES
+from seerob.judging import Judge
 from seerob.mounting.mass_tolerances import MassTolerances
 from seerob.tolerances import Tolerance, deciding, spread
+from seerob.whereabouts.tracking_error import TrackingError
 
 POSE = ((0.0, np.pi / 2), (1.0, -2.0))
 GRIP = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ sphere = 0.02 }}\nmass = {mass}\n{more}\n'
@@ -220,7 +224,10 @@ def test_a_distance_is_known_to_its_uncertainty(tmp_path, limit, verdict):
 
 
 def test_what_a_person_is_off_by_is_in_every_distance(tmp_path):
-    """A hand 30 mm from where a device sees it, turned by 0.1 rad: its points are within 30 mm + 0.1 ρ."""
+    """A hand 30 mm from where a device sees it, turned by 0.1 rad: its points are within 30 mm + 0.1 ρ.
+
+    Each bone counts with its own error: by brute force over all pairs.
+    """
     text = FLOATING + TWO_R + PERSON.format(x=3.0)
     text += criterion("minimum_distance", 'between = ["arm", "op"]\nlimit = 0.3')
     text += criterion(
@@ -230,17 +237,31 @@ def test_what_a_person_is_off_by_is_in_every_distance(tmp_path):
     state = state_at(station, arm=((0.0, 0.0), (1.0, 0.0)))
     hand = next(b for b in station.model.bodies if b.name == "op/right_hand")
     reach = float(np.linalg.norm(hand.corners, axis=1).max()) + hand.radius
-    from seerob.run import Judge
-
     before = {r.name: r for r in Judge(station.bound)(state)}
     assert before["S"].interval is None
-    state.hearings["op"].bones = {"right_hand": (0.03, 0.1), "left_hand": (None, None), "pelvis": (0.01, 0.0)}
-    after = {r.name: r for r in Judge(station.bound)(state)}
-    error = 0.03 + 0.1 * reach
-    for name in ("it", "S"):
-        low, high = after[name].interval
-        assert after[name].value - low >= error - 1e-12
-        assert (high - after[name].value) == pytest.approx(error)
+    rng = np.random.default_rng(4)
+    robot, person = station.model.robot("arm").moving, station.model.human("op").bodies
+    apart = Query(station.model.shapes, person, robot).per_pair(state.rotations, state.positions)
+    d = apart.distance.reshape(len(person), len(robot))
+    for _ in range(20):
+        state.hearings["op"].bones = {
+            "right_hand": (0.03, 0.1),
+            "left_hand": (None, None),
+            **{
+                bone: (float(rng.exponential(0.1)), 0.0)
+                for bone in rng.choice(BONES, 5)
+                if "hand" not in bone
+            },
+        }
+        e = TrackingError(station.model, person).at(state)[:, None]
+        assert e[person.index(hand.index), 0] == pytest.approx(0.03 + 0.1 * reach)
+        after = {r.name: r for r in Judge(station.bound)(state)}
+        interval = after["it"].interval or (after["it"].value,) * 2
+        assert interval == pytest.approx(((d - e).min(), (d + e).min()), abs=1e-12)
+        for k, body in enumerate(robot):
+            part = next(p for p in after["S"].parts if p.name == station.model.bodies[body].name)
+            interval = part.interval or (part.value,) * 2
+            assert interval == pytest.approx(((d - e)[:, k].min(), (d + e)[:, k].min()), abs=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["kinetic_energy", "effective_mass"])

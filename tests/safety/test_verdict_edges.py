@@ -10,6 +10,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.contact.areas import area_results, margin
@@ -23,7 +24,7 @@ from seerob.norms.body_limits import SHIPPED, parse, shipped
 from seerob.norms.iso_13855 import Approach, Edition, intrusion, minimum_distance, speed_at
 from seerob.safety import tool_force
 from seerob.safety.effective_mass import inverse_effective_mass, principal_masses
-from seerob.safety.manipulability import Manipulability, least_value_by_joint, singular_values
+from seerob.safety.manipulability import Manipulability, least_value_after, singular_values
 from seerob.safety.minimum_distance import MinimumDistance
 from seerob.safety.separation import Separation
 from seerob.snapshot import Result, Verdict
@@ -372,7 +373,7 @@ def test_a_slow_motion_has_a_direction_and_its_mass_is_drawn_at_the_point(tmp_pa
 
 
 def test_the_joint_that_leads_out_of_a_singularity_is_named(tmp_path):
-    """A stretched elbow; and the change of σ₃ with each joint is its finite difference."""
+    """A stretched elbow; and σ₃ once a joint has moved is that of the twin in the pose it has moved to."""
     text = FLOATING + '[[robots]]\nname = "arm"\nmodel = "library:ur5e"\n'
     text += '[[safety]]\nkind = "manipulability"\nname = "m"\nat = "arm/wrist_3_link"\nlimit = 0.1\n'
     station = made(tmp_path, text)
@@ -386,12 +387,32 @@ def test_the_joint_that_leads_out_of_a_singularity_is_named(tmp_path):
     def J(q):
         return state_at(station, arm=(q, np.zeros(6))).jacobian(frame, robot)
 
-    def least(q):
-        return np.linalg.svd(J(q)[:3], compute_uv=False)[2]
+    for pose in (q, away, np.zeros(6)):
+        after = [[np.linalg.svd(J(pose + d * e)[:3])[1][2] for d in (0.3, -0.3)] for e in np.eye(6)]
+        np.testing.assert_allclose(least_value_after(J(pose), 0.3), after, atol=1e-12)
 
-    h = 1e-6
-    slopes = [abs(least(away + h * e) - least(away - h * e)) / (2 * h) for e in np.eye(6)]
-    np.testing.assert_allclose(least_value_by_joint(J(away)), slopes, atol=1e-7)
+
+def test_where_two_singular_values_vanish_the_joints_that_lead_out_are_still_told():
+    """An arm stretched along two of its axes: σ₃ after each turn is that of the pose it leads to."""
+    axes = np.array([[1.0, 0, 0], [0, 0, 1], [0, 0, 1], [1, 0, 0]])
+    origins = np.array([[0.0, 0, 0], [0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    tip = np.array([3.0, 0, 0])
+
+    def jacobian(q):
+        """By products of rotations, from the base outward."""
+        turned, where, point = axes.copy(), origins.copy(), tip
+        for j in reversed(range(4)):
+            R = Rotation.from_rotvec(q[j] * axes[j]).as_matrix()
+            turned[j + 1 :] = turned[j + 1 :] @ R.T
+            where[j + 1 :] = origins[j] + (where[j + 1 :] - origins[j]) @ R.T
+            point = origins[j] + R @ (point - origins[j])
+        return np.vstack([np.cross(turned, point - where).T, turned.T])
+
+    assert np.linalg.svd(jacobian(np.zeros(4))[:3])[1][1] < 1e-15
+    assert least_value_after(jacobian(np.zeros(4))).max(axis=1).argmax() == 2
+    for step in (0.01, 0.5):
+        after = [[np.linalg.svd(jacobian(d * e)[:3])[1][2] for d in (step, -step)] for e in np.eye(4)]
+        np.testing.assert_allclose(least_value_after(jacobian(np.zeros(4)), step), after, atol=1e-12)
 
 
 def test_an_acceleration_needs_two_evaluations_within_50_ms():

@@ -5,6 +5,7 @@ import time
 import msgspec
 import numpy as np
 import pytest
+from websockets.exceptions import InvalidStatus
 
 from seerob.human.estimated import estimated
 from seerob.human.mapping import conventions
@@ -147,9 +148,9 @@ def test_an_offer_that_contradicts_itself_is_turned_away(server, wrong):
 
 def test_without_the_token_nobody_offers():
     with Server(scene=scene(), meshes=MESHES, feed=Live(), port=0, token=TOKEN) as server:
-        with pytest.raises(Exception, match="401"):
+        with pytest.raises(InvalidStatus, match="401"):
             Page(server)
-        with pytest.raises(Exception, match="403"):
+        with pytest.raises(InvalidStatus, match="403"):
             Page(server, path=f"/ws?token={TOKEN}", origin="https://elsewhere.example")
         with Page(server, path=f"/ws?token={TOKEN}") as page:
             page.see(human="nobody")

@@ -161,6 +161,15 @@ def web(_):
     return Made(server, Web(name="plc", url=server.live, timeout=1.0), target("speed", "/speed"))
 
 
+def web_http(_):
+    """The other way: asked again and again."""
+    from seerob.emulators.web import STATE, WebServer
+    from seerob.sources.web import Web
+
+    server = WebServer(lambda t: {"speed": 250.0}).start()
+    return Made(server, Web(name="plc", url=server.url + STATE, every=0.02), target("speed", "/speed"))
+
+
 def opcua(_):
     from seerob.emulators.opcua import URI
     from seerob.sources.opcua import Opcua
@@ -265,7 +274,8 @@ def headset(patch):
 FOREIGN = (opcua, opcua_robot, mqtt, foxglove)
 """Their servers are processes of their own, which are killed with SIGKILL."""
 OWN = (
-    *(rtde, fri, drfl, modbus_robot, rosbridge, ros_tcp, ros_tcp_endpoint, modbus, siemens_web, web),
+    *(rtde, fri, drfl, modbus_robot, rosbridge, ros_tcp, ros_tcp_endpoint),
+    *(modbus, siemens_web, web, web_http),
     *(natnet, vrpn, mvn, rokoko, vive, kinect, headset),
 )
 KINDS = {make.__name__: make for make in (*OWN, *FOREIGN)}

@@ -8,6 +8,7 @@ import tempfile
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -25,10 +26,9 @@ def hammer(kind, seed, files):
     """How many of ``files`` broken files of a kind were read and refused; anything else raises."""
     format_ = KINDS[kind]
     counts = Counter(read=0, refused=0)
+    whole, rng = made(kind), random.Random(f"{kind} {seed}")
     with tempfile.TemporaryDirectory(dir=_memory()) as folder:
         path = Path(folder) / f"f.{format_.suffix}"
-        format_.make(path)
-        whole, rng = path.read_bytes(), random.Random(f"{kind} {seed}")
         for number in range(files):
             broken = format_.change(whole, rng)
             path.write_bytes(broken)
@@ -43,6 +43,15 @@ def hammer(kind, seed, files):
             else:
                 counts["read"] += 1
     return counts
+
+
+@cache
+def made(kind):
+    """The valid file of a kind, made once in each process."""
+    with tempfile.TemporaryDirectory(dir=_memory()) as folder:
+        path = Path(folder) / f"f.{KINDS[kind].suffix}"
+        KINDS[kind].make(path)
+        return path.read_bytes()
 
 
 def hammer_in_processes(kind, files, tell):

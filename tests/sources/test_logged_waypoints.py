@@ -1,7 +1,5 @@
 """Logs as waypoints: near what was logged, stops where the robot stood, drawn in a workstation."""
 
-from contextlib import nullcontext
-
 import numpy as np
 import pytest
 import test_kuka_log
@@ -9,6 +7,7 @@ import test_robodk
 from made_motion import target
 
 import seerob
+from kept_run import Kept
 from seerob.errors import InputError
 from seerob.samples import JointSample
 from seerob.snapshot import Polyline, Sphere
@@ -62,15 +61,6 @@ def test_a_log_of_a_robot_that_stands_is_refused():
         reduced(Trajectory(file="log", t=np.arange(9.0), q=np.zeros((9, 2))), 0.01)
 
 
-class Kept(nullcontext):
-    """A writer that keeps the first results."""
-
-    results = ()
-
-    def write(self, snapshot, samples):
-        self.results = self.results or snapshot.results
-
-
 def logged(folder, kind):
     if kind == "robodk":
         _, q, _ = test_robodk.write(folder / "log.csv")
@@ -110,9 +100,9 @@ robot = "arm"
     assert far(found, q) < 3 * 0.002
     assert np.abs(found[-1] - q[-1]).max() < 1e-9
     assert any("waypoints of" in f.text and "within 0.002" in f.text for f in opened.findings)
-    first = Kept()
-    station.run(writers=[first], stop=lambda: bool(first.results))
-    (drawn,) = first.results
+    kept = Kept()
+    station.run(writers=[kept], stop=lambda: bool(kept.snapshots))
+    (drawn,) = kept.snapshots[0].results
     balls = [m for m in drawn.markers if isinstance(m, Sphere)]
     assert len(balls) == len(source.program(tmp_path / file).waypoints)
     assert [isinstance(m, Polyline) for m in drawn.markers].count(True) == 1

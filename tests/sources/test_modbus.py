@@ -6,7 +6,7 @@ import asyncio
 import socket
 import struct
 import threading
-from contextlib import aclosing, contextmanager
+from contextlib import aclosing
 from pathlib import Path
 
 import msgspec
@@ -16,14 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
 
-from live_story import Story, lived, open_files, wait_for
+from live_story import Story, listening, lived, open_files, wait_for
 from made_cell import made
 from seerob import cli
 from seerob.commands.emulating import modbus as emulating
 from seerob.emulators.modbus import ModbusServer
 from seerob.emulators.modbus_robot import program
 from seerob.errors import InputError, UnknownName
-from seerob.live.listening import Listener
 from seerob.protocols.modbus import MOST, Block, Place, Table, Type, Words, blocks, decode, encode
 from seerob.protocols.modbus_map import load, names
 from seerob.recordings.recording import Recording
@@ -48,18 +47,6 @@ def holding(at, kind=Type.U16, **more):
 
 def robot(state="moving", **more):
     return ModbusServer(program(DOOSAN, motion, {"robot_state": state, "servo_on": True}), **more)
-
-
-@contextmanager
-def listening(source, target=None):
-    heard = []
-    listener = Listener(source, target, heard.append)
-    listener.start()
-    try:
-        yield heard
-    finally:
-        listener.ask_to_stop()
-        assert listener.join(10)
 
 
 # -- registers ----------------------------------------------------------------------------------

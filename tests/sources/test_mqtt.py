@@ -9,15 +9,14 @@ import logging
 import socket
 import threading
 import time
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager
 
 import pytest
 from paho.mqtt import publish
 
 from amqtt_broker import broker
-from live_story import open_files, wait_for
+from live_story import listening, open_files, wait_for
 from seerob.errors import InputError
-from seerob.live.listening import Listener
 from seerob.protocols.sparkplug import Metric, Payload, encode
 from seerob.source import Target
 from seerob.sources.mqtt import Mqtt, Plain, address, plain_change
@@ -44,17 +43,8 @@ def said(port, topic, payload, **more):
     publish.single(topic, payload, hostname="127.0.0.1", port=port, **more)
 
 
-@contextmanager
-def listening(port, *variables):
-    heard = []
-    target = Target(name="", joints=(), units=(), lower=(), upper=(), velocity=(), variables=variables)
-    listener = Listener(Mqtt(name="plc", host="127.0.0.1", port=port), target, heard.append)
-    listener.start()
-    try:
-        yield heard
-    finally:
-        listener.ask_to_stop()
-        assert listener.join(5)
+def listening_to(port, *variables):
+    return listening(Mqtt(name="plc", host="127.0.0.1", port=port), Target(variables=variables))
 
 
 def newest(heard):
@@ -76,7 +66,7 @@ def until(heard, true, say=lambda: None):
 
 
 def test_values_arrive_in_si_and_grow_old(port):
-    with broker(port), listening(port, SPEED, DOOR) as heard:
+    with broker(port), listening_to(port, SPEED, DOOR) as heard:
         until(heard, lambda: known(heard, "belt/speed") == 0.5, lambda: said(port, "belt", '{"speed": 500}'))
         until(heard, lambda: known(heard, "door") is True, lambda: said(port, "cell/door", "true"))
         # Silence: the one that must be said often grows old, the other stands.
@@ -110,7 +100,7 @@ def test_a_sparkplug_device_is_known_from_birth_to_death(port):
         send("NBIRTH", seq=0, device="")
         send("DBIRTH", birth, seq=1)
 
-    with broker(port), listening(port, COUNT) as heard:
+    with broker(port), listening_to(port, COUNT) as heard:
         wait_for(lambda: "birth was not heard" in newest(heard).doubts["count"] if heard else False, 20)
         until(heard, lambda: known(heard, "count") == 7.0, born)
         send("DDATA", Metric(alias=5, value=-8.0, type=4), seq=2)
@@ -127,7 +117,7 @@ def test_a_broker_that_is_killed_is_found_again(port, monkeypatch):
     monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.02)
     monkeypatch.setattr("seerob.live.listening.LONGEST_PAUSE", 0.1)
     files, threads = open_files(), threading.active_count()
-    with listening(port, DOOR) as heard:
+    with listening_to(port, DOOR) as heard:
         for _ in range(3):
             with broker(port):
                 heard.clear()
@@ -169,7 +159,7 @@ def test_a_broker_that_falls_over_again_and_again_is_tried_again_and_again(port,
 
     async def wait():
         async with rude(port) as clients:
-            with listening(port, DOOR):
+            with listening_to(port, DOOR):
                 async with asyncio.timeout(30):
                     while len(clients) < 4:
                         await asyncio.sleep(0.01)

@@ -5,18 +5,16 @@ from __future__ import annotations
 import asyncio
 import datetime
 import math
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
 
 pytest.importorskip("asyncua")
 
-from live_story import Story, lived, wait_for
+from live_story import Story, listening, lived, wait_for
 from made_cell import made
 from seerob.emulators.opcua import URI, Emulated, OpcuaServer
 from seerob.errors import InputError, SeerobError
-from seerob.live.listening import Listener
 from seerob.protocols.opcua_client import Address, Security, address
 from seerob.protocols.opcua_robotics import natural
 from seerob.protocols.opcua_units import number, unit
@@ -60,18 +58,6 @@ def server():
     """A PLC with a robot: starting one takes seconds."""
     with OpcuaServer(PLC, {"R1": motion, "R2": motion}, outputs=("Twin/fast",)) as found:
         yield found
-
-
-@contextmanager
-def listening(source, aim):
-    heard = []
-    listener = Listener(source, aim, heard.append)
-    listener.start()
-    try:
-        yield heard
-    finally:
-        listener.ask_to_stop()
-        assert listener.join(10)
 
 
 def good(heard, name="belt/speed"):
@@ -182,12 +168,8 @@ def test_units_are_required_and_never_guessed(tmp_path):
         with pytest.raises(InputError, match="Axis_1 states no unit"):
             _ = cell(tmp_path / "a", silent).sources
         source = OpcuaRobot(robot="arm", url=silent.url, position_unit="deg")
-        heard = []
-        listener = Listener(source, None, heard.append)
-        listener.start()
-        wait_for(lambda: any(isinstance(s, JointSample) for s in heard), 30)
-        listener.ask_to_stop()
-        assert listener.join(10)
+        with listening(source) as heard:
+            wait_for(lambda: any(isinstance(s, JointSample) for s in heard), 30)
         sample = next(s for s in heard if isinstance(s, JointSample))
         assert np.abs(np.array(sample.q) - HOME).max() < 0.51
         assert sample.qd is None

@@ -17,11 +17,11 @@ from seerob.errors import InputError
 from seerob.live.listening import Listener
 from seerob.protocols import ProtocolError
 from seerob.protocols.rtde_states import RobotMode, SafetyStatus, quality
+from seerob.recorded_station import load_recorded
 from seerob.recordings.recording import Recording
 from seerob.samples import Quality, SignalSample
 from seerob.sinks.recorder import Recorder
 from seerob.sources.rtde import Rtde, figures, joint_sample, states
-from seerob.station import load_recorded
 
 HOME, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([0.5, 0.3, -0.3, 0.4, -0.4, 0.5])
 FASTEST = 1.5

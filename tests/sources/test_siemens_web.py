@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import asyncio
 import datetime
 import json
-from contextlib import contextmanager
+import socket
+from contextlib import suppress
+from pathlib import Path
 
 import httpx
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from live_story import wait_for
+from live_story import listening, wait_for
+from relay import Stream
 from seerob.emulators.siemens_web import SiemensWebServer
 from seerob.errors import InputError
-from seerob.live.listening import Listener
 from seerob.protocols import ProtocolError
-from seerob.protocols.s7_web import reading, result, results
+from seerob.protocols.s7_web import PATH, reading, result, results
 from seerob.source import Target
 from seerob.sources.siemens_web import SiemensWeb
 from seerob.variables.dictionary import Kind, Variable
@@ -25,7 +29,7 @@ SPEED = Variable(name="belt/speed", source="plc", address='"Belt".speed', unit="
 RUNS = Variable(name="belt/runs", source="plc", address='"Belt".runs', type=Kind.BOOL, timeout=1)
 GONE = Variable(name="gone", source="plc", address='"Gone".x', unit="1", timeout=1)
 PROGRAM = {'"Belt".speed': lambda t: 250.0, '"Belt".runs': lambda t: True}
-TARGET = Target(name="", joints=(), units=(), lower=(), upper=(), velocity=(), variables=(SPEED, RUNS, GONE))
+TARGET = Target(variables=(SPEED, RUNS, GONE))
 
 
 @pytest.fixture(autouse=True)
@@ -48,38 +52,25 @@ def source(server, **more):
     return SiemensWeb(**(options | more))
 
 
-@contextmanager
-def listening(found, folder=""):
-    heard = []
-    target = Target(**{f: getattr(TARGET, f) for f in TARGET.__struct_fields__} | {"folder": str(folder)})
-    listener = Listener(found, target, heard.append)
-    listener.start()
-    try:
-        yield heard
-    finally:
-        listener.ask_to_stop()
-        assert listener.join(10)
-
-
 def good(heard):
     return bool(heard) and "belt/speed" not in heard[-1].doubts and "belt/speed" in heard[-1].values
 
 
 def test_variables_arrive_and_the_session_is_given_back():
     with plc() as server:
-        with listening(source(server)) as heard:
+        with listening(source(server), TARGET) as heard:
             wait_for(lambda: good(heard), 20)
             assert heard[-1].values == {"belt/speed": 0.25, "belt/runs": True}
             assert "Address does not exist" in heard[-1].doubts["gone"]
             assert len(server.sessions) == 1
-        assert server.sessions == set()
+        assert not server.sessions
 
 
 def test_a_plc_that_is_switched_off_and_on_is_asked_again(monkeypatch):
     monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.02)
     server = plc().start()
     try:
-        with listening(source(server)) as heard:
+        with listening(source(server), TARGET) as heard:
             for _ in range(3):
                 wait_for(lambda: good(heard), 20)
                 server.stop()
@@ -134,7 +125,9 @@ def signed(folder):
 
 def test_only_the_certificate_that_was_given_is_trusted(tmp_path):
     with plc(certificate=signed(tmp_path)) as server:
-        with listening(source(server, ca="plc.pem"), tmp_path) as heard:
+        with listening(
+            source(server, ca="plc.pem"), msgspec.structs.replace(TARGET, folder=str(tmp_path))
+        ) as heard:
             wait_for(lambda: good(heard), 20)
         opened = source(server, ca="plc.pem").open(tmp_path, TARGET)
         assert "asked from https" in opened.findings[1].text
@@ -148,7 +141,7 @@ def test_a_wrong_password_is_said(monkeypatch):
     with plc() as server:
         said = " ".join(f.text for f in source(server).open(None, None).findings)
         assert "Login failed" in said
-        assert server.sessions == set()
+        assert not server.sessions
 
 
 def test_a_password_does_not_travel_unencrypted(tmp_path):
@@ -208,3 +201,63 @@ def test_any_batch_is_an_outcome_per_question(answers):
     found = results(json.dumps(answers).encode(), 3)
     assert len(found) == 3
     assert all(isinstance(why, str) for _, why in found)
+
+
+def half_asked(server):
+    """A connection on which a request has begun."""
+    asking = socket.create_connection((server.host, server.port))
+    head = f"POST {PATH} HTTP/1.1\r\nHost: plc\r\nContent-Length: 100\r\n\r\n"
+    asking.sendall(head.encode() + b"{")
+    return asking
+
+
+def test_a_plc_that_is_switched_off_within_a_request_says_nothing_of_it(caplog):
+    caplog.set_level("ERROR")
+    with plc() as server:
+        with half_asked(server):
+            assert httpx.get(server.url).status_code == 404  # by now it has read the one before, too
+            server.stop()
+        server.start()
+        half_asked(server).close()
+        assert httpx.get(server.url).status_code == 404
+    assert not caplog.records
+
+
+@pytest.mark.parametrize(
+    ("asked", "code"),
+    [
+        (b"{", -32700),
+        (b"[" * 100_000, -32700),
+        (b"[1, {}]", -32600),
+        (b'{"method": 1, "id": 1, "params": 2}', 2),
+    ],
+)
+def test_a_plc_answers_what_is_no_request(caplog, asked, code):
+    with plc() as server:
+        said = httpx.post(server.url + PATH, content=asked).json()
+    first = said[0] if isinstance(said, list) else said
+    assert first["error"]["code"] == code
+    assert not [r for r in caplog.records if r.levelname == "ERROR"]
+
+
+def test_sessions_that_lost_connections_have_left_are_given_back():
+    """A PLC has four; ten losses in a row must not take them all."""
+
+    async def logged_in(found, wire, *, lost):
+        with suppress(ConnectionError):
+            async with found._session(Path()):
+                if lost:
+                    wire.deaf = True
+                    wire.cut()
+                    raise ConnectionError
+
+    with plc() as server:
+        wire = Stream(server.port)
+        found = source(server, url=f"http://127.0.0.1:{wire.port}")
+        for k in range(10):
+            asyncio.run(logged_in(found, wire, lost=True))
+            wire.deaf = False
+            assert len(server.sessions) == 1, k
+        asyncio.run(logged_in(found, wire, lost=False))
+        wire.close()
+        assert not server.sessions

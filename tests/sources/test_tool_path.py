@@ -9,6 +9,7 @@ from made_motion import target, write_csv, write_sheet
 from scipy.spatial.transform import Rotation
 
 import seerob as sr
+from kept_run import Kept
 from oracles.pinocchio_oracle import pinocchio_model
 from seerob.errors import InputError
 from seerob.model_io.loader import load_robot
@@ -284,25 +285,6 @@ class Arm:
     def base_from(self, q, link):
         pin.framesForwardKinematics(self.model, self.data, q)
         return self.data.oMf[self.model.getFrameId(link)]
-
-
-class Kept:
-    """A sink that keeps what it is given."""
-
-    def __init__(self):
-        self.snapshots = []
-
-    def write(self, snapshot, samples):
-        self.snapshots.append(snapshot)
-
-    def close(self):
-        pass
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
 
 
 def station(folder, poses, times, source, q=Q):

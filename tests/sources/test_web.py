@@ -5,16 +5,14 @@ from __future__ import annotations
 import asyncio
 import json
 import time
-from contextlib import contextmanager
 
 import pytest
 
-from live_story import open_files, wait_for
+from live_story import listening, open_files, wait_for
 from seerob import cli
 from seerob.commands.emulating import web as emulating
 from seerob.emulators.web import STATE, WebServer
 from seerob.errors import InputError
-from seerob.live.listening import Listener
 from seerob.source import Target
 from seerob.sources.web import Web, leaves
 from seerob.variables.dictionary import Kind, Variable
@@ -38,18 +36,6 @@ def patience(monkeypatch):
     monkeypatch.setenv("PLC_TOKEN", "secret")
 
 
-@contextmanager
-def listening(source, target=ALL):
-    heard = []
-    listener = Listener(source, target, heard.append)
-    listener.start()
-    try:
-        yield heard
-    finally:
-        listener.ask_to_stop()
-        assert listener.join(10)
-
-
 def good(heard):
     return bool(heard) and heard[-1].values.get("speed") == 0.25 and heard[-1].values["runs"] is True
 
@@ -65,7 +51,7 @@ def pushed(server, **more):
 @pytest.mark.parametrize("way", [polled, pushed])
 def test_values_arrive_and_what_is_not_there_is_doubted(way):
     files = open_files()
-    with WebServer(told) as server, listening(way(server)) as heard:
+    with WebServer(told) as server, listening(way(server), ALL) as heard:
         wait_for(lambda: good(heard), 20)
         doubts = heard[-1].doubts
         assert "not heard for" in doubts["old"]
@@ -80,7 +66,7 @@ def test_values_arrive_and_what_is_not_there_is_doubted(way):
 @pytest.mark.parametrize("way", [polled, pushed])
 def test_only_who_has_the_token_is_answered(way):
     with WebServer(told, token="secret") as server:
-        with listening(way(server, token_env="PLC_TOKEN")) as heard:
+        with listening(way(server, token_env="PLC_TOKEN"), ALL) as heard:
             wait_for(lambda: good(heard), 20)
         said = " ".join(f.text for f in way(server).open(None, ALL).findings)
         assert "not reached at start" in said
@@ -160,7 +146,7 @@ def test_the_emulated_machine_can_be_probed(capsys):
     options = cli.parser().parse_args(["emulate", "web", "--port", "0"])
     with emulating.emulated(options).server as server:
         for url in (server.url + STATE, server.live):
-            assert cli.main(["probe", "web", url, "--seconds", "1.5"]) == 0
+            assert cli.main(["probe", "web", url, "--seconds", "0.3"]) == 0
     said = capsys.readouterr().out
     assert said.count('kind = "web"') == 2
     assert said.count("/belt/speed = 250.0") + said.count("/belt/speed = 0.0") == 2

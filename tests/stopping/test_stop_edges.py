@@ -87,11 +87,11 @@ def test_the_largest_factor_is_searched_up_to_ten_times_the_present_speeds(costl
 
 def test_what_S_p_may_be_off_is_put_on_the_side_of_the_distance():
     distance, S_p = np.array([3.0, 2.0]), np.array([1.0, 1.5])
-    assert intervals(distance, S_p, 0.0, None) == [(3.0, 3.0), (2.0, 2.0)]
-    assert intervals(distance, S_p, 0.25, None) == [(2.75, 3.25), (1.75, 2.25)]
+    assert intervals(distance, distance, S_p, None) == [(3.0, 3.0), (2.0, 2.0)]
+    assert intervals(distance - 0.25, distance + 0.25, S_p, None) == [(2.75, 3.25), (1.75, 2.25)]
     span = Spread(S_p - 0.5, S_p + 0.25, np.zeros((0, 2)))
-    assert intervals(distance, S_p, 0.0, span) == [(2.75, 3.5), (1.75, 2.5)]
-    assert intervals(distance, S_p, 1.0, span) == [(1.75, 4.5), (0.75, 3.5)]
+    assert intervals(distance, distance, S_p, span) == [(2.75, 3.5), (1.75, 2.5)]
+    assert intervals(distance - 1.0, distance + 1.0, S_p, span) == [(1.75, 4.5), (0.75, 3.5)]
 
 
 @pytest.mark.parametrize("remembers", [False, True])

@@ -109,6 +109,8 @@ def test_largest_factor_is_the_last_that_holds(c, b, a):
     elif np.isfinite(s) and s < 1e6:
         assert worst(s * (1 - 1e-6)) <= 1e-9
         assert worst(s * (1 + 1e-6) + 1e-9) >= -1e-9
+    else:
+        assert worst(1e6 * (1 - 1e-6)) <= 1e-9
 
 
 def test_no_factor_helps_a_part_that_is_too_near_at_rest():

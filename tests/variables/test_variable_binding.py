@@ -6,7 +6,7 @@ import pytest
 
 from seerob import load
 from seerob.errors import InputError
-from seerob.run import source_target
+from seerob.opening import source_target
 
 STATION = """
 variables = "variables.toml"

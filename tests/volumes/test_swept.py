@@ -56,6 +56,13 @@ def test_no_point_of_the_moving_bodies_at_any_time_is_outside(ur10, step, voxel,
     assert swept.dilation > 0.2 * min(slack, 0.5) * voxel
 
 
+def test_none_of_a_million_points_is_outside(ur10):
+    rng = np.random.default_rng(8)
+    bodies, motion = ur10.select("arm"), {"arm": wander(12, rng, 0.1)}
+    swept = swept_volume(ur10, bodies, motion, voxel=0.02)
+    assert missed(ur10, bodies, motion, swept.grid.contains, 1_000_000, rng, each=1000) == 0
+
+
 def test_coarse_pieces_cover_every_way_between_the_two_samples(planar):
     """With one piece, joints may go from end to end at any pace of their own."""
     rng = np.random.default_rng(3)

@@ -7,6 +7,7 @@ from seerob.model_io import library
 from seerob.transforms import rotation_from_rpy, wxyz_from_rotation
 from seerob.waypoints.arm import Arm
 from seerob.waypoints.continuous import Wish, continuous
+from seerob.waypoints.joint_limits import JointLimits
 from seerob.waypoints.waypoint import Move, Program, ToolPose, Waypoint
 
 HOME = np.array([0.0, -1.2, 1.4, -1.7, -1.57, 0.0])
@@ -21,7 +22,7 @@ WISH = Wish(
     tool_jerk=TOOL[2],
     period=0.001,
 )
-FREE = (9.0,) * 6
+FREE = JointLimits.of(6, speed=(9.0,))
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +31,7 @@ def arm():
 
 
 def moved(arm, waypoints, limits=FREE):
-    found = continuous(Program("p", tuple(waypoints)), arm, WISH, speed_limits=limits)
+    found = continuous(Program("p", tuple(waypoints)), arm, WISH, limits=limits)
     return found.trajectory.q[:-1]  # the last sample is no whole period after the one before
 
 
@@ -90,7 +91,7 @@ def test_blends_keep_the_speed_limits_of_the_joints(arm):
         )
         for k, p in enumerate(corner)
     ]
-    slow = (0.2,) * 6
+    slow = JointLimits.of(6, speed=(0.2,))
     q = moved(arm, [Waypoint(place="home", q=tuple(HOME), speed=0.1), *points], limits=slow)
     assert 0.15 < derivatives(q)[0].max() <= 0.2 * (1 + 1e-4)
 
@@ -108,10 +109,40 @@ def test_a_linear_corner_between_a_joint_and_a_tool_move_is_smooth(arm):
     assert 20.0 < derivatives(q)[2].max() < 60.0
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_every_move_keeps_what_the_joints_may_do(arm, seed):
+    random = np.random.default_rng(seed)
+    acceleration, jerk = random.uniform(0.3, 1.5, 6), random.uniform(1.5, 9.0, 6)
+    own = JointLimits.of(6, speed=(9.0,), acceleration=acceleration, jerk=jerk)
+    points = [Waypoint(place="home", q=tuple(HOME))]
+    for k, place in enumerate(np.array([-0.7, 0.0, 0.4]) + random.uniform(-0.25, 0.25, (5, 3))):
+        turn = np.array([np.pi, 0.0, 0.0]) + random.uniform(-0.4, 0.4, 3)
+        pose = ToolPose(tuple(place), tuple(wxyz_from_rotation(rotation_from_rpy(turn))))
+        move = Move.LINEAR if k % 3 else Move.JOINT
+        points.append(Waypoint(place=f"{k}", move=move, pose=pose, blend=random.choice([0.0, 0.03])))
+    _, a, j = derivatives(moved(arm, points, limits=own))
+    for found, limit in ((a, acceleration), (j, jerk)):
+        assert (found <= limit * (1 + 1e-3)).all()
+    # As a whole it is slowed no more than some joint needs.
+    assert max((a / acceleration).max(), (j / jerk).max()) > 0.7
+
+
+def test_a_move_that_is_slowed_for_a_joint_says_for_which_and_how_much(arm):
+    goal = ToolPose((-0.7, 0.0, 0.4), (0.0, 1.0, 0.0, 0.0))
+    points = Waypoint(place="a", q=tuple(HOME)), Waypoint(place="b", move=Move.LINEAR, pose=goal)
+    own = JointLimits.of(6, acceleration=(0.4,), jerk=(4.0,))
+    found, free = (continuous(Program("p", points), arm, WISH, limits=each) for each in (own, FREE))
+    (doubt,) = [text for text in found.doubts if "slowed by" in text]
+    assert "keeps its limit of" in doubt
+    k = float(doubt.split("slowed by ")[1].split()[0])
+    assert found.trajectory.duration == pytest.approx(k * free.trajectory.duration, rel=1e-2)
+    assert "do not limit" not in " ".join(found.remarks)
+
+
 def test_what_joints_reach_on_a_linear_move_is_said(arm):
     goal = ToolPose((-0.7, 0.0, 0.4), (0.0, 1.0, 0.0, 0.0))
     points = Waypoint(place="a", q=tuple(HOME)), Waypoint(place="b", move=Move.LINEAR, pose=goal)
-    found = continuous(Program("p", points), arm, WISH, speed_limits=FREE)
+    found = continuous(Program("p", points), arm, WISH, limits=FREE)
     sizes = derivatives(found.trajectory.q[:-1])
     (text,) = [r for r in found.remarks if r.startswith("joints reach, over 0.001 s")]
     assert (

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from seerob.distances.least import Query
 from seerob.human.skeleton import BONES
 from seerob.judging import Judge
 from seerob.whereabouts.tracking_error import TrackingError, tracking
@@ -138,3 +139,41 @@ def test_the_room_is_that_of_the_nearest_and_whoever_may_be_inside_leaves_it_ope
         assert (found.value, found.verdict) == (exact.value, verdict)
         assert who in found.reason
     assert "9000.0 mm" in found.reason
+
+
+def test_what_a_person_carries_is_off_as_its_bone_is_and_two_people_add_up(tmp_path):
+    """A rod in the hand, turned and beside it, moves by the hand's place and turn times its own reach."""
+    more = (
+        '[[workpieces]]\nname = "rod"\non = "op/right_hand"\nshape = { box = [0.6, 0.1, 0.1] }\nmass = 1\n'
+        "at = { position = [0.2, 0, 0], rpy_deg = [0, 0, 90] }\n"
+        '[[areas]]\nname = "halo"\non = "op/head"\nshape = { sphere = 0.5 }\n'
+        '[[safety]]\nkind = "minimum_distance"\nname = "rod"\nbetween = ["rod", "arm"]\n'
+        '[[safety]]\nkind = "minimum_distance"\nname = "both"\nbetween = ["op", "other"]\n'
+        '[[safety]]\nkind = "safety_area"\nname = "halo"\narea = "halo"\nof = "other"\n'
+    )
+    station, state = twin(tmp_path, more)
+    state.hearings["op"].bones = {"head": (0.03, 0.2), "right_hand": (0.02, 0.1)}
+    state.hearings["other"].bones = {"pelvis": (0.5, 0.0)}
+    rod = 0.02 + 0.1 * np.linalg.norm([0.2 + 0.05, 0.3, 0.05])
+    assert off(station, state, "rod", "halo") == pytest.approx([rod, 0.03 + 0.2 * 0.5], rel=1e-9)
+    found = {result.name: result for result in Judge(station.bound)(state)}
+    assert found["rod"].interval == pytest.approx((found["rod"].value - rod, found["rod"].value + rod))
+    bodies = [station.model.select(name) for name in ("op", "other")]
+    apart = Query(station.model.shapes, *bodies).per_pair(state.rotations, state.positions).distance
+    first, second = (TrackingError(station.model, side).at(state) for side in bodies)
+    errors = (first[:, None] + second).ravel()
+    assert found["both"].interval == pytest.approx(((apart - errors).min(), (apart + errors).min()))
+    assert found["both"].interval[0] < found["both"].value - 0.4
+
+
+@pytest.mark.parametrize(("error", "verdict"), [(0.0, "within"), (0.04, "within"), (0.06, "undecided")])
+def test_an_area_on_a_bone_may_be_where_the_bone_is(tmp_path, error, verdict):
+    """Of 5 cm of room."""
+    area = '[[areas]]\nname = "halo"\non = "op/pelvis"\nshape = {{ sphere = {} }}\n'
+    area += '[[safety]]\nkind = "safety_area"\nname = "it"\narea = "halo"\nof = "arm"\n'
+    station, state = twin(tmp_path / "a", area.format(0.5))
+    room = Judge(station.bound)(state)[0].value
+    station, state = twin(tmp_path / "b", area.format(0.5 + room - 0.05))
+    state.hearings["op"].bones = {"pelvis": (error, 0.0)}
+    found = Judge(station.bound)(state)[0]
+    assert (found.value, found.verdict) == (pytest.approx(0.05, abs=1e-9), verdict)

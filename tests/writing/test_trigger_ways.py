@@ -2,51 +2,22 @@
 
 from __future__ import annotations
 
-import asyncio
 import socket
 import threading
 from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
+from made_trigger import said, triggering
 from msgspec.structs import replace as changed
 
 from amqtt_broker import broker
 from foreign_opcua import URI, foreign_opcua
+from in_a_loop import in_a_loop
 from live_story import wait_for
-from seerob import load
 from seerob.errors import InputError
-from seerob.snapshot import Result, Snapshot, Verdict
+from seerob.snapshot import Verdict
 from seerob.writing.triggers import Triggers, allowed
-
-STATION = """
-allow_writing = true
-variables = "variables.toml"
-[[machines]]
-name = "arm"
-shape = { sphere = 0.1 }
-slide = {}
-[[sources]]
-name = "plc"
-SOURCE
-[[safety]]
-kind = "velocity"
-name = "speed"
-at = "arm"
-limit = 1.0
-[[triggers]]
-variable = "twin/fast"
-criterion = "speed"
-every = 0.1
-"""
-VARIABLE = """
-[[variables]]
-name = "twin/fast"
-source = "plc"
-address = ADDRESS
-type = "bool"
-write = true
-"""
 
 
 @pytest.fixture(autouse=True)
@@ -55,18 +26,11 @@ def patience(monkeypatch):
     monkeypatch.setattr("seerob.writing.triggers.WITHIN", 20.0)
 
 
-def made(folder, source, address):
-    (folder / "workstation.toml").write_text(STATION.replace("SOURCE", source))
-    (folder / "variables.toml").write_text(VARIABLE.replace("ADDRESS", address))
-    return load(folder)
-
-
 def edges(station, *verdicts):
     """A run in which a verdict comes and goes, each once it was written."""
     with Triggers(station.model, on_command_line=True) as triggers:
         for seq, (verdict, written) in enumerate(verdicts):
-            result = Result(name="speed", value=1.0, verdict=verdict)
-            triggers.write(Snapshot(seq=seq, t=0.01 * seq, poses=b"", results=(result,)), ())
+            triggers.write(said(verdict, seq), ())
             wait_for(written, 60)
 
 
@@ -74,28 +38,6 @@ def free_port():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         return free.getsockname()[1]
-
-
-@contextmanager
-def in_a_loop(serve):
-    """Something that serves until it is told to stop: ``serve(ready, over)``."""
-    ready, ends = threading.Event(), []
-
-    async def main():
-        over = asyncio.Event()
-        ends.append((asyncio.get_running_loop(), over))
-        await serve(ready, over)
-
-    thread = threading.Thread(target=lambda: asyncio.run(main()), daemon=True)
-    thread.start()
-    assert ready.wait(60)
-    try:
-        yield
-    finally:
-        loop, over = ends[0]
-        loop.call_soon_threadsafe(over.set)
-        thread.join(30)
-        assert not thread.is_alive()
 
 
 # -- Modbus -------------------------------------------------------------------------------------
@@ -136,7 +78,7 @@ def coil(port):
 
 def test_a_coil_of_a_modbus_device_is_written(tmp_path):
     port = free_port()
-    station = made(tmp_path, coil(port), '{ table = "coil", at = 5, type = "bit" }')
+    station = triggering(tmp_path, coil(port), '{ table = "coil", at = 5, type = "bit" }')
     with modbus_device(port) as written:
         edges(
             station,
@@ -147,7 +89,7 @@ def test_a_coil_of_a_modbus_device_is_written(tmp_path):
 
 
 def test_registers_are_not_written(tmp_path):
-    station = made(tmp_path, coil(1), '{ table = "holding", at = 5, type = "bit", bit = 0 }')
+    station = triggering(tmp_path, coil(1), '{ table = "holding", at = 5, type = "bit", bit = 0 }')
     with pytest.raises(InputError, match="a trigger is written to a coil alone"):
         _ = station.sources
 
@@ -155,28 +97,36 @@ def test_registers_are_not_written(tmp_path):
 # -- OPC UA -------------------------------------------------------------------------------------
 
 
-def test_a_node_of_another_makers_server_is_written(tmp_path):
-    nodes = {"fast": False, "other": False}
-    with foreign_opcua(nodes, writable=nodes) as (url, node):
-        station = made(tmp_path, f'kind = "opcua"\nurl = "{url}"', f'"nsu={URI};s=fast"')
-        edges(
-            station,
-            (Verdict.WITHIN, lambda: True),
-            (Verdict.EXCEEDED, lambda: node["fast"].read_value() is True),
-            (Verdict.WITHIN, lambda: node["fast"].read_value() is False),
-        )
-        assert node["other"].read_value() is False
+@pytest.fixture(scope="module")
+def server():
+    """One for all: it takes seconds to start."""
+    with foreign_opcua(dict.fromkeys(("fast", "kept", "other"), False), writable=("fast", "other")) as found:
+        yield found
 
 
-def test_a_node_that_its_server_protects_stays_as_it_is(tmp_path, caplog):
-    with foreign_opcua({"fast": False}) as (url, node):
-        station = made(tmp_path, f'kind = "opcua"\nurl = "{url}"', f'"nsu={URI};s=fast"')
-        edges(
-            station,
-            (Verdict.WITHIN, lambda: True),
-            (Verdict.EXCEEDED, lambda: "twin/fast" in caplog.text),
-        )
-        assert node["fast"].read_value() is False
+def node_of(url, name):
+    return f'kind = "opcua"\nurl = "{url}"', f'"nsu={URI};s={name}"'
+
+
+def test_a_node_of_another_makers_server_is_written(tmp_path, server):
+    url, node = server
+    edges(
+        triggering(tmp_path, *node_of(url, "fast")),
+        (Verdict.WITHIN, lambda: True),
+        (Verdict.EXCEEDED, lambda: node["fast"].read_value() is True),
+        (Verdict.WITHIN, lambda: node["fast"].read_value() is False),
+    )
+    assert node["other"].read_value() is False
+
+
+def test_a_node_that_its_server_protects_stays_as_it_is(tmp_path, server, caplog):
+    url, node = server
+    edges(
+        triggering(tmp_path, *node_of(url, "kept")),
+        (Verdict.WITHIN, lambda: True),
+        (Verdict.EXCEEDED, lambda: "twin/fast" in caplog.text),
+    )
+    assert node["kept"].read_value() is False
 
 
 # -- MQTT ---------------------------------------------------------------------------------------
@@ -186,7 +136,7 @@ def test_a_topic_is_published(tmp_path):
     from paho.mqtt.client import CallbackAPIVersion, Client
 
     port, heard = free_port(), []
-    station = made(tmp_path, f'kind = "mqtt"\nhost = "127.0.0.1"\nport = {port}', '"twin/fast"')
+    station = triggering(tmp_path, f'kind = "mqtt"\nhost = "127.0.0.1"\nport = {port}', '"twin/fast"')
     with broker(port):
         machine, up = Client(CallbackAPIVersion.VERSION2), threading.Event()
         machine.on_message = lambda _client, _data, message: heard.append((message.topic, message.payload))
@@ -209,7 +159,7 @@ def test_a_topic_is_published(tmp_path):
 
 @pytest.mark.parametrize("address", ['{ topic = "a", pointer = "/b" }', '{ node = "g/n", metric = "m" }'])
 def test_what_is_no_plain_topic_is_not_published(tmp_path, address):
-    station = made(tmp_path, 'kind = "mqtt"\nhost = "127.0.0.1"\nport = 1', address)
+    station = triggering(tmp_path, 'kind = "mqtt"\nhost = "127.0.0.1"\nport = 1', address)
     with pytest.raises(InputError, match="on a topic of its own"):
         _ = station.sources
 
@@ -218,7 +168,9 @@ def test_what_is_no_plain_topic_is_not_published(tmp_path, address):
 
 
 def test_each_takes_the_file_and_the_command_line(tmp_path):
-    model = made(tmp_path, 'kind = "opcua"\nurl = "opc.tcp://127.0.0.1:1"', '"nsu=urn:cell;s=fast"').model
+    model = triggering(
+        tmp_path, 'kind = "opcua"\nurl = "opc.tcp://127.0.0.1:1"', '"nsu=urn:cell;s=fast"'
+    ).model
     assert allowed(model, on_command_line=True)
     with pytest.raises(InputError, match="not allowed"):
         Triggers(model, on_command_line=False)
@@ -230,4 +182,4 @@ def test_each_takes_the_file_and_the_command_line(tmp_path):
 def test_a_source_that_cannot_write_says_which_can(tmp_path):
     source = 'kind = "web"\nurl = "http://127.0.0.1:1/"'
     with pytest.raises(InputError, match="modbus, mqtt, opcua, siemens_web"):
-        Triggers(made(tmp_path, source, '"/x"').model, on_command_line=True)
+        Triggers(triggering(tmp_path, source, '"/x"').model, on_command_line=True)

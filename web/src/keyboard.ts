@@ -37,6 +37,10 @@ function actionOf(key: string, shift: boolean, actions: Actions): (() => void) |
       return () => (shift ? time.seekBy(BACK) : time.step(BACK));
     case "ArrowRight":
       return () => (shift ? time.seekBy(AHEAD) : time.step(AHEAD));
+    case "Home":
+      return () => time.begin();
+    case "End":
+      return () => time.end();
     case "[":
       return () => time.violation(false);
     case "]":

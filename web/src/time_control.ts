@@ -29,6 +29,17 @@ export class TimeControl {
     }
   }
 
+  /** To the first instant that can be shown. */
+  begin(): void {
+    if (Number.isFinite(reach.value.start)) this.seek(reach.value.start);
+  }
+
+  /** To the last instant of a recording, or to the newest of a live run. */
+  end(): void {
+    if (isLive.value) this.follow();
+    else this.seek(reach.value.end);
+  }
+
   seekBy(seconds: number): void {
     if (Number.isFinite(now.value)) this.seek(now.value + seconds);
   }

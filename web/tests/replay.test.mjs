@@ -52,7 +52,7 @@ test("who may be elsewhere is hatched, in the tree, and in the legend; the rest 
   await page.waitForFunction(() => !document.querySelector(".item .doubt, .doubt-key"));
 });
 
-test("arrows step by one snapshot, with shift by a second", async () => {
+test("arrows step by one snapshot, with shift by a second; Home and End go to the ends", async () => {
   const t = await settled(page);
   await page.keyboard.press("ArrowRight");
   await reaches(t + 0.01);
@@ -61,6 +61,15 @@ test("arrows step by one snapshot, with shift by a second", async () => {
   await page.keyboard.press("Shift+ArrowLeft");
   await reaches(t - 1);
   await assertShown(page, served, await settled(page));
+  for (const [key, to] of [
+    ["Home", 0],
+    ["End", 20],
+  ]) {
+    await page.keyboard.press(key);
+    await reaches(to);
+  }
+  await page.keyboard.press("Home");
+  await reaches(0);
 });
 
 test("] goes to where a limit begins to be exceeded, and [ back", async () => {

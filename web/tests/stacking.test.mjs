@@ -8,14 +8,15 @@ const { stackCaptions } = await load("markers/stacking");
 const view = { camera: { fov: 90, aspect: 1 }, pixel: 1 / 400 };
 
 function captionAt(x, y, widthPx) {
-  const caption = { lifted: 0, widthPx, heightPx: 24, object: {} };
+  const caption = { lifted: 0, right: 0, widthPx, heightPx: 24, object: {} };
   caption.object.getWorldPosition = (to) => {
     to.set(x / 400, y / 400, 0);
     to.project = () => to;
     return to;
   };
-  caption.lift = (px) => {
+  caption.lift = (px, right = 0) => {
     caption.lifted = px;
+    caption.right = right;
   };
   return { caption, x, y, widthPx };
 }
@@ -54,4 +55,17 @@ test("at the upper edge of the room captions go down, not behind the tools", () 
   const places = all.map((c) => 300 + c.caption.lifted).sort((a, b) => a - b);
   assert.ok(places.at(-1) + 24 <= 400 - 50);
   for (const [i, y] of places.slice(1).entries()) assert.ok(y - places[i] >= 24, `${places}`);
+});
+
+test("at a side of the room captions stay in sight, as far as the room is wide enough", () => {
+  const shifted = (x, width) => {
+    const { caption } = captionAt(x, 0, width);
+    stackCaptions([caption], view);
+    return caption.right;
+  };
+  assert.equal(shifted(100, 200), 0);
+  assert.ok(Math.abs(shifted(390, 200) + 90) < 1e-9);
+  assert.ok(Math.abs(shifted(-390, 200) - 90) < 1e-9);
+  assert.equal(shifted(390, 900), 0);
+  assert.equal(shifted(500, 200), 0);
 });

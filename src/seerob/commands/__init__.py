@@ -245,13 +245,17 @@ def _missing(errors: BoneErrors) -> str:
 
 
 def extreme(series: Series) -> str:
-    """The figure that matters: ``max 0.84 m/s at 12.31 s   limit 1.00``."""
+    """The figure that matters: ``max 0.84 m/s at 12.31 s, limit 1``.
+
+    It is ``worst`` where a limit that moves decides at another instant than that of the extreme value.
+    """
     worst = series.worst()
-    if series.verdict is Verdict.UNDECIDED:
+    if worst.reason and (worst.value is None or series.verdict is Verdict.UNDECIDED):
         return f"{worst.reason} (first at {worst.t:.2f} s)" if worst.t is not None else worst.reason
     if worst.value is None:
         return "no value"
-    what = "max" if series.at_most else "min"
+    what, most = ("max", series.max()) if series.at_most else ("min", series.min())
+    what = what if worst.value == most else "worst"
     shown = against(worst.value, worst.limit, series.unit, at_most=series.at_most)
     text = f"{what} {with_unit(shown.value, series.unit)} at {worst.t:.2f} s"
     if worst.limit is not None:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 HELP = "make a workstation folder from an AutomationML plant: parts, places, robots to choose, variables"
 EXAMPLE = "seerob import-aml cell.amlx my_cell"
 
+GEOMETRY = {"COLLADAInterface", "GeometryDataConnector"}
 VARIABLES = {"VariableInterface", "SignalInterface", "LogicInterface"}
 ADDRESSES = ("refURI", "Address", "address", "Tag", "Variable", "Path")
 """Attributes of an interface that say where a variable is, the first that there is."""
@@ -65,8 +66,9 @@ def run(options: argparse.Namespace) -> int:
     if not (made.parts or made.robots or made.variables):
         count = sum(1 for _ in plant.walk())
         text = (
-            f"{count} elements, none of which has a geometry file (COLLADAInterface), the role Robot or a "
-            f"variable ({', '.join(sorted(VARIABLES))}): the folder is an empty workstation"
+            f"{count} elements, none of which has a geometry file ({', '.join(sorted(GEOMETRY))}), "
+            f"the role Robot or a variable ({', '.join(sorted(VARIABLES))}): the folder is an empty "
+            "workstation"
         )
         line("warning", text, "yellow")
     line(
@@ -117,7 +119,7 @@ class Made:
             self.robots += 1
             yield from self._robot(self._unique(path.rpartition("/")[2]), world)
         for interface in element.interfaces:
-            if interface.kind == "COLLADAInterface" or _value(interface, "refURI").lower().endswith(".dae"):
+            if interface.kind in GEOMETRY or _is_mesh(_value(interface, "refURI")):
                 yield from self._part(path, interface, world)
             elif interface.kind in VARIABLES:
                 self.variables.append("\n".join(self._variable(path, interface)))
@@ -174,6 +176,12 @@ class Made:
             found = f"{name}_{n}"
         self._names.add(found)
         return found
+
+
+def _is_mesh(uri: str) -> bool:
+    from seerob.model_io.mesh import READERS
+
+    return PurePosixPath(uri.partition("#")[0].replace("\\", "/")).suffix.lower() in READERS
 
 
 def _deep(attributes: Iterable[Attribute]) -> Iterator[Attribute]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from seerob.commands import OUT, Exit, line
-from seerob.errors import InputError, Problem, suggestion
+from seerob.errors import InputError, Problem
 
 if TYPE_CHECKING:
     from seerob.human.morphology import Morphology
@@ -65,9 +65,8 @@ def reader(options: argparse.Namespace, command: str) -> CaptureFile:
         InputError: It is none of a person's motion; or every option that it does not have, or that is the
             command's own.
     """
-    import msgspec
-
     from seerob.commands.probe import options_of
+    from seerob.conversion import convert
     from seerob.plugin import load
     from seerob.source import Source
     from seerob.sources._capture_file import CaptureFile
@@ -77,21 +76,16 @@ def reader(options: argparse.Namespace, command: str) -> CaptureFile:
         what = f"{options.kind} reads no recording of a person"
         raise InputError.at(command, "kind", what, "see: seerob kinds sources")
     where, more = f"{command} {options.kind}", options_of(options.set, command)
-    fields = [name for name in kind.__struct_fields__ if name not in GIVEN]
     problems = [
         Problem(where, f"--set {key}", "is an argument of the command itself", GIVEN[key])
-        if key in GIVEN
-        else Problem(where, f"--set {key}", "no such option", suggestion(key, fields))
         for key in more
-        if key not in fields
+        if key in GIVEN
     ]
-    if problems:
-        raise InputError(problems)
     given = {"human": options.name, "file": Path(options.file).name, "subject": options.subject}
-    try:
-        return msgspec.convert(given | more, kind)
-    except msgspec.ValidationError as error:
-        raise InputError.at(where, "--set", str(error), f"options: {', '.join(fields)}") from error
+    source = convert(more | given, kind, file=where, key="", problems=problems)
+    if problems or source is None:
+        raise InputError(problems)
+    return source
 
 
 def measured(

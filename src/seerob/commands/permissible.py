@@ -32,6 +32,7 @@ from seerob.commands.permissible_result import (
 from seerob.commands.sinks import refuse_existing
 from seerob.commands.whole_folder import whole_folder
 from seerob.errors import InputError
+from seerob.same_names import by_name
 
 if TYPE_CHECKING:
     from seerob.permissible.between_samples import Bound
@@ -123,15 +124,7 @@ def run(options: argparse.Namespace) -> int:
     if not options.json:
         describe(station)
         tell(station.scene().findings)
-    wish = Wish(
-        by=By(options.by),
-        tolerance=options.tolerance,
-        spacing=options.spacing,
-        margin=options.margin,
-        not_faster=options.not_faster,
-        period=options.period,
-        verify=options.verify,
-    )
+    wish = by_name(Wish, options, by=By(options.by))
     bounds: list[Bound] = []
     cut: list[PathSegment] = []
     with whole_folder(folder) as working, work_progress(quiet=options.json) as say:

@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
     from seerob.sources._variables import VariablesSource
 
     if isinstance(source, VariablesSource):
-        return _variables(source, options.kind, given)
+        return _variables(source, options.kind, given, options.seconds)
     if options.calibration is not None:
         _save_calibration(source, options.calibration, where)
     newest: dict[str, Sample] = {}
@@ -108,10 +108,11 @@ def run(options: argparse.Namespace) -> int:
     return Exit.WITHIN
 
 
-def _variables(source: VariablesSource, kind: str, given: dict[str, Any]) -> int:
-    """Print what a device has; it is heard through a dictionary, for which this is the beginning."""
+def _variables(source: VariablesSource, kind: str, given: dict[str, Any], wait: float) -> int:
+    """Print what a device has, and how regularly; a dictionary says what it means."""
     import asyncio
 
+    from seerob.commands.heard_variables import tell_heard
     from seerob.commands.variables import nodes_of
     from seerob.live.listening import because
 
@@ -127,6 +128,11 @@ def _variables(source: VariablesSource, kind: str, given: dict[str, Any]) -> int
         line(node.type or "variable", f"{node.address} = {node.value}{unit}")
     if len(nodes) > MOST_SHOWN:
         line("", f"… {len(nodes) - MOST_SHOWN} more")
+    if nodes:
+        try:
+            tell_heard(source, nodes[:MOST_SHOWN], wait)
+        except (OSError, EOFError, SeerobError) as error:
+            line("heard", f"nothing: {because(error)}", "yellow")
     name = kind if source.name == "" else source.name
     line("note", f"seerob variables my_cell --browse {name} writes a dictionary of them")
     OUT.print(_snippet(kind, {"name": name} | given), markup=False)
@@ -166,12 +172,16 @@ def _save_calibration(source: LiveSource, path: Path, where: str) -> None:
 
 def _source(options: argparse.Namespace) -> tuple[LiveSource, dict[str, Any]]:
     """The source, and the options that make it."""
-    import msgspec
-
+    from seerob.conversion import convert
+    from seerob.errors import Problem
     from seerob.live.listening import LiveSource
     from seerob.plugin import load
+    from seerob.source import Source
 
-    kind = load("sources", options.kind, LiveSource)  # type: ignore[type-abstract,unused-ignore]
+    kind = load("sources", options.kind, Source)
+    if not issubclass(kind, LiveSource):
+        what = f"{options.kind} plays a file: there is no controller to ask"
+        raise InputError.at("seerob probe", "kind", what, "seerob check-file says what its file lacks")
     fields = set(kind.__struct_fields__)
     given = {key: getattr(options, key) for key in ("robot", "human", "port", "frequency")}
     given = {key: value for key, value in given.items() if value is not None and key in fields}
@@ -182,10 +192,11 @@ def _source(options: argparse.Namespace) -> tuple[LiveSource, dict[str, Any]]:
             raise InputError.at("seerob probe", "address", what, "leave it out")
         given[where] = options.address
     given |= options_of(options.set)
-    try:
-        return msgspec.convert(given, kind), given
-    except msgspec.ValidationError as error:
-        raise InputError.at(f"seerob probe {options.kind}", "", str(error)) from error
+    problems: list[Problem] = []
+    source = convert(given, kind, file=f"seerob probe {options.kind}", key="", problems=problems)
+    if source is None:
+        raise InputError(problems)
+    return source, given
 
 
 def options_of(pairs: list[str], command: str = "seerob probe") -> dict[str, Any]:

@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
         station = compiled(options.workstation, quiet=options.json, sources=False)
     else:
         tell_compiling()
-        from seerob.station import load_recorded
+        from seerob.recorded_station import load_recorded
 
         station = load_recorded(recording, cache=cache_folder())
     folder = run_folder(options.recording.parent, options.output)

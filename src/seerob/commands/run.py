@@ -121,6 +121,7 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
         with spinner() as say:
             writers = announced(station.open_sinks(sinks, folder, scene), list(map(file_of, sinks)), say)
             line("page", f"{view.url}  (Ctrl-C ends the run)", "bold")
+            _tell_ends(station)
             writers += _triggers(station, allow=options.allow_writing)
             writers += _targets(station, allow=options.allow_writing)
             summary = station.run(writers=[view, *writers], live=True, scene=scene, stop=over, progress=note)
@@ -128,6 +129,17 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
     tell_results(summary)
     tell_files(sinks, folder)
     return exit_code(summary.verdict)
+
+
+def _tell_ends(station: Station) -> None:
+    """Say whose file ends while the run goes on: nobody says where they are from then on."""
+    for source, opened in station.sources:
+        if source.target() and opened.duration > 0 and not source.loop:
+            text = (
+                f"{source.target()}: {source.name} ends at {opened.duration:.1f} s; what depends on it "
+                "is undecided from then on (loop = true in its source starts it again)"
+            )
+            line("note", text)
 
 
 def _triggers(station: Station, *, allow: bool) -> list[Triggers]:

@@ -66,7 +66,7 @@ def _sort(variable: Variable) -> str:
 def _listen(station: Station, wait: float) -> dict[str, str]:
     """What was heard of each variable, in words."""
     from seerob.live.listening import Listener, LiveSource
-    from seerob.run import source_target
+    from seerob.opening import source_target
     from seerob.samples import SignalSample
 
     newest: dict[str, SignalSample] = {}

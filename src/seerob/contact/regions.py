@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.distances.least import Per, Query, Reach
+from seerob.distances.least import Per, Query, Reach, Survey
 from seerob.human.skeleton import without_side
 from seerob.human.skin import BODY_REGION
 from seerob.model import Mechanism, Model
@@ -13,6 +13,7 @@ from seerob.norms import body_limits
 from seerob.snapshot import Verdict
 from seerob.state import State
 from seerob.transforms import Array
+from seerob.whereabouts.tracking_error import TrackingError
 
 SENSITIVE = "Larynx, eyes and ears"
 """In no row of the table; contact is not permitted."""
@@ -46,7 +47,7 @@ class Person:
     """The bones of a person by body region, bound once.
 
     A bone counts for its region in front and for that behind: a person can turn. Head and neck count
-    for larynx, eyes and ears too.
+    for larynx, eyes and ears too. A bone that is off from where devices see it counts from as much farther.
     """
 
     def __init__(
@@ -74,8 +75,10 @@ class Person:
         self._gap = model.gap(robot.moving, self.bodies)
         self._asked = (*robot.moving, *self.bodies)
         # Not the gap's own query: that measures pairs however far they are.
-        reach = float(np.nextafter(horizon + self._gap.deviation, np.inf))
-        self._query = Query(model.shapes, robot.moving, self.bodies, cap=reach)
+        self._reach = float(np.nextafter(horizon + self._gap.deviation, np.inf))
+        self._query = Query(model.shapes, robot.moving, self.bodies, cap=self._reach)
+        self._farther = Survey(model.shapes, [(self._query, Per.WHETHER)])
+        self._off = TrackingError(model, self.bodies)
         self._names = [model.bodies[body].name for body in self.bodies]
         self._close: NDArray[np.bool_] = np.zeros(len(self.bodies), bool)
         self._shape = len(robot.moving), len(self.bodies)
@@ -104,7 +107,12 @@ class Person:
             Per moving body and region, shape (b, len(REGIONS)), and bounds on the regions' speeds [m/s].
         """
         state.require_bodies(self._asked)
-        found = state.distances(self._query, Per.WHETHER)
+        off = self._off.at(state)
+        if off.any():
+            caps = np.tile(self._reach + off, self._shape[0])
+            found = self._farther.within(state.rotations, state.positions, caps)
+        else:
+            found = state.distances(self._query, Per.WHETHER)
         close: NDArray[np.bool_] = np.asarray(found.reach == _WITHIN_CAP).reshape(self._shape)
         self._close = np.asarray(close.any(axis=0))
         near: NDArray[np.bool_] = close @ self._member

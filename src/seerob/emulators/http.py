@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import socket
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +56,7 @@ class HttpEmulator(Emulator):
         files: dict[str, Any] = {}
         if self._certificate is not None:
             files = {"ssl_certfile": self._certificate[0], "ssl_keyfile": self._certificate[1]}
-        app = Starlette(routes=list(self.routes()))
+        app = _unmoved(Starlette(routes=list(self.routes())))
         config = uvicorn.Config(app, log_config=None, lifespan="off", timeout_graceful_shutdown=1, **files)
         self._server = uvicorn.Server(config)
         self._begun = time.monotonic()
@@ -69,3 +71,20 @@ class HttpEmulator(Emulator):
     def stopping(self) -> None:
         """Close at once, as a device does that is switched off."""
         self._server.should_exit = self._server.force_exit = True
+
+
+def _unmoved(app: Any) -> Callable[[Any, Any, Any], Awaitable[None]]:
+    """The same, with no word about visitors who leave, or who are there when it is switched off."""
+    from starlette.requests import ClientDisconnect
+
+    async def answer(scope: Any, receive: Any, send: Any) -> None:
+        try:
+            await app(scope, receive, send)
+        except (ClientDisconnect, asyncio.CancelledError):
+            if scope["type"] != "http":
+                return
+            with contextlib.suppress(RuntimeError):  # it had begun to answer
+                await send({"type": "http.response.start", "status": 503, "headers": []})
+                await send({"type": "http.response.body"})
+
+    return answer

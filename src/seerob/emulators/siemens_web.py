@@ -11,6 +11,8 @@ from seerob.emulators.http import HttpEmulator
 from seerob.protocols import s7_web
 
 MOST_SESSIONS = 4
+IDLE = 120.0
+"""A session that nobody uses for so long is freed [s]."""
 Program = Mapping[str, Callable[[float], Any]]
 """Variable → its value at a time since the start [s]."""
 
@@ -41,7 +43,8 @@ class SiemensWebServer(HttpEmulator):
     ) -> None:
         super().__init__(host, port, certificate)
         self.program = program
-        self.sessions: set[str] = set()
+        self.sessions: dict[str, float] = {}
+        """When each was last used, in time since the start [s]."""
         self.written: dict[str, list[bool]] = {name: [] for name in outputs}
         self._who = user, password
 
@@ -59,30 +62,39 @@ class SiemensWebServer(HttpEmulator):
     async def _answer(self, request: Any) -> Any:
         from starlette.responses import JSONResponse
 
-        calls = await request.json()
+        try:
+            calls = await request.json()
+        except (ValueError, RecursionError):
+            return JSONResponse({"jsonrpc": "2.0", "id": None, **_error(-32700, "Parse error")})
         token = request.headers.get(s7_web.TOKEN, "")
         if isinstance(calls, list):
             return JSONResponse([self._one(call, token) for call in calls])
         return JSONResponse(self._one(calls, token))
 
-    def _one(self, call: dict[str, Any], token: str) -> dict[str, Any]:
-        method, params, number = call["method"], call.get("params", {}), call["id"]
-        outcome = self._outcome(method, params, token)
+    def _one(self, call: Any, token: str) -> dict[str, Any]:
+        try:
+            method, params, number = call["method"], call.get("params", {}), call["id"]
+            outcome = self._outcome(method, params, token)
+        except (KeyError, TypeError, AttributeError):
+            return {"jsonrpc": "2.0", "id": None, **_error(-32600, "Invalid request")}
         return {"jsonrpc": "2.0", "id": number, **outcome}
 
     def _outcome(self, method: str, params: dict[str, Any], token: str) -> dict[str, Any]:
         if method == "Api.Login":
             if (params["user"], params["password"]) != self._who:
                 return _error(100, "Login failed")
+            for forgotten in [t for t, used in self.sessions.items() if self.now() - used > IDLE]:
+                del self.sessions[forgotten]
             if len(self.sessions) >= MOST_SESSIONS:
                 return _error(4, "No resources")
             token = secrets.token_hex(14)
-            self.sessions.add(token)
+            self.sessions[token] = self.now()
             return {"result": {"token": token}}
         if token not in self.sessions:
             return _error(2, "Permission denied")
+        self.sessions[token] = self.now()
         if method == "Api.Logout":
-            self.sessions.discard(token)
+            del self.sessions[token]
             return {"result": True}
         if method == "PlcProgram.Read":
             value = self.program.get(params["var"])
@@ -106,7 +118,14 @@ class SiemensWebServer(HttpEmulator):
                 names[block] = bool(rest)
             elif address == f'"{block}"' and rest:
                 names[rest.removeprefix(".")] = False
-        return [{"name": name, "has_children": below} for name, below in names.items()]
+        return [
+            {"name": name, "has_children": below, **({} if below else self._kind(f"{address}.{name}"))}
+            for name, below in names.items()
+        ]
+
+    def _kind(self, address: str) -> dict[str, str]:
+        value = self.program[address](self.now()) if address in self.program else None
+        return {"datatype": "bool" if isinstance(value, bool) else "lreal"}
 
 
 def _error(code: int, text: str) -> dict[str, Any]:

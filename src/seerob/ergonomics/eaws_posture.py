@@ -129,6 +129,8 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
             verdict = Verdict.UNDECIDED
         if every and known and not counting and screening.silent == 0:
             reasons.append(_rating(ends[0]))
+        if verdict in (Verdict.WITHIN, Verdict.EXCEEDED):
+            reasons.append("by figures of one public code and of memory, not verified (1 + M)")
         best = method.lines()[now[-1]]
         reasons.append(f"now line {' or '.join(now)}" + (f": {best.name}" if len(now) == 1 else ""))
         value = ends[0] if known else None

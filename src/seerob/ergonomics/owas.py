@@ -218,7 +218,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
                 *(() if self.limit is None else provenance.limit(self.limit, "")),
             ),
             not_modelled=(
-                "shares of time: the category is of one posture",
+                "categories of the shares of time of single codes: the category is of one posture",
                 *((ACCURACY_NOTE,) if self.error() is not None else ()),
             ),
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 import numpy as np
+from msgspec.structs import replace
 
 from seerob.samples import BodyPoint, Vec3, Vec4
 
@@ -46,7 +47,7 @@ def best(
             here = best.get((p.bone, False), (0.0, -1))[1] == k
             turned = best.get((p.bone, True), (0.0, -1))[1] == k
             if (here and p.position is not None) or (turned and p.wxyz is not None):
-                out.append(_point(p, p.position if here else None, p.wxyz if turned else None))
+                out.append(replace(p, position=p.position if here else None, wxyz=p.wxyz if turned else None))
     return out
 
 
@@ -63,7 +64,7 @@ def between(before: Sequence[BodyPoint], after: Sequence[BodyPoint], share: floa
             position = x, y, z
         if other is not None and p.wxyz is not None and other.wxyz is not None:
             wxyz = _nlerp(p.wxyz, other.wxyz, share)
-        out.append(_point(p, position, wxyz))
+        out.append(replace(p, position=position, wxyz=wxyz))
     return out
 
 
@@ -73,16 +74,3 @@ def _nlerp(a: Vec4, b: Vec4, share: float) -> Vec4:
     norm = float(np.linalg.norm(mixed)) or 1.0
     w, x, y, z = (value / norm for value in mixed)
     return w, x, y, z
-
-
-def _point(p: BodyPoint, position: Vec3 | None, wxyz: Vec4 | None) -> BodyPoint:
-    return BodyPoint(
-        name=p.name,
-        bone=p.bone,
-        at=p.at,
-        position=position,
-        wxyz=wxyz,
-        position_weight=p.position_weight,
-        orientation_weight=p.orientation_weight,
-        confidence=p.confidence,
-    )

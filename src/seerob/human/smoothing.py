@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec.structs import replace
 
 from seerob.samples import BodyPoint, Vec3, Vec4
 
@@ -75,18 +76,7 @@ class Smoother:
                 position = x, y, z
             if wxyz is not None and all(abs(v) <= 2 for v in wxyz):
                 wxyz = self._turned(p.name, t, wxyz, cutoff)
-            out.append(
-                BodyPoint(
-                    name=p.name,
-                    bone=p.bone,
-                    at=p.at,
-                    position=position,
-                    wxyz=wxyz,
-                    position_weight=p.position_weight,
-                    orientation_weight=p.orientation_weight,
-                    confidence=p.confidence,
-                )
-            )
+            out.append(replace(p, position=position, wxyz=wxyz))
         return tuple(out)
 
     def _moved(self, key: tuple[str, bool], t: float, heard: Vec3, cutoff: float) -> Sequence[float]:

@@ -16,6 +16,8 @@ WINDOW = 5.0
 quartz clocks)."""
 RESTART = 1.0
 """A device whose time goes back by more has started again [s]."""
+LATEST = 1e12
+"""No clock counts further [s]: what is later or not finite is no instant."""
 
 
 class DeviceClock:
@@ -46,7 +48,7 @@ class DeviceClock:
         Returns:
             At most ``host``; None for a sample that is not newer than the one before, which is no news.
         """
-        if not math.isfinite(device):
+        if not abs(device) <= LATEST:
             return None
         if device < self._last - RESTART:
             self.restart()

@@ -49,7 +49,7 @@ ASK_WITHIN = 1.5
 PATIENCE = 1.0
 """How long a run waits for the first samples before it begins without them [s]."""
 
-PROMPT = 5e-4
+PROMPT = 1e-4
 """How long a thread keeps the interpreter while others wait for it [s], during a live run. Python's own 5 ms
 is as long as samples then wait for the twin's computations."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from seerob.model import Model
 from seerob.state import State
-from seerob.variables.dictionary import Value
+from seerob.variables.dictionary import Value, WhenStale
 
 UNKNOWN = (0.55, 0.55, 0.6)
 """Of a lamp of which nobody knows whether it is lit: red, green, blue."""
@@ -34,8 +34,9 @@ class Looks:
         looks: dict[str, Look] = {}
         for display, bodies in self._displays:
             known = state.signals.at(display.variable, state.t)
+            held = state.signals.dictionary[display.variable].when_stale is WhenStale.HOLD
             look: Look
-            if known.value is None or known.doubt:
+            if known.value is None or (known.doubt and not held):
                 # What may be there is drawn.
                 if not display.colors:
                     continue

@@ -89,6 +89,9 @@ def _welded(mesh: Mesh) -> Mesh:
 
 def oriented(mesh: Mesh) -> tuple[Mesh, int]:
     """Neighbours turned to agree, spreading from the first triangle of each body."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
     key = edges[:, 0] * len(mesh.vertices) + edges[:, 1]
     _, inverse, uses = np.unique(key, return_inverse=True, return_counts=True)
@@ -97,28 +100,39 @@ def oriented(mesh: Mesh) -> tuple[Mesh, int]:
     plain = uses[inverse.ravel()[order]] == 2
     pairs = order[plain].reshape(-1, 2)
     disagree = upward[pairs[:, 0]] == upward[pairs[:, 1]]
-    neighbours: list[list[tuple[int, bool]]] = [[] for _ in mesh.faces]
-    for (a, b), d in zip((pairs // 3).tolist(), disagree.tolist(), strict=True):
-        neighbours[a].append((b, d))
-        neighbours[b].append((a, d))
-    flip = np.full(len(mesh.faces), -1)
-    for seed in range(len(flip)):
+    pairs //= 3
+    # Most triangles agree already: what agrees is turned together. Regions are numbered by first triangle.
+    a, b = pairs[~disagree].T
+    graph = coo_matrix((np.ones(len(a), bool), (a, b)), shape=(len(mesh.faces), len(mesh.faces)))
+    regions, region = connected_components(graph, directed=False)
+    turned = _turned(regions, np.bincount(region), region[pairs[disagree]])[region]
+    faces = np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces)
+    return Mesh(mesh.vertices, faces, mesh.color), int(turned.sum())
+
+
+def _turned(regions: int, sizes: NDArray[np.int64], against: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Which regions are turned, so that those of each pair that are against each other agree."""
+    neighbours: list[list[int]] = [[] for _ in range(regions)]
+    for a, b in against.tolist():
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    flip: NDArray[np.int64] = np.full(regions, -1)
+    for seed in range(regions):
         if flip[seed] >= 0:
             continue
         flip[seed] = 0
         body, queue = [seed], deque([seed])
         while queue:
-            face = queue.popleft()
-            for other, d in neighbours[face]:
+            here = queue.popleft()
+            for other in neighbours[here]:
                 if flip[other] < 0:
-                    flip[other] = flip[face] ^ int(d)
+                    flip[other] = 1 - flip[here]
                     body.append(other)
                     queue.append(other)
         # The seed may have been the odd one out: turn as few as possible.
-        if 2 * int(flip[body].sum()) > len(body):
+        if 2 * int(sizes[body] @ flip[body]) > int(sizes[body].sum()):
             flip[body] = 1 - flip[body]
-    faces = np.where(flip[:, None] == 1, mesh.faces[:, ::-1], mesh.faces)
-    return Mesh(mesh.vertices, faces, mesh.color), int((flip == 1).sum())
+    return np.asarray(flip == 1)
 
 
 def _open_loops(mesh: Mesh) -> list[NDArray[np.int64]]:

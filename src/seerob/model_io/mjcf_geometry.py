@@ -15,6 +15,7 @@ import numpy as np
 from seerob.geometry import Mesh, Solid, capsule
 from seerob.model_io import shapes
 from seerob.model_io.detail import physics_mesh
+from seerob.model_io.split_surfaces import with_insides
 from seerob.model_io.urdf_geometry import moved
 from seerob.model_io.xml_values import Reader
 from seerob.transforms import rotation_from_wxyz, transform
@@ -46,9 +47,9 @@ def shapes_of_body(
             "note", name, "nothing that collides in the file: distances and contacts use what is drawn"
         )
         solids = tuple(Solid(mesh=physics_mesh(mesh), name=f"visual_{i}") for i, mesh in enumerate(drawn))
-        return tuple(drawn), solids
+        return tuple(drawn), with_insides(solids)
     solids = tuple(replace(solid, name=solid.name or f"geom_{i}") for i, (solid, _) in enumerate(touched))
-    return tuple(drawn) or tuple(mesh for _, mesh in touched), solids
+    return tuple(drawn) or tuple(mesh for _, mesh in touched), with_insides(solids)
 
 
 def _geom(reader: Reader, model: Any, geom: int, body: str) -> tuple[Solid, Mesh] | None:

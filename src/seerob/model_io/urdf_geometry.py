@@ -15,6 +15,7 @@ from seerob.model_io import shapes
 from seerob.model_io.detail import physics_mesh
 from seerob.model_io.mesh import LoadedMeshes, load_meshes
 from seerob.model_io.resolve import Resolver
+from seerob.model_io.split_surfaces import with_insides
 from seerob.model_io.xml_values import Reader
 from seerob.transforms import Array, apply
 
@@ -65,7 +66,7 @@ class Shapes:
                 solid = self._primitive(kind, key)
                 if solid is not None:
                     found.append(moved(replace(solid[0], name=label), link_from_shape))
-        return tuple(found)
+        return with_insides(found)
 
     def _elements(self, link: Element, name: str, tag: str) -> Iterator[tuple[str, Element, Element, Array]]:
         for i, element in enumerate(link.findall(tag)):

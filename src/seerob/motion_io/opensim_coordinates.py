@@ -22,7 +22,6 @@ SIDES = {"r": "right", "l": "left"}
 PELVIS = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
 PLACE = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
 BACK = ("lumbar_extension", "lumbar_bending", "lumbar_rotation")
-OUR_BACK = ("lumbar", "thorax")
 BENT = -1.0
 """Sign of knee flexion in our values; older models (gait2392) have it so too."""
 

@@ -14,8 +14,8 @@ from seerob.model_io import detail, lint, mass_properties, shapes
 from seerob.model_io.description import Inertial, Link
 from seerob.model_io.mesh import load_meshes
 from seerob.model_io.mesh_bodies import is_closed, joined
-from seerob.model_io.mesh_sides import sided
 from seerob.model_io.moments import signed_volume
+from seerob.model_io.split_surfaces import enclosing
 from seerob.snapshot import Finding, Origin
 from seerob.transforms import Array
 from seerob.volumes.floor_polygon import prism_mesh
@@ -97,7 +97,7 @@ def load_thing(
         source = f"shape of {thing.mesh}"
         whole = [mesh for _, mesh in meshes]
         findings += _holes(thing, whole, path)
-        if not all(map(is_closed, whole)) and is_closed(around := sided(joined(whole)[0])[0]):
+        if not all(map(is_closed, whole)) and (around := enclosing(whole)) is not None:
             # Split by colour or by name, none of the pieces has an inside; all of them together do.
             inside = Solid(mesh=detail.physics_mesh(around))
             pieces = (replace(pieces[0], solids=(*pieces[0].solids, inside)), *pieces[1:])
@@ -221,7 +221,7 @@ def _holes(thing: Thing, meshes: Sequence[Mesh], path: Path) -> tuple[Finding, .
     Raises:
         InputError: An area, of which only the inside matters.
     """
-    if all(map(is_closed, meshes)) or is_closed(sided(joined(meshes)[0])[0]):
+    if all(map(is_closed, meshes)) or enclosing(meshes) is not None:
         return ()
     if isinstance(thing, Area):
         raise InputError.at(

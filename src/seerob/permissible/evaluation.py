@@ -8,7 +8,6 @@ from functools import partial
 
 from msgspec.structs import replace as changed
 
-from seerob.engine import Engine
 from seerob.errors import InputError
 from seerob.model import Model
 from seerob.permissible.given_motion import GivenMotion
@@ -23,7 +22,7 @@ from seerob.permissible.verification import Verified, verify
 from seerob.permissible.witness import Clock, Witness
 from seerob.results.result_log import ResultLog
 from seerob.results.series import worst_verdict
-from seerob.run import Bound, Feed, Judge, Summary, coarse, pump, signal_timeouts, ticks
+from seerob.run import Bound, Feed, Judge, Summary, engine_of, pump, ticks
 from seerob.samples import JointSample, PoseSample, Sample
 from seerob.snapshot import CriterionInfo, Finding, Snapshot, Verdict
 from seerob.source import HOLD, Opened, Source
@@ -133,16 +132,10 @@ def witness(
     model: Model, sources: Sources, bound: Sequence[Bound], infos: Sequence[CriterionInfo], say: Say
 ) -> tuple[Witness, ResultLog, Snapshot]:
     """Run the given motion once: where everybody is, what the criteria say of it, and its first tick."""
-    driven = {s.target(): s.timeout for s, _ in sources if s.target()}
     seen, log = Witness(Judge(bound)), ResultLog(infos)
     duration = max((opened.duration for _, opened in sources), default=0.0)
-    # Silence of a controller, and of the machines that follow it, shows as in any run.
-    signals, following = signal_timeouts(model)
-    engine = Engine(model, driven={**following, **driven}, signals=signals)
-    for name, why in coarse(model).items():
-        engine.state.hearings[name].coarse = why
     first: Snapshot | None = None
-    for out, _ in ticks(engine, seen, pump(sources, model.workstation.engine.tick)):
+    for out, _ in ticks(engine_of(model), seen, pump(sources, model.workstation.engine.tick)):
         first = first or out
         log.add(out)
         say("the given motion", min(1.0, out.t / duration) if duration else 1.0)

@@ -64,11 +64,6 @@ class Rescaled:
                 out[k][inside] = values if k == 0 else values * moving
         return out[0], out[1], out[2], out[3]
 
-    def given_time(self, t: Array) -> Array:
-        """When the given motion was where this one is at instants [s], shape (k,); stands run alike."""
-        new, old = self._clock
-        return np.asarray(np.interp(t, new, old))
-
     def own_instant(self, t: float) -> float:
         """When this motion is where the given one was at an instant [s]."""
         new, old = self._clock

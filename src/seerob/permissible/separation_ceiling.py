@@ -23,7 +23,7 @@ from seerob.permissible.ceiling import Answer, Ceiling, Look
 from seerob.safety.separation import Separation
 from seerob.state import State
 from seerob.transforms import Array
-from seerob.whereabouts.tracking_error import TrackingError
+from seerob.whereabouts.distance_ends import DistanceEnds
 
 
 def separation(criterion: Separation, model: Model, robot: str) -> tuple[Answer, Look | None]:
@@ -39,14 +39,13 @@ def separation(criterion: Separation, model: Model, robot: str) -> tuple[Answer,
     human = next(name for name in criterion.between if name != robot)
     gap = model.gap(model.select(human), model.robot(robot).moving)
     names = [model.bodies[i].name for i in gap.b]
-    off = TrackingError(model, gap.a)
+    ends = DistanceEnds(model, gap)
     least = np.full(len(gap.b), np.inf)
     fixed = criterion.mode == "fixed"
 
     def distances(state: State) -> Array:
-        # As the criterion has them: less how far the twin's person is from where devices see them.
-        found = np.asarray(state.closest_per_body(gap).distance)
-        return np.asarray(found - off.at(state).max(initial=0.0))
+        # As the criterion has them: the least that the errors of the twin's bones leave possible.
+        return ends.of_bodies(state, state.closest_per_body(gap).distance)[0]
 
     def look(state: State) -> None:
         # Where somebody's place is not known the map has no number either.

@@ -35,12 +35,12 @@ def solved(model: Model, robot: Mechanism, samples: Sequence[PoseSample]) -> lis
             what = f"a pose that is not finite at {sample.t:.3f} s"
             raise InputError.at("permissible speed", robot.name, what, "correct the source")
         frame = model.frame(sample.target)
-        q, error = solve_pose(
+        q, miss = solve_pose(
             model.mj, data, robot, frame, rotation_from_wxyz(wxyz), position, start=q
         )  # fmt: skip
         good = sample.quality is Quality.GOOD
-        if error > POSE_TOLERANCE and good:
-            what = f"the pose at {sample.t:.3f} s is out of reach by {error:.3g} m or rad"
+        if miss.larger > POSE_TOLERANCE and good:
+            what = f"the pose at {sample.t:.3f} s is out of reach: the nearest that was found is {miss}"
             raise InputError.at("permissible speed", robot.name, what, "move the path or the robot")
         out.append(
             JointSample(

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from types import TracebackType
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 from msgspec.structs import replace
@@ -13,6 +12,7 @@ from seerob.criterion import Criterion, Evaluate
 from seerob.errors import InputError, Problem
 from seerob.model import Model
 from seerob.samples import Sample
+from seerob.sink import Closing
 from seerob.snapshot import Basis, Result, Snapshot
 from seerob.state import State
 from seerob.transforms import Array
@@ -70,7 +70,7 @@ def made_for(who: Collection[str]) -> list[str]:
     return [f"{SWEEPS}{name}" for name in who]
 
 
-class Witness:
+class Witness(Closing):
     """A writer that keeps where everybody is at the first tick from an instant on, and who was not known.
 
     Args:
@@ -101,17 +101,6 @@ class Witness:
         reason = next((r.reason for r in snapshot.results if r.name == KNOWN and r.value is None), "")
         if reason:
             self._unknown = f"{reason} (at {snapshot.t:.2f} s)"
-
-    def close(self) -> None:
-        """Nothing to finish."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def require(self) -> None:
         """InputError when somebody's motion is not known, or ends before the instant."""

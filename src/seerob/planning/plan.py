@@ -107,7 +107,10 @@ def plan(
     mechanism = model.robot(robot)
     if start is None and not mechanism.home_given:
         raise InputError.at(
-            "plan", "start", f"nobody says where {robot} is", "give its q in the file, or start"
+            "plan",
+            "start",
+            f"nobody says where {robot} is",
+            "give its q in the file, or a start (--from on the command line)",
         )
     if not goals:
         raise InputError.at("plan", "goal", "missing", "give joint positions to go to")

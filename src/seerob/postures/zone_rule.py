@@ -23,6 +23,8 @@ from seerob.scoring.zones import DERIVED, ZoneRow, ZoneWatch, sided, value_of
 from seerob.snapshot import Aspect, Basis, Highlight, Input, Origin, Result, Row, RowState, Verdict
 from seerob.state import State
 
+FROM_MEMORY = "by figures quoted from memory, not verified (M)"
+"""What a verdict rests on whose table says so."""
 Scores = dict[tuple[str, int], tuple[float, float]]
 
 
@@ -92,6 +94,10 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
         if missing or low != high:
             reasons.append(whatever_is_missing("score", low, high))
         reasons += [self._said(rows, key, angles, scores[key]) for key in drivers[:4]]
+        deciding = {angle for angle, _ in drivers} if verdict is Verdict.EXCEEDED else {r.angle for r in rows}
+        decided = verdict in (Verdict.WITHIN, Verdict.EXCEEDED)
+        if decided and any(r.confidence == "M" and r.angle in deciding for r in rows):
+            reasons.append(FROM_MEMORY)
         best = max((row.score for row in rows), default=0.0)
         top = best if self.combination() == "max" else sum(_tops(rows, scores).values())
         return Result(

@@ -1,4 +1,4 @@
-"""Foxglove's WebSocket protocol, as its SDK's servers and the bridge of ROS speak it: the listener's half.
+"""Foxglove's WebSocket protocol, as its SDK's servers and the bridge of ROS speak it.
 
 Text frames carry JSON operations (``serverInfo``, ``advertise``, ``status``), binary ones messages: a byte 1,
 the number of the subscription (u32), an instant (u64, ns), the payload; little-endian. Payloads are JSON,
@@ -121,6 +121,46 @@ def channels(said: Operation) -> list[ServerChannel]:
         )
         found.append(ServerChannel(number, topic, encoding, schema))
     return found
+
+
+def server_info(name: str) -> str:
+    """What a server says first."""
+    said = {"op": "serverInfo", "name": name, "capabilities": [], "metadata": {}, "sessionId": name}
+    return json.dumps(said)
+
+
+def offer(channels: list[ServerChannel]) -> str:
+    """What a server has."""
+    listed = [
+        {"id": c.id, "topic": c.topic, "encoding": c.encoding, "schemaName": c.schema, "schema": ""}
+        for c in channels
+    ]
+    return json.dumps({"op": "advertise", "channels": listed})
+
+
+def subscriptions(said: Operation) -> dict[int, int]:
+    """Channels that a ``subscribe`` asks for, by the number that their messages are to carry.
+
+    Raises:
+        ProtocolError: It is not as it should be.
+    """
+    listed = said.fields.get("subscriptions")
+    if not isinstance(listed, list) or len(listed) > MOST_CHANNELS:
+        raise ProtocolError("a wish without channels, or with too many")
+    pairs = [(w.get("id"), w.get("channelId")) for w in listed if isinstance(w, dict)]
+    numbers = [(own, at) for own, at in pairs if isinstance(own, int) and isinstance(at, int)]
+    return {own: channel for own, channel in numbers if 0 <= own < 1 << 32}
+
+
+def pack(subscription: int, log_time: float, payload: bytes) -> bytes:
+    """A message on a subscription.
+
+    Args:
+        subscription: Its number.
+        log_time: When the server had it [s].
+        payload: As the channel's encoding is.
+    """
+    return _HEAD.pack(MESSAGE_DATA, subscription, int(log_time * 1e9)) + payload
 
 
 def message(data: bytes) -> Message | None:

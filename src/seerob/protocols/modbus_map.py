@@ -65,7 +65,10 @@ class Joints(msgspec.Struct, frozen=True, kw_only=True):
 class SignalEntry(msgspec.Struct, frozen=True, kw_only=True):
     """One state or figure of the controller."""
 
-    name: Annotated[str, Meta(pattern=r"^[A-Za-z_][\w.]{0,99}$")]
+    name: Annotated[
+        str,
+        Meta(pattern=r"^[A-Za-z_][\w.]{0,99}$", description="a letter or _, then letters, digits, _ and ."),
+    ]
     at: Annotated[int, Meta(ge=0, le=65535)]
     type: Type
     source: Text

@@ -10,6 +10,7 @@ import asyncio
 import logging
 import os
 import time
+import traceback
 from collections.abc import AsyncGenerator, Mapping
 from contextlib import asynccontextmanager, suppress
 from datetime import UTC, datetime
@@ -20,9 +21,11 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import msgspec
 from msgspec import Meta
 
-from seerob.errors import InputError
+from seerob.errors import InputError, SeerobError
 from seerob.protocols import ProtocolError
+from seerob.protocols.opcua_link import hang_up, hung_up_on_failure
 from seerob.protocols.opcua_units import unit
+from seerob.protocols.plain_cancel import plainly_cancelled
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client
@@ -53,7 +56,9 @@ class Security(StrEnum):
 class Way(msgspec.Struct, frozen=True, kw_only=True):
     """How to get to a server."""
 
-    url: Annotated[str, Meta(pattern=r"^opc\.tcp://[^\s/]+")]
+    url: Annotated[
+        str, Meta(pattern=r"^opc\.tcp://[^\s/]+", description="an address such as opc.tcp://192.168.0.1:4840")
+    ]
     security: Security = Security.NONE
     certificate: str | None = None
     """Own certificate (PEM or DER), which the server must trust."""
@@ -143,27 +148,45 @@ async def connect(way: Way, folder: Path) -> AsyncGenerator[Client, None]:
         if way.security is not Security.NONE:
             await _protect(client, way, folder)
         async with asyncio.timeout(3 * PATIENCE):
-            await client.connect()
+            with plainly_cancelled(), hung_up_on_failure(client):
+                await client.connect()
     except TimeoutError as error:
         raise TimeoutError("no answer in time") from error
     except UaError as error:
         raise ProtocolError(f"the server refuses: {_text(error)}") from error
     except ValueError as error:
         raise ProtocolError(str(error)) from error
+    except Exception as error:
+        _refuse_garbled(error)
+        raise
     link = client.uaclient.protocol
     try:
-        yield client
+        with plainly_cancelled():
+            yield client
     except UaError as error:
         raise ProtocolError(f"the server says: {_text(error)}") from error
+    except Exception as error:
+        _refuse_garbled(error)
+        raise
     finally:
         # Whatever is left to be said, a stop does not wait long for it.
         with suppress(Exception):
             async with asyncio.timeout(PATIENCE / 2):
-                await client.disconnect()
+                with plainly_cancelled():
+                    await client.disconnect()
         # A link that broke while it was closed counts as closed there, and its socket stays open.
-        if link is not None and link.transport is not None:
-            link.transport.close()
-            await asyncio.sleep(0)
+        hang_up(link)
+        await asyncio.sleep(0)
+
+
+def _refuse_garbled(error: Exception) -> None:
+    """Raise a ProtocolError for bytes on which asyncua failed: they are the server's mistake, not ours."""
+    if isinstance(error, OSError | SeerobError):
+        return
+    frames = (frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__))
+    if any(name.startswith("asyncua.") for name in frames):
+        what = f"{type(error).__name__}: {_text(error)[:100]}"
+        raise ProtocolError(f"what the server says is no OPC UA ({what})") from error
 
 
 async def _protect(client: Client, way: Way, folder: Path) -> None:

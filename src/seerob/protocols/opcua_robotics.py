@@ -25,6 +25,9 @@ SYSTEM, DEVICE, AXIS, SAFETY = 1002, 1004, 16601, 1013
 """Types: MotionDeviceSystemType, MotionDeviceType, AxisType, SafetyStateType."""
 MOST = 200
 """Nodes below one folder."""
+HAS_SUBTYPE = 45
+DEEPEST = 8
+"""Types that are derived from one another."""
 MODES = ("OTHER", "MANUAL_REDUCED_SPEED", "MANUAL_HIGH_SPEED", "AUTOMATIC", "AUTOMATIC_EXTERNAL")
 
 
@@ -161,10 +164,36 @@ async def _safety(system: Node, own: int, di: int) -> dict[str, Node]:
 
 
 async def _of_type(folder: Node, namespace: int, number: int) -> AsyncIterator[Node]:
+    """Children of a type, or of one that a maker has derived from it."""
     for child in (await folder.get_children())[:MOST]:
         kind = await child.read_type_definition()
-        if kind is not None and kind.NamespaceIndex == namespace and kind.Identifier == number:
+        for _ in range(DEEPEST):
+            if kind is None or (kind.NamespaceIndex == namespace and kind.Identifier == number):
+                break
+            kind = await _derived_from(child, kind)
+        else:
+            kind = None
+        if kind is not None and not _is_template((await child.read_browse_name()).Name):
             yield child
+
+
+def _is_template(name: str) -> bool:
+    """Whether a node stands for those that there may be: some servers keep ``<AxisIdentifier>`` too."""
+    return name.startswith("<") and name.endswith(">")
+
+
+async def _derived_from(node: Node, kind: Any) -> Any:
+    """The type that a type is derived from; None where the server does not say."""
+    from asyncua import ua
+    from asyncua.ua.uaerrors import UaError
+
+    try:
+        parents = await type(node)(node.session, kind).get_references(
+            refs=HAS_SUBTYPE, direction=ua.BrowseDirection.Inverse
+        )
+    except UaError:
+        return None
+    return parents[0].NodeId if parents else None
 
 
 async def _child(node: Node, namespace: int, name: str) -> Node | None:

@@ -48,7 +48,6 @@ _CACHED_CHUNKS = 8
 _TICK = {SAMPLES, SNAPSHOT}
 _TICK_VIEWS = {SAMPLES, SNAPSHOT, BASIS, *VIEWS}
 _REMEDY = "give a recording (.mcap) made by seerob"
-_UPGRADE = "read it with the seerob that wrote it"
 
 _decode_scene = msgspec.msgpack.Decoder(Scene).decode
 _decode_snapshot = msgspec.msgpack.Decoder(Snapshot).decode

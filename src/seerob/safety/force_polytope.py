@@ -6,10 +6,12 @@ The sets themselves are in `seerob.polytope`.
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from msgspec import Meta
+from msgspec.structs import replace
 
 from seerob import figures, joint_torques, provenance
 from seerob.answers import Answers
@@ -18,6 +20,8 @@ from seerob.errors import InputError, Undecided
 from seerob.kernels.contact_forces import drawn_corners
 from seerob.kernels.polytope import largest
 from seerob.model import Mechanism, Model
+from seerob.norms import body_limits
+from seerob.norms.force_limits import force_inputs, pushed_region
 from seerob.polytope import Polytope, free_moment, torque_box, zero_moment
 from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Hull, Input, Marker, Origin, Result, Sphere, Verdict
@@ -53,6 +57,10 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
     """The point in that frame [m]."""
     limit: Annotated[float, Meta(gt=0, extra={"unit": "N"})] | None = None
     """Largest admissible force [N]: the radius of the sphere that the polytope is compared with."""
+    body_region: str | None = None
+    """Instead of a limit: a body region, whose quasi-static limit F_s is the radius of the sphere."""
+    limits: str | None = None
+    """File with other limits of body regions, of the form of the one that ships."""
     definition: Literal["zero_moment", "free_moment", "torque_box"] = "zero_moment"
     """Which set: forces at a point contact, forces of a contact that also bears a moment, or the image of
     all extreme torques under the pseudo-inverse. Each of the last two contains the first."""
@@ -61,12 +69,31 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
     torque_limits: tuple[tuple[float, float], ...] | None = None
     """Least and largest torque of each joint [N·m or N] instead of the robot's own limits."""
 
+    def __post_init__(self) -> None:
+        if self.limit is not None and self.body_region is not None:
+            raise ValueError("give either limit or body_region")
+        if self.limits is not None and self.body_region is None:
+            raise ValueError("limits are of a body_region: name one")
+
     def subjects(self) -> tuple[str, ...]:
         """The point."""
         return (self.at,)
 
+    def _table(self, model: Model) -> body_limits.BodyLimits:
+        own = self.limits
+        return body_limits.shipped() if own is None else body_limits.read(Path(model.folder, own))
+
+    def _against(self, model: Model) -> ForcePolytope:
+        """The same with the limit of its body region."""
+        if self.body_region is None:
+            return self
+        force = pushed_region(self._table(model), self.body_region).force
+        return replace(self, limit=force.value, body_region=None, limits=None)
+
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
+        if self.body_region is not None:
+            return self._against(model).bind(model)
         frame = model.frame(self.at)
         robot = model.carrier(frame)
         if self.load != "none":
@@ -96,6 +123,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             return None
         frame, offset = model.frame(self.at), np.array(self.offset)
         robot = model.carrier(frame)
+        limit = self._against(model).limit
         lower, upper, unknown = self._torques(model, robot)
 
         def evaluate(states: States) -> Answers:
@@ -106,7 +134,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             J_v = np.ascontiguousarray(states.jacobian(frame, robot, offset)[:, :3])
             norm, _, _ = largest(J_v, lower - held, upper - held)
             # Unbounded is infinite: it exceeds any limit and is no figure. Empty is nan, and undecided.
-            return Answers.against(norm, self.limit, at_most=self.at_most).finite()
+            return Answers.against(norm, limit, at_most=self.at_most).finite()
 
         return evaluate
 
@@ -207,14 +235,20 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
         robot = model.carrier(model.frame(self.at))
+        limit = provenance.limit(self.limit, "N")
+        doubts: tuple[str, ...] = ()
+        if self.body_region is not None:
+            edition, own = model.workstation.edition, self.limits is not None
+            limit, doubts = force_inputs(self._table(model), self.body_region, edition, own=own)
         return Basis(
             formula=f"largest |f| of {FORMULA[self.definition]}; {LOAD[self.load]}",
             source="Weistroffer et al. 2022, section 2.2.2.4; Chiacchio et al. 1997",
             inputs=provenance.motion(model, robot.name)
             + self._limits_given(robot)
             + (() if self.load == "none" else provenance.masses(model, robot))
-            + provenance.limit(self.limit, "N"),
+            + limit,
             not_modelled=(
+                *doubts,
                 "static: no force of an impact, no inertia of the moving robot",
                 "friction in joints and gears, which a pushing robot must overcome and a pushed one adds",
                 "torques beyond the stated limits, and force monitoring of the controller below them",

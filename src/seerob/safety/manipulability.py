@@ -19,8 +19,10 @@ from seerob.state import State
 from seerob.states import States
 from seerob.transforms import Array, wxyz_from_rotation
 
+STEP = math.radians(1)
+"""How far joints are moved to see which leads out of a singularity [rad or m]."""
 NOTHING = 1e-9
-"""Change of a singular value below which a joint does not change it [m/rad²]."""
+"""Growth of a singular value up to which a joint does not lead out [m/rad]."""
 DRAWN = 0.3
 """Half axis drawn for a singular value of 1 m/rad [m]."""
 
@@ -46,24 +48,33 @@ def singular_values(J_v: Array) -> tuple[Array, Array]:
     return values.reshape(*batch, 3), directions.reshape(*batch, 3, 3)
 
 
-def least_value_by_joint(J: Array) -> Array:
-    r"""How the smallest singular value of J_v changes with each joint, unsigned [m/rad²], shape (n,).
+def least_value_after(J: Array, step: float = STEP) -> Array:
+    r"""Smallest singular value of J_v [m/rad] once each joint alone has moved, either way, shape (n, 2).
 
-    :math:`|\partial\sigma_3 / \partial q_j| = |u_3^T (\partial J_v / \partial q_j) v_3|`, where the column of
-    joint i changes by :math:`\omega_j \times J_{v,i}` when j is not farther out, else by
-    :math:`\omega_i \times J_{v,j}`. The joint with the largest one leads out of a singularity the soonest.
+    Exact, not by a derivative, which at a singularity depends on which of the vectors is taken that the
+    arm cannot move along. A turn of joint j by :math:`\delta` turns what is farther out, :math:`J_{v,i}` of
+    i > j, and moves the point by :math:`d`, so that :math:`J_{v,i}` of the others changes by
+    :math:`\omega_i \times d`.
 
     Args:
         J: Jacobian of a chain from its base outward, linear rows first, shape (6, n).
+        step: How far each joint moves [rad or m].
     """
     linear, angular = J[:3].T, J[3:].T
     n = len(linear)
-    axes, _, Vt = np.linalg.svd(J[:3], full_matrices=False)
-    u, v = axes[:, -1], Vt[-1]
-    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
-    first, last = np.minimum(i, j), np.maximum(i, j)
-    turned = np.cross(angular[first], linear[last])
-    return np.asarray(np.abs(np.einsum("k,ijk,i->j", u, turned, v)))
+    moved = np.empty((n, 2, n, 3))
+    for j in range(n):
+        # 1 of a joint that turns or slides; of one that others follow, how fast all of them turn.
+        rate = float(np.linalg.norm(angular[j])) or 1.0
+        axis, own = angular[j] / rate, linear[j] / rate
+        for k, angle in enumerate((step * rate, -step * rate)):
+            sine, rest = math.sin(angle), 1 - math.cos(angle)
+            d = sine * own + rest * np.cross(axis, own) if axis.any() else angle * own
+            inner = linear[: j + 1] + np.cross(angular[: j + 1], d)
+            once = np.cross(axis, linear[j + 1 :])
+            outer = linear[j + 1 :] + sine * once + rest * np.cross(axis, once)
+            moved[j, k] = np.vstack([inner, outer])
+    return np.asarray(np.linalg.svd(moved, compute_uv=False)[..., -1])
 
 
 class Manipulability(Criterion, frozen=True, kw_only=True):
@@ -98,11 +109,11 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
             verdict = judge(smallest, self.limit, at_most=False)
             reason = ""
             if verdict is Verdict.EXCEEDED and len(names) >= 3:
-                by_joint = least_value_by_joint(J)
-                joint = names[int(by_joint.argmax())]
+                after = least_value_after(J).max(axis=1)
+                joint = names[int(after.argmax())]
                 reason = f"near a singularity: {joint} leads out of it the soonest"
-                if by_joint.max() < NOTHING:
-                    reason = "singular in every pose nearby: no joint leads out of it"
+                if after.max() <= smallest + NOTHING:
+                    reason = "no joint by itself leads out of the singularity"
             rotation, position = state.pose(frame)
             ellipsoid = Ellipsoid(
                 center=tuple((position + rotation @ offset).tolist()),

@@ -18,8 +18,9 @@ from seerob.snapshot import Basis, Result, Segment, Verdict
 from seerob.state import State
 from seerob.states import States
 from seerob.tolerances import Tolerance, deciding
+from seerob.whereabouts.distance_ends import DistanceEnds
 from seerob.whereabouts.partly_seen import partly_seen
-from seerob.whereabouts.tracking_error import TrackingError, tracking
+from seerob.whereabouts.tracking_error import tracking
 
 
 class MinimumDistance(Criterion, frozen=True, kw_only=True):
@@ -54,14 +55,14 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
 
     def _bound(self, model: Model, gap: Gap) -> Evaluate:
         places = BodyPlaces(model)
-        off = TrackingError(model, (*gap.a, *gap.b))
+        ends = DistanceEnds(model, gap)
 
         def evaluate(state: State) -> Result:
             closest = state.closest(gap, estimates=True)
             distance = closest.distance
-            seen = float(off.at(state).max(initial=0.0))
-            either = self.uncertainty + seen
-            interval = (distance - gap.deviation - either, distance + either)
+            low, high = ends.of_sets(state, distance)
+            seen = (high - low) / 2
+            interval = (low - gap.deviation - self.uncertainty, high + self.uncertainty)
             verdict = judge_interval(interval, self.limit, at_most=False)
             open_ = f"; {_deciding(self.uncertainty, seen, gap)}" if verdict is Verdict.UNDECIDED else ""
             if closest.reach == Reach.DEPTH_AT_LEAST and self.limit is not None:

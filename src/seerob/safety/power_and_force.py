@@ -11,12 +11,13 @@ from msgspec import Meta, field
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from seerob import figures, provenance
+from seerob import provenance
 from seerob.contact import collision, impact_mass
 from seerob.contact import limits as contact_limits
 from seerob.contact import shape as contact_shape
 from seerob.contact.areas import NOT_MODELLED, area_results, margin
 from seerob.contact.clamped_regions import Clamping, floor_input
+from seerob.contact.drawn import ContactMarkers
 from seerob.contact.impact_mass import masses_along_motion, moving_masses, simplified_mass
 from seerob.contact.limits import Judged
 from seerob.contact.regions import REGIONS, Person, without_limit
@@ -30,7 +31,7 @@ from seerob.norms import body_limits
 from seerob.norms.crushing_gaps import NOT_VERIFIED, gap_inputs
 from seerob.norms.limit_inputs import excluded_input, limit_inputs, table_input
 from seerob.quantities import Coordinate, Tolerance
-from seerob.snapshot import Arrow, Basis, Highlight, Input, Result, Verdict
+from seerob.snapshot import Basis, Input, Result, Verdict
 from seerob.state import State
 from seerob.tolerances import Spread, deciding
 from seerob.transforms import Array
@@ -135,6 +136,10 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
                 found[row] = arrays.pressures() * min(given[body], self.largest_area)
         return np.array(found).reshape(len(moving), 2, len(arrays.pressure))
 
+    def given_contacts(self, model: Model) -> frozenset[int]:
+        """Bodies of which the file says how they touch."""
+        return frozenset(self._by_body(model, {**self.contact_radius, **self.contact_area}))
+
     def _by_body(self, model: Model, given: dict[str, float]) -> dict[int, float]:
         moving = model.robot(self.robot).moving
         found: dict[int, float] = {}
@@ -232,6 +237,11 @@ class Contacts:
         self.columns = {region.name: k for k, region in enumerate(self.arrays.regions)}
         self.in_regions = np.array([REGIONS.index(name) for name in self.columns], int)
         shapes = spec.shapes(model)
+        placed = [
+            None if i in spec.given_contacts(model) else shape
+            for i, shape in zip(self.moving, shapes, strict=True)
+        ]
+        self.markers = ContactMarkers(model, self.moving, placed, self.arrays, spec.largest_area)
         self.forces = spec.pressure_forces(model, self.arrays)
         self.least = self.arrays.by_region(self.forces)
         self.unknown = [
@@ -311,16 +321,6 @@ class Contacts:
         verdict = worst([part.verdict for part, _ in found])
         chosen = [entry for entry in found if entry[0].verdict is verdict]
         part, row = min(chosen, key=margin)
-        body = self.model.bodies[self.moving[row]]
-        _, point, velocity = state.fastest_point(self.moving[row])
-        shown = figures.against(part.value, part.limit, spec.unit, at_most=spec.at_most)
-        label = f"{part.name}: {shown.value} m/s" + ("" if part.limit is None else f" of {shown.limit}")
-        arrow = Arrow(
-            origin=tuple(point.tolist()),
-            vector=tuple((0.3 * velocity).tolist()),
-            label=label,
-            verdict=verdict,
-        )
         return Result(
             name=spec.name,
             value=part.value,
@@ -330,7 +330,7 @@ class Contacts:
             reason=f"{part.name}: {part.reason}",
             interval=part.interval,
             parts=(*(part for part, _ in found), *mass_parts),
-            markers=(arrow, Highlight(body=body.name, verdict=verdict)),
+            markers=self.markers.of(state, part, row, judged),
             rows=self.rows.of(found, judged, (lambda _: ()) if people is None else people.hit),
         )
 

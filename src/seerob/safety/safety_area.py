@@ -66,7 +66,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
 
     def _bound(self, model: Model, watched: tuple[_Watched, ...], depths: Depths) -> Evaluate:
         several = len(_names(self.area)) > 1
-        offs = [TrackingError(model, each.gap.b) for each in watched]
+        offs = [TrackingError(model, (*each.gap.a, *each.gap.b)) for each in watched]
 
         def evaluate(state: State) -> Result:
             nearest, perhaps = (np.inf, ""), (np.inf, "", 0.0)
@@ -75,7 +75,9 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
             asked = [state.closest_per_body(each.gap) for each in watched]
             entered: list[tuple[_Watched, Closests, int]] = []
             for each, found, off in zip(watched, asked, offs, strict=True):
-                may = off.at(state) + each.gap.deviation
+                errors, on = off.at(state), len(each.gap.a)
+                # An area that a person carries may be elsewhere, too.
+                may = errors[:on].max() + errors[on:] + each.gap.deviation
                 i = int(found.distance.argmin())
                 nearest = min(nearest, (float(found.distance[i]), _where(model, each, i, several)))
                 # Another may be nearer than it, shapes and devices being what they are.

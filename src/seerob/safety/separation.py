@@ -27,8 +27,9 @@ from seerob.stopping.terms import At, Course, separation_distance, way_of_person
 from seerob.stopping.tolerances import SIMULATED, SeparationEnds, intervals, shifted, tolerances
 from seerob.tolerances import Shifts, Tolerance, deciding
 from seerob.transforms import Array
+from seerob.whereabouts.distance_ends import DistanceEnds
 from seerob.whereabouts.partly_seen import partly_seen
-from seerob.whereabouts.tracking_error import TrackingError, tracking
+from seerob.whereabouts.tracking_error import tracking
 
 __all__ = ["Detection", "Separation", "Stop", "separation_bound"]
 
@@ -203,7 +204,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         K = C + Z_d + Z_r + gap.deviation
         unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
         places, names = BodyPlaces(model), [body.name for body in model.bodies]
-        off = TrackingError(model, gap.a)
+        ends_of_distance = DistanceEnds(model, gap)
 
         def evaluate(state: State) -> Result:
             found = state.closest_per_body(gap, estimates=True)
@@ -212,10 +213,10 @@ class Separation(Criterion, frozen=True, kw_only=True):
             S_p = self._distance(now, K)
             if self.mode == "fixed":
                 S_p = largest.including(state, S_p)
-            seen = float(off.at(state).max(initial=0.0))
+            near, far = ends_of_distance.of_bodies(state, found.distance)
             span = ends.at(state) if ends.tolerances else None
-            spans = intervals(found.distance, S_p, seen, span)
-            off_at_all, bodies = span is not None or seen > 0, found.body_a.tolist()
+            spans = intervals(near, far, S_p, span)
+            off_at_all, bodies = span is not None or bool((far > near).any()), found.body_a.tolist()
             parts = tuple(
                 Result(
                     name=names[body],
@@ -225,9 +226,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
                     at_most=False,
                     verdict=self._verdict(ends_of_part, least, bool(unknown)),
                     interval=ends_of_part if off_at_all else None,
-                    reason=names[nearest],
+                    reason=names[bone],
                 )
-                for body, distance, least, ends_of_part, nearest in zip(
+                for body, distance, least, ends_of_part, bone in zip(
                     gap.b, found.distance.tolist(), S_p.tolist(), spans, bodies, strict=True
                 )
             )
@@ -237,9 +238,10 @@ class Separation(Criterion, frozen=True, kw_only=True):
             open_ = unknown
             if verdict is Verdict.UNDECIDED and not unknown:
                 widths = np.zeros(0) if span is None else span.widths[:, k]
-                open_ = deciding((*ends.tolerances, tracking(seen)), np.append(widths, 2 * seen))
-            near = places.named(state, int(found.body_a[k]), found.point_a[k])
-            where = f"{parts[k].name} ↔ {near}"
+                seen = float(far[k] - near[k])
+                open_ = deciding((*ends.tolerances, tracking(seen / 2)), np.append(widths, seen))
+            nearest = places.named(state, int(found.body_a[k]), found.point_a[k])
+            where = f"{parts[k].name} ↔ {nearest}"
             shown = figures.against(float(found.distance[k]), float(S_p[k]), self.unit, at_most=self.at_most)
             segment = Segment(
                 start=tuple(found.point_b[k].tolist()),

@@ -16,6 +16,7 @@ from seerob.snapshot import Basis, Label, Marker, Polyline, Result, Sphere, Vec3
 from seerob.source import Target
 from seerob.state import State
 from seerob.transforms import Array
+from seerob.waypoints.joint_limits import JointLimits
 from seerob.waypoints.programmed import Programmed
 
 DRAWN_RADIUS = 0.012
@@ -88,7 +89,13 @@ def _drawn(model: Model, robot: Mechanism) -> _Drawn:
     program = source.program(model.folder / source.file)
     target = Target(name=robot.name, description=robot.description)
     arm, _ = source.arm(program, target)
-    limits = tuple(None if v is None else v.value for v in robot.velocity_limits)
+    table = next(r for r in model.workstation.robots if r.name == robot.name)
+    limits = JointLimits.of(
+        arm.n,
+        speed=tuple(None if v is None else v.value for v in robot.velocity_limits),
+        acceleration=table.acceleration_limits or (),
+        jerk=table.jerk_limits or (),
+    )
     motion = source.motion(program, arm, limits)
     at = _tool_points(model, robot, np.array(motion.at))
     names = tuple(w.name or str(i + 1) for i, w in enumerate(program.waypoints))

@@ -2,8 +2,9 @@
 
 Causal: what is said at an instant depends on nothing after it, so that live and replayed runs agree.
 A joint is *held* while its angle stays within a band of twice the tolerance, short absences apart; a
-*movement* is a rise of more than a stated amplitude after a fall of as much. Both figures are choices: the
-methods leave it to an observer. `scoring.repetition` finds the same in scores that are recorded already.
+*movement* is a rise of more than a stated amplitude after a fall of as much, or the reverse. Both figures
+are choices: the methods leave it to an observer. `scoring.repetition` finds the same in scores that are
+recorded already.
 """
 
 from __future__ import annotations
@@ -106,7 +107,10 @@ class Hold:
 
 
 class Moves:
-    """How often one angle rose by an amplitude within the last minute.
+    """How often one angle moved to and fro by an amplitude within the last minute.
+
+    Rises and falls are counted apart and the larger number counts: a trunk that turns to the left and back
+    moves as often as one that turns to the right.
 
     Args:
         amplitude: [rad]
@@ -115,26 +119,29 @@ class Moves:
 
     def __init__(self, amplitude: float, window: float = WINDOW) -> None:
         self._amplitude, self._window = max(amplitude, _ROUNDING), window
-        self._rising = False
-        self._turn = math.nan
-        self._rises: deque[float] = deque()
+        self._low = self._high = math.nan
+        self._going = 0
+        """1 since a rise, -1 since a fall, 0 before the first of either."""
+        self._turns: dict[int, deque[float]] = {1: deque(), -1: deque()}
 
     def add(self, t: float, angle: float) -> None:
         """The angle [rad] at an instant [s] after the one before."""
-        ahead = angle - self._turn if self._rising else self._turn - angle
-        if math.isnan(self._turn) or ahead >= 0:
-            self._turn = angle
-        elif -ahead > self._amplitude:
-            self._rising, self._turn = not self._rising, angle
-            if self._rising:
-                self._rises.append(t)
-        while self._rises and self._rises[0] <= t - self._window + _ROUNDING:
-            self._rises.popleft()
+        if math.isnan(self._low):
+            self._low = self._high = angle
+        self._low, self._high = min(self._low, angle), max(self._high, angle)
+        for way, passed in ((1, angle - self._low), (-1, self._high - angle)):
+            if self._going != way and passed > self._amplitude:
+                self._going, self._low, self._high = way, angle, angle
+                self._turns[way].append(t)
+                break
+        for turns in self._turns.values():
+            while turns and turns[0] <= t - self._window + _ROUNDING:
+                turns.popleft()
 
     @property
     def count(self) -> int:
         """Within the window that ended with the last sample."""
-        return len(self._rises)
+        return max(map(len, self._turns.values()))
 
 
 class Found(NamedTuple):

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from types import TracebackType
-from typing import Self
 
 from seerob.samples import Sample
 from seerob.server.feed import Audience
 from seerob.server.past import Past
 from seerob.server.serving import Server
+from seerob.sink import Closing
 from seerob.snapshot import Command, History, Scene, Snapshot, Transport
 
 WAITING = 8192
@@ -77,7 +76,7 @@ class Live:
             await asyncio.sleep(self._pause)
 
 
-class LiveView:
+class LiveView(Closing):
     """The live view as a sink: an open `seerob.sink.Writer` that pages in a browser look at.
 
     Args:
@@ -116,11 +115,3 @@ class LiveView:
     def close(self) -> None:
         """Stop the server."""
         self.server.stop()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

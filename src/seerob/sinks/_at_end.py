@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from types import TracebackType
-from typing import Self
 
 from seerob.results.result_log import ResultLog
+from seerob.sink import Closing
 from seerob.snapshot import CriterionInfo
 
 Progress = Callable[[int, int], None]
 """Called with how many of how many steps of writing are done."""
 
 
-class AtEnd:
+class AtEnd(Closing):
     """What such writers do alike: they say how far they are, and an impatient user does not wait."""
 
     progress: Progress | None = None
@@ -25,9 +25,6 @@ class AtEnd:
 
     def abandon(self) -> None:
         """Leave nothing behind: called in place of `close` when somebody does not want to wait."""
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 Color = tuple[float, float, float]
 
 PAPER: Color = (0.955, 0.965, 0.975)
-INK: Color = (0.10, 0.13, 0.17)
 OVERSAMPLING = 2
 _LIGHT = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
 """Toward the light, in the world."""

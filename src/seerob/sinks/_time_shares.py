@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from seerob.figures import figure
 from seerob.results.distribution import distribution
 from seerob.results.result_log import ResultLog
@@ -11,12 +13,17 @@ from seerob.results.series import Series
 from seerob.sinks._html import Html, joined, table, tag
 from seerob.sinks._sentences import percent
 from seerob.sinks._sheet_rows import Cell
-from seerob.snapshot import CriterionInfo
+from seerob.snapshot import CriterionInfo, Level
 
 HEAD: list[Cell] = [
     "criterion", "part", "coverage [%]", "what", "value", "first at [s]", "share of time [%]",
     "longest stretch [s]",
 ]  # fmt: skip
+
+_WHOLE = ("", "right", "left")
+"""Parts whose values have the levels of the rule."""
+_FEW = 12
+"""A component with more values than this has no scores, but a measure."""
 
 
 def spread_over_time(info: CriterionInfo | None, series: Series) -> Html | None:
@@ -46,14 +53,13 @@ def spread_over_time(info: CriterionInfo | None, series: Series) -> Html | None:
 
 
 def time_rows(log: ResultLog, infos: dict[str, CriterionInfo]) -> Iterator[list[Cell]]:
-    """Rows of a sheet: for each ergonomics rule and side its levels, percentiles and extremes."""
+    """Rows of a sheet: for each ergonomics rule, side and component its levels, percentiles and extremes."""
     for name, info in infos.items():
         series = log.get(name)
         if info.group != "ergonomics" or series is None:
             continue
-        sides = {side: series.parts[side] for side in ("right", "left") if side in series.parts}
-        for part, one in {"": series, **sides}.items():
-            found = distribution(one, info.levels)
+        for part, one in {"": series, **series.parts}.items():
+            found = distribution(one, info.levels if part in _WHOLE else _scores(one))
             if found is None:
                 yield [name, part, 0.0, "never assessed", None, None, None, None]
                 continue
@@ -64,3 +70,11 @@ def time_rows(log: ResultLog, infos: dict[str, CriterionInfo]) -> Iterator[list[
             yield [name, part, covered, "mean, beside the others", found.mean, None, None, None]
             for level in found.levels:
                 yield [name, part, covered, level.name, None, None, 100 * level.share, level.longest]
+
+
+def _scores(series: Series) -> tuple[Level, ...]:
+    """The scores that a component had, the lowest first; none when its values are no scores."""
+    values = np.unique(series.values[~np.isnan(series.values)])
+    if len(values) > _FEW or not np.array_equal(values, np.round(values)):
+        return ()
+    return tuple(Level(up_to=float(value), name=f"score {value:.0f}") for value in values)

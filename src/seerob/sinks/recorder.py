@@ -7,14 +7,13 @@ import time
 from collections import deque
 from pathlib import Path
 from threading import Condition, Thread
-from types import TracebackType
-from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from msgspec import Meta
 
 from seerob.errors import InputError, SeerobError
 from seerob.samples import Sample
-from seerob.sink import Sink
+from seerob.sink import Closing, Sink
 from seerob.snapshot import Finding, Scene, Snapshot
 
 if TYPE_CHECKING:
@@ -73,7 +72,7 @@ class _Waiting(NamedTuple):
     snapshot: Snapshot | None
 
 
-class RecorderWriter:
+class RecorderWriter(Closing):
     """Hands ticks to its own thread.
 
     When the disk cannot keep up, snapshots are dropped first and the samples kept, so that a replay
@@ -153,14 +152,6 @@ class RecorderWriter:
         if self._error is not None:
             texts.append(f"recording stopped early: {self._error}")
         return tuple(Finding(level="warning", subject=self.path.name, text=text) for text in texts)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _refuse_after_error(self) -> None:
         if self._error is not None:

@@ -16,8 +16,7 @@ from seerob.human.calibration import CalibrationPose
 from seerob.human.captured import Captured, CaptureFrame
 from seerob.human.mapping import read_conventions
 from seerob.human.observing import Observer
-from seerob.human.smoothing import group_delay
-from seerob.quantities import Pose
+from seerob.quantities import Pose, Seconds
 from seerob.samples import BodySample, Quality
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
@@ -26,9 +25,9 @@ from seerob.sources._capture_options import (
     CutOff,
     Instant,
     Mapped,
-    Seconds,
     Weights,
     calibrated,
+    lateness,
     observer,
     person,
     placed_only,
@@ -142,7 +141,7 @@ class BodySamples:
         source = self.source
         first: float | None = None
         last, seq = -1e-9, 0
-        late = source.latency + group_delay(source.smoothing or 0.0)
+        late = lateness(source)
         for frame in self.captured.frames:
             first = frame.t if first is None else first
             t = frame.t - first - late
@@ -209,6 +208,4 @@ def _check(samples: BodySamples, rows: int, subject: str, file: str) -> tuple[fl
         shown = ", ".join(f"{name or 'nameless'} ({n})" for name, n in people.most_common(4))
         notes.append(("warning", f"the device changed its name of the person: {shown}"))
     found = (Finding(level=level, subject=subject, text=f"{file}: {text}") for level, text in notes)
-    return max(last - samples.source.latency - group_delay(samples.source.smoothing or 0.0), 0.0), tuple(
-        found
-    )
+    return max(last - lateness(samples.source), 0.0), tuple(found)

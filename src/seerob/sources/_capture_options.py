@@ -15,15 +15,14 @@ from seerob.human.captured import CaptureFrame, Layout
 from seerob.human.estimated import estimated as without_neighbours
 from seerob.human.observing import Observer, bind, with_mounts, with_places, without_unplaced
 from seerob.human.skeleton import BONES
-from seerob.human.smoothing import HIGHEST, LOWEST
+from seerob.human.smoothing import HIGHEST, LOWEST, group_delay
 from seerob.model_io.description import Description
-from seerob.quantities import Pose
+from seerob.quantities import Pose, Seconds
 from seerob.snapshot import Finding
 from seerob.source import Target
 from seerob.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
 
 Weight = Annotated[float, Meta(ge=0, le=1e6)]
-Seconds = Annotated[float, Meta(gt=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})]
 Instant = Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})]
 Metres3 = Annotated[tuple[float, float, float], Meta(extra={"unit": "m"}, extra_json_schema={"x-unit": "m"})]
 
@@ -84,6 +83,15 @@ class Options(Protocol):
     def convention(self) -> str: ...
     @property
     def calibration(self) -> Calibration: ...
+    @property
+    def latency(self) -> float: ...
+    @property
+    def smoothing(self) -> float | None: ...
+
+
+def lateness(options: Options) -> float:
+    """By how much later than it happened the twin sees it [s]: the device's delay and the filter's."""
+    return options.latency + group_delay(options.smoothing or 0.0)
 
 
 Known = Mapping[str, names.Convention]

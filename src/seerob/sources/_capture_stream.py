@@ -15,10 +15,9 @@ from seerob.human import manikin
 from seerob.human.calibration import Calibrated, CalibrationPose
 from seerob.human.captured import CaptureFrame, Layout
 from seerob.human.observing import Observer
-from seerob.human.smoothing import group_delay
 from seerob.live.listening import LiveSource, say_once
 from seerob.model_io.description import Description
-from seerob.quantities import Pose
+from seerob.quantities import Pose, Seconds
 from seerob.samples import BodyPoint, BodySample, Quality, Sample, SignalSample
 from seerob.snapshot import Finding
 from seerob.source import Target
@@ -27,9 +26,9 @@ from seerob.sources._capture_options import (
     CutOff,
     Instant,
     Mapped,
-    Seconds,
     Weights,
     calibrated,
+    lateness,
     observer,
     person,
     placed_only,
@@ -74,8 +73,7 @@ class CaptureStream(LiveSource, frozen=True, kw_only=True):
 
     def behind(self) -> float:
         """Delay behind the world that it needs [s]; latency and filter come on top of the period."""
-        late = self.latency + group_delay(self.smoothing or 0.0)
-        return super().behind() + (late if self.delay is None else 0.0)
+        return super().behind() + (lateness(self) if self.delay is None else 0.0)
 
     def frames(self) -> AsyncGenerator[tuple[Layout, CaptureFrame], None]:
         """Connect, and yield every frame of every person until the connection ends.
@@ -125,7 +123,7 @@ class _Hearing:
         if not self._calibrated:
             return self._calibrate(layout, frame, now)
         points = bound.points(frame)
-        late = self._source.latency + group_delay(self._source.smoothing or 0.0)
+        late = lateness(self._source)
         return BodySample(
             source=self._source.name,
             target=self._source.human,

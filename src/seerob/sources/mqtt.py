@@ -20,6 +20,7 @@ from seerob.protocols.json_pointer import document, parts
 from seerob.protocols.trusted_certificates import trusting
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
+from seerob.sources._access import missing_access
 from seerob.sources._json_values import told
 from seerob.sources._variables import BEAT, LONGEST_PULSE, PULSES, Change, Node, VariablesSource
 from seerob.variables.dictionary import Variable
@@ -40,7 +41,10 @@ WAITING = 4096
 class Plain(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A topic whose payload is a value or a JSON document."""
 
-    topic: Annotated[str, Meta(min_length=1, max_length=500, pattern=r"^[^#+\x00]+$")]
+    topic: Annotated[
+        str,
+        Meta(min_length=1, max_length=500, pattern=r"^[^#+\x00]+$", description="a topic without # and +"),
+    ]
     pointer: str = ""
     """JSON pointer to the value; the whole payload when not given."""
     time: str | None = None
@@ -54,10 +58,10 @@ class Plain(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Metric(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A metric of a Sparkplug B node or device."""
 
-    node: Annotated[str, Meta(pattern=r"^[^/#+]+/[^/#+]+$")]
+    node: Annotated[str, Meta(pattern=r"^[^/#+]+/[^/#+]+$", description='"group/edge node"')]
     """``group/node``."""
     metric: str
-    device: Annotated[str, Meta(pattern=r"^[^/#+]*$")] = ""
+    device: Annotated[str, Meta(pattern=r"^[^/#+]*$", description="a name without /, # and +")] = ""
 
     @property
     def speaker(self) -> str:
@@ -144,15 +148,10 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
                     raise ValueError('a trigger is true or false on a topic of its own: write "a/topic"')
             except (ValueError, msgspec.ValidationError) as error:
                 problems.append(Problem(f"mqtt {self.host}", f"{variable.name}.address", str(error)))
-        if self.password_env is not None and self.password_env not in os.environ:
-            what = f"no environment variable {self.password_env!r}"
-            problems.append(Problem(f"mqtt {self.host}", "password_env", what, "set it before the start"))
-        if self.ca is not None and not (folder / self.ca).is_file():
-            problems.append(Problem(f"mqtt {self.host}", "ca", f"no such file: {self.ca}", "give a PEM file"))
+        problems += missing_access(self, folder, where=f"mqtt {self.host}")
         if problems:
             raise InputError(problems)
-        at_home = self if self.ca is None else msgspec.structs.replace(self, ca=str(folder / self.ca))
-        return VariablesSource.open(at_home, folder, target)
+        return VariablesSource.open(self.beside(folder), folder, target)
 
     async def ask(self) -> tuple[Finding, ...]:
         """Connect once."""

@@ -26,7 +26,7 @@ from seerob.protocols.opcua_client import (
 from seerob.quantities import Seconds
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
-from seerob.sources._opcua_files import at_home, missing
+from seerob.sources._opcua_files import missing
 from seerob.sources._variables import LONGEST_PULSE, PULSES, Change, Node, VariablesSource
 from seerob.variables.dictionary import Kind, Variable
 from seerob.variables.units import unit
@@ -44,7 +44,9 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
 
     by_exception: ClassVar[bool] = True
 
-    url: Annotated[str, Meta(pattern=r"^opc\.tcp://[^\s/]+")]
+    url: Annotated[
+        str, Meta(pattern=r"^opc\.tcp://[^\s/]+", description="an address such as opc.tcp://192.168.0.1:4840")
+    ]
     """``opc.tcp://192.168.0.1:4840``"""
     interval: Seconds = 0.02
     """Publishing interval that is asked for [s]; a server may grant a longer one, and says so."""
@@ -80,7 +82,7 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
                 problems.append(Problem(where, f"{variable.name}.address", str(error)))
         if problems:
             raise InputError(problems)
-        return VariablesSource.open(at_home(self, folder), folder, target)
+        return VariablesSource.open(self.beside(folder), folder, target)
 
     async def ask(self) -> tuple[Finding, ...]:
         """Connect once."""

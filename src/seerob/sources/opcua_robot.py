@@ -34,7 +34,9 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
 
     robot: str
     """The robot it drives."""
-    url: Annotated[str, Meta(pattern=r"^opc\.tcp://[^\s/]+")]
+    url: Annotated[
+        str, Meta(pattern=r"^opc\.tcp://[^\s/]+", description="an address such as opc.tcp://192.168.0.1:4840")
+    ]
     """``opc.tcp://192.168.0.1:4840``"""
     device: str | None = None
     """Name of the motion device on the server; the only one when not given."""

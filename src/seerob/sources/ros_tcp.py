@@ -109,13 +109,18 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
         return ros_tcp.command("subscribe", {"topic": topic, "message_name": name})
 
     async def _frames(self, connection: Connection) -> AsyncGenerator[tuple[float, Frame], None]:
-        splitter = Splitter()
+        splitter, patience = Splitter(), self.silence() or PATIENT
+        whole = time.monotonic()
         while True:
-            arrived, data, _ = await connection.read(self.silence() or PATIENT)
+            arrived, data, _ = await connection.read(patience)
             if not data:
                 return
             for frame in splitter.feed(data):
+                whole = arrived
                 yield arrived, frame
+            if arrived - whole > patience:
+                # A length that was damaged would be waited for much longer.
+                raise TimeoutError(f"connected, but nothing that is whole for {patience:g} s")
 
     async def _decoded(
         self, frames: AsyncGenerator[tuple[float, Frame], None], edition: Edition

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+from collections import defaultdict, deque
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -12,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from urllib.parse import urlsplit
 
 from msgspec import Meta
-from msgspec.structs import replace
 
 from seerob.errors import InputError, Problem
 from seerob.protocols import ProtocolError, s7_web
@@ -21,6 +21,7 @@ from seerob.protocols.trusted_certificates import trusting
 from seerob.quantities import Seconds
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
+from seerob.sources._access import missing_access
 from seerob.sources._variables import Change, Node, VariablesSource
 from seerob.variables.dictionary import Variable
 
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 PATIENCE = 2.0
 """With each answer [s]."""
+MOST_LEFT = 8
+"""Sessions that are given back once the PLC is there again."""
 DEEPEST = 4
 """Levels that `browse` goes down."""
 
@@ -38,7 +41,9 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
 
     by_exception: ClassVar[bool] = False
 
-    url: Annotated[str, Meta(pattern=r"^https?://[^/\s]+/?$")]
+    url: Annotated[
+        str, Meta(pattern=r"^https?://[^/\s]+/?$", description="an address such as https://192.168.0.1")
+    ]
     """``https://192.168.0.1``; unencrypted only to this machine itself."""
     user: str
     """A user of the PLC who may read."""
@@ -71,15 +76,10 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
             for v in (() if target is None else target.variables)
             if not isinstance(v.address, str) or not v.address
         ]
-        if self.password_env not in os.environ:
-            what = f"no environment variable {self.password_env!r}"
-            problems.append(Problem(where, "password_env", what, "set it before the start"))
-        if self.ca is not None and not (folder / self.ca).is_file():
-            problems.append(Problem(where, "ca", f"no such file: {self.ca}", "give a PEM file"))
+        problems += missing_access(self, folder, where=where)
         if problems:
             raise InputError(problems)
-        at_home = self if self.ca is None else replace(self, ca=str(folder / self.ca))
-        return VariablesSource.open(at_home, folder, target)
+        return VariablesSource.open(self.beside(folder), folder, target)
 
     async def ask(self) -> tuple[Finding, ...]:
         """Log in and out."""
@@ -134,6 +134,7 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
         context = trusting(None if self.ca is None else folder / self.ca, server=self.url)
         async with httpx.AsyncClient(verify=context, timeout=PATIENCE, trust_env=False) as client:
             session = _Session(client, self.url.rstrip("/") + s7_web.PATH)
+            await _give_back(session)
             password = os.environ.get(self.password_env, "")
             found = s7_web.result(await session.post(s7_web.login(self.user, password)))
             token = found.get("token") if isinstance(found, dict) else None
@@ -144,13 +145,30 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
                 yield session
             finally:
                 # A PLC has few sessions, and keeps a forgotten one for minutes.
-                with contextlib.suppress(OSError, ProtocolError):
-                    await session.post(s7_web.logout())
+                try:
+                    s7_web.result(await session.post(s7_web.logout()))
+                except (OSError, ProtocolError):
+                    _left[session.url].append(token)
+
+
+_left: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=MOST_LEFT))
+"""Sessions of each PLC that a lost connection has left open."""
+
+
+async def _give_back(session: _Session) -> None:
+    """Log out of what a lost connection has left: else a few losses would take all sessions."""
+    left = _left[session.url]
+    while left:
+        session.token = left[0]
+        with contextlib.suppress(ProtocolError):
+            await session.post(s7_web.logout())
+        left.popleft()
+    session.token = ""
 
 
 class _Session:
     def __init__(self, client: httpx.AsyncClient, url: str) -> None:
-        self._client, self._url = client, url
+        self._client, self.url = client, url
         self.token = ""
 
     async def post(self, data: bytes) -> bytes:
@@ -161,4 +179,4 @@ class _Session:
             ProtocolError: It is too large, or no success.
         """
         headers = {"Content-Type": "application/json"} | ({s7_web.TOKEN: self.token} if self.token else {})
-        return await answer(self._client, "POST", self._url, who="the PLC", headers=headers, content=data)
+        return await answer(self._client, "POST", self.url, who="the PLC", headers=headers, content=data)

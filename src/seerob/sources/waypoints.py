@@ -10,6 +10,7 @@ from msgspec import Meta
 
 from seerob.errors import InputError, Problem, suggestion
 from seerob.quantities import Pose, Radians, unit
+from seerob.same_names import by_name
 from seerob.snapshot import Finding
 from seerob.source import Target
 from seerob.sources._logged_program import log_kind, logged_program
@@ -19,6 +20,7 @@ from seerob.transforms import Array, rotation_from_rpy, rotation_from_wxyz, tran
 from seerob.waypoints.arm import Arm
 from seerob.waypoints.branches import parse
 from seerob.waypoints.continuous import Continuous, Wish, continuous
+from seerob.waypoints.joint_limits import JointLimits
 from seerob.waypoints.point import Point
 from seerob.waypoints.reading import read_program
 from seerob.waypoints.waypoint import Program
@@ -78,7 +80,7 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
         """Read the waypoints, solve the poses, time the way."""
         program = self.program(path)
         arm, said = self.arm(program, target)
-        found = self.motion(program, arm, target.velocity)
+        found = self.motion(program, arm, _limits(target, arm))
         where = program.file
         text = (
             f"the motion between the {len(program.waypoints)} waypoints of {where} is timed by seerob with "
@@ -91,30 +93,19 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
             *notes(tuple(f"{where}: {d}" for d in found.doubts), target.name, level="warning"),
         )
 
-    def motion(self, program: Program, arm: Arm, speed_limits: tuple[float | None, ...]) -> Continuous:
+    def motion(self, program: Program, arm: Arm, limits: JointLimits) -> Continuous:
         """The continuous motion.
 
         Args:
             program: Of `program`.
             arm: Of `arm`.
-            speed_limits: Of the joints [rad/s or m/s]; None where unknown.
+            limits: What its joints may do.
 
         Raises:
             InputError: What nobody gave, or a waypoint that cannot be reached.
         """
-        wish = Wish(
-            joint_speed=self.joint_speed,
-            joint_acceleration=self.joint_acceleration,
-            joint_jerk=self.joint_jerk,
-            tool_speed=self.tool_speed,
-            tool_acceleration=self.tool_acceleration,
-            tool_jerk=self.tool_jerk,
-            tool_turn=self.tool_turn,
-            period=self.period,
-            start=self.start,
-            branch=None if self.branch is None else parse(self.branch),
-        )
-        return continuous(program, arm, wish, speed_limits=speed_limits)
+        wish = by_name(Wish, self, branch=None if self.branch is None else parse(self.branch))
+        return continuous(program, arm, wish, limits=limits)
 
     def program(self, path: Path) -> Program:
         """The waypoints of the file, or those by hand.
@@ -172,3 +163,7 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
         if program.tcp is not None:
             return transform(rotation_from_wxyz(program.tcp.wxyz), program.tcp.position), "that set_tcp says"
         return np.eye(4), "at the origin"
+
+
+def _limits(target: Target, arm: Arm) -> JointLimits:
+    return JointLimits.of(arm.n, speed=target.velocity, acceleration=target.acceleration, jerk=target.jerk)

@@ -14,7 +14,6 @@ from urllib.parse import urljoin, urlsplit
 
 import msgspec
 from msgspec import Meta
-from msgspec.structs import replace
 
 from seerob.errors import InputError, Problem
 from seerob.protocols import ProtocolError
@@ -25,6 +24,7 @@ from seerob.protocols.websocket_link import linked_to
 from seerob.quantities import Seconds
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
+from seerob.sources._access import missing_access
 from seerob.sources._json_values import told
 from seerob.sources._variables import Change, Node, VariablesSource
 from seerob.variables.dictionary import Variable
@@ -38,7 +38,14 @@ MOST_PATHS = 20
 DEEPEST, MOST_NODES = 12, 5000
 """Of what `browse` names."""
 
-Url = Annotated[str, Meta(pattern=r"^(https?|wss?)://[^/\s?#]+(/[^\s#]*)?$", max_length=500)]
+Url = Annotated[
+    str,
+    Meta(
+        pattern=r"^(https?|wss?)://[^/\s?#]+(/[^\s#]*)?$",
+        max_length=500,
+        description="an address that begins with http://, https://, ws:// or wss://",
+    ),
+]
 
 
 class Spot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -46,7 +53,9 @@ class Spot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     pointer: Annotated[str, Meta(max_length=500)]
     """JSON pointer to the value."""
-    path: Annotated[str, Meta(max_length=500, pattern=r"^[^\s#]*$")] = ""
+    path: Annotated[
+        str, Meta(max_length=500, pattern=r"^[^\s#]*$", description="a path without blanks and #")
+    ] = ""
     """Of another document, relative to ``url``; not with a WebSocket."""
     time: Annotated[str, Meta(max_length=500)] | None = None
     """JSON pointer to when it was so: seconds or milliseconds since 1970, or an ISO 8601 text."""
@@ -82,9 +91,13 @@ class Web(VariablesSource, frozen=True, kw_only=True):
     """Text that is sent to a WebSocket once it is open, to ask it for what it has."""
     token_env: str | None = None
     """Environment variable that holds a token: a workstation file is no place for one."""
-    header: Annotated[str, Meta(pattern=r"^[A-Za-z0-9\-]+$", max_length=100)] = "Authorization"
+    header: Annotated[
+        str, Meta(pattern=r"^[A-Za-z0-9\-]+$", max_length=100, description="letters, digits and -")
+    ] = "Authorization"
     """Header that the token is sent in."""
-    scheme: Annotated[str, Meta(pattern=r"^[A-Za-z0-9\-]*$", max_length=50)] = "Bearer"
+    scheme: Annotated[
+        str, Meta(pattern=r"^[A-Za-z0-9\-]*$", max_length=50, description="letters, digits and -")
+    ] = "Bearer"
     """Word before the token; nothing when empty."""
     ca: str | None = None
     """Certificates that are trusted instead of the system's, a PEM file beside the workstation."""
@@ -130,15 +143,10 @@ class Web(VariablesSource, frozen=True, kw_only=True):
                 problems.append(Problem(where, f"{variable.name}.address", str(error)))
         if len(spots) > MOST_PATHS:
             problems.append(Problem(where, "address", f"{len(spots)} paths", f"at most {MOST_PATHS}"))
-        if self.token_env is not None and self.token_env not in os.environ:
-            what = f"no environment variable {self.token_env!r}"
-            problems.append(Problem(where, "token_env", what, "set it before the start"))
-        if self.ca is not None and not (folder / self.ca).is_file():
-            problems.append(Problem(where, "ca", f"no such file: {self.ca}", "give a PEM file"))
+        problems += missing_access(self, folder, where=where, env="token_env")
         if problems:
             raise InputError(problems)
-        at_home = self if self.ca is None else replace(self, ca=str(folder / self.ca))
-        return VariablesSource.open(at_home, folder, target)
+        return VariablesSource.open(self.beside(folder), folder, target)
 
     async def ask(self) -> tuple[Finding, ...]:
         """Hear one document."""

@@ -76,18 +76,18 @@ class SeparationEnds:
         return found
 
 
-def intervals(distance: Array, S_p: Array, seen: float, span: Spread | None) -> list[tuple[float, float]]:
+def intervals(near: Array, far: Array, S_p: Array, span: Spread | None) -> list[tuple[float, float]]:
     """Of each part's distance [m], with what S_p may be off put on the distance's side.
 
     So the verdict of an interval against the S_p shown is that of the least distance against the largest S_p
     and of the largest distance against the least.
 
     Args:
-        distance: Of each part [m], shape (n,).
+        near: Least distance of each part [m], people being where devices see them or not, shape (n,).
+        far: Largest distance, likewise.
         S_p: Of each part, as given [m], shape (n,).
-        seen: How far people may be from where they are seen [m].
         span: Ends of S_p; None when nothing of the stop may be off.
     """
     low, high = (S_p, S_p) if span is None else (span.low, span.high)
-    ends = distance - seen - (high - S_p), distance + seen + (S_p - low)
+    ends = near - (high - S_p), far + (S_p - low)
     return list(zip(*(end.tolist() for end in ends), strict=True))

@@ -24,8 +24,9 @@ BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "
 def check_file(path: Path, name: str, max_bytes: int = MAX_BYTES) -> bytes:
     """The first bytes of a readable file of a bearable size; InputError otherwise."""
     if not path.is_file():
-        what = "is a folder" if path.is_dir() else "no such file"
-        raise InputError.at(name, "", what, f"looked for {path.name!r} next to the workstation file")
+        if path.is_dir():
+            raise InputError.at(name, "", "is a folder", "give the file that is meant")
+        raise InputError.at(name, "", "no such file", f"looked for {path}")
     size = path.stat().st_size
     if size == 0:
         raise InputError.at(name, "", "the file is empty")

@@ -57,9 +57,7 @@ class ToolTrajectory(Timed):
     """Sheet of a workbook; for messages."""
 
     def __post_init__(self) -> None:
-        problems = list(self._shape_problems()) or list(self._value_problems())
-        if problems:
-            raise InputError(problems)
+        super().__post_init__()
         unit = self.wxyz / np.linalg.norm(self.wxyz, axis=1, keepdims=True)
         # q and -q are the same orientation: a change of sign between rows is no motion.
         flips = np.where(np.sum(unit[1:] * unit[:-1], axis=1) < 0, -1.0, 1.0)

@@ -64,6 +64,19 @@ class Timed:
     rows: NDArray[np.int64] | None
     sheet: str
 
+    def __post_init__(self) -> None:
+        problems = list(self._shape_problems()) or list(self._value_problems())
+        if problems:
+            raise InputError(problems)
+
+    def _shape_problems(self) -> Iterator[Problem]:
+        """Whether the arrays belong together."""
+        raise NotImplementedError
+
+    def _value_problems(self) -> Iterator[Problem]:
+        """What is wrong in arrays that do."""
+        raise NotImplementedError
+
     @property
     def duration(self) -> float:
         """From the first to the last sample [s]."""
@@ -165,11 +178,6 @@ class Trajectory(Timed):
     """Row numbers in the file, from 1, shape (n,); for messages."""
     sheet: str = ""
     """Sheet of a workbook; for messages."""
-
-    def __post_init__(self) -> None:
-        problems = list(self._shape_problems()) or list(self._value_problems())
-        if problems:
-            raise InputError(problems)
 
     def __repr__(self) -> str:
         return f"Trajectory({self.file!r}, {len(self.t)} samples of {self.dof} joints, {self.duration:g} s)"

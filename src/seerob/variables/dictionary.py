@@ -43,9 +43,9 @@ class WhenStale(StrEnum):
     """What becomes of a value that is too old, or that its source calls bad."""
 
     UNDECIDED = "undecided"
-    """What depends on it is undecided."""
+    """What depends on it is undecided, and what shows it looks unknown."""
     HOLD = "hold"
-    """It is shown as it was last; what is judged by it is undecided all the same."""
+    """What shows it (``[[displays]]``) stays as it was; what is judged by it is undecided all the same."""
 
 
 class BadValue(ValueError):

@@ -9,8 +9,6 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import msgspec
 import numpy as np
@@ -22,7 +20,7 @@ from seerob.mounting.compilation import Progress
 from seerob.mounting.things import MadeArea
 from seerob.run import Bound
 from seerob.samples import Sample
-from seerob.sink import Writer
+from seerob.sink import Closing, Writer
 from seerob.snapshot import Finding, Origin, Result, Snapshot
 from seerob.transforms import Array
 from seerob.volumes.moving import posed, reach_box
@@ -42,7 +40,7 @@ Run = Callable[[Writer], object]
 """Runs the workstation once and tells a writer."""
 
 
-class MotionRecord:
+class MotionRecord(Closing):
     """A writer that keeps the twin's joint positions, and results, of a part of a run."""
 
     def __init__(self, start: float, end: float) -> None:
@@ -62,17 +60,6 @@ class MotionRecord:
             self.instants.append(snapshot.t)
             for name, error in snapshot.tracking.items():
                 self.off[name] = max(self.off.get(name, 0.0), error)
-
-    def close(self) -> None:
-        """Nothing to finish."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def motion(self) -> dict[str, Array]:
         """Joint positions by robot and human [rad or m], shape (N, n) each."""

@@ -100,15 +100,6 @@ def contains(corners: Sequence[Corner] | Array, points: Array) -> NDArray[np.boo
     return np.asarray(crosses.sum(axis=1) % 2 == 1)
 
 
-def distance_to_edge(corners: Sequence[Corner] | Array, points: Array) -> Array:
-    """Distance of each point (n, 2) to the polygon's border, inside or out [m], shape (n,)."""
-    a = np.asarray(corners, float)
-    edge = np.roll(a, -1, axis=0) - a
-    away = points[:, None] - a
-    share = np.clip(np.einsum("nij,ij->ni", away, edge) / np.einsum("ij,ij->i", edge, edge), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(away - share[..., None] * edge, axis=2).min(axis=1))
-
-
 def triangulate(corners: Sequence[Corner]) -> NDArray[np.int32]:
     """Triangles of a simple polygon by ear clipping [Meisters1975]_, counter-clockwise, shape (n - 2, 3).
 

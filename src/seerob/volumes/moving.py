@@ -15,7 +15,8 @@ from seerob.geometry import Mesh, Solid
 from seerob.kernels.fields import Field, mesh_field
 from seerob.kernels.tree_file import tree_of
 from seerob.model import Model
-from seerob.model_io.mesh_bodies import is_closed, joined
+from seerob.model_io.mesh_bodies import is_closed
+from seerob.model_io.split_surfaces import enclosing
 from seerob.transforms import Array
 
 Indices = NDArray[np.int64]
@@ -280,7 +281,7 @@ def _refuse_open(model: Model, bodies: Sequence[int]) -> None:
         for i, thing in enumerate(getattr(station, group)):
             own = [model.bodies[k].solids for k in bodies if model.bodies[k].owner == thing.name]
             meshes = [solid.mesh for solids in own for solid in solids if solid.mesh is not None]
-            if meshes and not all(map(is_closed, meshes)) and not is_closed(joined(meshes)[0]):
+            if meshes and not all(map(is_closed, meshes)) and enclosing(meshes) is None:
                 what = f"the mesh of {thing.name} is open: the volume that it sweeps cannot be told"
                 problems.append(Problem(file, f"{group}[{i}].mesh", what, "close it, or give a shape"))
     if problems:

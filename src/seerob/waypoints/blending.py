@@ -2,7 +2,7 @@ r"""Moves that do not stop: how a corner is rounded off, and how fast it is pass
 
 A rounding is a quintic :math:`q(u)`, :math:`u = \rho t`, of which speeds grow with the rate :math:`\rho`,
 accelerations with its square and jerks with its cube. It is passed at the largest rate at which none of the
-three is exceeded that either of its moves has, nor a speed limit of a joint; where a move is too short to get
+three is exceeded that either of its moves has, nor what a joint may do; where a move is too short to get
 to that speed or to brake from it, it is passed slower. Of slopes that a rounding may have at its ends the
 one that is passed in the shortest time is taken.
 """
@@ -16,6 +16,7 @@ import numpy as np
 
 from seerob.transforms import Array
 from seerob.waypoints.arm import Arm
+from seerob.waypoints.joint_limits import JointLimits
 from seerob.waypoints.pieces import Piece, Rounding, rounding
 from seerob.waypoints.timing import Limits, reachable
 from seerob.waypoints.waypoint import Program
@@ -48,14 +49,14 @@ class Leg:
     """What it is, when it is a rounding; its speeds are rates then."""
 
 
-def rounded(legs: list[Leg], program: Program, arm: Arm, speed_limits: Array, doubts: list[str]) -> list[Leg]:
+def rounded(legs: list[Leg], program: Program, arm: Arm, joints: JointLimits, doubts: list[str]) -> list[Leg]:
     """The legs with roundings between those that do not stop.
 
     Args:
         legs: Moves; cut where they are rounded off.
         program: Whose blend radii count.
         arm: The robot.
-        speed_limits: Of the joints [rad/s or m/s], infinite where unknown, shape (n,).
+        joints: What they may do.
         doubts: What is done otherwise than asked is added.
     """
     radius = {w.shown: w.blend for w in program.waypoints}
@@ -88,7 +89,7 @@ def rounded(legs: list[Leg], program: Program, arm: Arm, speed_limits: Array, do
         if leg.blend:
             nxt = legs[k + 1]
             each = [rounding(whole, nxt.piece, cuts[k][1], cuts[k + 1][0], slope) for slope in SLOPES]
-            rates = [_rate(arm, curve, leg, nxt, speed_limits) for curve in each]
+            rates = [_rate(arm, curve, leg, nxt, joints) for curve in each]
             best = int(np.argmax(rates))
             curve, v = each[best], rates[best]
             found.append(Leg(curve.piece, leg.limits, leg.place, v0=v, v1=v, rounding=curve))
@@ -108,15 +109,15 @@ def _distance_cut(arm: Arm, piece: Piece, corner: Array, r: float, *, from_end: 
     return float(s[k - 1] + x * (s[k] - s[k - 1]) if k else s[0]), True
 
 
-def _rate(arm: Arm, curve: Rounding, before: Leg, after: Leg, speed_limits: Array) -> float:
-    """Largest rate of a rounding, within the limits of both sides."""
+def _rate(arm: Arm, curve: Rounding, before: Leg, after: Leg, joints: JointLimits) -> float:
+    """Largest rate of a rounding, within the limits of both sides and of the joints."""
     u = np.linspace(0.0, 1.0, FINE + 1)
-    joints = [np.abs(curve.piece.derivative(u, order)).max(axis=0) for order in (1, 2, 3)]
-    options = [float(np.min(speed_limits / np.maximum(joints[0], 1e-12)))]
+    moved = [np.abs(curve.piece.derivative(u, order)).max(axis=0) for order in (1, 2, 3)]
+    options = [joints.rate(moved)]
     for leg in (before, after):
         limits, tool = leg.limits, leg.piece.tool and not leg.piece.turning
         scale = 1.0 if leg.piece.tool else leg.piece.leading
-        sizes = _of_tool(arm, curve.piece) if tool else [float(each.max()) for each in joints]
+        sizes = _of_tool(arm, curve.piece) if tool else [float(each.max()) for each in moved]
         for size, limit, order in zip(
             sizes, (limits.speed, limits.acceleration, limits.jerk), (1, 2, 3), strict=True
         ):

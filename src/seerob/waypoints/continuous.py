@@ -13,6 +13,7 @@ from seerob.waypoints.arm import Arm
 from seerob.waypoints.blending import Leg, meet, rounded
 from seerob.waypoints.branches import Branch
 from seerob.waypoints.goals import Goals
+from seerob.waypoints.joint_limits import JointLimits
 from seerob.waypoints.pieces import SINGULAR, Piece, joint_line, tool_way
 from seerob.waypoints.timing import Limits, Profile, profile
 from seerob.waypoints.waypoint import Program, Waypoint
@@ -56,17 +57,14 @@ class Continuous:
     """What may differ on a controller, or was changed."""
 
 
-def continuous(
-    program: Program, arm: Arm, wish: Wish, *, speed_limits: tuple[float | None, ...]
-) -> Continuous:
+def continuous(program: Program, arm: Arm, wish: Wish, *, limits: JointLimits) -> Continuous:
     """A continuous motion through all waypoints.
 
     Args:
         program: Waypoints, poses in the arm's base.
         arm: The robot.
         wish: Speeds and the like that the program does not give.
-        speed_limits: Of the joints [rad/s or m/s]; None where unknown. Linear moves that need more are
-            slowed as a whole, and said.
+        limits: What the joints may do. Moves that need more are slowed as a whole, and said.
 
     Raises:
         InputError: With every limit that nobody gave, or the first waypoint that cannot be reached.
@@ -77,7 +75,6 @@ def continuous(
     doubts: list[str] = []
     remarks: list[str] = []
     rests = 0.0
-    limits = np.array([np.inf if v is None else v for v in speed_limits])
     for k, (before, waypoint, q) in enumerate(goals.steps()):
         piece = _piece(program, arm, before, waypoint, q)
         if piece is None:
@@ -88,7 +85,7 @@ def continuous(
             continue
         goals.reached(piece.last)
         leg = Leg(piece, _limits(waypoint, wish, piece), waypoint.shown, waypoint.duration, waypoint.pause)
-        _slowed(leg, limits, wish.tool_turn, doubts)
+        _slowed(leg, limits, wish.tool_turn, arm, doubts)
         if piece.least < SINGULAR:
             doubts.append(
                 f"{waypoint.shown}: near a singularity at {100 * piece.least_at:.0f} % of the way (least "
@@ -107,7 +104,7 @@ def continuous(
     meet(legs)
     trajectory = _sampled(legs, program.file, wish.period, goals.first, rests)
     if any(leg.piece.tool for leg in legs):
-        remarks.append(_of_joints(trajectory, arm))
+        remarks.append(_of_joints(trajectory, arm, limits))
     remarks += goals.remarks
     return Continuous(trajectory, tuple(goals.found), tuple(remarks), (*goals.doubts, *doubts))
 
@@ -156,23 +153,31 @@ def _piece(program: Program, arm: Arm, before: Array, waypoint: Waypoint, q: Arr
     return tool_way(arm, before, rotation, position, via=via, file=program.file, place=waypoint.shown)
 
 
-def _slowed(leg: Leg, limits: Array, tool_turn: float | None, doubts: list[str]) -> None:
-    """A move whose joints or tool would be faster than they may is slowed as a whole."""
-    possible = float(np.min(limits / np.maximum(leg.piece.fastest(), 1e-12)))
+def _slowed(leg: Leg, limits: JointLimits, tool_turn: float | None, arm: Arm, doubts: list[str]) -> None:
+    """A move in which a joint or the tool would do more than it may is slowed as a whole."""
+    possible = float(np.min(limits.speed / np.maximum(leg.piece.fastest(), 1e-12)))
     if tool_turn is not None and leg.piece.turn > 0:
         possible = min(possible, tool_turn / leg.piece.turn)
+    unit = "m/s" if leg.piece.tool else "rad/s of the leading joint"
+    scale = 1.0 if leg.piece.tool else leg.piece.leading
     if possible < leg.limits.speed:
-        unit = "m/s" if leg.piece.tool else "rad/s of the leading joint"
-        scale = 1.0 if leg.piece.tool else leg.piece.leading
         doubts.append(
             f"{leg.place}: slowed from {leg.limits.speed * scale:.3g} to {possible * scale:.3g} {unit}, "
             "which the speed limits of the joints or tool_turn allow; a controller may do otherwise"
         )
         leg.limits = Limits(possible, leg.limits.acceleration, leg.limits.jerk)
+    k, what, joint = limits.stretch(leg.piece, leg.limits)
+    if k > 1:
+        was = leg.limits
+        leg.limits = Limits(was.speed / k, was.acceleration / k**2, was.jerk / k**3)
+        doubts.append(
+            f"{leg.place}: slowed by {k:.3g} (to {leg.limits.speed * scale:.3g} {unit} at most), so that "
+            f"{arm.joints[joint].name} keeps its limit of {what}; a controller may do otherwise"
+        )
 
 
-def _of_joints(motion: Trajectory, arm: Arm) -> str:
-    """What the joints do, which linear and circular moves do not limit, by differences over the period."""
+def _of_joints(motion: Trajectory, arm: Arm, limits: JointLimits) -> str:
+    """What the joints do on linear and circular moves, by differences over the period."""
     period = float(motion.t[1] - motion.t[0])
     said = []
     for order, what in ((2, "acceleration"), (3, "jerk")):
@@ -181,7 +186,10 @@ def _of_joints(motion: Trajectory, arm: Arm) -> str:
         i = int(np.argmax(size))
         unit = f"{'m' if arm.slides[i] else 'rad'}/s{'²' if order == 2 else '³'}"
         said.append(f"{what} of {size[i]:.3g} {unit} ({arm.joints[i].name})")
-    return f"joints reach, over {period:g} s, at most an {' and a '.join(said)}: tool moves do not limit them"
+    named = {"acceleration": limits.acceleration, "jerk": limits.jerk}
+    open_ = [f"{name}_limits" for name, given in named.items() if np.isinf(given).any()]
+    rest = f": tool moves do not limit them without {' and '.join(open_)} of the robot" if open_ else ""
+    return f"joints reach, over {period:g} s, at most an {' and a '.join(said)}{rest}"
 
 
 def _timing(leg: Leg, file: str) -> Profile:

@@ -19,7 +19,8 @@ from seerob.errors import InputError
 from seerob.transforms import Array, rotation_from_axis_angle
 from seerob.waypoints.arm import Arm
 from seerob.waypoints.branches import factors, is_classic
-from seerob.waypoints.inverse import follow, rotation_vectors
+from seerob.waypoints.inverse import follow, rotation_vectors, solutions
+from seerob.waypoints.unreachable import why_not
 
 STEP, TURN = 0.005, 0.02
 """Largest distance [m] and angle [rad] between two solved points."""
@@ -66,6 +67,13 @@ class Piece:
         """Derivatives of the joint positions by the way, at places counted from its begin, shape (…, n)."""
         place = np.clip(np.asarray(s, float) + self.start, self.start, self.end)
         return np.asarray(self.curve(place, order))
+
+    def places(self, between: int) -> Array:
+        """Places from its begin: both ends, every knot of the curve, some between two knots, shape (m,)."""
+        inside = self.curve.x[(self.curve.x > self.start) & (self.curve.x < self.end)]
+        knots = np.array([self.start, *inside, self.end]) - self.start
+        share = np.arange(between) / between
+        return np.append((knots[:-1, None] + np.diff(knots)[:, None] * share).ravel(), knots[-1])
 
     def fastest(self) -> Array:
         """Largest speed of each joint per speed along the way, shape (n,)."""
@@ -154,10 +162,10 @@ def tool_way(
         guess = q[k - 1] if k < 2 else 2 * q[k - 1] - q[k - 2]
         q[k], error = follow(arm, wanted, way.point(u[k]), guess)
         if error > REACHED or np.abs(q[k] - q[k - 1]).max() > 0.5:
-            what = (
-                f"the tool cannot follow the way there beyond {100 * u[k - 1]:.0f} % of it (out of reach, or "
-                "through a singularity)"
-            )
+            why = "only joint positions of another branch reach on"
+            if not solutions(arm, wanted, way.point(u[k]), q[k - 1]):
+                why = why_not(arm, wanted, way.point(u[k]), q[k - 1])
+            what = f"the tool cannot follow the way there beyond {100 * u[k - 1]:.0f} % of it: {why}"
             raise InputError.at(file, place, what, "move by joints there, or choose another branch")
     posture = arm.posture(q)
     J = posture.jacobian()

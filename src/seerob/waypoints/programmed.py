@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 from seerob.source import Target
 from seerob.waypoints.arm import Arm
 from seerob.waypoints.continuous import Continuous
+from seerob.waypoints.joint_limits import JointLimits
 from seerob.waypoints.waypoint import Program
 
 
@@ -24,5 +25,5 @@ class Programmed(Protocol):
     def arm(self, program: Program, target: Target) -> tuple[Arm, tuple[str, ...]]:
         """The robot up to its tool point, and what is assumed of both."""
 
-    def motion(self, program: Program, arm: Arm, speed_limits: tuple[float | None, ...]) -> Continuous:
+    def motion(self, program: Program, arm: Arm, limits: JointLimits) -> Continuous:
         """The continuous motion."""

@@ -10,7 +10,7 @@ from seerob.human.skeleton import BONES
 from seerob.model import Model
 from seerob.state import State
 from seerob.tolerances import Tolerance
-from seerob.transforms import Array
+from seerob.transforms import Array, rotation_from_wxyz
 from seerob.whereabouts.told_bones import told_between, told_errors
 
 
@@ -33,12 +33,18 @@ class TrackingError:
         self._bones: dict[str, list[tuple[int, str, float]]] = {}
         self._n = len(bodies)
         self._accepted = model.estimates
+        bones = {body.mj: body for body in model.bodies if body.role == "human"}
         for row, index in enumerate(bodies):
             body = model.bodies[index]
-            if body.role == "human":
-                reach = float(np.linalg.norm(body.corners, axis=1).max(initial=0.0)) + body.radius
-                bone = body.name.removeprefix(f"{body.owner}/")
-                self._bones.setdefault(body.owner, []).append((row, bone, reach))
+            mj, corners = body.mj, body.corners
+            while mj and mj not in bones and model.mj.body_weldid[mj] != mj:
+                corners = corners @ rotation_from_wxyz(model.mj.body_quat[mj]).T + model.mj.body_pos[mj]
+                mj = int(model.mj.body_parentid[mj])
+            if mj in bones:
+                reach = float(np.linalg.norm(corners, axis=1).max(initial=0.0)) + body.radius
+                person = bones[mj].owner
+                bone = bones[mj].name.removeprefix(f"{person}/")
+                self._bones.setdefault(person, []).append((row, bone, reach))
         places = {body.name: body.index for body in model.bodies}
         self._joints = {
             person: {bone: places[name] for bone in BONES if (name := f"{person}/{bone}") in places}

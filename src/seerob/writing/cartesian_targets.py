@@ -14,7 +14,6 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from threading import Event, Thread
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -22,8 +21,9 @@ import numpy as np
 from seerob.errors import InputError, SeerobError, UnknownName
 from seerob.live.listening import because
 from seerob.model import Model
-from seerob.run import target
+from seerob.opening import target
 from seerob.samples import PoseSample, Quality, Sample
+from seerob.sink import Closing
 from seerob.snapshot import Snapshot
 from seerob.sources.tool_path import fixed_links
 from seerob.transforms import Array, inverse, rotation_from_wxyz, transform, wxyz_from_rotation
@@ -98,7 +98,7 @@ def message(table: CartesianTarget, pose: Array, now: float) -> dict[str, Any]:
     return {"header": header, "child_frame_id": table.at.rpartition("/")[2], "transform": moved}
 
 
-class CartesianTargets:
+class CartesianTargets(Closing):
     """The Cartesian targets of a run: takes samples like a sink, and publishes to ROS.
 
     Args:
@@ -130,11 +130,6 @@ class CartesianTargets:
         for thread in self._threads:
             thread.start()
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Note what is due; returns at once."""

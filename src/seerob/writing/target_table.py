@@ -9,7 +9,14 @@ from msgspec import Meta
 
 from seerob.quantities import PathName, Table, unit
 
-Topic = Annotated[str, Meta(pattern=r"^/?[A-Za-z~][A-Za-z0-9_/]*$", max_length=200)]
+Topic = Annotated[
+    str,
+    Meta(
+        pattern=r"^/?[A-Za-z~][A-Za-z0-9_/]*$",
+        max_length=200,
+        description="a name of ROS such as /target_pose: letters, digits, _ and /",
+    ),
+]
 
 
 class TargetMessage(StrEnum):

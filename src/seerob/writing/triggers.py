@@ -12,13 +12,13 @@ import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from threading import Condition, Thread
-from types import TracebackType
 from typing import Protocol, Self
 
 from seerob.errors import InputError, SeerobError
 from seerob.live.listening import because
 from seerob.model import Model
 from seerob.samples import Sample
+from seerob.sink import Closing
 from seerob.snapshot import Snapshot
 from seerob.variables.dictionary import Variable
 from seerob.writing.trigger_table import Trigger
@@ -67,7 +67,7 @@ def allowed(model: Model, *, on_command_line: bool) -> bool:
     return bool(station.triggers) and station.allow_writing and on_command_line
 
 
-class Triggers:
+class Triggers(Closing):
     """The triggers of a run: takes snapshots like a sink, and writes to machines.
 
     Args:
@@ -98,11 +98,6 @@ class Triggers:
     def __enter__(self) -> Self:
         self._thread.start()
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Note which verdicts came or went; returns at once."""

@@ -72,10 +72,10 @@ export class Caption {
     return RAISED_PX + this.liftedPx;
   }
 
-  /** Draw it so much higher on the screen than where it belongs [px]. */
-  lift(px: number): void {
+  /** Draw it so much higher on the screen than where it belongs, and so much further right [px]. */
+  lift(px: number, rightPx = 0): void {
     this.liftedPx = px;
-    this.object.center.set(0.5, -this.bottomPx / this.heightPx);
+    this.object.center.set(0.5 - rightPx / Math.max(this.widthPx, 1), -this.bottomPx / this.heightPx);
   }
 
   dispose(): void {

@@ -1,5 +1,5 @@
 // Captions that would lie over each other on the screen are stacked upward, in a steady order; below where
-// they belong when the room ends above.
+// they belong when the room ends above, and beside it when the room ends at a side.
 
 import { Vector3 } from "three";
 import type { Caption } from "./caption";
@@ -28,8 +28,12 @@ export function stackCaptions(captions: Iterable<Caption>, { camera, pixel }: Vi
       caption.lift(0);
       continue;
     }
+    const edge = half * camera.aspect;
+    const belongs = at.x * edge;
+    // Of a point that is out of sight, or where the room is too narrow, it stays over its point.
+    const room = Math.abs(at.x) < 1 ? Math.max(edge - caption.widthPx / 2, 0) : Number.POSITIVE_INFINITY;
     const place = {
-      x: at.x * half * camera.aspect,
+      x: room > 0 ? Math.min(Math.max(belongs, -room), room) : belongs,
       y: at.y * half,
       width: caption.widthPx,
       height: caption.heightPx + GAP_PX,
@@ -44,7 +48,7 @@ export function stackCaptions(captions: Iterable<Caption>, { camera, pixel }: Vi
         place.y = above.y - place.height;
       }
     }
-    caption.lift(place.y - from);
+    caption.lift(place.y - from, place.x - belongs);
     placed.push(place);
   }
 }

@@ -72,10 +72,11 @@ function turn(event: KeyboardEvent, shown: Tab, open: (name: Tab) => void): void
 function FindingCount() {
   const findings = allFindings();
   const warnings = findings.filter((finding) => finding.level !== "note").length;
+  const said = `${warnings} warnings and assumptions, ${findings.length - warnings} notes`;
   return (
     <>
       {" "}
-      <span class={warnings > 0 ? "count count-warn" : "count"}>
+      <span class={warnings > 0 ? "count count-warn" : "count"} title={said}>
         {warnings > 0 ? `! ${findings.length}` : findings.length}
       </span>
     </>

@@ -1,0 +1,124 @@
+"""A Foxglove bridge beside a robot of ROS: offers its joint states, and sends them to whoever subscribes."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from seerob.emulators.background import LoopEmulator
+from seerob.emulators.motions import Motion
+from seerob.emulators.rosbridge import JOINT_STATES, LATE, Says, states_of
+from seerob.protocols import ProtocolError, foxglove
+from seerob.protocols.foxglove import ServerChannel
+from seerob.protocols.ros_messages import Content
+from seerob.protocols.ros_serialised import Edition, encode, store
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
+
+EPOCH = 1_700_000_000.0
+"""What the robot's clock begins at [s]."""
+
+
+class FoxgloveBridge(LoopEmulator):
+    """The bridge, in a thread of its own.
+
+    Args:
+        motion: What the robot does; time counts from the start of the server.
+        names: Of its joints, as ROS calls them.
+        host: Address to listen on.
+        port: 0 is any free one.
+        edition: Of ROS: messages are CDR or ROS 1.
+        rate: Messages per second [Hz].
+        more: What is published beside the joint states, by topic.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        names: tuple[str, ...],
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        edition: Edition = Edition.ROS2,
+        rate: float = 100.0,
+        more: Mapping[str, tuple[Content, Says]] | None = None,
+    ) -> None:
+        super().__init__()
+        self.host, self.port, self.edition, self.rate = host, port, edition, rate
+        states = (Content.JOINT_STATE, states_of(motion, names, EPOCH))
+        self.topics: dict[str, tuple[Content, Says]] = {JOINT_STATES: states, **(more or {})}
+        encoding = "cdr" if edition is Edition.ROS2 else "ros1"
+        self._channels = [
+            ServerChannel(k, topic, encoding, content.message_type)
+            for k, (topic, (content, _)) in enumerate(self.topics.items(), start=1)
+        ]
+        self._begun = 0.0
+
+    async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
+        """Listen, and serve whoever connects."""
+        from websockets.asyncio.server import serve
+        from websockets.typing import Subprotocol
+
+        store(self.edition)
+        spoken = [Subprotocol(name) for name in foxglove.SUBPROTOCOLS]
+        async with serve(
+            self._welcome,
+            self.host,
+            self.port,
+            subprotocols=spoken,
+            compression=None,
+            max_size=foxglove.MAX_MESSAGE,
+            close_timeout=0.1,
+        ) as server:
+            self.port = next(iter(server.sockets)).getsockname()[1]
+            self._begun = time.monotonic()
+            ready()
+            await over.wait()
+
+    async def _welcome(self, connection: ServerConnection) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        wanted: dict[int, ServerChannel] = {}
+        sending = asyncio.create_task(self._send(connection, wanted))
+        try:
+            await connection.send(foxglove.server_info("seerob"))
+            await connection.send(foxglove.offer(self._channels))
+            async for data in connection:
+                with contextlib.suppress(ProtocolError):
+                    self._hear(foxglove.operation(data if isinstance(data, str) else ""), wanted)
+        except ConnectionClosed:
+            pass
+        finally:
+            sending.cancel()
+
+    def _hear(self, said: foxglove.Operation, wanted: dict[int, ServerChannel]) -> None:
+        if said.op == "subscribe":
+            known = {channel.id: channel for channel in self._channels}
+            for own, channel in foxglove.subscriptions(said).items():
+                if channel in known and len(wanted) < foxglove.MOST_CHANNELS:
+                    wanted[own] = known[channel]
+        elif said.op == "unsubscribe":
+            listed = said.fields.get("subscriptionIds")
+            for own in listed if isinstance(listed, list) else ():
+                wanted.pop(own if isinstance(own, int) else -1, None)
+
+    async def _send(self, connection: ServerConnection, wanted: dict[int, ServerChannel]) -> None:
+        """Send what is subscribed, on a grid of time."""
+        from websockets.exceptions import ConnectionClosed
+
+        k = int((time.monotonic() - self._begun) * self.rate) + 1
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                late = time.monotonic() - self._begun - k / self.rate
+                if late > LATE:
+                    k += int(late * self.rate)
+                await asyncio.sleep(max(0.0, -late))
+                for own, channel in list(wanted.items()):
+                    content, says = self.topics[channel.topic]
+                    payload = encode(content, says(k / self.rate), self.edition)
+                    await connection.send(foxglove.pack(own, EPOCH + k / self.rate, payload))
+                k += 1

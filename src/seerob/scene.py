@@ -1,0 +1,80 @@
+"""What sinks and the page need to know once, before the first snapshot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from importlib.metadata import version
+
+from seerob.judging import Bound
+from seerob.model import Model
+from seerob.opening import coarse
+from seerob.snapshot import CriterionInfo, Finding, JointInfo, MechanismInfo, Node, Scene
+from seerob.workstation import content_hash
+
+
+def scene_of(
+    model: Model, bound: Sequence[Bound], findings: Iterable[Finding] = (), *, files: dict[str, bytes]
+) -> Scene:
+    """What sinks and the page need to know once; ``files`` are what the hash is of."""
+    station = model.workstation
+    too_coarse = coarse(model)
+    return Scene(
+        title=station.title,
+        edition=station.edition,
+        version=version("seerob"),
+        workstation_hash=content_hash(files),
+        period=station.engine.tick,
+        nodes=tuple(
+            Node(
+                name=body.name,
+                role=body.role,
+                owner=body.owner,
+                mesh=body.mesh,
+                triangles=body.triangles,
+                moves=bool(body.mover),
+                mover=body.mover,
+                mass=None if body.mass is None else body.mass.value,
+                mass_origin=model.mass_origin(body),
+                note=body.note,
+            )
+            for body in model.bodies
+        ),
+        mechanisms=tuple(
+            MechanismInfo(
+                name=m.name,
+                role=m.role,
+                joints=tuple(
+                    JointInfo(name=joint.name, unit=unit, lower=joint.lower, upper=joint.upper)
+                    for joint, unit in zip(m.joints, m.units, strict=True)
+                ),
+                coarse=too_coarse.get(m.name, ""),
+            )
+            for m in model.mechanisms.values()
+        ),
+        criteria=tuple(
+            CriterionInfo(
+                name=b.criterion.name,
+                kind=type(b.criterion).__module__.removeprefix(f"seerob.{b.group}."),
+                group=b.group,
+                title=(type(b.criterion).__doc__ or "").strip().split("\n")[0],
+                subjects=b.criterion.subjects(),
+                unit=b.criterion.unit,
+                limit=getattr(b.criterion, "limit", None),
+                at_most=b.criterion.at_most,
+                basis=b.basis,
+                levels=getattr(b.criterion, "levels", ()),
+            )
+            for b in bound
+        ),
+        findings=tuple(dict.fromkeys((*model.findings, *_without_physics(model), *findings))),
+    )
+
+
+def _without_physics(model: Model) -> tuple[Finding, ...]:
+    if model.workstation.engine.physics:
+        return ()
+    text = (
+        "engine.physics = false: the twin is put where the samples say; whether torque limits and contacts "
+        "allow that motion is not looked at"
+    )
+    return (Finding(level="note", subject="engine", text=text),)

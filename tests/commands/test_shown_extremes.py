@@ -1,0 +1,30 @@
+"""The one line that is printed of a criterion."""
+
+from seerob.commands import extreme
+from seerob.results.result_log import log_of
+from seerob.snapshot import Result, Snapshot, Verdict
+
+
+def shown(*results):
+    log = log_of(Snapshot(seq=k, t=k / 10, poses=b"", results=(r,)) for k, r in enumerate(results))
+    return extreme(log["share"])
+
+
+def result(value, verdict, reason=""):
+    return Result(name="share", value=value, unit="", limit=1.0, verdict=verdict, reason=reason)
+
+
+def test_what_has_no_figure_says_why():
+    fine, forbidden = result(0.5, Verdict.WITHIN), result(None, Verdict.EXCEEDED, "moves where it may not")
+    assert shown(fine, forbidden, forbidden) == "moves where it may not (first at 0.10 s)"
+    assert shown(fine, result(1.5, Verdict.EXCEEDED, "knee")) == "max 1.5 at 0.10 s, limit 1 (knee)"
+    assert shown(result(None, None)) == "no value"
+
+
+def test_the_instant_that_decides_is_called_so_where_a_limit_that_moves_hides_the_extreme_value():
+    def separation(value, limit):
+        verdict = Verdict.EXCEEDED
+        return Result(name="share", value=value, unit="m", limit=limit, at_most=False, verdict=verdict)
+
+    assert shown(separation(0.2, 0.3), separation(0.4, 1.0)) == "worst 0.4 m at 0.10 s, limit 1"
+    assert shown(separation(0.2, 1.0), separation(0.4, 0.5)) == "min 0.2 m at 0.00 s, limit 1"

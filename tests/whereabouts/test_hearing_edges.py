@@ -1,0 +1,76 @@
+"""What is kept of what was heard, and which of it counts at an instant: samples on and beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from seerob.human.skeleton import BONES
+from seerob.whereabouts.hearing import SLACK, Hearing
+
+
+def heard(*instants: float, timeout: float = 0.5) -> Hearing:
+    hearing = Hearing(given=False, driven=True, timeout=timeout)
+    hearing.heard += [(t, "") for t in instants]
+    hearing.torques += [np.array([t]) for t in instants]
+    return hearing
+
+
+@pytest.mark.parametrize(
+    ("t", "kept"),
+    [
+        (-1.0, [0, 1, 2]),
+        (0.99, [0, 1, 2]),
+        (1.0, [1, 2]),  # of the instant itself nothing older is needed
+        (1.5, [1, 2]),
+        (2.0, [2]),
+        (9.0, [2]),
+    ],
+)
+def test_what_is_older_than_the_last_sample_is_forgotten(t: float, kept: list[float]) -> None:
+    hearing = heard(0.0, 1.0, 2.0)
+    told = (hearing.parts, hearing.observed, hearing.aims)
+    for instants in told:
+        instants += [(float(k), ()) for k in range(3)]  # type: ignore[arg-type]
+    hearing.forget(t)
+    assert [instant for instant, _ in hearing.heard] == kept
+    assert [float(tau[0]) for tau in hearing.torques if tau is not None] == kept
+    assert [[instant for instant, _ in instants] for instants in told] == [kept] * 3
+
+
+def test_a_sample_counts_from_its_instant_on_and_to_the_end_of_the_time_out() -> None:
+    hearing = heard(SLACK, timeout=0.5)
+    assert hearing.doubt(0.0) == ""
+    assert hearing.doubt(-1e-6) == "nothing heard yet"
+    hearing = heard(0.0, timeout=0.5)
+    last = 0.5 + SLACK
+    assert hearing.doubt(last) == ""
+    assert "not heard for" in hearing.doubt(np.nextafter(last, 1))
+
+
+def test_what_is_said_of_bones_counts_between_the_samples_beside_an_instant() -> None:
+    hearing = heard(0.0)
+    first, last = ("first", ("head",)), ("last", ("pelvis",))
+    hearing.parts += [(0.0, (first,)), (1.0, ()), (2.0, ()), (3.0, (last,))]
+    expected = {-1.0: (first,), 0.0: (first,), 0.5: (first,), 1.0 - SLACK: (), 1.5: (), 2.5: (last,)}
+    for t, doubted in expected.items():
+        assert hearing.doubted(t) == doubted, t
+    hearing.aims += [
+        (0.0, {"head": 0.9}),
+        (1.0, {"head": 0.1, "left_hand": 0.3}),
+        (2.0, {"head": 0.2}),
+        (3.0, {}),
+    ]
+    for t, unaimed in {
+        0.5: {"head": 0.9, "left_hand": 0.3},
+        1.0 - SLACK: {"head": 0.2, "left_hand": 0.3},
+        1.5: {"head": 0.2, "left_hand": 0.3},
+        2.5: {"head": 0.2},
+        9.0: {},
+    }.items():
+        assert hearing.unaimed(t) == unaimed, t
+    everything = frozenset(BONES)
+    blind = everything - {"head"}
+    hearing.observed += [(0.0, blind), (1.0, everything), (2.0, everything), (3.0, blind)]
+    for t, unseen in {0.5: ("head",), 1.0 - SLACK: (), 1.5: (), 2.5: ("head",)}.items():
+        assert hearing.unseen(t) == unseen, t

@@ -32,9 +32,10 @@ from pathlib import Path
 import numpy as np
 
 import seerob as sr
-from seerob import cli, run
+from seerob import cli
 from seerob.emulators.rtde import RtdeServer
 from seerob.live import listening as live
+from seerob.opening import source_target
 from seerob.samples import SignalSample, key
 
 FOLDER = Path(__file__).parents[1] / "workstations" / "plc_cell"
@@ -278,7 +279,7 @@ def main() -> None:
         sources = [s for s in station.workstation.sources if isinstance(s, live.LiveSource)]
         _ = station.sources
         with Post().watching() as alone:
-            pairs = [(source, run.source_target(station.model, source)) for source in sources]
+            pairs = [(source, source_target(station.model, source)) for source in sources]
             with live.Listening(pairs) as listening:
                 listening.first(5.0)
                 time.sleep(seconds)

@@ -62,6 +62,12 @@ def wave(t):
     return Q0 + AMPLITUDE * np.sin(2 * t), 2 * AMPLITUDE * np.cos(2 * t)
 
 
+def person(name: str = "op", *at: float) -> str:
+    """A man of 1.75 m and 75 kg who stands at x, y, z [m]."""
+    place = f"at = {{ position = [{', '.join(map(str, at))}] }}\n" if at else ""
+    return f'[[humans]]\nname = "{name}"\nstature = 1.75\nmass = 75\nsex = "male"\n{place}'
+
+
 def made(folder: Path, text: str, files: Mapping[str, str | bytes] | None = None) -> Station:
     """Write a workstation and the files it names, and load it."""
     for name, content in {"workstation.toml": text, **(files or {})}.items():

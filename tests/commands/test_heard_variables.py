@@ -2,6 +2,8 @@
 
 import re
 
+import httpx  # noqa: F401 - what is imported late would count as silence
+
 from seerob.commands.heard_variables import tell_heard
 from seerob.emulators.web import WebServer
 from seerob.sources._variables import Node

@@ -17,14 +17,18 @@ from seerob.commands.schema import schema
 from seerob.reading import convert_workstation
 from seerob.workstation import PLUGINS, TABLES
 
+pytestmark = pytest.mark.xdist_group("schema")
+"""What all of them ask is made once: it takes seconds."""
+
 STARTER = tomllib.loads((resources.files("seerob.commands") / "starter" / "workstation.toml").read_text())
 STATIONS = sorted((Path(__file__).parents[2] / "workstations").glob("*/workstation.toml"))
 
 
 @pytest.fixture(scope="module")
 def validator():
-    Draft202012Validator.check_schema(schema())
-    return Draft202012Validator(schema())
+    whole = schema()
+    Draft202012Validator.check_schema(whole)
+    return Draft202012Validator(whole)
 
 
 def changed(path, value):
@@ -36,12 +40,12 @@ def changed(path, value):
     return table
 
 
-def test_the_command_writes_it_whole(capsys, tmp_path):
+def test_the_command_writes_it_whole(capsys, tmp_path, validator):
     code, out, _ = seerob(capsys, "schema")
     assert code == 0
-    assert json.loads(out) == schema()
+    assert json.loads(out) == validator.schema
     seerob(capsys, "schema", "-o", tmp_path / "s.json")
-    assert json.loads((tmp_path / "s.json").read_text()) == schema()
+    assert json.loads((tmp_path / "s.json").read_text()) == validator.schema
 
 
 def test_every_workstation_and_the_starter_are_valid(validator):
@@ -51,8 +55,8 @@ def test_every_workstation_and_the_starter_are_valid(validator):
         validator.validate(tomllib.loads(file.read_text()))
 
 
-def test_every_table_and_every_kind_is_in_it():
-    properties = schema()["properties"]
+def test_every_table_and_every_kind_is_in_it(validator):
+    properties = validator.schema["properties"]
     assert set(TABLES) | set(PLUGINS) <= set(properties)
     assert not {"folder", "files"} & set(properties)
     for group in PLUGINS:

@@ -7,7 +7,8 @@ import json
 import pytest
 from websockets.sync.client import connect
 
-from seerob.emulators.foxglove import EPOCH, FoxgloveBridge
+from seerob.emulators.foxglove import FoxgloveBridge
+from seerob.emulators.ros_robot import EPOCH
 from seerob.protocols import foxglove
 from seerob.protocols.ros_serialised import Edition
 from seerob.sources.foxglove import Foxglove

@@ -162,16 +162,21 @@ def test_what_is_no_table(tmp_path, content, message):
         read_zones(path, "t.csv")
 
 
-@pytest.mark.parametrize("seed", range(60))
-def test_damaged_files_are_refused_or_read(tmp_path, seed):
-    rng = np.random.default_rng(seed)
-    raw = bytearray(text([HEAD, *ROWS]).encode())
-    for _ in range(rng.integers(1, 12)):
-        raw[rng.integers(len(raw))] = rng.integers(256)
+def test_damaged_files_are_refused_or_read(tmp_path):
+    rng = np.random.default_rng(0)
+    whole = text([HEAD, *ROWS]).encode()
     path = tmp_path / "t.csv"
-    path.write_bytes(bytes(raw))
-    with suppress(InputError):
-        assert read_zones(path, "t.csv").rows
+    read = 0
+    for _ in range(60):
+        raw = bytearray(whole)
+        # Mostly what stands in such files: of any bytes nothing but text that is none comes.
+        for at in rng.integers(len(raw), size=rng.integers(1, 4)):
+            raw[at] = rng.choice(list(b'0123456789.,-\neinf"\xff\0'))
+        path.write_bytes(bytes(raw))
+        with suppress(InputError):
+            assert read_zones(path, "t.csv").rows
+            read += 1
+    assert 3 < read < 57
 
 
 def station(folder, more, kind="posture_table"):

@@ -7,21 +7,16 @@ import math
 import numpy as np
 import pytest
 
+from made_cell import person
 from seerob import load
 from seerob.engine import Engine
 from seerob.errors import InputError, Undecided
 from seerob.moving_base import velocity_of
 from seerob.samples import JointSample, PoseSample
 
-STATION = """
-[engine]
-physics = false
-[[humans]]
-name = "op"
-stature = 1.75
-mass = 75
-sex = "male"
-at = { position = [3, 0, 0] }
+STATION = (
+    f"[engine]\nphysics = false\n{person('op', 3, 0, 0)}"
+    + """
 [[machines]]
 name = "axis"
 shape = { box = [0.6, 0.6, 0.1] }
@@ -71,6 +66,7 @@ human_uncertainty = 0.05
 robot_uncertainty = 0.02
 stop = { model = "bound", reaction = 0.1, stopping = 0.4 }
 """
+)
 Q = np.array([0.3, -1.2, 1.4, -1.5, -1.5, 0.2])
 MOTION = {
     "axis": (np.array([0.4]), np.array([0.5])),

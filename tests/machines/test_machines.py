@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from made_cell import person
 from seerob import load
 from seerob.engine import Engine
 from seerob.errors import InputError, Undecided
@@ -15,15 +16,9 @@ from seerob.machines.tables import AtEnd, Belt, Slide, Turn, Vehicle
 from seerob.opening import signal_timeouts
 from seerob.samples import SignalSample
 
-PERSON = """
+PERSON = f"""
 variables = "variables.toml"
-[[humans]]
-name = "op"
-stature = 1.75
-mass = 75
-sex = "male"
-at = { position = [2, 0, 0] }
-[[sources]]
+{person("op", 2, 0, 0)}[[sources]]
 kind = "signals_csv"
 name = "plc"
 file = "signals.csv"

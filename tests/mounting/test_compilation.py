@@ -276,3 +276,15 @@ def test_no_name_leads_out_of_the_folder(tmp_path):
     placed = filed("r", dict.fromkeys(names, b""), folder=tmp_path, references=("arm.urdf",))
     assert len(placed) == len(names)
     assert all(not key.startswith(("/", "..")) and ".." not in key.split("/") for key in placed)
+
+
+def test_warnings_of_the_physics_leave_no_file_behind(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ball = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
+    )
+    data = mujoco.MjData(ball)
+    data.qpos[0] = np.nan
+    mujoco.mj_step(ball, data)
+    assert data.warning[mujoco.mjtWarning.mjWARN_BADQPOS].number == 1
+    assert list(tmp_path.iterdir()) == []

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from made_cell import FLOATING, TWO_R, made, person, results_at, state_at, two_r
 from seerob.engine import Engine
 from seerob.errors import InputError, UnknownName
 from seerob.judging import Judge
@@ -16,13 +16,8 @@ from seerob.volumes.offset_shell import offset_shell
 CELL = (
     FLOATING
     + TWO_R
+    + person("operator", 3.2, 0, 0)
     + """
-[[humans]]
-name = "operator"
-stature = 1.75
-mass = 75
-sex = "male"
-at = { position = [3.2, 0, 0] }
 [[parts]]
 name = "post"
 shape = { box = [0.1, 0.1, 0.1] }

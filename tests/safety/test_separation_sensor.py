@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from made_cell import FLOATING, TWO_R, made, results_at, two_r
+from made_cell import FLOATING, TWO_R, made, person, results_at, two_r
 from seerob.errors import InputError, UnknownName
 
 CELL = (
     FLOATING
     + TWO_R
+    + person("operator", 4, 0, 0)
     + """
-[[humans]]
-name = "operator"
-stature = 1.75
-mass = 75
-sex = "male"
-at = { position = [4, 0, 0] }
 [[sensors]]
 name = "scan"
 at = { position = [0, 0, 0.3] }

@@ -5,6 +5,7 @@ What `scripts/mutate` found that no other test would have noticed.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from importlib.resources import files
 
@@ -24,7 +25,7 @@ from seerob.norms.body_limits import SHIPPED, parse, shipped
 from seerob.norms.iso_13855 import Approach, Edition, intrusion, minimum_distance, speed_at
 from seerob.safety import tool_force
 from seerob.safety.effective_mass import inverse_effective_mass, principal_masses
-from seerob.safety.manipulability import Manipulability, least_value_after, singular_values
+from seerob.safety.manipulability import STEP, Manipulability, least_value_after, singular_values
 from seerob.safety.minimum_distance import MinimumDistance
 from seerob.safety.separation import Separation
 from seerob.snapshot import Result, Verdict
@@ -413,6 +414,29 @@ def test_where_two_singular_values_vanish_the_joints_that_lead_out_are_still_tol
     for step in (0.01, 0.5):
         after = [[np.linalg.svd(jacobian(d * e)[:3])[1][2] for d in (step, -step)] for e in np.eye(4)]
         np.testing.assert_allclose(least_value_after(jacobian(np.zeros(4)), step), after, atol=1e-12)
+
+
+def test_slides_and_joints_that_move_at_a_rate_of_their_own_lead_out_as_they_move():
+    """A turn about z, a slide along (3, 0, 4)/5 and a turn about y; the last two geared by 0.5 and 2."""
+    axes = np.array([[0, 0, 1.0], [0.6, 0, 0.8], [0, 1.0, 0]])
+    origins, tip, rates = np.array([[0, 0, 0], [0, 0, 0], [1.0, 0, 0]]), np.array([2, 0, 0.3]), (1, 0.5, 2)
+
+    def jacobian(q):
+        turned, where, point = axes.copy(), origins.copy(), tip
+        for j in reversed(range(3)):
+            R = Rotation.from_rotvec(q[j] * rates[j] * axes[j]).as_matrix() if j != 1 else np.eye(3)
+            slid = q[j] * rates[j] * axes[j] * (j == 1)
+            turned[j + 1 :] = turned[j + 1 :] @ R.T
+            where[j + 1 :] = origins[j] + (where[j + 1 :] - origins[j]) @ R.T + slid
+            point = origins[j] + R @ (point - origins[j]) + slid
+        columns = np.vstack([np.cross(turned, point - where).T, turned.T])
+        columns[:, 1] = [*turned[1], 0, 0, 0]
+        return columns * rates
+
+    after = [[np.linalg.svd(jacobian(d * e)[:3])[1][2] for d in (0.3, -0.3)] for e in np.eye(3)]
+    # The slide comes at its rate by itself: 0.5 m/m is how its column says it moves.
+    np.testing.assert_allclose(least_value_after(jacobian(np.zeros(3)), 0.3), after, atol=1e-12)
+    assert math.degrees(STEP) == pytest.approx(1)
 
 
 def test_an_acceleration_needs_two_evaluations_within_50_ms():

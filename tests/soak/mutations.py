@@ -2,8 +2,11 @@
 
 import gzip
 import io
+import random
 import re
 import zipfile
+
+from seerob.protocols import ProtocolError
 
 NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 NASTY = (
@@ -39,6 +42,18 @@ def mutated(data, rng):
         if len(out) < 2:
             break
     return bytes(out)
+
+
+def refusals(read, whole, *, seed, count, refusal=ProtocolError):
+    """How many of ``count`` mutated messages a decoder refuses; any other error of it is not caught."""
+    read(whole)
+    rng, refused = random.Random(seed), 0
+    for _ in range(count):
+        try:
+            read(mutated(whole, rng))
+        except refusal:
+            refused += 1
+    return refused
 
 
 def mutated_text(data, rng):

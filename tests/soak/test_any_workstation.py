@@ -1,9 +1,9 @@
-"""The long form of ``test_reading.py``: any table is a workstation or a list of mistakes."""
+"""The long form of ``test_reading_anything.py``: any table is a workstation or a list of mistakes."""
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from test_reading import ANY_TABLE, outcome
+from test_reading_anything import ANY_TABLE, outcome
 
 
 @pytest.mark.soak

@@ -25,6 +25,9 @@ from seerob.sources.opcua_robot import OpcuaRobot
 from seerob.variables.dictionary import Kind, Variable
 from seerob.variables.units import UNITS
 
+pytestmark = pytest.mark.xdist_group("opcua")
+"""One server for all: starting one takes seconds."""
+
 HOME, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([0.5, 0.3, -0.3, 0.4, -0.4, 0.5])
 
 

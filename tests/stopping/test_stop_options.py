@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from seerob.snapshot import Origin
+from seerob.stopping.inputs import approach_speed, intrusion
 from seerob.stopping.models import MOVING, SHARE, Stop, StopTolerance, bind_stop
 from seerob.stopping.terms import BOUND, CONSTANT, largest_speed_decelerating, largest_speed_in_time
 from seerob.stopping.tolerances import shifted, tolerances
@@ -128,3 +130,12 @@ def test_a_stop_at_the_ends_of_its_tolerances():
     assert tolerances(braking) == (Tolerance("stop.deceleration", 0.5, "m/s²"),)
     assert [shifted(braking, (side,)).deceleration for side in (-1, 1)] == [2.5, 1.5]
     assert tolerances(Stop(**KNOWN)) == tolerances(Stop(**KNOWN, tolerance=OFF())) == ()
+
+
+def test_the_approach_speed_says_where_it_is_from():
+    stated, given, norm = approach_speed(1.6), approach_speed(1.5), approach_speed(None)
+    assert (stated.value, stated.unit, stated.origin) == (1.6, "m/s", Origin.STATED)
+    assert "ISO/TS 15066:2016 5.5.4.2.3" in stated.source
+    assert (given.value, given.unit, given.origin) == (1.5, "m/s", Origin.GIVEN)
+    assert (norm.value, norm.origin) == ("1.6 m/s, 2 m/s up to S_p = 0.5 m", Origin.STATED)
+    assert [intrusion(C).origin for C in (None, 0.0, 0.2)] == [Origin.MISSING, Origin.GIVEN, Origin.GIVEN]

@@ -5,17 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from made_cell import FLOATING, TWO_R, made, person, state_at, two_r
 from seerob.distances.least import Query
 from seerob.human.skeleton import BONES
 from seerob.judging import Judge
 from seerob.whereabouts.tracking_error import TrackingError, tracking
 
-PEOPLE = "".join(
-    f'[[humans]]\nname = "{name}"\nstature = 1.75\nmass = 75\nsex = "male"\n'
-    f"at = {{ position = [{x}, 0, 0] }}\n"
-    for name, x in (("op", 3.0), ("other", -9.0))
-)
+PEOPLE = person("op", 3, 0, 0) + person("other", -9, 0, 0)
 AREA = '[[areas]]\nname = "zone"\nshape = { box = [1, 1, 3] }\n'
 MAT = (
     '[[sensors]]\nname = "mat"\npressure_mat = { corners = [[0, -0.5], [0.5, -0.5], [0.5, 0.5], [0, 0.5]] }\n'

@@ -134,7 +134,8 @@ def _variables(source: VariablesSource, kind: str, given: dict[str, Any], wait: 
         except (OSError, EOFError, SeerobError) as error:
             line("heard", f"nothing: {because(error)}", "yellow")
     name = kind if source.name == "" else source.name
-    line("note", f"seerob variables my_cell --browse {name} writes a dictionary of them")
+    if nodes:
+        line("note", f"seerob variables my_cell --browse {name} writes a dictionary of them")
     OUT.print(_snippet(kind, {"name": name} | given), markup=False)
     return Exit.WITHIN
 

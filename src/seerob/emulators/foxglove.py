@@ -5,58 +5,30 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
-from seerob.emulators.background import LoopEmulator
 from seerob.emulators.motions import Motion
-from seerob.emulators.rosbridge import JOINT_STATES, LATE, Says, states_of
+from seerob.emulators.ros_robot import LATE, RosRobot
 from seerob.protocols import ProtocolError, foxglove
 from seerob.protocols.foxglove import ServerChannel
-from seerob.protocols.ros_messages import Content
 from seerob.protocols.ros_serialised import Edition, encode, store
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
 
-EPOCH = 1_700_000_000.0
-"""What the robot's clock begins at [s]."""
 
+class FoxgloveBridge(RosRobot):
+    """The bridge, in a thread of its own; its messages are CDR, or those of ROS 1."""
 
-class FoxgloveBridge(LoopEmulator):
-    """The bridge, in a thread of its own.
-
-    Args:
-        motion: What the robot does; time counts from the start of the server.
-        names: Of its joints, as ROS calls them.
-        host: Address to listen on.
-        port: 0 is any free one.
-        edition: Of ROS: messages are CDR or ROS 1.
-        rate: Messages per second [Hz].
-        more: What is published beside the joint states, by topic.
-    """
-
-    def __init__(
-        self,
-        motion: Motion,
-        names: tuple[str, ...],
-        *,
-        host: str = "127.0.0.1",
-        port: int = 0,
-        edition: Edition = Edition.ROS2,
-        rate: float = 100.0,
-        more: Mapping[str, tuple[Content, Says]] | None = None,
-    ) -> None:
-        super().__init__()
-        self.host, self.port, self.edition, self.rate = host, port, edition, rate
-        states = (Content.JOINT_STATE, states_of(motion, names, EPOCH))
-        self.topics: dict[str, tuple[Content, Says]] = {JOINT_STATES: states, **(more or {})}
-        encoding = "cdr" if edition is Edition.ROS2 else "ros1"
+    def __init__(self, motion: Motion, names: tuple[str, ...], **more: Any) -> None:
+        """As `RosRobot`."""
+        super().__init__(motion, names, **more)
+        encoding = "cdr" if self.edition is Edition.ROS2 else "ros1"
         self._channels = [
             ServerChannel(k, topic, encoding, content.message_type)
             for k, (topic, (content, _)) in enumerate(self.topics.items(), start=1)
         ]
-        self._begun = 0.0
 
     async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
         """Listen, and serve whoever connects."""
@@ -120,5 +92,5 @@ class FoxgloveBridge(LoopEmulator):
                 for own, channel in list(wanted.items()):
                     content, says = self.topics[channel.topic]
                     payload = encode(content, says(k / self.rate), self.edition)
-                    await connection.send(foxglove.pack(own, EPOCH + k / self.rate, payload))
+                    await connection.send(foxglove.pack(own, self.epoch + k / self.rate, payload))
                 k += 1

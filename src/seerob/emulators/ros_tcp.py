@@ -6,56 +6,26 @@ import asyncio
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
+from typing import Any, ClassVar
 
-from seerob.emulators.background import LoopEmulator
 from seerob.emulators.motions import Motion
-from seerob.emulators.rosbridge import JOINT_STATES, Says, states_of
+from seerob.emulators.ros_robot import LATE, RosRobot
 from seerob.protocols import ProtocolError, ros_tcp
-from seerob.protocols.ros_messages import Content, ros1_name, same_type
+from seerob.protocols.ros_messages import ros1_name, same_type
 from seerob.protocols.ros_serialised import Edition, encode, store
 from seerob.protocols.ros_tcp import Frame, Splitter
 
-EPOCH = 1_700_000_000.0
-"""What the robot's clock begins at [s]."""
 PAUSE = 0.02
 """Before Unity tries again to connect [s]."""
 KEPT = 10_000
 """Frames that are kept of what others publish."""
-LATE = 0.5
-"""Time that is not made up for when this machine was too slow [s]."""
 
 
-class _Playing(LoopEmulator):
-    """A robot's messages on a grid of time.
+class _Playing(RosRobot):
+    """A robot's messages on a grid of time."""
 
-    Args:
-        motion: What the robot does.
-        names: Of its joints, as ROS calls them.
-        host: Address to listen on, or to connect to.
-        port: Of the endpoint.
-        edition: Of ROS.
-        rate: Messages per second [Hz].
-        more: What is published beside the joint states, by topic.
-    """
-
-    def __init__(
-        self,
-        motion: Motion,
-        names: tuple[str, ...],
-        *,
-        host: str = "127.0.0.1",
-        port: int = 0,
-        edition: Edition = Edition.ROS1,
-        rate: float = 100.0,
-        more: Mapping[str, tuple[Content, Says]] | None = None,
-    ) -> None:
-        super().__init__()
-        self.host, self.port, self.edition, self.rate, self.epoch = host, port, edition, rate, EPOCH
-        states = (Content.JOINT_STATE, states_of(motion, names, EPOCH))
-        self.topics: dict[str, tuple[Content, Says]] = {JOINT_STATES: states, **(more or {})}
-        self._begun = 0.0
+    usual: ClassVar[Edition] = Edition.ROS1
 
     async def play(self, writer: asyncio.StreamWriter, wanted: set[str]) -> None:
         """Send what is wanted until the other side has gone; the set may change meanwhile."""

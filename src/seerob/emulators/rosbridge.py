@@ -12,12 +12,12 @@ import logging
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from seerob.emulators.background import LoopEmulator
 from seerob.emulators.motions import Motion
-from seerob.protocols.ros_messages import Content, Joints, Plan, Said, Transform, ros1_name
+from seerob.emulators.ros_robot import LATE, RosRobot
+from seerob.protocols.ros_messages import Joints, Plan, Said, Transform, ros1_name
 from seerob.protocols.ros_serialised import Edition, encode
 from seerob.protocols.rosbridge import MAX_MESSAGE, Compression
 
@@ -26,55 +26,17 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-JOINT_STATES, TF, TF_STATIC = "/joint_states", "/tf", "/tf_static"
-LATE = 0.5
-"""Time that is not made up for when this machine was too slow [s]."""
-Says = Callable[[float], Said]
-"""What is published at a time since the start [s]."""
+TF_STATIC = "/tf_static"
 
 
-def states_of(motion: Motion, names: tuple[str, ...], epoch: float) -> Says:
-    """Joint states of a robot whose clock began at ``epoch`` [s]."""
+class RosbridgeServer(RosRobot):
+    """The server, in a thread of its own; that of ROS 1 fails at ``cbor`` without a word."""
 
-    def says(t: float) -> Joints:
-        q, qd = motion(t)
-        return Joints(stamp=epoch + t, names=names, position=q, velocity=qd)
-
-    return says
-
-
-class RosbridgeServer(LoopEmulator):
-    """The server, in a thread of its own.
-
-    Args:
-        motion: What the robot does; time counts from the start of the server.
-        names: Of its joints, as ROS calls them.
-        host: Address to listen on.
-        port: 0 is any free one.
-        edition: Of ROS; the server of ROS 1 fails at ``cbor`` without a word.
-        rate: Messages per second [Hz].
-        more: What is published beside the joint states, by topic; may be changed while it runs.
-    """
-
-    def __init__(
-        self,
-        motion: Motion,
-        names: tuple[str, ...],
-        *,
-        host: str = "127.0.0.1",
-        port: int = 0,
-        edition: Edition = Edition.ROS2,
-        rate: float = 100.0,
-        more: Mapping[str, tuple[Content, Says]] | None = None,
-    ) -> None:
-        super().__init__()
-        self.host, self.port, self.edition, self.rate = host, port, edition, rate
-        self.epoch = 1_700_000_000.0
-        states = (Content.JOINT_STATE, states_of(motion, names, self.epoch))
-        self.topics: dict[str, tuple[Content, Says]] = {JOINT_STATES: states, **(more or {})}
+    def __init__(self, motion: Motion, names: tuple[str, ...], **more: Any) -> None:
+        """As `RosRobot`."""
+        super().__init__(motion, names, **more)
         self.received: deque[dict[str, Any]] = deque(maxlen=1000)
         """What clients advertised and published, oldest first."""
-        self._begun = 0.0
 
     async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
         """Listen, and serve whoever connects."""

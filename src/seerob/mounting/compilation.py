@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -36,6 +37,9 @@ from seerob.snapshot import Finding
 from seerob.transforms import Array
 from seerob.variables.binding import Bound, bound
 from seerob.workstation import Area, Human, Machine, Mounted, Robot, Tool, Workpiece, Workstation
+
+# MuJoCo's own way is a file in the folder where the user happens to be.
+mujoco.set_mju_user_warning(logging.getLogger("mujoco").debug)
 
 Progress = Callable[[str], None]
 

@@ -309,10 +309,10 @@ class Contacts:
         near, projected = judged.near, judged.projected
         found = [self._region(int(k), judged) for k in np.flatnonzero(near.any(axis=0))]
         known = projected[np.isfinite(projected)]
-        heaviest = float(known.max()) if len(known) else None
+        heaviest, still = (float(known.max()), "") if len(known) else (None, "no part moves")
         mass_parts = (
             Result(name="M/2 + m_L", value=self.simplified, unit="kg"),
-            Result(name="m_u along the motion, heaviest part", value=heaviest, unit="kg"),
+            Result(name="m_u along the motion, heaviest part", value=heaviest, unit="kg", reason=still),
         )
         if not found:
             nobody = f"nobody within {spec.horizon:g} m of a moving part"

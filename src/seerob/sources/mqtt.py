@@ -236,7 +236,7 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
             async with known_end(client), client:
                 yield client
         except aiomqtt.MqttError as error:
-            raise ConnectionError(str(error)) from error
+            raise ConnectionError(str(error).partition("] ")[2] or str(error)) from error
 
 
 def _topics(node: str) -> tuple[str, ...]:

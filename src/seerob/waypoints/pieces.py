@@ -163,8 +163,11 @@ def tool_way(
         q[k], error = follow(arm, wanted, way.point(u[k]), guess)
         if error > REACHED or np.abs(q[k] - q[k - 1]).max() > 0.5:
             why = "only joint positions of another branch reach on"
-            if not solutions(arm, wanted, way.point(u[k]), q[k - 1]):
-                why = why_not(arm, wanted, way.point(u[k]), q[k - 1])
+            # The end says more than the place where it begins to fail.
+            for pose in ((rotation, position), (wanted, way.point(u[k]))):
+                if not solutions(arm, *pose, q[k - 1]):
+                    why = why_not(arm, *pose, q[k - 1])
+                    break
             what = f"the tool cannot follow the way there beyond {100 * u[k - 1]:.0f} % of it: {why}"
             raise InputError.at(file, place, what, "move by joints there, or choose another branch")
     posture = arm.posture(q)

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from seerob.commands import port as a_port
 from seerob.commands.emulating import Emulated
-from seerob.commands.emulating._motions import home_of, read, target_of
+from seerob.commands.emulating._motions import add_motion, home_of, motion_of, target_of
 
 
 def add_robot(sub: argparse.ArgumentParser, *, port: int) -> None:
     """Arguments; ``port`` is the usual one."""
     sub.add_argument("--robot", default="ur10", help="robot of the library (default: ur10)")
-    sub.add_argument("--file", type=Path, help="motion to play: a table with joint columns (.csv, .xlsx)")
+    add_motion(sub)
     sub.add_argument("--port", type=a_port, default=port, help=f"port; 0 is any free one (default: {port})")
     sub.add_argument("--ros", choices=("1", "2"), default="2", help="of ROS (default: 2)")
     sub.add_argument("--rate", type=float, default=100.0, help="messages per second (default: 100)")
@@ -31,14 +30,14 @@ def robot_of(options: argparse.Namespace, server: Callable[..., Any]) -> Emulate
     Raises:
         InputError: No such robot, or a motion that it cannot do.
     """
-    from seerob.emulators.motions import SWING, swing
+    from seerob.emulators.motions import SWING
     from seerob.errors import InputError
     from seerob.protocols.ros_serialised import Edition
 
     if not 1 <= options.rate <= 1000:
         raise InputError.at("seerob emulate", "--rate", f"{options.rate:g} Hz", "it does 1 to 1000 Hz")
     target = target_of(options.robot)
-    motion = swing(home_of(target, SWING)) if options.file is None else read(options.file, target)
+    motion, what = motion_of(options, target, home_of(target, SWING))
     made = server(
         motion,
         target.joints,
@@ -47,5 +46,4 @@ def robot_of(options: argparse.Namespace, server: Callable[..., Any]) -> Emulate
         edition=Edition(f"ros{options.ros}"),
         rate=options.rate,
     )
-    what = "a calm swing" if options.file is None else str(options.file)
     return Emulated(made, f"{target.name}, {what}", f"{options.host}:{options.port}")

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from seerob.commands import port
 from seerob.commands.emulating import Emulated
-from seerob.commands.emulating._motions import read, target_of
+from seerob.commands.emulating._motions import add_motion, motion_of, target_of
 
 HELP = "the bridge of a Doosan controller (DRFL), which sends to this software"
 HOME = (0.0, 0.3, 1.2, 0.0, 1.2, 0.0)
@@ -19,7 +18,7 @@ RATES = (10, 50, 100, 200, 250, 500, 1000)
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     sub.add_argument("--robot", default="doosan_m1013", help="robot of the library (default: doosan_m1013)")
-    sub.add_argument("--file", type=Path, help="motion to play: a table with joint columns (.csv, .xlsx)")
+    add_motion(sub)
     sub.add_argument("--to", default="127.0.0.1", help="address to send to (default: this machine)")
     sub.add_argument("--port", type=port, default=20128, help="port to send to (default: 20128)")
     sub.add_argument("--rate", type=int, default=100, choices=RATES, help="messages per second [Hz]")
@@ -32,11 +31,9 @@ def emulated(options: argparse.Namespace) -> Emulated:
         InputError: No such robot, or a motion that it cannot do.
     """
     from seerob.emulators.drfl import DrflSender
-    from seerob.emulators.motions import swing
     from seerob.protocols.doosan_drfl import JOINTS
 
     target = target_of(options.robot, joints=JOINTS, whose="a Doosan arm")
-    motion = swing(HOME) if options.file is None else read(options.file, target)
+    motion, what = motion_of(options, target, HOME)
     sender = DrflSender(motion, to=(options.to, options.port), rate=options.rate)
-    what = "a calm swing" if options.file is None else str(options.file)
     return Emulated(sender, f"{target.name}, {what}", f"to {options.to}:{options.port}")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from seerob.commands import port
 from seerob.commands.emulating import Emulated
-from seerob.commands.emulating._motions import read, target_of
+from seerob.commands.emulating._motions import add_motion, motion_of, target_of
 
 HELP = "a controller that has a robot's joints in Modbus registers, with a belt beside them"
 HOME = (0.0, 0.3, 1.2, 0.0, 1.2, 0.0)
@@ -19,7 +19,7 @@ BELT = 128
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     sub.add_argument("--robot", default="doosan_m1013", help="robot of the library (default: doosan_m1013)")
-    sub.add_argument("--file", type=Path, help="motion to play: a table with joint columns (.csv, .xlsx)")
+    add_motion(sub)
     sub.add_argument("--map", default="doosan", help="register map, or a file of one (default: doosan)")
     sub.add_argument("--port", type=port, default=5020, help="port; 0 is any free one (default: 5020)")
 
@@ -33,14 +33,13 @@ def emulated(options: argparse.Namespace) -> Emulated:
     from seerob.emulators import plc_cell
     from seerob.emulators.modbus import ModbusServer
     from seerob.emulators.modbus_robot import program
-    from seerob.emulators.motions import swing
     from seerob.protocols.modbus import Place, Table, Type, Words
     from seerob.protocols.modbus_map import load
 
     found = load(options.map, Path())
     target = target_of(options.robot, joints=found.joints, whose=f"the map {options.map}")
     home = (*HOME, *(0.0,) * found.joints)[: found.joints]
-    motion = swing(home) if options.file is None else read(options.file, target)
+    motion, what = motion_of(options, target, home)
     states: dict[str, str | bool | float] = {"robot_state": "moving", "servo_on": True}
     known = {s.name for s in found.signals}
     played = {
@@ -51,6 +50,5 @@ def emulated(options: argparse.Namespace) -> Emulated:
         Place(table=Table.HOLDING, at=BELT + 2, type=Type.F32, words=Words.HIGH_FIRST): plc_cell.position,
     }
     server = ModbusServer(played, host=options.host, port=options.port, refresh=found.refresh)
-    what = "a calm swing" if options.file is None else str(options.file)
     belt = f"a belt in the holding registers {BELT} (i16, mm/s) to {BELT + 3}"
     return Emulated(server, f"{target.name}, {what}; {belt}", f"{options.host}:{options.port}")

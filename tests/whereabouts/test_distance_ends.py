@@ -1,0 +1,45 @@
+"""Ends of distances to people whose bones may be elsewhere, by brute force over all pairs of bodies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from seerob.distances.least import Query
+from seerob.human.skeleton import BONES
+from seerob.whereabouts.distance_ends import DistanceEnds
+from seerob.whereabouts.tracking_error import TrackingError
+
+PEOPLE = "".join(
+    f'[[humans]]\nname = "{name}"\nstature = 1.75\nmass = 75\nsex = "male"\n'
+    f"at = {{ position = [{x}, 0, 0] }}\n"
+    for name, x in (("op", 3.0), ("other", 4.2))
+)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), [(0.0, 0.0), (0.04, 0.0), (0.0, 0.07), (0.04, 0.07), (None, None)]
+)
+def test_ends_of_two_people_are_those_of_all_pairs(
+    tmp_path: Path, first: float | None, second: float | None
+) -> None:
+    station = made(tmp_path, FLOATING + TWO_R + PEOPLE, {"arm.urdf": two_r()})
+    model, rng = station.model, np.random.default_rng(2)
+    state = state_at(station, arm=((0.0, 0.0), (0.0, 0.0)))
+    for name, error in (("op", first), ("other", second)):
+        state.hearings[name].bones = {
+            bone: (float(rng.exponential(0.1)) if error is None else error, 0.0) for bone in BONES
+        }
+    a, b = model.human("op").bodies, model.human("other").bodies
+    gap = model.gap(a, b)
+    d = Query(model.shapes, a, b).per_pair(state.rotations, state.positions).distance.reshape(len(a), len(b))
+    own, others = TrackingError(model, a).at(state)[:, None], TrackingError(model, b).at(state)
+    ends = DistanceEnds(model, gap)
+    low, high = ends.of_bodies(state, d.min(axis=0))
+    np.testing.assert_allclose(low, (d - own).min(axis=0) - others, atol=1e-12)
+    np.testing.assert_allclose(high, (d + own).min(axis=0) + others, atol=1e-12)
+    both = ends.of_sets(state, float(d.min()))
+    assert both == pytest.approx(((d - own - others).min(), (d + own + others).min()), abs=1e-12)

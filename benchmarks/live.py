@@ -27,6 +27,7 @@ import tempfile
 import threading
 import time
 from collections import defaultdict
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -245,13 +246,16 @@ def line(what: str, late: list[float]) -> float:
 
 def used_late(post: Post, period: float) -> int:
     """Ticks that used a sample older than one tick while a newer one had been in the mailbox."""
-    count, newest = 0, {}
+    count, newest, after = 0, {}, {}
+    for (source, signals), came in post.came.items():
+        if not signals:  # which are counted together with the others, and take no place from them
+            after |= {(source, one[0]): post.posted[source, two[0]] for one, two in pairwise(came)}
     for now, samples in post.taken:
         for sample in samples:
             if not isinstance(sample, SignalSample):
                 newest[key(sample), sample.source] = sample.seq
         for (_, source), seq in newest.items():
-            following = post.posted.get((source, seq + 1))
+            following = after.get((source, seq))
             count += following is not None and following < now - period
     return count
 

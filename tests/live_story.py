@@ -36,6 +36,12 @@ class Story(Kept):
     def joints(self):
         return [s for samples in self.heard for s in samples if isinstance(s, JointSample)]
 
+    def lost(self, stopped):
+        """First tick from this one on that says so; on a busy machine what comes late is lost before, too."""
+        return next(
+            k for k, s in enumerate(self.snapshots) if k >= stopped and "not heard for" in s.results[0].reason
+        )
+
     def verdicts(self):
         return [s.results[0].verdict for s in self.snapshots]
 

@@ -50,7 +50,6 @@ def test_distance_of_boxes_is_coals(tmp_path):
     station = made(tmp_path, FLOATING + TWO_R + tables, {"arm.urdf": two_r()})
     judge = bind(station.model)
     rng = np.random.default_rng(0)
-    apart = 0
     for _ in range(60):
         q = rng.uniform(-3, 3, 2)
         value = Judge(judge)(state_at(station, arm=(q, ZERO)))[0].value
@@ -74,12 +73,9 @@ def test_distance_of_boxes_is_coals(tmp_path):
                         result,
                     )
                 )
-        if min(expected) > 0:
-            apart += 1
-            assert value == pytest.approx(min(expected), abs=1e-6)
-        else:
-            assert value <= 0
-    assert apart > 30
+        # None of these poses touches; how deep a body is in another is asked elsewhere.
+        assert min(expected) > 0
+        assert value == pytest.approx(min(expected), abs=1e-6)
 
 
 def test_a_set_cannot_be_compared_with_itself(tmp_path):

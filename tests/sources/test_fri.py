@@ -83,7 +83,7 @@ def test_silence_is_undecided_and_the_robot_is_followed_again(tmp_path, port):
     finally:
         server.stop()
     verdicts = story.verdicts()
-    lost = next(k for k, s in enumerate(story.snapshots) if "not heard for" in s.results[0].reason)
+    lost = story.lost(40)
     assert set(verdicts[lost:100]) == {"undecided"}
     assert "within" in verdicts[100:]
     assert story.fastest(100) < 1.5

@@ -299,21 +299,27 @@ def test_naming_a_kind_loads_no_heavy_package():
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
 
 
-@pytest.mark.parametrize("seed", range(60))
-def test_no_damage_to_a_file_ends_in_anything_but_samples_or_an_input_error(tmp_path, seed):
-    rng = np.random.default_rng(seed)
-    if seed % 2:
-        write_delmia_like(tmp_path / "a.xlsx")
-        path, source = tmp_path / "a.xlsx", Excel
+@pytest.mark.parametrize("source", [Csv, Excel])
+def test_no_damage_to_a_file_ends_in_anything_but_samples_or_an_input_error(tmp_path, source):
+    rng = np.random.default_rng(0)
+    path = tmp_path / ("a.csv" if source is Csv else "a.xlsx")
+    if source is Csv:
+        write_csv(path, HEADER, rows(), delimiter=";", comma=True)
     else:
-        write_csv(tmp_path / "a.csv", HEADER, rows(), delimiter=";", comma=True)
-        path, source = tmp_path / "a.csv", Csv
-    data = bytearray(path.read_bytes())
-    for place in rng.integers(0, len(data), 1 + seed // 4):
-        data[place] = rng.integers(256)
-    path.write_bytes(bytes(data[: rng.integers(1, len(data) + 1)] if seed % 3 == 0 else data))
-    try:
-        opened = source(robot="ur10", file=path.name).open(tmp_path, target())
-    except InputError:
-        return
-    assert all(np.isfinite(s.q).all() for s in opened.samples)
+        write_delmia_like(path)
+    whole, read = path.read_bytes(), 0
+    for seed in range(30):
+        data = bytearray(whole)
+        for place in rng.integers(0, len(data), 1 + seed // 4):
+            # Of a table mostly by what stands in tables: any bytes are no text.
+            data[place] = rng.choice(list(b"0123456789,;\n")) if seed % 3 else rng.integers(256)
+        path.write_bytes(bytes(data[: rng.integers(1, len(data) + 1)] if seed % 3 == 0 else data))
+        try:
+            opened = source(robot="ur10", file=path.name).open(tmp_path, target())
+        except InputError:
+            continue
+        assert all(np.isfinite(s.q).all() for s in opened.samples)
+        read += 1
+    # A workbook has a checksum: little that is damaged can be read.
+    assert read < 30
+    assert source is Excel or read > 3

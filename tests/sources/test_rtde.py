@@ -66,7 +66,7 @@ def test_silence_is_undecided_within_the_time_out_and_the_robot_is_followed_agai
     finally:
         server.stop()
     verdicts, times = story.verdicts(), [s.t for s in story.snapshots]
-    lost = next(k for k, s in enumerate(story.snapshots) if "not heard for" in s.results[0].reason)
+    lost = story.lost(50)
     last = max(s.t for s in story.joints() if s.t < times[lost])
     # A tick speaks of what was a delay ago.
     (source,) = station.workstation.sources

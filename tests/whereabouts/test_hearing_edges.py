@@ -70,7 +70,7 @@ def test_what_is_said_of_bones_counts_between_the_samples_beside_an_instant() ->
     }.items():
         assert hearing.unaimed(t) == unaimed, t
     everything = frozenset(BONES)
-    blind = everything - {"head"}
-    hearing.observed += [(0.0, blind), (1.0, everything), (2.0, everything), (3.0, blind)]
-    for t, unseen in {0.5: ("head",), 1.0 - SLACK: (), 1.5: (), 2.5: ("head",)}.items():
+    blind, armless = everything - {"head"}, everything - {"right_hand"}
+    hearing.observed += [(0.0, blind), (1.0, everything), (2.0, everything), (3.0, armless)]
+    for t, unseen in {0.5: ("head",), 1.0 - SLACK: (), 1.5: (), 2.5: ("right_hand",)}.items():
         assert hearing.unseen(t) == unseen, t

@@ -6,6 +6,8 @@ is when it stands on a machine that moves or carries one: then its bodies are as
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from seerob.errors import InputError
@@ -13,6 +15,17 @@ from seerob.model import Frame, Mechanism, Model
 from seerob.samples import PoseSample
 from seerob.state import State
 from seerob.transforms import Array
+
+RESTS = 1e-3
+"""Largest speed of a joint of a machine that counts as standing still [m/s or rad/s]."""
+
+
+def first_moving(state: State, mechanisms: Iterable[Mechanism]) -> str | None:
+    """Name of the first that does not stand still; None where all do."""
+    for mechanism in mechanisms:
+        if np.abs(state.data.qvel[mechanism.v_address]).max(initial=0.0) > RESTS:
+            return mechanism.name
+    return None
 
 
 def velocity_of(state: State, frame: Frame, mechanism: Mechanism, offset: Array) -> Array:

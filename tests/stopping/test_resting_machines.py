@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
-from seerob.contact import impact_mass
 from seerob.contact.impact_mass import while_carriers_rest
 from seerob.errors import Undecided
+from seerob.moving_base import RESTS
 from seerob.snapshot import Result, Verdict
-from seerob.stopping import models
 from seerob.stopping.models import Stop, bind_stop
 from seerob.stopping.simulated import StopSimulation
 
@@ -22,7 +21,7 @@ mass = 2
 slide = { along = [1, 0, 0], lower = -1, upper = 1 }
 """
 WALL = '[[parts]]\nname = "wall"\nshape = { box = [0.1, 1, 1] }\nat = { position = [9, 0, 0] }\n'
-SPEEDS = [(0.0, True), (models.RESTS, True), (-models.RESTS, True), (1.05e-3, False), (-1.05e-3, False)]
+SPEEDS = [(0.0, True), (RESTS, True), (-RESTS, True), (1.05e-3, False), (-1.05e-3, False)]
 
 
 def moving(cell, speed):
@@ -32,7 +31,7 @@ def moving(cell, speed):
 
 
 def test_both_rest_up_to_a_millimetre_a_second():
-    assert models.RESTS == impact_mass.RESTS == 1e-3
+    assert RESTS == 1e-3
 
 
 @pytest.mark.parametrize(("speed", "rests"), SPEEDS)

@@ -11,12 +11,10 @@ from seerob.criterion import Evaluate
 from seerob.errors import Undecided
 from seerob.kernels.speed import directions
 from seerob.model import Mechanism, Model
+from seerob.moving_base import first_moving
 from seerob.snapshot import Result, Verdict
 from seerob.state import State
 from seerob.transforms import Array
-
-RESTS = 1e-3
-"""Speed of its joints up to which what carries a robot rests [rad/s or m/s]."""
 
 
 def simplified_mass(model: Model, robot: Mechanism) -> float:
@@ -70,18 +68,18 @@ def while_carriers_rest(model: Model, robot: Mechanism, judge: Evaluate) -> Eval
 
     What carries it moves too then, and its mass is not in M/2 + m_L: the real mass may be larger.
     """
-    rows = {}
+    carriers = []
     above = robot.on
     while above:
-        rows[above], above = model.mechanisms[above].v_address, model.mechanisms[above].on
+        carriers.append(model.mechanisms[above])
+        above = carriers[-1].on
 
     def evaluate(state: State) -> Result:
         result = judge(state)
         if result.verdict is None or result.verdict is Verdict.EXCEEDED:
             return result
-        for name, row in rows.items():
-            if np.abs(state.data.qvel[row]).max(initial=0.0) > RESTS:
-                raise Undecided(f"{name} moves and carries {robot.name}: its mass is not in M/2 + m_L")
+        if name := first_moving(state, carriers):
+            raise Undecided(f"{name} moves and carries {robot.name}: its mass is not in M/2 + m_L")
         return result
 
-    return evaluate if rows else judge
+    return evaluate if carriers else judge

@@ -13,6 +13,7 @@ from msgspec import Meta, Struct
 from seerob.distances.least import Per
 from seerob.errors import InputError, Undecided
 from seerob.model import Gap, Mechanism, Model
+from seerob.moving_base import first_moving
 from seerob.snapshot import Input, Origin
 from seerob.state import State
 from seerob.stopping import table as stopping_table
@@ -37,8 +38,6 @@ SHARES = {"bound": BOUND, "constant_deceleration": CONSTANT}
 """Of v_r T_s, by how a stop is modelled whose time is known."""
 MOVING = 1e-6
 """Speed above which a robot moves [m/s]."""
-RESTS = 1e-3
-"""Speed of its joints up to which a machine rests [rad/s or m/s]."""
 INSTANTS = 16
 """At most this many instants of a stop are asked for their distance to the person."""
 
@@ -170,13 +169,12 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
 
 def _while_riders_rest(courses: Courses, model: Model, robot: Mechanism) -> Courses:
     """The same, undecided while a machine on the robot moves: neither table nor simulation knows its stop."""
-    rows = {name: model.mechanisms[name].v_address for name in robot.riders}
+    riders = [model.mechanisms[name] for name in robot.riders]
 
     def at(state: State) -> At:
-        state.require(*rows)
-        for name, row in rows.items():
-            if np.abs(state.data.qvel[row]).max(initial=0.0) > RESTS:
-                raise Undecided(f"{name} moves on {robot.name}, and its own way to stop is not known")
+        state.require(*robot.riders)
+        if name := first_moving(state, riders):
+            raise Undecided(f"{name} moves on {robot.name}, and its own way to stop is not known")
         return courses(state)
 
     return at

@@ -17,7 +17,7 @@ def bones_of(model: Model, bodies: Sequence[int]) -> tuple[tuple[str, ...], dict
     others: dict[str, None] = {}
     people: dict[str, set[str]] = {}
     for body in (model.bodies[i] for i in bodies):
-        if body.role == "human" and body.carrier == body.owner:
+        if body.role == "human":
             people.setdefault(body.owner, set()).add(body.name.removeprefix(f"{body.owner}/"))
         elif body.mover:
             others[body.mover] = None

@@ -38,6 +38,8 @@ class DistanceEnds:
             state: The twin.
             distance: As the twin has it [m], shape (b,).
         """
+        if self._off.none(state):
+            return distance, distance
         own, others = self._errors(state)
         if np.ptp(own) == 0.0:
             return distance - own[0] - others, distance + own[0] + others
@@ -47,6 +49,8 @@ class DistanceEnds:
 
     def of_sets(self, state: State, distance: float) -> tuple[float, float]:
         """The same of all of ``gap.b`` [m]; distance as the twin has it [m]."""
+        if self._off.none(state):
+            return distance, distance
         own, others = self._errors(state)
         off = own[:, None] + others
         if np.ptp(off) == 0.0:

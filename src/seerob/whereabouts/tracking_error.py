@@ -51,10 +51,14 @@ class TrackingError:
             for person in self._bones
         }
 
+    def none(self, state: State) -> bool:
+        """Whether no device says where any of these people are: nothing is off then."""
+        return not any(state.hearings[person].bones for person in self._bones)
+
     def at(self, state: State) -> Array:
         """Of each body [m], shape (b,)."""
         found = np.zeros(self._n)
-        if not any(state.hearings[person].bones for person in self._bones):
+        if self.none(state):
             return found
         for person, bones in self._bones.items():
             errors = state.hearings[person].bones

@@ -143,6 +143,8 @@ def test_what_a_person_carries_is_off_as_its_bone_is_and_two_people_add_up(tmp_p
         '[[workpieces]]\nname = "rod"\non = "op/right_hand"\nshape = { box = [0.6, 0.1, 0.1] }\nmass = 1\n'
         "at = { position = [0.2, 0, 0], rpy_deg = [0, 0, 90] }\n"
         '[[areas]]\nname = "halo"\non = "op/head"\nshape = { sphere = 0.5 }\n'
+        '[[areas]]\nname = "wedge"\non = "op/right_hand"\nat = { position = [-1, 0, 0] }\n'
+        "shape = { polygon = [[0, 0], [3, 0], [0, 1]], height = [0, 2] }\n"
         '[[safety]]\nkind = "minimum_distance"\nname = "rod"\nbetween = ["rod", "arm"]\n'
         '[[safety]]\nkind = "minimum_distance"\nname = "both"\nbetween = ["op", "other"]\n'
         '[[safety]]\nkind = "safety_area"\nname = "halo"\narea = "halo"\nof = "other"\n'
@@ -151,7 +153,9 @@ def test_what_a_person_carries_is_off_as_its_bone_is_and_two_people_add_up(tmp_p
     state.hearings["op"].bones = {"head": (0.03, 0.2), "right_hand": (0.02, 0.1)}
     state.hearings["other"].bones = {"pelvis": (0.5, 0.0)}
     rod = 0.02 + 0.1 * np.linalg.norm([0.2 + 0.05, 0.3, 0.05])
-    assert off(station, state, "rod", "halo") == pytest.approx([rod, 0.03 + 0.2 * 0.5], rel=1e-9)
+    wedge = 0.02 + 0.1 * np.linalg.norm([3 - 1, 0, 2])
+    expected = [rod, 0.03 + 0.2 * 0.5, wedge]
+    assert off(station, state, "rod", "halo", "wedge") == pytest.approx(expected, rel=1e-9)
     found = {result.name: result for result in Judge(station.bound)(state)}
     assert found["rod"].interval == pytest.approx((found["rod"].value - rod, found["rod"].value + rod))
     bodies = [station.model.select(name) for name in ("op", "other")]

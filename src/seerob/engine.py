@@ -30,7 +30,7 @@ from seerob.model import Mechanism, Model
 from seerob.mounting.compilation import pose_matrix
 from seerob.moving_base import moved_by_poses
 from seerob.reference import Course, Reference
-from seerob.sample_values import beyond_limits, is_finite, largest_speed, torques_of
+from seerob.sample_values import beyond_limits, is_possible, largest_speed, torques_of
 from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
 from seerob.state import Hearing, State
 from seerob.task_space import TaskPull
@@ -162,7 +162,7 @@ class Engine:
             mechanism = self._target(sample)
             reason = "" if sample.quality is Quality.GOOD else f"its source says {sample.quality.value}"
             reference = self._references[mechanism.name]
-            if not is_finite(sample):
+            if not is_possible(sample):
                 # Nothing to be pulled to; not knowing where it is must show all the same.
                 taken, reason = (
                     bool(np.isfinite(sample.t)),

@@ -25,7 +25,7 @@ def torques_of(sample: JointSample | PoseSample) -> Array | None:
     return np.array(sample.tau)
 
 
-def is_finite(sample: JointSample | PoseSample) -> bool:
+def is_possible(sample: JointSample | PoseSample) -> bool:
     """Whether the instant is finite, and positions and velocities are no larger than anything that is."""
     said = (
         (*sample.q, *(sample.qd or ())) if isinstance(sample, JointSample) else sample.position + sample.wxyz

@@ -96,11 +96,14 @@ def load_thing(
         pieces = tuple(_piece("" if single else name, mesh) for name, mesh in meshes)
         source = f"shape of {thing.mesh}"
         whole = [mesh for _, mesh in meshes]
-        findings += _holes(thing, whole, path)
-        if not all(map(is_closed, whole)) and (around := enclosing(whole)) is not None:
-            # Split by colour or by name, none of the pieces has an inside; all of them together do.
-            inside = Solid(mesh=detail.physics_mesh(around))
-            pieces = (replace(pieces[0], solids=(*pieces[0].solids, inside)), *pieces[1:])
+        if not all(map(is_closed, whole)):
+            around = enclosing(whole)
+            if around is None:
+                findings += (_hole(thing, path),)
+            else:
+                # Split by colour or by name, none of the pieces has an inside; all of them together do.
+                inside = Solid(mesh=detail.physics_mesh(around))
+                pieces = (replace(pieces[0], solids=(*pieces[0].solids, inside)), *pieces[1:])
     else:
         assert thing.shape is not None
         piece, whole = _simple(thing.shape, color)
@@ -215,14 +218,12 @@ def _capsule(radius: float, length: float) -> tuple[float, Array]:
     return volume, np.array([across, across, along]) / volume
 
 
-def _holes(thing: Thing, meshes: Sequence[Mesh], path: Path) -> tuple[Finding, ...]:
+def _hole(thing: Thing, path: Path) -> Finding:
     """What an open surface means for distances.
 
     Raises:
         InputError: An area, of which only the inside matters.
     """
-    if all(map(is_closed, meshes)) or enclosing(meshes) is not None:
-        return ()
     if isinstance(thing, Area):
         raise InputError.at(
             path,
@@ -230,7 +231,7 @@ def _holes(thing: Thing, meshes: Sequence[Mesh], path: Path) -> tuple[Finding, .
             "the mesh is open: nothing can be said to be inside of it",
             "close it, or give a shape",
         )
-    return (Finding(level="note", subject=thing.name, text=lint.OPEN),)
+    return Finding(level="note", subject=thing.name, text=lint.OPEN)
 
 
 def _odd(thing: Thing, solids: tuple[Solid, ...], meshes: list[Mesh]) -> tuple[Finding, ...]:

@@ -11,6 +11,7 @@ from importlib.metadata import version
 from typing import NoReturn
 
 from seerob.commands import Exit
+from seerob.commands.interruption import Interrupts
 from seerob.errors import SeerobError
 
 COMMANDS = (
@@ -70,29 +71,33 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; errors end in a message, never in a traceback."""
-    options = parser().parse_args(arguments)
+    interrupts = Interrupts()
     try:
-        code = int(options.run(options))
-        sys.stdout.flush()
+        with interrupts:
+            options = parser().parse_args(arguments)
+            code = int(options.run(options))
+            sys.stdout.flush()
         return code
-    except SeerobError as error:
-        sys.stderr.write(f"{error}\n")
-        return Exit.ERROR
     except KeyboardInterrupt:
         return _stopped()
-    except BrokenPipeError:
+    except Exception as error:
+        if interrupts.came:
+            return _stopped()
+        if not isinstance(error, SeerobError | OSError):
+            raise
+        return _failed(error)
+
+
+def _failed(error: SeerobError | OSError) -> Exit:
+    if isinstance(error, BrokenPipeError):
         # Whoever read has gone; the interpreter must not try to write the rest at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return Exit.ERROR
-    except OSError as error:
+    elif isinstance(error, OSError):
         remedy = "; check that it exists and may be read and written" if error.filename else ""
         sys.stderr.write(f"{error.filename or 'seerob'}: {error.strerror or error}{remedy}\n")
-        return Exit.ERROR
-    except Exception as error:
-        # Libraries with a bare except turn an interrupt into an error of their own.
-        if not _interrupted(error):
-            raise
-        return _stopped()
+    else:
+        sys.stderr.write(f"{error}\n")
+    return Exit.ERROR
 
 
 def _stopped() -> Exit:
@@ -101,12 +106,6 @@ def _stopped() -> Exit:
     eval("0")  # noqa: S307
     sys.stderr.write("stopped\n")
     return Exit.ERROR
-
-
-def _interrupted(error: BaseException | None) -> bool:
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__context__
-    return error is not None
 
 
 if __name__ == "__main__":

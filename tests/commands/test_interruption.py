@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 from made_cells import make_cell
 
-from seerob.errors import SeerobError
+from seerob import cli
+from seerob.errors import InputError, SeerobError
 from seerob.recordings.recording import Recording
 
 
@@ -85,20 +88,68 @@ def test_a_second_signal_writes_no_report_but_loses_no_recording(live):
     assert [p.name for p in out.iterdir() if p.name.startswith(".")] == []
 
 
-def test_an_interrupt_that_a_library_turned_into_its_own_error_is_one(monkeypatch, capsys):
-    """A bare ``except`` around an import makes a TypeError of Ctrl-C."""
-    from seerob import cli
+def interrupting(monkeypatch, command):
+    """Have ``seerob kinds`` do something else."""
     from seerob.commands import kinds
 
+    monkeypatch.setattr(kinds, "run", command)
+    return cli.main(["kinds"])
+
+
+def test_an_interrupt_that_a_library_made_an_error_of_its_own_of_is_one(monkeypatch, capsys):
+    """A bare ``except`` around an import makes a TypeError of Ctrl-C, and compiled code does not say why."""
+
+    def interrupted(options):
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise TypeError("expected float")
+
+    assert interrupting(monkeypatch, interrupted) == 3
+    assert capsys.readouterr().err == "stopped\n"
+
+
+def test_what_an_interrupt_left_half_done_is_no_mistake_of_the_user(monkeypatch, capsys):
     def interrupted(options):
         try:
-            raise KeyboardInterrupt
-        except KeyboardInterrupt:
-            raise TypeError("expected float")  # noqa: B904
+            signal.raise_signal(signal.SIGINT)
+        finally:
+            raise InputError.at("results.xlsx", "", "cannot be written: Bad file descriptor", "close it")
 
-    monkeypatch.setattr(kinds, "run", interrupted)
-    assert cli.main(["kinds"]) == 3
+    assert interrupting(monkeypatch, interrupted) == 3
     assert capsys.readouterr().err == "stopped\n"
+
+
+def test_an_interrupt_while_an_object_is_destroyed_is_not_lost(monkeypatch, capsys):
+    class Leaving:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    def interrupted(options):
+        leaving = Leaving()
+        del leaving
+        threading.Event().wait(60)
+        raise AssertionError("went on for a minute")
+
+    assert interrupting(monkeypatch, interrupted) == 3
+    assert capsys.readouterr().err == "stopped\n"
+
+
+def test_other_errors_of_destroyed_objects_are_still_told(monkeypatch):
+    heard = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda what: heard.append(what.exc_value))
+
+    class Leaving:
+        def __del__(self):
+            raise ValueError("half closed")
+
+    def fails(options):
+        leaving = Leaving()
+        del leaving
+        return 0
+
+    assert interrupting(monkeypatch, fails) == 0
+    assert list(map(str, heard)) == ["half closed"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_an_interrupt_in_generated_code_ends_with_the_exit_code_too(tmp_path):

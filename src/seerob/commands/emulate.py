@@ -10,7 +10,7 @@ import time
 from importlib import import_module
 
 from seerob.commands import Exit, line, seconds
-from seerob.commands.run import Stopped
+from seerob.commands.interruption import Stopped
 from seerob.errors import InputError
 from seerob.plugin import kinds
 

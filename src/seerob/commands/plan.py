@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
     if not options.output.parent.is_dir():
         raise InputError.at(options.output, "", "its folder does not exist", "make it, or give another place")
     station = compiled(options.workstation, sources=False)
-    from seerob.commands.run import Stopped as Asked
+    from seerob.commands.interruption import Stopped as Asked
     from seerob.planning.plan import plan
     from seerob.planning.search import NoPath, Stopped
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from seerob.commands import OUT, Exit, line, port, seconds
-from seerob.commands.run import Stopped
+from seerob.commands.interruption import Stopped
 from seerob.errors import InputError, SeerobError
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ import time
 from pathlib import Path
 
 from seerob.commands import Exit, line, seconds
-from seerob.commands.run import Stopped, add_page
+from seerob.commands.interruption import Stopped
+from seerob.commands.run import add_page
 
 HELP = "show a recording in the page: play, pause, seek"
 EXAMPLE = "seerob replay runs/2026-11-21T10-12-00/run.mcap"

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import signal
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING
 
 from seerob.commands import (
@@ -19,6 +17,7 @@ from seerob.commands import (
     tell,
     tell_results,
 )
+from seerob.commands.interruption import Stopped
 from seerob.commands.progress import announced, spinner
 from seerob.commands.sinks import file_of, refuse_existing, sinks_of, tell_files
 from seerob.errors import InputError
@@ -57,24 +56,6 @@ def add_page(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine only)")
     sub.add_argument("--port", type=port, default=8080, help="port of the page; 0 is any free one")
     sub.add_argument("--token", help="what visitors must know; needed when not only this machine may visit")
-
-
-class Stopped:
-    """Whether the user asked to stop. A second Ctrl-C does not wait."""
-
-    def __init__(self) -> None:
-        self._asked = False
-        signal.signal(signal.SIGINT, self._ask)
-        signal.signal(signal.SIGTERM, self._ask)
-
-    def _ask(self, number: int, frame: FrameType | None) -> None:
-        if self._asked:
-            raise KeyboardInterrupt
-        self._asked = True
-
-    def __call__(self) -> bool:
-        """Whether to stop."""
-        return self._asked
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from seerob.commands import OUT, Exit, add_workstation, compiled, line, seconds, tell
-from seerob.commands.run import Stopped
+from seerob.commands.interruption import Stopped
 from seerob.errors import InputError, SeerobError
 
 if TYPE_CHECKING:

@@ -9,6 +9,8 @@ The tests say what must hold; this says how well it does.
 from __future__ import annotations
 
 import argparse
+import atexit
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -53,7 +55,9 @@ def wave(t: float) -> tuple[Array, Array]:
 
 
 def folder() -> Path:
-    return Path(tempfile.mkdtemp(prefix="seerob-"))
+    made = Path(tempfile.mkdtemp(prefix="seerob-"))
+    atexit.register(shutil.rmtree, made, ignore_errors=True)
+    return made
 
 
 def dynamics(poses: int, names: tuple[str, ...]) -> None:

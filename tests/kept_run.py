@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 from seerob.sink import Closing
@@ -23,17 +24,19 @@ class Chapters(Closing):
 
     Args:
         chapters: Pairs of a condition, asked with each snapshot, and a deed once it is so.
-        patience: With one chapter [s], on the slowest machine.
+        patience: With one chapter [s], on the slowest machine; the first begins with the run, after all
+            that is compiled for it.
     """
 
-    def __init__(self, *chapters, patience=60.0):
+    def __init__(self, *chapters, patience=120.0):
         self._chapters, self._patience = list(chapters), patience
-        self._end = time.monotonic() + patience
+        self._end = math.inf
         self._last = ()
         self.reasons = {}
 
     def write(self, snapshot, samples):
         self._last = snapshot.results
+        self._end = min(self._end, time.monotonic() + self._patience)
         if self._chapters and self._chapters[0][0](snapshot):
             _, deed = self._chapters.pop(0)
             self.reasons |= {r.name: r.reason for r in self._last if r.verdict == "undecided"}

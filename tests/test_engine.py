@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from made_cell import AMPLITUDE, FLOATING, Q0, TWO_R, UR10, heard, hinge_limits, made, recorded, two_r, wave
 from seerob.engine import Engine
@@ -191,3 +192,19 @@ def test_what_is_asked_of_a_state_does_not_change_the_motion(ur10):
             state.fastest_point(body)
         asked.append(state.data.qpos.tobytes())
     assert plain == asked
+
+
+@pytest.mark.parametrize("whole", [float, int])
+def test_after_a_silence_it_moves_as_fast_as_is_heard_from_the_instant_of_the_sample_on(tmp_path, whole):
+    """Also where that is the instant of a tick; whole numbers are as good as any."""
+    station = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()})
+    arm = station.model.robot("arm")
+    engine, speeds = Engine(station.model, driven={"arm": 0.05}), {}
+    for k in range(30):
+        if not 3 < k < 20:
+            sample = heard("arm", k * 0.01, [k * 0.01, 0.0], [1.0, 0.0])
+            engine.take([replace(sample, q=(whole(k > 19), whole(0)), qd=(whole(1), whole(0)))])
+        state = engine.tick() if k else engine.start()
+        speeds[k] = state.qd(arm)[0] if state.doubt("arm") == "" else None
+    assert speeds[15] is None
+    assert speeds[20] == pytest.approx(1.0, abs=1e-9)

@@ -6,7 +6,7 @@ from decimal import Context, Decimal
 import numpy as np
 import pytest
 
-from seerob.figures import DECIMALS, against, figure, margin, told, with_unit
+from seerob.figures import DECIMALS, against, between, figure, margin, told, with_unit
 
 
 def back(text):
@@ -87,3 +87,14 @@ def test_a_label_is_the_text_of_the_pair_and_a_figure_that_of_decimal_arithmetic
             if unit and 1e-3 < abs(value) < 1e6:
                 exact = Decimal(f"{value:.11e}").quantize(Decimal(1).scaleb(-DECIMALS[unit]), context=ten)
                 assert back(figure(value, unit)) == float(exact)
+
+
+@pytest.mark.parametrize("unit", [*DECIMALS, "", "kN"])
+def test_where_a_value_lies_is_rounded_outward(unit):
+    rng = np.random.default_rng(6)
+    for low, high in np.sort(rng.normal(0, 10.0 ** rng.integers(-3, 3, (200, 1)), (200, 2)), axis=1):
+        shown_low, shown_high = map(back, between(low, high, unit).split(" and "))
+        noise = 1e-11 * max(abs(low), abs(high)) + 1e-3 * 10.0 ** -DECIMALS.get(unit, 9)
+        assert shown_low <= low + noise
+        assert shown_high >= high - noise
+    assert between(-math.inf, 0.29, "m") == "−∞ m and 0.29 m"

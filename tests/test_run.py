@@ -335,7 +335,7 @@ def test_a_clock_that_falls_behind_slips_by_what_was_lost():
     clock = Clock()
     time.sleep(0.3)
     clock.wait(0.01)
-    assert 0.28 < clock.slipped < 5.0
+    assert 0.28 < clock.slipped < 60.0
     before = clock.slipped
     clock.wait(0.011)
     assert clock.slipped == before

@@ -1,8 +1,24 @@
-"""``python -m seerob``: the command line."""
+"""``seerob`` and ``python -m seerob``: the command line, and Ctrl-C before it is there and after its end."""
 
+import signal
 import sys
 
-from seerob.cli import main
+from seerob.interrupted import stopped
+
+
+def program() -> int:
+    """Run one command; its exit code."""
+    try:
+        try:
+            from seerob.cli import main
+
+            return main()
+        finally:
+            # What is left is the interpreter's own end, which would answer with a traceback.
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+    except KeyboardInterrupt:
+        return stopped()
+
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(program())

@@ -255,7 +255,7 @@ class _Reader:
         self.links: list[tuple[str, str]] = []
         self.findings: list[Finding] = []
         self._count = 0
-        self._turned = False
+        self._turned = self._comma = False
 
     def note(self, level: str, text: str) -> None:
         """Add a finding."""
@@ -347,6 +347,11 @@ class _Reader:
         if attribute.unit not in units:
             known = ", ".join(unit for unit in units if unit)
             raise InputError.at(self.file, key, f"unknown unit {attribute.unit!r}", f"known: {known}")
+        if "," in attribute.value and not self._comma:
+            self._comma = True
+            self.note(
+                "assumed", f"{key} = {attribute.value[:40]!r}: commas in numbers are read as decimal points"
+            )
         try:
             value = float(attribute.value.replace(",", ".")) * units[attribute.unit]
         except ValueError:

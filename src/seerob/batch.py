@@ -21,6 +21,7 @@ from seerob.answers import UNDECIDED, Answers
 from seerob.criterion import Criterion, EvaluateMany
 from seerob.errors import Undecided, UnknownName
 from seerob.judging import Judge
+from seerob.judging import bound as evaluation
 from seerob.model import Model
 from seerob.results.series import CODES
 from seerob.run import Bound, Feed, engine_of, settled
@@ -158,6 +159,8 @@ def _able(
         many = criterion.batch(model)
         if many is None:
             notes[criterion.name] = "asked instant by instant: with these options it is not made for batches"
+        elif criterion.unseen(model):
+            notes[criterion.name] = "asked instant by instant: parts of a robot have no shape"
         elif criterion.variables():
             notes[criterion.name] = "asked instant by instant: it follows variables"
         else:
@@ -243,7 +246,7 @@ def _walked(model: Model, bound: Sequence[Bound], motion: Motion) -> Stretch:
     state = State(model, data, hearings)
     # With criteria that were bound for another run, what they remember of it would be in the way.
     fresh = [
-        Bound(changed(one.criterion, every=None), one.group, one.criterion.bind(model), one.basis)
+        Bound(changed(one.criterion, every=None), one.group, evaluation(one.criterion, model), one.basis)
         for one in bound
     ]
     judge = Judge(fresh)

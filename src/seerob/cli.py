@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
+import re
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from seerob.commands import Exit
 from seerob.commands.interruption import Interrupts
+from seerob.commands.printable import PrintableLines, printable
 from seerob.errors import SeerobError
+from seerob.interrupted import stopped
 
 COMMANDS = (
     "new",
@@ -34,6 +38,7 @@ COMMANDS = (
     "import_aml",
 )
 """One module each in `seerob.commands`, with ``HELP``, ``EXAMPLE``, ``add`` and ``run``."""
+_NEGATIVE, _OPTION = re.compile(r"-\.?\d"), re.compile(r"--[a-z][a-z-]*")
 
 
 class Parser(argparse.ArgumentParser):
@@ -43,6 +48,21 @@ class Parser(argparse.ArgumentParser):
         """Print the usage and the mistake, and leave."""
         self.print_usage(sys.stderr)
         self.exit(Exit.ERROR, f"{self.prog}: {message}\n")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Also values that begin with a minus, ``--to -60,70``: argparse takes them for options."""
+        return super().parse_known_args(_joined(sys.argv[1:] if args is None else args), namespace)
+
+
+def _joined(words: Sequence[str]) -> list[str]:
+    """Words of which a negative number is one with the option before it; no option begins with a digit."""
+    found: list[str] = []
+    for word in words:
+        if found and _NEGATIVE.match(word) and _OPTION.fullmatch(found[-1]) and "--" not in found:
+            found[-1] += f"={word}"
+        else:
+            found.append(word)
+    return found
 
 
 def parser() -> argparse.ArgumentParser:
@@ -72,6 +92,8 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; errors end in a message, never in a traceback."""
     interrupts = Interrupts()
+    if logging.lastResort is not None:
+        logging.lastResort.setFormatter(PrintableLines())
     try:
         with interrupts:
             options = parser().parse_args(arguments)
@@ -79,10 +101,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return code
     except KeyboardInterrupt:
-        return _stopped()
+        return stopped()
     except Exception as error:
         if interrupts.came:
-            return _stopped()
+            return stopped()
         if not isinstance(error, SeerobError | OSError):
             raise
         return _failed(error)
@@ -94,17 +116,10 @@ def _failed(error: SeerobError | OSError) -> Exit:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     elif isinstance(error, OSError):
         remedy = "; check that it exists and may be read and written" if error.filename else ""
-        sys.stderr.write(f"{error.filename or 'seerob'}: {error.strerror or error}{remedy}\n")
+        text = f"{error.filename or 'seerob'}: {error.strerror or error}{remedy}"
+        sys.stderr.write(f"{printable(text)}\n")
     else:
-        sys.stderr.write(f"{error}\n")
-    return Exit.ERROR
-
-
-def _stopped() -> Exit:
-    # An interrupt inside text that a library had run makes the interpreter end by a signal instead of with
-    # our exit code, until other text is run.
-    eval("0")  # noqa: S307
-    sys.stderr.write("stopped\n")
+        sys.stderr.write(f"{printable(str(error))}\n")
     return Exit.ERROR
 
 

@@ -38,6 +38,8 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Unit of its results."""
     at_most: ClassVar[bool] = True
     """Whether its limit bounds from above."""
+    by_shape: ClassVar[bool] = False
+    """Whether it is about the shapes of its subjects: what no shape shows of a robot is nowhere near."""
 
     name: str = ""
     """What results are called; made from the kind and the subject when not given."""
@@ -74,6 +76,14 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def subjects(self) -> tuple[str, ...]:
         """Names from the workstation file that this criterion speaks of."""
         return ()
+
+    def unseen(self, model: Model) -> str:
+        """Why nothing is within: what no shape shows of the robots that it speaks of; empty for nothing."""
+        if not self.by_shape:
+            return ""
+        found = (model.mechanisms[name].unseen for name in self.subjects() if name in model.mechanisms)
+        names = ", ".join(dict.fromkeys(link for links in found for link in links))
+        return f"no shape shows {names}, which has a mass: give it one, or mount one on it" if names else ""
 
 
 def judge(value: float, limit: float | None, *, at_most: bool = True) -> Verdict | None:

@@ -183,11 +183,7 @@ class Engine:
             hearing.driven = self.controllers
             for found in following.until((self._tick + 1) * self._period):
                 self._references[name].take(found.t, found.q, None, anew=found.anew and self._tick > 0)
-                hearing.heard.append((found.t, found.reason))
-                hearing.parts.append((found.t, found.parts))
-                hearing.observed.append((found.t, found.observed))
-                hearing.aims.append((found.t, found.unaimed))
-                hearing.torques.append(None)
+                hearing.follow(found)
 
     def _silent(self, name: str) -> bool:
         """Whether what drives it was silent: of a live source only the newest sample is ever this old."""
@@ -286,21 +282,21 @@ class Engine:
             if self.controllers and not kernel.tame(qvel, WILD):
                 self._put_back(step + 1, start + (step + 1) * self._dt)
         self._tick += 1
-        if not self.physics:
-            self._follow()
-        self._check_finite()
         t = self._tick * self._period
+        if self.physics:
+            self._land(self._steps, t)
+        else:
+            self._follow(t)
+        self._check_finite()
         self._show(t)
         self._note_errors()
         return self.state
 
-    def _follow(self) -> None:
+    def _follow(self, t: float) -> None:
         """Put the twin on what was heard, with the velocities of that motion."""
-        t = self._tick * self._period
         for mechanism in self._mechanisms:
-            reference = self._references[mechanism.name]
-            reference.lands(t)
-            self._put(mechanism, *reference.at(t))
+            self._references[mechanism.name].lands(t)
+            self._put(mechanism, *self._references[mechanism.name].at(t))
 
     def _aim(self, start: float) -> None:
         """Where every joint is to be at each step of the tick that begins, and at its end."""
@@ -323,9 +319,7 @@ class Engine:
 
     def _pull(self, step: int, t: float) -> None:
         wanted, mj = self._wanted, self._mj
-        for mechanism in self._mechanisms:
-            if self._references[mechanism.name].lands(t):
-                self._put(mechanism, *(part[step] for part in self._courses[mechanism.name]))
+        self._land(step, t)
         q, v, a = (part[step] for part in self._course)
         wanted.qpos[:], wanted.qvel[:], wanted.qacc[:] = q, v, a
         mujoco.mj_kinematics(mj, wanted)
@@ -339,6 +333,12 @@ class Engine:
         )  # fmt: skip
         for pull in self._task_pulls:
             pull.command(mj, self._data, wanted, self._kp)
+
+    def _land(self, step: int, t: float) -> None:
+        """Put there who jumped there by ``t`` [s], also where that is the instant of the tick itself."""
+        for mechanism in self._mechanisms if self.controllers else ():
+            if self._references[mechanism.name].lands(t):
+                self._put(mechanism, *(part[step] for part in self._courses[mechanism.name]))
 
     def _place(self, t: float) -> None:
         for mechanism in self._mechanisms:

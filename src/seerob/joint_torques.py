@@ -10,7 +10,6 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from seerob.errors import Undecided
 from seerob.kernels.chain import held
 from seerob.model import Mechanism
 from seerob.state import State
@@ -28,7 +27,7 @@ def gravity(state: State, mechanism: Mechanism) -> Array:
     Raises:
         Undecided: Not heard, or a mass that nobody gave.
     """
-    _need_masses(state, mechanism)
+    state.weigh(mechanism)
     data, columns = state.data, state.columns[mechanism.name]
     found = np.empty(len(columns.joints))
     held(
@@ -47,13 +46,7 @@ def bias(state: State, mechanism: Mechanism) -> Array:
     Raises:
         Undecided: Not heard, or a mass that nobody gave.
     """
-    _need_masses(state, mechanism)
+    state.weigh(mechanism)
     every = np.zeros(state.model.mj.nv)
     mujoco.mj_rne(state.model.mj, state.data, 0, every)
     return np.asarray(mechanism.coupling.T @ every[mechanism.v_address])
-
-
-def _need_masses(state: State, mechanism: Mechanism) -> None:
-    state.require(mechanism.name)
-    if mechanism.unknown_masses:
-        raise Undecided("; ".join(mechanism.unknown_masses))

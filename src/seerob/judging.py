@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from seerob.criterion import Criterion, Evaluate
 from seerob.errors import Undecided
+from seerob.model import Model
 from seerob.snapshot import Basis, Result, Verdict
 from seerob.state import State
 from seerob.whereabouts.hearing import SLACK
@@ -24,6 +25,27 @@ class Bound:
     group: str
     evaluate: Evaluate
     basis: Basis
+
+
+def bound(criterion: Criterion, model: Model) -> Evaluate:
+    """The criterion with its names resolved; never within where parts of a robot have no shape."""
+    evaluate, unseen = criterion.bind(model), criterion.unseen(model)
+    if not unseen:
+        return evaluate
+
+    def judged(state: State) -> Result:
+        result = evaluate(state)
+        nobody = result.verdict is None and result.value is None
+        if result.verdict is not Verdict.WITHIN and not nobody:
+            return result
+        reason = f"{unseen}; {result.reason}".removesuffix("; ")
+        markers = tuple(
+            replace(marker, verdict=Verdict.UNDECIDED) if getattr(marker, "verdict", None) else marker
+            for marker in result.markers
+        )
+        return replace(result, verdict=Verdict.UNDECIDED, reason=reason, markers=markers)
+
+    return judged
 
 
 class _Kept(NamedTuple):

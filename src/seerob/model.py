@@ -125,6 +125,13 @@ class Mechanism:
     """Machines that are mounted on it: their bodies are among its own, their joints are not."""
     holders: tuple[str, ...] = ()
     """Those of them that pick things up: what it weighs depends on them."""
+    unseen: tuple[str, ...] = ()
+    """Full names of moving links that have a mass, and that no shape shows."""
+
+    @property
+    def links(self) -> frozenset[str]:
+        """Full names of its own links, which no name of a tool is taken for."""
+        return frozenset(f"{self.name}/{link.name}" for link in self.description.links)
 
     @property
     def alone(self) -> bool:
@@ -278,7 +285,8 @@ class Model:
 
     def names(self) -> tuple[str, ...]:
         """Every name that `select` takes without wildcards."""
-        found: dict[str, None] = dict.fromkeys(self.mechanisms)
+        shaped = (name for name, m in self.mechanisms.items() if m.bodies or m.carried)
+        found: dict[str, None] = dict.fromkeys(shaped)
         for body in self.bodies:
             pieces = body.name.split("/")
             found.update(dict.fromkeys("/".join(pieces[:i]) for i in range(1, len(pieces) + 1)))

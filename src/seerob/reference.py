@@ -84,6 +84,7 @@ class Reference:
                 set in motion when its instant has come.
         """
         self._knots = None
+        q, qd = np.asarray(q, float), None if qd is None else np.asarray(qd, float)
         if anew and t > self.until:
             self._times, self._jumps, self._landings = [], [], [-np.inf, t]
         if not self._times:
@@ -158,7 +159,7 @@ class Reference:
         if self._knots is None:
             self._knots = (
                 # Before the first sample it waits at home.
-                np.array(self._times or [np.inf]),
+                np.array(self._times or [np.inf], float),
                 np.array(self._points),
                 np.array(self._velocities),
                 np.array([instant in self._jumps for instant in self._times or [np.inf]]),

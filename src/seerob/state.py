@@ -262,15 +262,21 @@ class State:
 
     # -- dynamics ---------------------------------------------------------------------------
 
+    def weigh(self, mechanism: Mechanism) -> None:
+        """Raise `Undecided` unless it is known what a robot weighs, with all that it holds now."""
+        self.require(mechanism.name, *mechanism.holders)
+        if lost := self.bearers.unknown.keys() & set(mechanism.carried):
+            raise Undecided(self.bearers.unknown[min(lost)])
+        if mechanism.unknown_masses:
+            raise Undecided("; ".join(mechanism.unknown_masses))
+
     def mass_matrix(self, mechanism: Mechanism) -> Array:
         """Joint-space mass matrix M(q) with tools and workpieces [kg·m², kg·m or kg], shape (n, n).
 
         Raises:
             Undecided: A mass that nobody gave, or what drives it is too coarse for what a mass is asked for.
         """
-        self.require(mechanism.name, *mechanism.holders)
-        if mechanism.unknown_masses:
-            raise Undecided("; ".join(mechanism.unknown_masses))
+        self.weigh(mechanism)
         if why := self.hearings[mechanism.name].coarse:
             raise Undecided(f"{mechanism.name}: {why}")
         key = ("M", mechanism.name)
@@ -328,12 +334,6 @@ class State:
         every = np.empty((len(rows), self.model.mj.nv))
         along(self._cdof, self._com, roots[rows], moves, points, directions, every)
         return self.columns[mechanism.name].of_rows(every)
-
-    def body_velocity(self, index: int) -> tuple[Array, Array]:
-        """Linear velocity at its origin [m/s] and angular velocity [rad/s] of a body, world axes."""
-        self.require_bodies((index,))
-        linear, angular = self.body_velocities()
-        return linear[index], angular[index]
 
     def body_velocities(self) -> tuple[Array, Array]:
         """Linear and angular velocities of all bodies at their origins, shape (n, 3) each."""

@@ -171,6 +171,7 @@ class States:
 
     def _weigh(self, mechanism: Mechanism) -> None:
         self.require(mechanism.name)
+        self._settled(mechanism.carried)
         if mechanism.unknown_masses:
             raise Undecided("; ".join(mechanism.unknown_masses))
 

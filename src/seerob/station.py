@@ -185,11 +185,12 @@ class Station:
                 road.warm_up(self.model)
                 targets = [(source, source_target(self.model, source)) for source in heard]
                 feed = hear(feed, until_the_end.enter_context(Listening(targets)), clock)
+            bound = self.bound  # takes a while: before anything is open
             opened = self.open_sinks(sinks, Path(folder or "."), scene) if sinks else []
             return road.run(
                 self.model,
                 feed,
-                bound=self.bound,
+                bound=bound,
                 scene=scene,
                 writers=[*opened, *writers],
                 clock=clock,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import random
+import re
 import tomllib
 import zipfile
 
@@ -246,3 +247,20 @@ def test_a_plant_of_structure_alone_is_said_to_be_so(tmp_path, capsys):
     assert cli.main(["import-aml", str(tmp_path / "plant.aml"), str(tmp_path / "made")]) == Exit.WITHIN
     said = " ".join(capsys.readouterr().out.split())
     assert "3 elements, none of which has a geometry file" in said
+
+
+def test_names_of_others_are_texts_and_a_decimal_comma_is_said(tmp_path, box):
+    """A file's name may hold a line break, an attribute a quote: neither may write a table of its own."""
+    folder = tmp_path / "plant"
+    file = written(folder, OLD.format(plant()).replace("DB1.Speed", "DB1&quot;\x7f.Speed"), box)
+    file = file.rename(folder / 'a\n[[robots]]\nname = "b".aml')
+    text = file.read_text(encoding="utf-8")
+    file.write_text(re.sub(r"<Value>1</Value>", "<Value>1,0</Value>", text, count=1), encoding="utf-8")
+    found = read(file)
+    assert ["commas in numbers are read as decimal points" in f.text for f in found.findings] == [True]
+    assert cli.main(["import-aml", str(file), str(tmp_path / "cell")]) == Exit.WITHIN
+    table = tomllib.loads((tmp_path / "cell" / "workstation.toml").read_text(encoding="utf-8"))
+    assert "robots" not in table
+    assert table["title"] == file.name
+    variables = tomllib.loads((tmp_path / "cell" / "variables.toml").read_text(encoding="utf-8"))["variables"]
+    assert variables[0]["address"] == 'DB1"\x7f.Speed'

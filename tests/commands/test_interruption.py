@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import signal
 import subprocess
@@ -13,8 +14,17 @@ import pytest
 from made_cells import make_cell
 
 from seerob import cli
+from seerob.commands.interruption import Stopped
 from seerob.errors import InputError, SeerobError
 from seerob.recordings.recording import Recording
+
+
+@pytest.fixture(autouse=True)
+def heard():
+    """Ctrl-C is heard, also where the tests run in the background of a shell, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture
@@ -46,8 +56,8 @@ def live(tmp_path):
 
 
 def until_it_moves(out):
-    """Wait until half a second of the run is in the recording."""
-    end = time.monotonic() + 60
+    """Wait until half a second of the run is in the recording; everything may have to be compiled first."""
+    end = time.monotonic() + 300
     while not recorded(out) > 0.5:
         assert time.monotonic() < end
         time.sleep(0.1)
@@ -66,7 +76,7 @@ def test_one_signal_ends_the_run_with_recording_report_and_verdict(live, number)
     process, out = live
     until_it_moves(out)
     process.send_signal(number)
-    said, errors = process.communicate(timeout=180)
+    said, errors = process.communicate(timeout=300)
     assert (process.returncode, errors) == (1, "")
     assert "EXCEEDED" in said
     assert sorted(p.name for p in out.iterdir()) == ["report.html", "results.xlsx", "run.mcap"]
@@ -81,7 +91,7 @@ def test_a_second_signal_writes_no_report_but_loses_no_recording(live):
     process.send_signal(signal.SIGINT)
     time.sleep(0.05)
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=180)
+    _, errors = process.communicate(timeout=300)
     assert (process.returncode, errors) == (3, "stopped\n")
     assert not (out / "report.html").exists()
     assert Recording.open(out / "run.mcap").duration > 0.3
@@ -124,14 +134,55 @@ def test_an_interrupt_while_an_object_is_destroyed_is_not_lost(monkeypatch, caps
         def __del__(self):
             signal.raise_signal(signal.SIGINT)
 
+    went_on = []
+
     def interrupted(options):
         leaving = Leaving()
         del leaving
+        threading.Event().wait(60)  # for what only a true signal wakes
+        went_on.append("for a minute")
+
+    assert interrupting(monkeypatch, interrupted) == 3
+    assert capsys.readouterr().err == "stopped\n"
+    assert went_on == []
+
+
+def test_an_interrupt_while_the_last_one_is_told_of_is_not_lost_either(monkeypatch, capsys):
+    class Leaving:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    def interrupted(options):
+        begin = _thread.start_new_thread
+        told = []
+
+        def once_more(*what):
+            if not told:
+                told.append(what)
+                signal.raise_signal(signal.SIGINT)
+            return begin(*what)
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(_thread, "start_new_thread", once_more)
+            leaving = Leaving()
+            del leaving
         threading.Event().wait(60)
         raise AssertionError("went on for a minute")
 
     assert interrupting(monkeypatch, interrupted) == 3
     assert capsys.readouterr().err == "stopped\n"
+
+
+@pytest.mark.parametrize("before", [signal.default_int_handler, signal.SIG_IGN])
+def test_a_command_that_asked_for_signals_leaves_them_as_they_were(monkeypatch, before):
+    def asks(options):
+        Stopped()
+        return 0
+
+    ends = signal.getsignal(signal.SIGTERM)
+    signal.signal(signal.SIGINT, before)
+    assert interrupting(monkeypatch, asks) == 0
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == (before, ends)
 
 
 def test_other_errors_of_destroyed_objects_are_still_told(monkeypatch):
@@ -163,5 +214,24 @@ def test_an_interrupt_in_generated_code_ends_with_the_exit_code_too(tmp_path):
     )
     ended = subprocess.run(
         [sys.executable, "-m", "interrupted_kinds"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert (ended.returncode, ended.stderr) == (3, "stopped\n")
+
+
+def test_ctrl_c_before_the_command_line_is_there_and_after_its_end_needs_no_traceback(tmp_path):
+    (tmp_path / "early_and_late.py").write_text(
+        "import atexit, signal, sys\n"
+        "from seerob.__main__ import program\n"
+        "def press(*_): signal.raise_signal(signal.SIGINT)\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, path, target=None):\n"
+        "        if name == 'seerob.cli': press()\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "sys.meta_path.insert(0, Finder())\n"
+        "atexit.register(press)\n"
+        "sys.exit(program())\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-m", "early_and_late"], cwd=tmp_path, capture_output=True, text=True
     )
     assert (ended.returncode, ended.stderr) == (3, "stopped\n")

@@ -8,7 +8,7 @@ from made_capture import PERSON, captured, frames_of, source, walking, workstati
 
 from seerob import run as road
 from seerob.engine import Engine
-from seerob.human.ends import ENDS, aimed, swing
+from seerob.human.ends import ENDS, aimed, bare, swing, turned, untold
 from seerob.human.posture import posture
 from seerob.human.skeleton import AXES, BONES, bone_poses
 from seerob.postures.ergonomic_posture import bind_posture
@@ -27,13 +27,86 @@ def seen(bone, *, at=(0.0, 0.0, 0.0), wxyz=None, weight=1.0):
     )
 
 
-def test_an_orientation_a_second_place_or_the_toes_tell_how_an_end_is_turned():
-    assert aimed([seen(bone) for bone in ENDS]) == set()
-    assert aimed([seen("right_hand", wxyz=(1.0, 0, 0, 0))]) == {"right_hand"}
-    assert aimed([seen("right_hand"), seen("right_hand", at=(0.0, -0.08, 0.0))]) == {"right_hand"}
-    assert aimed([seen("right_hand"), seen("right_hand", at=(0.0, -0.08, 0.0), weight=0.0)]) == set()
-    assert aimed([seen("left_foot"), seen("left_toes")]) == {"left_foot"}
-    assert aimed([seen("left_forearm", wxyz=(1.0, 0, 0, 0))]) == set()
+def test_an_orientation_other_places_or_the_toes_tell_how_an_end_is_turned():
+    def found(*points):
+        return aimed(turned(points))
+
+    assert found(*(seen(bone) for bone in ENDS)) == set()
+    assert found(seen("right_hand", wxyz=(1.0, 0, 0, 0))) == {"right_hand"}
+    assert found(seen("right_hand"), seen("right_hand", at=(0.0, -0.08, 0.0))) == {"right_hand"}
+    assert found(seen("right_hand"), seen("right_hand", at=(0.0, -0.08, 0.0), weight=0.0)) == set()
+    assert found(seen("left_foot"), seen("left_toes")) == {"left_foot"}
+    assert found(seen("left_forearm", wxyz=(1.0, 0, 0, 0))) == set()
+    # Both sides of a wrist, or both ears, do not say where the fingers or the crown are.
+    across = [seen("left_hand", at=(0.0, 0.0, z)) for z in (-0.04, 0.04)]
+    assert found(*across) == set()
+    assert found(*across, seen("left_hand", at=(0.0, -0.08, 0.0))) == {"left_hand"}
+    assert found(seen("head", at=(0.0, 0.02, 0.07)), seen("head", at=(0.0, 0.02, -0.07))) == set()
+
+
+WRIST = {("wrist_flexion", 0), ("wrist_deviation", 0)}
+ROLL = {("forearm_rotation", 0)}
+
+
+@pytest.mark.parametrize(
+    ("points", "open_angles"),
+    [
+        ([], WRIST | ROLL),
+        ([seen("right_hand")], WRIST | ROLL),
+        # A fingertip shows where the hand points; whether the palm is up it does not.
+        ([seen("right_hand"), seen("right_hand", at=(0.0, -0.1, 0.0))], WRIST | ROLL),
+        ([seen("right_hand", at=(0.0, -0.1, 0.0)), seen("right_hand", at=(0.0, -0.05, 0.05))], set()),
+        ([seen("right_hand", wxyz=(1.0, 0, 0, 0))], set()),
+        # Both styloids: how the forearm is turned, and nothing of the hand.
+        ([seen("right_forearm", at=(0.0, -0.25, z)) for z in (-0.04, 0.04)], WRIST),
+        (
+            [
+                *(seen("right_forearm", at=(0.0, -0.25, z)) for z in (-0.04, 0.04)),
+                seen("right_hand", at=(-0.01, -0.09, 0.0)),
+            ],
+            set(),
+        ),
+        ([seen("right_hand", at=(0.0, 0.0, z)) for z in (-0.04, 0.04)], {("wrist_flexion", 0)}),
+    ],
+)
+def test_places_on_one_line_leave_the_turn_about_it_open(points, open_angles):
+    left = [seen("left_hand", wxyz=(1.0, 0, 0, 0)), seen("head", wxyz=(1.0, 0, 0, 0))]
+    assert untold(turned([*points, *left])) == open_angles
+
+
+def bare_of(*points):
+    return bare({p.bone for p in points}, {p.bone for p in points if p.position_weight}, turned(points))
+
+
+def test_a_joint_alone_does_not_say_where_the_bone_behind_it_points():
+    knee, ankle = seen("right_shank"), seen("right_foot")
+    assert bare_of(knee) == {"right_shank"}
+    assert bare_of(knee, ankle) == set()
+    assert bare_of(knee, seen("right_toes")) == set()  # the ankle is told between them
+    assert bare_of(seen("right_shank", wxyz=(1.0, 0, 0, 0))) == set()
+    assert bare_of(knee, seen("right_shank", at=(0.0, -0.2, 0.05))) == set()
+    assert bare_of(knee, seen("right_shank", at=(0.0, 0.0, 0.05))) == {"right_shank"}
+    arm = [seen(f"left_{bone}") for bone in ("clavicle", "upper_arm", "forearm", "hand")]
+    assert bare_of(*arm) == set()
+    assert bare_of(*arm[:3]) == {"left_forearm"}
+    assert bare_of(*arm[:2]) == {"left_upper_arm"}
+    assert bare_of(arm[1], arm[3]) == set()
+    # A wrist of which only the orientation arrives does not show where it is.
+    assert bare_of(*arm[:3], seen("left_hand", wxyz=(1.0, 0, 0, 0), weight=0.0)) == {"left_forearm"}
+    assert bare_of(seen("neck")) == {"neck"}
+    assert bare_of(seen("neck"), seen("head")) == set()
+
+
+def test_two_points_of_a_head_do_not_tell_all_of_the_neck():
+    hands = [seen(f"{side}_hand", wxyz=(1.0, 0, 0, 0)) for side in ("right", "left")]
+
+    def open_angles(*places):
+        return untold(turned([*hands, *(seen("head", at=at) for at in places)]))
+
+    assert open_angles((0.0, 0.15, 0.0)) == {("neck_twist", 0)}
+    assert open_angles((0.0, 0.01, 0.08), (0.0, 0.01, -0.08)) == {("neck_flexion", 0)}
+    assert open_angles((0.1, 0.03, 0.0)) == {("neck_side_bend", 0)}
+    assert open_angles((0.1, 0.03, 0.0), (0.0, 0.04, 0.07)) == frozenset()
 
 
 @pytest.mark.parametrize("bone", sorted(ENDS))
@@ -81,3 +154,5 @@ def test_a_distance_to_a_hand_of_which_the_wrist_alone_is_seen_is_as_uncertain_a
     unknown = {f for f in told.__dataclass_fields__ if np.isnan(np.asarray(getattr(lost, f), float)).any()}
     assert any("wrist" in name for name in unknown)
     assert not any(np.isnan(np.asarray(getattr(told, name), float)).any() for name in unknown)
+    assert any("forearm_rotation" in name for name in unknown)
+    assert "neck_twist" in unknown

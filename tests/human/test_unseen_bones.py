@@ -186,3 +186,28 @@ def test_a_bone_between_two_that_are_seen_widens_the_distance_by_what_its_length
     found = off.at(state)
     assert found[rows["operator/left_forearm"]] == found[rows["operator/left_upper_arm"]] > 0.03
     assert found[rows["operator/right_forearm"]] < 0.02
+
+
+@pytest.mark.parametrize(
+    ("gone", "angle"), [("foot", "knee_flexion"), ("hand", "elbow_flexion"), ("hand", "arm_rise")]
+)
+def test_of_a_limb_that_ends_out_of_sight_no_angle_is_made(gone, angle):
+    """A camera that sees knees and no ankles does not know how the knees are bent."""
+    frames = frames_of(*walking(0.3), turned=False)
+    centres = Weights(orientation=0.0)
+    whole = source(captured(frames), weights=centres)
+    cut = source(
+        captured(frames),
+        weights=centres,
+        mapping={f"{s}_{b}": "" for s in ("left", "right") for b in (gone, "toes")},
+    )
+    for made, known in ((whole, True), (cut, False)):
+        stage = Station(workstation(made))
+        engine = Engine(stage.model, driven={"operator": 0.2})
+        engine.take(next(iter(road.pump(stage.sources, 0.01))))
+        found = getattr(bind_posture(stage.model, "operator")(engine.start()), angle)
+        assert np.isfinite(found).all() == known
+    (said,) = [
+        f.text for _, o in stage.sources for f in o.findings if f.text.startswith("no verdict rests on")
+    ]
+    assert {"foot": "right_shank", "hand": "right_forearm"}[gone] in said

@@ -13,6 +13,7 @@ import time
 import msgspec
 import pytest
 
+from live_story import wait_for as until
 from seerob.errors import InputError, SeerobError
 from seerob.live.listening import (
     FIRST_PAUSE,
@@ -60,13 +61,6 @@ def joint(t=None, device=None):
     )
 
 
-def until(true, seconds=5.0):
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.002)
-
-
 class Ears:
     def __init__(self, script):
         self.samples = []
@@ -78,7 +72,7 @@ class Ears:
 
     def __exit__(self, *_):
         self.listener.ask_to_stop()
-        assert self.listener.join(1.0)
+        assert self.listener.join(30.0)
 
 
 def test_what_is_heard_is_numbered_named_and_put_on_the_hosts_clock():
@@ -148,18 +142,18 @@ def test_a_source_that_waits_is_stopped_at_once_and_its_thread_ends():
         finally:
             left.set()
 
-    before = threading.active_count()
+    before = set(threading.enumerate())
     with Ears(script) as ears:
         until(lambda: ears.samples)
     assert left.is_set()
-    assert threading.active_count() == before
+    assert set(threading.enumerate()) <= before
 
 
 def test_a_listener_that_is_stopped_before_it_began_ends():
     listener = Listener(Made(script=None), None, print)
     listener.ask_to_stop()
     listener.start()
-    assert listener.join(1.0)
+    assert listener.join(30.0)
 
 
 def test_the_newest_wins_and_nothing_queues():
@@ -243,16 +237,27 @@ def test_after_a_slip_nothing_is_sure_until_the_twin_has_settled():
     assert after[4].t - before[-1].t == pytest.approx(0.6)
 
 
-def test_a_run_begins_with_what_is_heard_then_and_not_with_what_was_heard_before():
+def test_a_run_begins_with_what_is_heard_then_and_not_with_what_was_heard_before(monkeypatch):
+    posted, begun = threading.Event(), threading.Event()
+
     async def script():
         yield joint(t=1.0)
-        await asyncio.sleep(0.2)
+        posted.set()
+        await asyncio.to_thread(begun.wait, 60)
         yield joint(t=2.0)
         await asyncio.sleep(60)
 
     with Listening([(Made(script=script), None)]) as listening:
-        until(lambda: listening.listeners[0].statistics().count)
-        assert [s.t for s in listening.first()] == [2.0]
+        assert posted.wait(60)
+        take = listening.take
+
+        def taken():
+            found = take()
+            begun.set()
+            return found
+
+        monkeypatch.setattr(listening, "take", taken)
+        assert [s.t for s in listening.first(patience=60.0)] == [2.0]
 
 
 def test_a_run_begins_without_a_source_that_is_not_there():
@@ -326,7 +331,48 @@ def test_what_a_machine_says_is_counted_and_so_are_its_losses():
     listener.start()
     until(lambda: len(samples) >= 6)
     listener.ask_to_stop()
-    assert listener.join(5.0)
+    assert listener.join(30.0)
     found = listener.statistics()
     assert found.count == len(samples)
     assert found.losses >= 1
+
+
+@pytest.mark.parametrize("kind", [Made, Machine])
+def test_who_only_has_signals_of_a_robot_is_not_heard_again(monkeypatch, caplog, kind):
+    """Where the joints are is what is missed; of a machine the signals are all there is."""
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
+    begun = itertools.count()
+    sessions = []
+
+    async def script():
+        sessions.append(next(begun))
+        yield SignalSample(source="", seq=0, t=time.monotonic(), values={"on": True})
+        raise ConnectionError("no joints")
+
+    listener = Listener(kind(script=script, name="made"), None, lambda sample: None)
+    listener.start()
+    until(lambda: len(sessions) > 3)
+    listener.ask_to_stop()
+    assert listener.join(30.0)
+    lines = [r.getMessage() for r in caplog.records if r.name == "seerob.live.listening"]
+    assert lines[0] == "made: not heard: no joints"
+    assert ("made: heard again" in lines) == (kind is Machine)
+    assert kind is Machine or len(lines) == 1
+
+
+def test_a_mistake_in_a_source_is_told_with_its_place_once(monkeypatch, caplog):
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
+    sessions = []
+
+    async def script():
+        sessions.append(None)
+        raise KeyError("gone")
+        yield
+
+    with Ears(script):
+        until(lambda: len(sessions) > 3)
+    said = [(r.getMessage(), bool(r.exc_info)) for r in caplog.records if r.name == "seerob.live.listening"]
+    assert said == [
+        ("made: a mistake in the source itself", True),
+        ("made: not heard: KeyError: 'gone'", False),
+    ]

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from made_cell import heard, made, two_r
 from seerob import load
 from seerob.engine import Engine
 from seerob.errors import InputError, Undecided
+from seerob.run import Judge
 from seerob.samples import JointSample
 
 AXIS = """
@@ -247,3 +249,49 @@ def test_with_physics_it_is_carried_too(tmp_path):
 def test_mistakes_are_said(tmp_path, wrong, message):
     with pytest.raises(InputError, match=message):
         Cell(tmp_path, STATION.replace(*wrong))
+
+
+ARM = """
+[[robots]]
+name = "arm"
+model = "arm.urdf"
+[[machines]]
+name = "hand"
+on = "arm/tip"
+shape = { box = [0.02, 0.02, 0.06] }
+mass = 0.2
+grip = { upper = 0.1 }
+"""
+WEIGHED = "".join(
+    f'[[safety]]\nkind = "{kind}"\nname = "{kind}"\n{key} = "arm"\nlimit = 1e6\n'
+    for kind, key in (("kinetic_energy", "robot"), ("effective_mass", "at"), ("force_polytope", "at"))
+)
+
+
+def weighed(folder):
+    return made(
+        folder,
+        ARM + NUT.replace('on = "hand"', 'on = "hand"\nat = { position = [0, 0, 0.5] }') + WEIGHED,
+        {"arm.urdf": two_r()},
+    )
+
+
+def test_without_a_run_nobody_knows_what_a_robot_weighs_that_picks_things_up(tmp_path):
+    still = {"arm": np.zeros((3, 2)), "hand": np.zeros((3, 1))}
+    found = weighed(tmp_path).batch(still, {name: q + 0.1 for name, q in still.items()})
+    for kind in ("kinetic_energy", "effective_mass", "force_polytope"):
+        assert found[kind].answers.verdict.tolist() == [2, 2, 2]
+        assert "only a run tells" in found[kind].reasons[0]
+
+
+def test_nor_while_its_gripper_is_silent(tmp_path):
+    station = weighed(tmp_path)
+    engine, judge = Engine(station.model, driven={"arm": 0.5, "hand": 0.05}), Judge(station.bound)
+    engine.take([heard("arm", 0.0, (0.3, 1.2), (0.1, 0.2)), heard("hand", 0.0, (0.04,), (0.0,))])
+    known = judge(engine.start())
+    for _ in range(8):
+        state = engine.tick()
+    for before, after in zip(known, judge(state), strict=True):
+        assert before.verdict in ("within", "exceeded")
+        assert after.verdict == "undecided"
+        assert "hand: not heard" in after.reason

@@ -8,12 +8,17 @@ import pytest
 from seerob.geometry import Mesh, Solid, capsule, dilated_rectangle
 from seerob.model_io import shapes
 from seerob.model_io.description import Description, Link
-from seerob.model_io.protrusion import protrusions, with_protrusions
+from seerob.model_io.protrusion import outside_distances, with_protrusions
 
 
 def robot(visual: Mesh, *solids: Solid) -> Description:
     link = Link(name="l", parent=None, parent_from_link=np.eye(4), visual=(visual,), solids=solids)
     return Description(name="r", links=(link,), tip="l", source="test")
+
+
+def protrusion(description):
+    (link,) = description.links
+    return outside_distances(link).max()
 
 
 def cube(half, center=(0, 0, 0)):
@@ -36,8 +41,7 @@ POINT = np.zeros(3)
     ],
 )
 def test_the_corners_of_a_cube(solids, depth):
-    made = protrusions(robot(cube(1.0), *solids))
-    assert made["l"] == pytest.approx(depth, abs=1e-12)
+    assert protrusion(robot(cube(1.0), *solids)) == pytest.approx(depth, abs=1e-12)
     text = [f.text for f in with_protrusions(robot(cube(1.0), *solids)).findings]
     assert bool(text) == (depth > 1e-4)
 
@@ -53,6 +57,6 @@ def test_a_crumb_far_off_is_no_surface_and_is_said():
         return robot(Mesh(vertices, faces), Solid(mesh=cube(1.0)))
 
     small, large = with_triangle(0.002), with_triangle(0.010)
-    assert protrusions(small)["l"] == pytest.approx(0.0, abs=1e-12)
+    assert protrusion(small) == pytest.approx(0.0, abs=1e-12)
     assert [f.level for f in with_protrusions(small).findings] == ["note"]
-    assert protrusions(large)["l"] == pytest.approx(2.01, abs=1e-2)
+    assert protrusion(large) == pytest.approx(2.01, abs=1e-2)

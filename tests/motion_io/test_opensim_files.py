@@ -33,6 +33,21 @@ def test_markers_are_read_back_as_they_were_written(tmp_path, up, unit):
     assert captured.rate == pytest.approx(120.0, rel=1e-4)
 
 
+def test_markers_lie_in_the_same_world_as_opensims_coordinates(tmp_path):
+    """OpenSim's ground has x forward, y up and z to the right, in both of its files."""
+    rng = np.random.default_rng(5)
+    world = markers() + rng.uniform(-2, 2, (1, 1, 3)) * [1.0, 1.0, 0.0]
+    path = tmp_path / "r.trc"
+    lines = trc.head(NAMES, len(T), 120.0)
+    rows = trc.cells(opensim.in_its_world(world))
+    body = (
+        "\t".join([str(k), f"{t:.6f}", *row]) + "\n" for k, (t, row) in enumerate(zip(T, rows, strict=True))
+    )
+    path.write_text("".join([*lines, *body]))
+    captured = trc.read(path, MarkerReading(file="r.trc"))
+    np.testing.assert_allclose(np.stack([f.positions for f in captured.frames]), world, atol=1e-5)
+
+
 def test_no_row_ends_with_a_blank_and_every_row_is_as_wide_as_the_others():
     lines = list(trc.written(NAMES, T, markers()))
     rows = [line.rstrip("\n").split("\t") for line in lines[6:]]

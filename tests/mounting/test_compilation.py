@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from made_cell import FLOATING, TWO_R, made, person, state_at, two_r
 from seerob.errors import InputError
 from seerob.geometry import capsule
 from seerob.mounting.specification import extreme_points
@@ -130,6 +130,15 @@ def test_mistakes_name_file_key_and_remedy(tmp_path, text, key, what):
     assert key in problem.key
     assert what in str(problem)
     assert problem.file
+
+
+@pytest.mark.parametrize("name", ["arm/l1", "op/head", "world"])
+@pytest.mark.parametrize("group", ["parts", "tools", "areas"])
+def test_a_name_that_a_link_a_bone_or_the_world_has_is_refused(tmp_path, group, name):
+    thing = f'[[{group}]]\nname = "{name}"\nshape = {{ sphere = 0.1 }}\n'
+    thing += 'on = "arm/tip"\nmass = 1\n' if group == "tools" else ""
+    with pytest.raises(InputError, match=rf"{group}\[0\] \(name\): the name '{name}' is taken"):
+        made(tmp_path, FLOATING + TWO_R + person() + thing, {"arm.urdf": two_r()})
 
 
 def test_mistakes_of_several_tables_come_together(tmp_path):

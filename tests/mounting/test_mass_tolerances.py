@@ -53,6 +53,15 @@ TOOL = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ sphere = 0.02 }}\n{
 DENSITY = 0.7 / (4 / 3 * np.pi * 0.02**3)
 
 
+@pytest.mark.parametrize("name", ["grip", "arm/grip"])
+def test_links_count_by_half_and_what_is_mounted_in_full_whatever_it_is_called(tmp_path, name):
+    """10 % of M/2 = 1 kg, and 10 % of the tool's 3 kg."""
+    tool = TOOL.replace("grip", name).format("mass = 3\nmass_tolerance = 0.1")
+    cell = made(tmp_path, FLOATING + TWO_R + "mass_tolerance = 0.1\n" + tool, {"arm.urdf": two_r()})
+    found = MassTolerances(cell.model, cell.model.robot("arm"))
+    assert [found.simplified(4.0, shifts) for shifts in ((1, 0), (0, 1))] == pytest.approx([4.1, 4.3])
+
+
 def young(state, name, way, lighter, heavier):
     """What is lost, lost at most and gained by the inequality of the module, with ε of the motion."""
     model, robot = state.model, state.model.robot("arm")

@@ -106,7 +106,8 @@ def test_a_sample_is_killed():
     command = [sys.executable, ROOT / "scripts/mutate", "--sample", "16", "--jobs", "1"]
     for only in ("contact/collision.py", "stopping/terms.py"):
         command += ["--only", only]
-    for tests in ("contact/test_collision.py", "stopping/test_stopping.py", "stopping/test_stop_options.py"):
+    stopping = ("stopping", "stop_options", "stop_edges")
+    for tests in ("contact/test_collision.py", *(f"stopping/test_{name}.py" for name in stopping)):
         command += ["--tests", ROOT / "tests" / tests]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -127,8 +127,24 @@ def test_the_count_comes_round_and_the_dead_say_nothing():
     assert values(node)["speed"] == 599.0
     assert say(node, "DDEATH", seq=600 % 256, device="belt")
     assert values(node) == {}
+    # Only a birth brings a device back.
+    assert not say(node, "DDATA", {"alias": 1, "double_value": 1.0}, seq=601 % 256, device="belt")
+    assert values(node) == {}
     say(node, "NDEATH", seq=0)
     assert not node.alive
+
+
+@pytest.mark.parametrize(("number", "lives"), [(0, False), (7, True), (None, False)])
+def test_after_the_death_of_another_connection_the_next_message_says_whether_it_lives(number, lives):
+    """A broker gives up a connection that broke long after the node has made another."""
+    for lost in (False, True):
+        node = born()  # with number 0
+        metrics = [] if number is None else [{"name": "bdSeq", "datatype": 8, "long_value": number}]
+        say(node, "NDEATH", *metrics, seq=0)
+        assert not node.alive
+        understood = say(node, "DDATA", {"alias": 2, "int_value": 4}, seq=2 + lost, device="belt")
+        assert node.alive is understood is (lives and not lost)
+        assert values(node) == ({"speed": 0.5, "count": 4.0} if lives and not lost else {})
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,17 @@ def test_mass_of_the_basis_is_without_the_fixed_base(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("kind", ['power_and_force"\nrobot = "arm', 'effective_mass"\nat = "arm'])
+def test_what_is_mounted_counts_in_full_whatever_it_is_called(tmp_path: Path, kind: str) -> None:
+    """A tool and a workpiece named below the robot are no links of it."""
+    named = UR10.replace('name = "load"', 'name = "arm/load"')
+    named += '[[workpieces]]\nname = "arm/load/plate"\non = "arm/load"\nshape = { sphere = 0.1 }\nmass = 2\n'
+    station = made(tmp_path, f'{named}[[safety]]\nkind = "{kind}"\n')
+    result = results_at(station, arm=([0, -1.2, 1.4, -1.5, -1.5, 0], [0.1, 0, 0, 0, 0, 0])).popitem()[1]
+    found = next(p.value for p in result.parts if p.name == "M/2 + m_L")
+    assert found == pytest.approx(28.435 / 2 + 3 + 2, abs=0.005)
+
+
 def test_unknown_mass_is_undecided(tmp_path: Path) -> None:
     urdf = two_r()
     start = urdf.index("<inertial>", urdf.index('name="l2"'))

@@ -96,6 +96,14 @@ def test_what_bones_are_off_by_counts_with_the_uncertainty(tmp_path):
     assert found.value == exact.value
     assert exact.interval == pytest.approx((exact.value - 0.1, exact.value + 0.1))
     assert found.interval == pytest.approx((exact.value - 0.4, exact.value + 0.4))
+    # The larger of the two decides.
+    for off, named in ((0.099, "uncertainty ± 100 mm"), (0.101, "tracking of the person ± 101 mm")):
+        station = made(tmp_path / str(off), text + f"limit = {exact.value}\n", {"arm.urdf": two_r()})
+        state = state_at(station, arm=(ZERO, ZERO))
+        state.hearings["op"].bones = dict.fromkeys(BONES, (off, None))
+        assert Judge(station.bound)(state)[0].reason.endswith(f"; decided by {named}")
+    station = made(tmp_path, text, {"arm.urdf": two_r()})
+    state = state_at(station, arm=(ZERO, ZERO))
     # One that is farther than it is off changes nothing.
     state.hearings["op"].bones = {"right_toes": (0.05, None)}
     (found,) = Judge(station.bound)(state)

@@ -11,6 +11,9 @@ from websockets.sync.client import connect
 from seerob import snapshot as wire
 from seerob.snapshot import Arrow, Basis, Command, CriterionInfo, Node, Result, Scene, Snapshot, Verdict
 
+PATIENCE = 60.0
+"""With what comes for sure [s]."""
+
 BASIS = Basis(formula="d(a, b)", source="the paper, Eq. 1")
 MESHES = {"ab" * 32: b"glTF" + bytes(100)}
 
@@ -88,20 +91,20 @@ class Visitor:
         self.socket = self._open.__enter__()
         self.acknowledge = acknowledge
 
-    def read(self, timeout=5.0):
+    def read(self, timeout=PATIENCE):
         message = self._decoder.decode(self.socket.recv(timeout=timeout))
         if isinstance(message, Snapshot) and self.acknowledge:
             self.ask("ack", message.seq)
         return message
 
-    def until(self, accept, timeout=5.0):
+    def until(self, accept, timeout=PATIENCE):
         """The first message that is accepted; those before it are dropped."""
         while True:
             message = self.read(timeout)
             if accept(message):
                 return message
 
-    def end(self, timeout=5.0):
+    def end(self, timeout=PATIENCE):
         """Read until the server ends the connection; the code and the reason that it gave."""
         try:
             while True:
@@ -109,7 +112,7 @@ class Visitor:
         except ConnectionClosed as closed:
             return (closed.rcvd.code, closed.rcvd.reason) if closed.rcvd else (1006, "")
 
-    def of(self, kind, timeout=5.0):
+    def of(self, kind, timeout=PATIENCE):
         return self.until(lambda m: isinstance(m, kind), timeout)
 
     def ask(self, action, value=None):
@@ -125,7 +128,7 @@ class Visitor:
 
 def raw(server, data, *, finish=False):
     """What the server answers to bytes, until it closes."""
-    with socket.create_connection(("127.0.0.1", server.port), timeout=5) as s:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) as s:
         s.sendall(data)
         if finish:
             s.shutdown(socket.SHUT_WR)

@@ -12,7 +12,7 @@ from seerob.server.live import Live
 from seerob.server.player import Player
 from seerob.server.serving import Server
 from seerob.snapshot import PROTOCOL, Snapshot
-from server.frames import MESHES, Remembered, Visitor, raw, scene, snapshot, stripped
+from server.frames import MESHES, PATIENCE, Remembered, Visitor, raw, scene, snapshot, stripped
 
 TOKEN = "0123456789abcdef0123456789abcdef"
 HASH = next(iter(MESHES))
@@ -140,7 +140,7 @@ def test_only_addresses_and_known_names_are_served(server, host, allowed):
     upgrade = f"GET /ws HTTP/1.1\r\nHost: {host}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n".encode()
     upgrade += b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\n"
     upgrade += f"Sec-WebSocket-Protocol: {PROTOCOL}\r\n\r\n".encode()
-    with socket.create_connection(("127.0.0.1", server.port), timeout=5) as s:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) as s:
         s.sendall(upgrade)
         first = s.recv(4096)
         assert (b" 101 " in first.split(b"\r\n")[0]) == allowed

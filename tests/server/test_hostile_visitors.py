@@ -14,7 +14,7 @@ from websockets.exceptions import ConnectionClosed
 from seerob.server.player import Player
 from seerob.server.serving import LARGEST_MESSAGE, Server
 from seerob.snapshot import PROTOCOL, Snapshot
-from server.frames import MESHES, Remembered, Visitor, raw, scene, snapshot, stripped
+from server.frames import MESHES, PATIENCE, Remembered, Visitor, raw, scene, snapshot, stripped
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,7 @@ def test_a_thousand_hostile_visitors_leave_no_trace(server, caplog):
     with Visitor(server) as witness:
         witness.of(Snapshot)
         for _ in range(1000):
-            with socket.create_connection(("127.0.0.1", server.port), timeout=5) as s:
+            with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) as s:
                 early = rng.random() < 0.05
                 s.sendall(upgrade + hostile(rng) if early else upgrade)
                 if early or rng.random() < 0.05:

@@ -109,6 +109,9 @@ def test_hostile_names_stay_text(source, page):
 
 def test_the_worst_instant_is_named_with_value_limit_and_what_governs(page):
     assert "Worst at 0.50 s: 0.3 m, 0.2504 m beyond the limit of 0.5504 m." in page.text
+    assert (
+        "Given the tolerances of the inputs, the true value there is between 0.29 m and 0.31 m." in page.text
+    )
     assert "ur10/forearm_link ↔ operator/head" in page.text
     assert "One limit was exceeded: separation." in page.text
 
@@ -118,6 +121,10 @@ def test_undecided_never_looks_like_a_pass(page):
     assert badges.count("badge undecided") == 4  # twice in the table, twice above the sections
     assert "Undecided is not a pass" in page.text
     assert "It is not a pass: find out why it was silent." in page.text
+    assert (
+        "In 25 % of the evaluated ticks nothing can be said, in one stretch; the longest lasted 0.29 s."
+        in (page.text)
+    )
 
 
 @pytest.mark.parametrize("word", [r"certif\w*", r"\bsafe\b", r"complian\w*", r"\bcompl(y|ies)\b"])

@@ -97,6 +97,11 @@ def test_coordinates_that_nobody_measured_are_named_in_the_header(tmp_path):
     named = {name for name in opensim_coordinates.coordinates() if f"{name} (75 % of the rows)" in text}
     assert named == {"knee_angle_r", "ankle_angle_r", "subtalar_angle_r", "mtp_angle_r"}
     assert "in 1 of 4 rows" in text
+    told = EstimatedCoordinates()
+    for k in range(300):
+        bones = {"op": dict.fromkeys(BONES, (1e-3, None)) if k == 7 else seen}
+        told.add(person.joints_measured(replace(run.snapshot(1), bones=bones)))
+    assert "knee_angle_r (99.7 % of the rows)" in "".join(told.lines())
     path = write(tmp_path) / "op_coordinates.mot"
     assert "estimated, no device saw the bones: pelvis_tilt (95 % of the rows)" in path.read_text("utf-8")
     assert len(joint_angles.from_storage(path, file="x").t) == N

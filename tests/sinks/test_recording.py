@@ -141,10 +141,9 @@ from pathlib import Path
 import made_run
 from seerob.sinks.recorder import Recorder
 writer = Recorder().open(made_run.scene(), made_run.MESHES, made_run.FILES, Path(sys.argv[1]))
-start = time.monotonic()
 k = 0
 while True:
-    time.sleep(max(0.0, start + k * 0.01 - time.monotonic()))
+    time.sleep(0.01)
     writer.write(made_run.snapshot(k), made_run.samples(k))
     print(k, flush=True)
     k += 1

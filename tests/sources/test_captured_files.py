@@ -95,6 +95,15 @@ def test_a_walk_through_opensims_coordinates_is_the_same_walk(tmp_path):
         np.testing.assert_allclose(way, wanted, atol=1e-5)
 
 
+@pytest.mark.parametrize(("floor", "heights"), [(True, [0.0, 0.0]), (False, [0.0, 0.3])])
+def test_a_table_says_how_high_the_pelvis_is(tmp_path, floor, heights):
+    rows = ["time [s],pelvis_z [m],right_elbow_flexion [deg]", "0,0,10", "1,0.3,10"]
+    (tmp_path / "r.csv").write_text("\n".join(rows))
+    opened = JointAngleFile(human="anna", file="r.csv", floor=floor).open(tmp_path, TARGET)
+    z = JOINTS.index("pelvis_z")
+    assert [sample.q[z] for sample in opened.samples] == pytest.approx(heights, abs=1e-6)
+
+
 def test_what_is_beyond_a_limit_is_put_to_it_and_far_beyond_not_judged(tmp_path):
     rows = ["time [s],right_knee_flexion [deg]", "0,10", "0.1,20", "0.2,175", "0.2,5", "0.3,nan", "0.4,30"]
     (tmp_path / "r.csv").write_text("\n".join(rows))

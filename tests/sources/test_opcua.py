@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import datetime
 import math
+from uuid import UUID
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from live_story import Story, listening, lived, wait_for
 from made_cell import made
 from seerob.emulators.opcua import URI, Emulated, OpcuaServer
 from seerob.errors import InputError, SeerobError
-from seerob.protocols.opcua_client import Address, Security, address
+from seerob.protocols.opcua_address import Address, address, browse_name, node_name, written
+from seerob.protocols.opcua_client import Security
 from seerob.protocols.opcua_robotics import natural
 from seerob.protocols.opcua_units import number, unit
 from seerob.samples import JointSample, SignalSample
@@ -272,9 +274,28 @@ def test_unit_ids_are_the_published_numbers(code, of_the_standard, spelling):
 def test_addresses():
     assert address("ns=2;i=5") == "ns=2;i=5"
     assert address({"browse": ["a|b", "c"]}) == Address(("a|b", "c"))
-    for wrong in ("Speed", 5, {"path": []}, {"browse": []}, {"browse": [1]}):
+    wrong_ids = "i=-1", "i=1e3", "ns=70000;i=1", "s=", "g=1", "b=é", "nsu=;s=a", "ns=x;s=a", f"i={1 << 32}"
+    for wrong in ("Speed", 5, {"path": []}, {"browse": []}, {"browse": [1]}, *wrong_ids):
         with pytest.raises((ValueError, TypeError)):
             address(wrong)
+
+
+@pytest.mark.parametrize("name", ["a;b", "a;s=b", "ns=3;i=4", '"DB"."x"', "a|b\n", b"\xff;", 7, UUID(int=5)])
+@pytest.mark.parametrize("uri", ["urn:a", "http://a/;x=1", ""])
+def test_a_node_id_is_read_as_it_is_written_whatever_its_name(uri, name):
+    """A semicolon in a name must not lead to another node, which there may be."""
+    ua = pytest.importorskip("asyncua").ua
+    node_id = ua.NodeId(name, 3)
+    found = node_name(written(node_id, uri))
+    assert found.uri == uri
+    assert found.node_id(3) == node_id
+    assert type(found.node_id(3).Identifier) is type(name)
+    assert found.node_id(3).NodeIdType == node_id.NodeIdType or isinstance(name, int)
+
+
+def test_a_name_on_a_path_may_hold_a_bar():
+    assert browse_name("urn:a|b|c") == ("urn:a", "b|c")
+    assert browse_name("Server") == ("", "Server")
 
 
 def test_axes_in_natural_order():

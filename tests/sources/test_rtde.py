@@ -235,3 +235,35 @@ def test_values_are_samples_in_si():
 )
 def test_what_a_state_means_for_the_truth(mode, safety, said):
     assert quality(mode, safety) == said
+
+
+@pytest.mark.parametrize("mode", [math.nan, math.inf, 6.5])
+def test_a_mode_that_is_no_whole_number_is_refused(mode):
+    with pytest.raises(ProtocolError, match="where a whole number belongs"):
+        states({"robot_mode": mode})
+
+
+class Counted(RtdeServer):
+    """Counts who comes."""
+
+    clients = 0
+
+    async def _welcome(self, reader, writer):
+        self.clients += 1
+        await super()._welcome(reader, writer)
+
+
+def test_a_controller_that_has_lost_its_joints_is_one_line_of_the_log(monkeypatch, caplog):
+    """After a change of firmware, say: there is nothing to hear, however often it is tried."""
+    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
+    samples = []
+    with Counted(motion, without=frozenset({"actual_q"})) as server:
+        source = Rtde(name="ur", robot="ur10", host="127.0.0.1", port=server.port)
+        listener = Listener(source, None, samples.append)
+        listener.start()
+        wait_for(lambda: server.clients >= 3)
+        listener.ask_to_stop()
+        assert listener.join(10)
+    assert samples == []
+    (line,) = [r for r in caplog.records if r.name == "seerob.live.listening"]
+    assert "the controller has no actual_q" in line.getMessage()

@@ -1,6 +1,8 @@
 """The source: every kind of file says the same, and what is wrong in one is named with its place."""
 
 import gzip
+import re
+import zipfile
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from seerob.reading import convert_workstation
 from seerob.samples import JointSample
 from seerob.source import Target
 from seerob.sources.waypoints import Waypoints
+from seerob.waypoints.reading import read_program
 
 A = (0.0, -70.0, 80.0, -100.0, -90.0, 0.0)
 B = (20.0, -60.0, 70.0, -95.0, -90.0, 10.0)
@@ -170,6 +173,7 @@ def test_the_tool_point_of_the_program_is_used_unless_the_source_says_another(tm
         ("w.csv", b"x_deg,y_m\n1,2\n", "deg does not fit"),
         ("w.csv", b"q1_deg,q2_deg\n1,foo\n", "row 2 column 'q2_deg'"),
         ("w.csv", b"q1_deg,q2_deg\n,2\n", "some before them are empty"),
+        ("w.csv", b"q1_deg,q2_deg\n0,5,1,5\n", "4 cells, the header names 2 columns; was a decimal comma"),
         ("w.csv", b"x_m,y_m,z_m\n1,2,\n", "only x, y of x, y, z"),
         ("w.urp", b"\x1f\x8b123", "is not gzip|is cut off"),
         ("w.urp", gzip.compress(b"<a/>", mtime=0)[:-9], "is cut off|is not gzip"),
@@ -187,6 +191,34 @@ def test_mistakes_are_named(tmp_path, name, content, said):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=said):
         opened(tmp_path, file=name)
+
+
+def test_a_formula_that_nobody_has_calculated_is_no_empty_cell(tmp_path):
+    """Else a speed that was written would be taken as not given."""
+    from openpyxl import Workbook
+
+    book = Workbook()
+    book.active.append(["q1_deg", "q2_deg", "speed"])
+    book.active.append([1, 2, "=1/4"])
+    book.save(tmp_path / "made.xlsx")
+    with pytest.raises(InputError, match="row 2: cell 3: a formula without its result; open it in Excel"):
+        read_program(tmp_path / "made.xlsx", "made.xlsx")
+    result = {"0.25": 0.25, "": None}  # that of a formula may be an empty text
+    for text, speed in result.items():
+        with (
+            zipfile.ZipFile(tmp_path / "made.xlsx") as made,
+            zipfile.ZipFile(tmp_path / "calculated.xlsx", "w") as calculated,
+        ):
+            for name in made.namelist():
+                part = made.read(name)
+                if name.endswith("sheet1.xml"):
+                    cell = b'<c r="C2"%s><f>1/4</f><v>%s</v>' % (b"" if text else b' t="str"', text.encode())
+                    part, count = re.subn(rb'<c r="C2"><f>1/4</f><v ?/?>(</v>)?', cell, part)
+                    part = part.replace(b"</v></v>", b"</v>")
+                    assert count == 1
+                calculated.writestr(name, part)
+        (waypoint,) = read_program(tmp_path / "calculated.xlsx", "calculated.xlsx").waypoints
+        assert waypoint.speed == speed
 
 
 def test_nodes_of_a_polyscope_program_that_are_left_out_are_named(tmp_path):

@@ -102,8 +102,8 @@ def test_a_speed_limit_of_0_says_nothing_of_full_speed(tmp_path, of_the_file):
     assert course(tmp_path / "stands", table(one), (0.0, 0.0), (0.0, 0.0), urdf=urdf, **said).T_s == 0.0
 
 
-def payload(folder, mass, its, **options):
-    tool = f'[[tools]]\nname = "t"\non = "arm/tip"\nshape = {{ sphere = 0.05 }}\nmass = {mass}\n'
+def payload(folder, mass, its, *, name="t", **options):
+    tool = f'[[tools]]\nname = "{name}"\non = "arm/tip"\nshape = {{ sphere = 0.05 }}\nmass = {mass}\n'
     text = FLOATING + TWO_R + tool
     text += (
         '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [20, 0, 0] }\n'
@@ -116,9 +116,11 @@ def payload(folder, mass, its, **options):
     return results_at(cell, arm=((0.0, 0.0), (0.5, 0.0)))["S"]
 
 
+@pytest.mark.parametrize("name", ["t", "arm/gripper"])
 @pytest.mark.parametrize(("mass", "verdict"), [(10.0, "within"), (10.001, "undecided")])
-def test_a_table_holds_up_to_its_rated_payload(tmp_path, mass, verdict):
-    assert payload(tmp_path, mass, "ur10_cb3").verdict == verdict
+def test_a_table_holds_up_to_its_rated_payload(tmp_path, name, mass, verdict):
+    """Whatever the tool is called: one named below the robot is no link of it."""
+    assert payload(tmp_path, mass, "ur10_cb3", name=name).verdict == verdict
 
 
 def inputs(folder, its, **options):

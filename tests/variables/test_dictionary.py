@@ -88,6 +88,7 @@ def test_units_by_their_definition(spelling, si, one):
     [
         (variable(), math.nan),
         (variable(), math.inf),
+        (variable(), 10**400),
         (variable(), "1"),
         (variable(), True),
         (variable(), None),

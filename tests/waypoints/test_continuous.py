@@ -1,5 +1,7 @@
 """Continuous motion through waypoints: geometry, limits, timing, what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from seerob.model_io import library
 from seerob.waypoints.arm import Arm
 from seerob.waypoints.branches import parse
 from seerob.waypoints.continuous import Wish, continuous
-from seerob.waypoints.inverse import rotation_vectors
+from seerob.waypoints.inverse import rotation_vectors, solutions
 from seerob.waypoints.joint_limits import JointLimits
 from seerob.waypoints.timing import Limits, needed, profile, reachable
 from seerob.waypoints.waypoint import Move, Program, ToolPose, Waypoint
@@ -171,6 +173,23 @@ def test_the_branch_is_nearest_or_as_wished_and_named(arm):
     np.testing.assert_allclose(
         arm.posture(other.at[-1]).position, arm.posture(near.at[-1]).position, atol=1e-8
     )
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_posture_to_be_near_to_chooses_the_branch_wherever_the_robot_is(arm, first):
+    target = to(-0.7, -0.2, 0.5, move=Move.JOINT)
+    rotation = arm.posture(made(arm, joints(HOME), target).at[-1]).rotation
+    ways = solutions(arm, rotation, np.array(target.pose.position), np.array(HOME))
+    assert len(ways) == 8
+    for way in ways:
+        near = tuple(way.q + 0.02 * np.sin(np.arange(6)))
+        w = replace(target, near=near)
+        found = made(arm, w, joints(HOME)) if first else made(arm, joints(HOME), w)
+        np.testing.assert_allclose(found.at[0 if first else -1], way.q, atol=1e-6)
+        (said,) = [r for r in found.remarks if "branch" in r]
+        assert f"{way.branch} (nearest to qnear, one of 8" in said
+    with pytest.raises(InputError, match="5 joint positions, the robot has 6"):
+        made(arm, joints(HOME), replace(target, near=near[:5]))
 
 
 def vars_of(wish):

@@ -84,6 +84,86 @@ def test_what_only_a_controller_knows_is_named_with_its_line(line, said):
     assert problem.remedy
 
 
+EXPORTED = """
+def Unnamed():
+  step_count = 0.0
+  thread Step_Counter_Thread():
+    while (True):
+      step_count = step_count + 1.0
+      sync()
+    end
+  end
+  run Step_Counter_Thread()
+  def grip(width, force=40):
+    if (width > 0):
+      return True
+    end
+    return False
+  end
+  global Above_p=p[.117, -.364, .451, -.001, 3.116, .039]
+  global Above_q=[-1.6006, -1.7271, -2.2029, -0.8079, 1.5951, -0.0309]
+  while (True):
+    $ 1 "Robot Program"
+    $ 3 "Above" "breakAfter"
+    movej(get_inverse_kin(Above_p, qnear=Above_q), a=1.4, v=1.05)
+    while (get_standard_digital_in(0) == False):
+      sync()
+    end
+    grip(20)
+    if (step_count > 3):
+      counted = 0
+    elif (step_count > 2):
+      textmsg("movej(nowhere)")
+    else:
+      counted = 1
+    end
+    movel(Above_p, v=0.1)
+  end
+end
+"""
+
+
+def test_a_program_as_polyscope_exports_it_is_one_round_of_its_moves():
+    program = read_urscript(EXPORTED.encode(), "cell.script")
+    a, b = program.waypoints
+    assert (a.move, a.near) == (Move.JOINT, (-1.6006, -1.7271, -2.2029, -0.8079, 1.5951, -0.0309))
+    assert a.pose == b.pose
+    assert (b.move, b.speed, b.near) == (Move.LINEAR, 0.1, None)
+    said = " ".join(program.remarks)
+    assert "read as one round" in said
+    assert "def (1), grip (1), if (1), run (1), thread (1), while (1)" in said
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("x = movej(q)", "line 3: `movej`: what moves the robot stands in a statement of its own"),
+        ("log(movel(q))", "line 3: `log`: moves the robot in a way that is not modelled"),
+        ("if (x):|movej(q)|end", "line 3: `if`"),
+        ("for_each(movec(q))", "line 3: `for_each`"),
+        ("def away():|movej(q)|end|away()", "line 3: `def`"),
+        ("thread t():|movej(q)|end", "line 3: `thread`"),
+        ("if (x):|return|end|movej(q)", "line 3: `if`"),
+        ("if (x):|while True:|sync()|end|end|movej(q)", "line 3: `if`"),
+        ("if (x):|set_tcp(p[0,0,0,0,0,0])|end|movej(q)", "line 3: `if`"),
+        ("if (x):|q = [1,0,0,0,0,0]|end|movej(q)", "line 6: `movej`: 'q' is not a constant"),
+        ("thread t():|q = 1|end|q = [0,0,0,0,0,1]|movej(q)", "line 7: `movej`: 'q' is not a constant"),
+        ("while True:|sync()|end|movej(q)", "line 6: `movej`: stands behind a loop that never ends"),
+        ("while True:|while (x):|movej(q)|end|end", "line 4: `while`"),
+        ("while True:|movej(q)", "line 3: `while`: its `end` is missing"),
+        ("if (x):|y = 1", "line 3: `if`: its `end` is missing"),
+        ("movej(get_inverse_kin(p[0,0,0,0,0,0]))", "constant qnear"),
+        ("movej(get_inverse_kin(q, q))", "a constant pose"),
+        ("movej(get_inverse_kin(p[0,0,0,0,0,0], q, tcp=p[0,0,0,0,0,0]))", "another tool point"),
+    ],
+)
+def test_nothing_that_moves_is_passed_over(lines, said):
+    text = "\n".join(["q = [0,0,0,0,0,0]", "movej([0,0,0,0,0,2])", *lines.split("|")])
+    with pytest.raises(InputError) as caught:
+        read_urscript(text.encode(), "a")
+    assert said in str(caught.value)
+
+
 def test_a_name_that_is_no_constant_matters_only_where_it_is_needed():
     text = "x = read_sensor()\nmovej([0,0,0,0,0,1])\n"
     assert len(read_urscript(text.encode(), "a").waypoints) == 1

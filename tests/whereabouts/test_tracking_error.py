@@ -177,3 +177,23 @@ def test_an_area_on_a_bone_may_be_where_the_bone_is(tmp_path, error, verdict):
     state.hearings["op"].bones = {"pelvis": (error, 0.0)}
     found = Judge(station.bound)(state)[0]
     assert (found.value, found.verdict) == (pytest.approx(0.05, abs=1e-9), verdict)
+
+
+@pytest.mark.parametrize(("turn", "verdict"), [(0.009, "within"), (0.011, "undecided")])
+def test_the_farther_field_of_a_device_on_a_person_moves_more(tmp_path, turn, verdict):
+    """Turned about its bone by 1/100: the corner at 5 m by 5 cm, which is the room there is."""
+    device = (
+        '[[sensors]]\nname = "scan"\non = "op/pelvis"\ncapability = 0.07\nresponse = 0.08\nsource = "sheet"\n'
+        "laser_scanner = {{ range = 9, angle = 3, resolution = 0.01, fields = [\n"
+        '  {{ name = "far", corners = [[0, 0], [5, 0], [0, 0.1]] }},\n'
+        '  {{ name = "near", corners = [[0, 0], [0.2, 0], [0, 0.1]] }} ] }}\n'
+        '[[parts]]\nname = "box"\nshape = {{ box = [0.1, 0.1, 0.1] }}\nat = {{ position = {} }}\n'
+        '[[safety]]\nkind = "safety_area"\nname = "it"\narea = "scan"\nof = "box"\n'
+    )
+    station, state = twin(tmp_path / "a", device.format([3, 0, 9]))
+    height = state.positions[next(b.index for b in station.model.bodies if b.name == "scan/far")][2]
+    far = device.format([3 + 5 + 0.1, 0, float(height)])
+    station, state = twin(tmp_path / "b", far)
+    state.hearings["op"].bones = {"pelvis": (0.0, turn)}
+    found = Judge(station.bound)(state)[0]
+    assert (found.value, found.verdict) == (pytest.approx(0.05, abs=1e-3), verdict)

@@ -45,6 +45,14 @@ export function formatFixed(value: number, decimals: number): string {
   return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
 }
 
+/** A text of at most `most` characters: what is left out is in its middle, as its end is often the figure. */
+export function shortened(text: string, most: number): string {
+  const characters = [...text];
+  if (characters.length <= most) return text;
+  const end = Math.floor((most - 1) / 2);
+  return `${characters.slice(0, most - 1 - end).join("")}…${characters.slice(characters.length - end).join("")}`;
+}
+
 /** The part of a full name below its owner: `ur10/forearm_link` → `forearm_link`. */
 export function shortName(name: string, owner: string): string {
   return name.startsWith(`${owner}/`) ? name.slice(owner.length + 1) : name;

@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { load } from "./source.mjs";
 
 const { margin, stateOf, worstState, STATE_WORDS, STATE_ICONS, VERDICT_TEXT } = await load("verdicts");
-const { formatFixed, formatNumber, formatTime, formatQuantity } = await load("format");
+const { formatFixed, formatNumber, formatTime, formatQuantity, shortened } = await load("format");
 
 test("numbers have three digits, a true minus, and the limit's decimals", () => {
   assert.equal(formatNumber(0.12345), "0.123");
@@ -19,6 +19,15 @@ test("numbers have three digits, a true minus, and the limit's decimals", () => 
   assert.equal(formatQuantity(0.61, "m"), "0.610\u00a0m");
   assert.equal(formatTime(83.456), "1:23.46");
   assert.equal(formatTime(59.999), "1:00.00");
+});
+
+test("a text that is too long keeps its begin and its end, where the figure is", () => {
+  const text = `${"n".repeat(60)}: 0.7343 m`;
+  const short = shortened(text, 48);
+  assert.equal([...short].length, 48);
+  assert.match(short, /^n+…n+: 0\.7343 m$/);
+  assert.equal(shortened("as long as that", 15), "as long as that");
+  assert.equal(shortened("🤖".repeat(9), 4), "🤖🤖…🤖");
 });
 
 test("the margin is positive on the admissible side, whichever that is", () => {

@@ -28,7 +28,7 @@ from seerob.commands.permissible_result import (
     work_progress,
 )
 from seerob.commands.progress import announced, progress
-from seerob.commands.sinks import file_of, refuse_existing, sinks_of, tell_files
+from seerob.commands.sinks import file_of, opened_sinks, refuse_existing, sinks_of, tell_files
 from seerob.errors import InputError
 
 if TYPE_CHECKING:
@@ -67,8 +67,10 @@ def run(options: argparse.Namespace) -> int:
     if options.permissible:
         with work_progress(quiet=options.json) as say:
             every = permissible_found(station, options.permissible, say)
-    with progress(station.duration, f"{station.duration:.1f} s of motion") as tick:
-        opened = station.open_sinks(sinks, folder, scene)
+    with (
+        progress(station.duration, f"{station.duration:.1f} s of motion") as tick,
+        opened_sinks(station, sinks, folder, scene) as opened,
+    ):
         for found, cut in every:
             add_sections(opened, station, found, cut)
         if bounds:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from seerob.commands import line
 from seerob.commands.measure import add_person, measured, person_table, reader
+from seerob.commands.whole_folder import whole_folder
 from seerob.errors import InputError
 from seerob.workstation import FILE_NAME
 
@@ -59,8 +60,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError.at(options.output, "", "exists already", "give another folder with -o")
     text = _workstation(options, Path(options.file))
     try:
-        options.output.mkdir(parents=True)
-        (options.output / FILE_NAME).write_text(text, encoding="utf-8")
+        with whole_folder(options.output) as working:
+            (working / FILE_NAME).write_text(text, encoding="utf-8")
     except OSError as error:
         what = f"cannot be made: {error.strerror}"
         raise InputError.at(options.output, "", what, "give a folder that may be written") from error

@@ -36,9 +36,11 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         InputError: What it shall play is wrong, or it cannot listen there.
     """
+    from seerob.commands.emulating._hint import probes_of
     from seerob.live.listening import because
 
-    server, what, where = import_module(f"seerob.{PACKAGE}.{options.kind}").emulated(options)
+    made = import_module(f"seerob.{PACKAGE}.{options.kind}").emulated(options)
+    server, where = made.server, made.where
     stopped = Stopped()
     try:
         server.start()
@@ -48,11 +50,13 @@ def run(options: argparse.Namespace) -> int:
             "seerob emulate", "--port", found, "choose another, or 0 for any free one"
         ) from error
     try:
-        line("emulates", what, "bold")
-        port = getattr(server, "port", None)
-        if port is not None and getattr(server, "to", None) is None:
-            where = f"{getattr(server, 'host', options.host)}:{port}"
-        line("listens", f"{options.kind} at {where}  (Ctrl-C ends)")
+        line("emulates", made.what, "bold")
+        to = getattr(server, "to", None)
+        host, port = to or (getattr(server, "host", options.host), getattr(server, "port", options.port))
+        way = ("sends", "to") if to else ("listens", "at")
+        line(way[0], f"{options.kind} {way[1]} {host}:{port}  (Ctrl-C ends)")
+        for command in probes_of(options.kind, host, port, sends=bool(to), commands=made.commands):
+            line("try", command)
         end = time.monotonic() + (options.seconds if options.seconds is not None else float("inf"))
         while not stopped() and time.monotonic() < end:
             time.sleep(0.05)

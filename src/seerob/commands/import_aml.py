@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import json
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 from seerob.commands import Exit, line, tell
+from seerob.commands.whole_folder import whole_folder
 from seerob.errors import InputError
 from seerob.snapshot import Finding
+from seerob.tables.mapping import toml_value
 
 if TYPE_CHECKING:
     from seerob.automationml import Attribute, Element, Interface, Plant
@@ -52,15 +53,18 @@ def run(options: argparse.Namespace) -> int:
     plant = read(options.plant)
     made = Made(plant)
     try:
-        (folder / "cad").mkdir(parents=True, exist_ok=True)
-        for name, data in made.meshes.items():
-            (folder / name).write_bytes(data)
-        for name, text in made.files().items():
-            (folder / name).write_text(text, encoding="utf-8")
-            line("wrote", str(folder / name))
+        with whole_folder(folder) as working:
+            (working / "cad").mkdir()
+            for name, data in made.meshes.items():
+                (working / name).write_bytes(data)
+            texts = made.files()
+            for name, text in texts.items():
+                (working / name).write_text(text, encoding="utf-8")
     except OSError as error:
         what = f"cannot be written: {error.strerror}"
         raise InputError.at(folder, "", what, "give a folder that may be written") from error
+    for name in texts:
+        line("wrote", str(folder / name))
     tell((*plant.findings, *made.findings))
     line("found", f"{made.parts} parts with a shape, {made.robots} robots, {len(made.variables)} variables")
     if not (made.parts or made.robots or made.variables):
@@ -94,14 +98,17 @@ class Made:
         self.variables: list[str] = []
         self.parts = self.robots = 0
         self._names: set[str] = set()
+        self._loaded: dict[str, bytes] = {}
         self._tables = [line for entry in plant.walk() for line in self._entry(*entry)]
 
     def files(self) -> dict[str, str]:
         """Content of each file by its name."""
         source = self.plant.file.name
+        # Names are of others: as values they cannot end a comment.
+        origin = f"{toml_value(source)} (CAEX {toml_value(self.plant.version)})"
         head = [
-            f"# Made by `seerob import-aml` from {source} (CAEX {self.plant.version}); complete it by hand.",
-            f"title = {_text(source)}",
+            f"# Made by `seerob import-aml` from {origin}; complete it by hand.",
+            f"title = {toml_value(source)}",
         ]
         found = {"workstation.toml": "\n".join([*head, "", *self._tables])}
         if self.variables:
@@ -126,7 +133,7 @@ class Made:
 
     def _robot(self, name: str, world: Array) -> Iterator[str]:
         yield "# [[robots]]              # which one it is the plant does not say in a way that can be read"
-        yield f"# name = {_text(name)}"
+        yield f"# name = {toml_value(name)}"
         yield '# model = "library:…"     # `seerob kinds` lists the library; or a path to its URDF'
         yield f"# base = {_pose(world)}"
         yield ""
@@ -134,10 +141,11 @@ class Made:
     def _part(self, path: str, interface: Interface, world: Array) -> Iterator[str]:
         uri = _value(interface, "refURI")
         try:
-            data = self.plant.load(uri)
+            data = self._loaded[uri] if uri in self._loaded else self.plant.load(uri)
         except InputError as error:
             self.findings.append(Finding(level="warning", subject=path, text=str(error)))
             return
+        self._loaded[uri] = data
         if "#" in uri:
             text = f"refers to a part of a file ({uri}); the whole file is taken"
             self.findings.append(Finding(level="warning", subject=path, text=text))
@@ -147,8 +155,8 @@ class Made:
         self.meshes[file] = data
         self.parts += 1
         yield "[[parts]]"
-        yield f"name = {_text(self._unique(path))}"
-        yield f"mesh = {_text(file)}"
+        yield f"name = {toml_value(self._unique(path))}"
+        yield f"mesh = {toml_value(file)}"
         yield f"at = {_pose(world)}"
         yield ""
 
@@ -158,13 +166,13 @@ class Made:
         address = next((v for key in ADDRESSES if (v := _value(interface, key))), "")
         unit = next((a.unit for a in _deep(interface.attributes.values()) if a.unit), "")
         yield "[[variables]]"
-        yield f"name = {_text(name)}"
+        yield f"name = {toml_value(name)}"
         yield 'source = "plc"'
-        yield f"address = {_text(address)}" + ("" if address else "   # the plant does not say")
+        yield f"address = {toml_value(address)}" + ("" if address else "   # the plant does not say")
         if (known := KINDS.get(kind.lower())) is not None:
             yield f'type = "{known}"'
         elif unit:
-            yield f"unit = {_text(unit)}   # as the plant states it"
+            yield f"unit = {toml_value(unit)}   # as the plant states it"
         else:
             yield '# unit = …   # or type = "bool", "text", "choice"'
         yield ""
@@ -198,11 +206,6 @@ def _value(interface: Interface, name: str) -> str:
 def _plain(name: str) -> str:
     """A name with the characters that names may have here."""
     return re.sub(r"[^A-Za-z0-9_.\-]+", "_", name).strip("_.")[:60] or "unnamed"
-
-
-def _text(value: str) -> str:
-    # A JSON string is a TOML basic string.
-    return json.dumps(value, ensure_ascii=False)
 
 
 def _pose(world: Array) -> str:

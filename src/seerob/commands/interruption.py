@@ -6,8 +6,9 @@ import _thread
 import signal
 import sys
 import threading
+import time
 from types import FrameType, TracebackType
-from typing import Self
+from typing import Any, Self
 
 _LATER = 0.002
 """After which a lost interrupt comes again [s]: whatever destroyed the object is over by then, mostly."""
@@ -18,7 +19,8 @@ class Interrupts:
 
     What it leaves half-done fails in ways of its own, also in compiled libraries that say nothing of where
     their error came from. Where it comes while an object is destroyed, in ``__del__`` or a callback of a weak
-    reference, Python would report it and go on; it comes again shortly after.
+    reference, Python would report it and go on; it comes again shortly after. In the end signals are handled
+    as before, whatever the command asked for.
 
     Attributes:
         came: Whether there was one.
@@ -27,14 +29,16 @@ class Interrupts:
     def __init__(self) -> None:
         self.came = False
         self._over = False
+        self._deaf = False
 
     def __enter__(self) -> Self:
         self._hook = sys.unraisablehook
-        # Only the main thread may ask for signals; a program in the background of a shell ignores this one.
-        mine = threading.current_thread() is threading.main_thread()
-        self._asks = mine and signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
-        if self._asks:
-            self._handler = signal.signal(signal.SIGINT, self._raise)
+        self._before: dict[signal.Signals, Any] = {}
+        if threading.current_thread() is threading.main_thread():  # only it may ask for signals
+            self._before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
+        # A program in the background of a shell ignores Ctrl-C.
+        if self._before.get(signal.SIGINT, signal.SIG_IGN) is not signal.SIG_IGN:
+            signal.signal(signal.SIGINT, self._raise)
         sys.unraisablehook = self._lost
         return self
 
@@ -43,23 +47,33 @@ class Interrupts:
     ) -> None:
         self._over = True
         sys.unraisablehook = self._hook
-        if self._asks:
-            signal.signal(signal.SIGINT, self._handler)
+        for number, handler in self._before.items():
+            if handler is not None:  # asked for by something else than Python
+                signal.signal(number, handler)
 
     def _raise(self, number: int, frame: FrameType | None) -> None:
         self.came = True
-        raise KeyboardInterrupt
+        if self._deaf:
+            _thread.start_new_thread(self._again, ())
+        else:
+            raise KeyboardInterrupt
 
     def _lost(self, what: sys.UnraisableHookArgs) -> None:
-        if isinstance(what.exc_value, KeyboardInterrupt):
-            again = threading.Timer(_LATER, self._again)
-            again.daemon = True
-            again.start()
-        else:
+        if not isinstance(what.exc_value, KeyboardInterrupt):
             self._hook(what)
+            return
+        self._deaf = True  # in here it would be lost once more
+        _thread.start_new_thread(self._again, ())
+        self._deaf = False
 
     def _again(self) -> None:
-        if not self._over:
+        time.sleep(_LATER)
+        main = threading.main_thread().ident
+        if self._over or main is None:
+            return
+        if hasattr(signal, "pthread_kill"):
+            signal.pthread_kill(main, signal.SIGINT)  # wakes it, too, where it waits for a lock
+        else:
             _thread.interrupt_main()
 
 

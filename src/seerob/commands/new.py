@@ -7,6 +7,7 @@ from importlib import resources
 from pathlib import Path
 
 from seerob.commands import Exit, line
+from seerob.commands.whole_folder import whole_folder
 from seerob.errors import InputError
 
 HELP = "make a commented workstation folder to start from"
@@ -27,14 +28,11 @@ def run(options: argparse.Namespace) -> int:
     folder: Path = options.folder
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError.at(folder, "", "exists already", "give the name of a new folder")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        what = f"cannot be made: {error.strerror}"
-        raise InputError.at(folder, "", what, "give a folder that may be written") from error
     starter = resources.files("seerob.commands") / "starter"
+    with whole_folder(folder) as working:
+        for entry in starter.iterdir():
+            (working / entry.name).write_bytes(entry.read_bytes())
     for entry in starter.iterdir():
-        (folder / entry.name).write_bytes(entry.read_bytes())
         line("wrote", str(folder / entry.name))
     line("next", f"seerob assess {folder}   or   seerob run {folder}")
     return Exit.WITHIN

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from seerob.commands import Exit, add_workstation, compiled, describe, line, seconds
 from seerob.commands.planned_around import OTHERS, STILL, around, others
 from seerob.commands.progress import spinner
-from seerob.commands.whole_folder import whole_folder
 from seerob.errors import InputError
 
 if TYPE_CHECKING:
@@ -98,6 +97,7 @@ def run(options: argparse.Namespace) -> int:
     from seerob.commands.interruption import Stopped as Asked
     from seerob.planning.plan import plan
     from seerob.planning.search import NoPath, Stopped
+    from seerob.sinks.dossier import write_whole
 
     names = [robot.name for robot in station.workstation.robots]
     if options.robot is None and len(names) != 1:
@@ -144,8 +144,7 @@ def run(options: argparse.Namespace) -> int:
         line("no path", str(error), "yellow")
         return Exit.UNDECIDED
     _refuse_existing(options.output)
-    with whole_folder(options.output.resolve().parent) as working:
-        (working / options.output.name).write_text(found.toml(), encoding="utf-8")
+    write_whole(options.output, found.toml().encode())
     text = (
         f"{len(found.q)} postures; between them nothing comes nearer than "
         f"{found.least:.3f} m to {found.robot} (margin {found.margin:g} m, {found.asked} postures looked at)"

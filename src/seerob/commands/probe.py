@@ -22,6 +22,8 @@ HELP = "connect to a controller and print what it says, how regularly, and what 
 EXAMPLE = "seerob probe rtde 192.168.0.10"
 MOST_SHOWN = 40
 """Variables."""
+NEAR = 0.2
+"""Rates that differ by a smaller share are the same: a few seconds are heard."""
 ADDRESSES = ("host", "url", "address")
 """Options of live sources that say where the other end is; a source has one of them, or listens itself."""
 
@@ -63,6 +65,8 @@ def run(options: argparse.Namespace) -> int:
 
     source, given = _source(options)
     where = f"{options.kind} {options.address or ''}".strip()
+    if options.address is not None and (port := getattr(source, "port", None)) is not None:
+        where += f" (port {port})"
     try:
         findings = asyncio.run(source.ask())
     except InputError:
@@ -104,8 +108,34 @@ def run(options: argparse.Namespace) -> int:
     line("quality", ", ".join(f"{count} {quality}" for quality, count in qualities.items()))
     for sample in newest.values():
         _tell(sample)
+    rate = heard_rate(source, given, statistics.rate)
+    if rate is not None:
+        line("note", f"heard {rate} times a second: frequency = {rate} below")
+        given["frequency"] = rate
     OUT.print(_snippet(options.kind, given), markup=False)
+    if source.asks and source.asks.split()[1] not in given:
+        OUT.print(source.asks, markup=False)
     return Exit.WITHIN
+
+
+def heard_rate(source: LiveSource, given: dict[str, Any], rate: float | None) -> int | None:
+    """What ``frequency`` should be [Hz]; None when it is right, was asked for, or is no option of the source.
+
+    Args:
+        source: As it was heard.
+        given: Its options.
+        rate: Samples per second.
+    """
+    import msgspec
+
+    assumed = getattr(source, "frequency", None)
+    if assumed is None or rate is None or "frequency" in given or abs(rate / assumed - 1) < NEAR:
+        return None
+    try:
+        msgspec.convert({**given, "frequency": round(rate)}, type(source))
+    except msgspec.ValidationError:
+        return None  # it takes more than another frequency, a longer timeout for one
+    return round(rate)
 
 
 def _variables(source: VariablesSource, kind: str, given: dict[str, Any], wait: float) -> int:
@@ -256,5 +286,7 @@ def _tell(sample: Sample) -> None:
 
 
 def _snippet(kind: str, given: dict[str, Any]) -> str:
-    shown = (f'{key} = "{v}"' if isinstance(v, str) else f"{key} = {v}" for key, v in given.items())
+    from seerob.tables.mapping import toml_value
+
+    shown = (f"{key} = {toml_value(value)}" for key, value in given.items())
     return "\n".join(["", "[[sources]]", f'kind = "{kind}"', *shown])

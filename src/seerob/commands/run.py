@@ -19,7 +19,7 @@ from seerob.commands import (
 )
 from seerob.commands.interruption import Stopped
 from seerob.commands.progress import announced, spinner
-from seerob.commands.sinks import file_of, refuse_existing, sinks_of, tell_files
+from seerob.commands.sinks import file_of, opened_sinks, refuse_existing, sinks_of, tell_files
 from seerob.errors import InputError
 
 if TYPE_CHECKING:
@@ -99,8 +99,8 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
             nonlocal now
             now = t
 
-        with spinner() as say:
-            writers = announced(station.open_sinks(sinks, folder, scene), list(map(file_of, sinks)), say)
+        with spinner() as say, opened_sinks(station, sinks, folder, scene) as opened:
+            writers = announced(opened, list(map(file_of, sinks)), say)
             line("page", f"{view.url}  (Ctrl-C ends the run)", "bold")
             _tell_ends(station)
             writers += _triggers(station, allow=options.allow_writing)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +14,9 @@ from seerob.errors import InputError
 from seerob.sink import Sink
 
 if TYPE_CHECKING:
+    from seerob.sink import Writer
+    from seerob.snapshot import Scene
+    from seerob.station import Station
     from seerob.workstation import Workstation
 
 
@@ -35,6 +40,22 @@ def sinks_of(workstation: Workstation, *, lossless: bool, record: bool = True) -
     # The recorder first: it alone touches the disk when it is opened, and may be refused.
     chosen.sort(key=lambda sink: not isinstance(sink, Recorder))
     return [replace(s, lossless=lossless) if isinstance(s, Recorder) else s for s in chosen]
+
+
+@contextmanager
+def opened_sinks(station: Station, sinks: list[Sink], folder: Path, scene: Scene) -> Iterator[list[Writer]]:
+    """Sinks that are open for a run, which closes them; an interrupt may come before it takes them over.
+
+    Raises:
+        InputError: As `Station.open_sinks` does.
+    """
+    opened = station.open_sinks(sinks, folder, scene)
+    try:
+        yield opened
+    except KeyboardInterrupt as error:
+        for writer in opened:
+            writer.__exit__(KeyboardInterrupt, error, None)
+        raise
 
 
 def file_of(sink: Sink) -> str:

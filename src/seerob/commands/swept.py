@@ -13,7 +13,7 @@ from seerob.errors import InputError
 
 if TYPE_CHECKING:
     from seerob.station import Station
-    from seerob.transforms import Array
+    from seerob.volumes.areas import MotionRecord
 
 HELP = "write the volume that a robot sweeps, or can reach, as a closed mesh (STL or GLB)"
 EXAMPLE = "seerob swept my_cell --of ur10 --voxel 0.01 -o swept.stl"
@@ -62,7 +62,8 @@ def run(options: argparse.Namespace) -> int:
     if not options.output.parent.is_dir():
         raise InputError.at(options.output, "", "its folder does not exist", "make it, or give another place")
     station = compiled(options.workstation, sources=not options.reach)
-    from seerob.volumes.moving import reach_box
+    from seerob.volumes.held import before
+    from seerob.volumes.moving import posed, reach_box
     from seerob.volumes.reachable import reachable_volume
     from seerob.volumes.swept import swept_volume
     from seerob.volumes.voxels import check_room
@@ -77,9 +78,12 @@ def run(options: argparse.Namespace) -> int:
             swept = reachable_volume(model, bodies, voxel=options.voxel, progress=share)
         assert swept is not None
     else:
-        motion = _motion(station, options.start, options.end)
+        path, first = _motion(station, options.start, options.end)
+        held = before(model, posed(model, path.motion())[:first])
         with progress(1.0, "sweeping") as share:
-            swept = swept_volume(model, bodies, motion, voxel=options.voxel, progress=share)
+            swept = swept_volume(
+                model, bodies, path.motion(first), voxel=options.voxel, held=held, progress=share
+            )
     mesh = swept.mesh(most=options.triangles)
     write_mesh(options.output, mesh)
     line("volume", f"{swept.volume:.4g} m³ in voxels of {options.voxel:g} m: not less than the truth")
@@ -104,8 +108,8 @@ def _subject(station: Station, name: str | None) -> str:
     return robots[0]
 
 
-def _motion(station: Station, start: float, end: float | None) -> dict[str, Array]:
-    """Where the twin's joints were at every tick of a part of the run."""
+def _motion(station: Station, start: float, end: float | None) -> tuple[MotionRecord, int]:
+    """Where the twin's joints were at every tick up to the end of a part of the run, and its first tick."""
     last = station.duration if end is None else end
     if start > last:
         raise InputError.at(
@@ -113,10 +117,11 @@ def _motion(station: Station, start: float, end: float | None) -> dict[str, Arra
         )
     from seerob.volumes.areas import MotionRecord
 
-    path = MotionRecord(start, last)
+    path = MotionRecord(0.0, last)
     with progress(station.duration, f"{station.duration:.1f} s of motion") as tick:
         station.run(writers=[path], progress=tick, stop=lambda: False)
-    if not path.joints:
+    first = sum(t < start - 1e-9 for t in path.instants)
+    if first == len(path.instants):
         what = f"no tick lies from {start:g} to {last:g} s"
         raise InputError.at("seerob swept", "--from", what, f"the motion takes {station.duration:g} s")
     limit = station.workstation.engine.tracking_limit
@@ -128,4 +133,4 @@ def _motion(station: Station, start: float, end: float | None) -> dict[str, Arra
     for name in station.model.mechanisms:
         if name not in driven:
             line("note", f"{name}: no source drives it; it stands still", "dim")
-    return path.motion()
+    return path, first

@@ -55,41 +55,25 @@ def reduced_mass(m_H: ArrayLike, m_R: ArrayLike) -> Array:
     return np.asarray(1.0 / (1.0 / m_H + 1.0 / m_R))
 
 
-def mass_along(J_v: Array, M: Array, u: Array) -> Array:
+def mass_of_rows(w: Array, M: Array) -> Array:
     r"""Mass of an articulated robot felt at points, :math:`1/m_u = u^T J_v M^{-1} J_v^T u` [kg].
 
     Args:
-        J_v: Linear Jacobians of the points, shape (b, 3, n).
+        w: Rows :math:`u^T J_v` of unit directions u and linear Jacobians of the points, shape (b, n).
         M: Joint-space mass matrix, shape (n, n).
-        u: Unit directions, shape (b, 3).
 
     Returns:
         Shape (b,); inf where a point cannot be pushed that way.
     """
-    return mass_of_rows(np.einsum("bij,bi->bj", J_v, u), M)
-
-
-def mass_of_rows(w: Array, M: Array) -> Array:
-    r"""The same of rows :math:`w = u^T J_v`, shape (b, n): :math:`1/m_u = w M^{-1} w^T` [kg], shape (b,)."""
     found = np.empty((1, len(w), len(w)))
     if not mobility(np.ascontiguousarray(w)[None], np.ascontiguousarray(M)[None], found):
         raise np.linalg.LinAlgError("a mass matrix is not positive definite")
     return reciprocals(found[0].diagonal().copy())
 
 
-def impact_energy(mu: ArrayLike, v: ArrayLike) -> Array:
-    """Energy of the relative motion, ½ μ v² [J]; not the kinetic energy of the robot."""
-    return np.asarray(0.5 * np.asarray(mu) * np.square(v))
-
-
 def spring_energy(F: ArrayLike, k: ArrayLike) -> Array:
     """Energy in the spring at a force, A.1 [J]. F [N], k [N/m]."""
     return np.asarray(np.square(F) / (2 * np.asarray(k)))
-
-
-def peak_force(v: ArrayLike, mu: ArrayLike, k: ArrayLike) -> Array:
-    """Force of an impact, A.5 the other way round [N]. v [m/s], μ [kg], k [N/m]."""
-    return np.asarray(np.asarray(v) * np.sqrt(np.asarray(mu) * k))
 
 
 def speed_at_force(F: ArrayLike, mu: ArrayLike, k: ArrayLike) -> Array:
@@ -105,15 +89,6 @@ def speed_at_pressure(p: ArrayLike, A: ArrayLike, mu: ArrayLike, k: ArrayLike) -
 def speed_at_energy(E: ArrayLike, mu: ArrayLike) -> Array:
     """Relative speed of an energy [m/s]. E [J], μ [kg]."""
     return np.asarray(np.sqrt(2 * np.asarray(E) / mu))
-
-
-def free_force(F_fixed: ArrayLike, m_H: ArrayLike, m_R: ArrayLike) -> Array:
-    r"""Force on a body that can recoil, from the force on a sensor that cannot [N].
-
-    Same speed, same spring: :math:`F_{free} = F_{fixed} \sqrt{m_H / (m_H + m_R)}`. Forces [N], masses [kg].
-    """
-    m_H, m_R = np.asarray(m_H, float), np.asarray(m_R, float)
-    return np.asarray(F_fixed * np.sqrt(1.0 / (1.0 + m_R / m_H)))
 
 
 def energy_limit(F: ArrayLike, k: ArrayLike, printed: ArrayLike) -> Array:

@@ -32,7 +32,7 @@ def moving_masses(model: Model, robot: Mechanism) -> tuple[float, float]:
     """
     names = {int(i): model.mj.body(int(i)).name for i in robot.mj_bodies}
     masses = {i: float(model.mj.body_mass[i]) for i in names}
-    links = sum(masses[i] for i, name in names.items() if name.startswith(f"{robot.name}/"))
+    links = sum(masses[i] for i, name in names.items() if name in robot.links)
     return links, sum(masses.values()) - links
 
 

@@ -89,6 +89,13 @@ class Angles:
                 changed[name] = values
         return replace(self, **changed) if changed else self
 
+    def untold(self, angles: Collection[tuple[str, int]]) -> Angles:
+        """The same with these angles not assessed, each by its name and side (0 right, 1 left)."""
+        changed = {name: np.array(getattr(self, name), float) for name, _ in angles}
+        for name, side in angles:
+            changed[name][(..., side) if name in SIDED else ...] = np.nan
+        return replace(self, **changed)
+
     def __getitem__(self, key: object) -> Angles:
         """Some postures of a batch: the key is applied to the leading axes of every angle."""
         return Angles(**{f.name: getattr(self, f.name)[key] for f in fields(self)})

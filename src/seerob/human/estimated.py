@@ -16,7 +16,7 @@ HIPS = frozenset(f"{side}_thigh" for side in SIDES)
 SHOULDERS = frozenset(f"{side}_upper_arm" for side in SIDES)
 
 
-def estimated(seen: Collection[str]) -> tuple[str, ...]:
+def estimated(seen: Collection[str], bare: Collection[str] = ()) -> tuple[str, ...]:
     """Bones that are neither seen nor told by the bones beside them, in the order of `BONES`.
 
     Told are: a bone between a bone that is seen (or a trunk that is told) and one that is seen; toes of a
@@ -25,12 +25,13 @@ def estimated(seen: Collection[str]) -> tuple[str, ...]:
     Args:
         seen: Bones that a device sees now. Whom joints or keyframes move nobody sees, and nothing of it is
             estimated: that is not asked here.
+        bare: Those of them of which nothing shows where they point (`seerob.human.ends.bare`).
     """
-    return _estimated(frozenset(seen))
+    return _estimated(frozenset(seen), frozenset(bare))
 
 
 @lru_cache(maxsize=256)
-def _estimated(seen: frozenset[str]) -> tuple[str, ...]:
+def _estimated(seen: frozenset[str], bare: frozenset[str]) -> tuple[str, ...]:
     known = set(seen)
     if seen >= HIPS and (seen >= SHOULDERS or seen & {"lumbar", "thorax"}):
         known.add("pelvis")
@@ -39,7 +40,7 @@ def _estimated(seen: frozenset[str]) -> tuple[str, ...]:
     ends = {PARENTS[bone] for bone in known}
     known |= {bone for bone in ends if PARENTS.get(bone) in known}
     known |= {f"{side}_toes" for side in SIDES if f"{side}_foot" in known}
-    return tuple(bone for bone in BONES if bone not in known)
+    return tuple(bone for bone in BONES if bone not in known or bone in bare)
 
 
 LIMBS = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot", "toes", "head")

@@ -120,7 +120,11 @@ def registered(
             f"median before, {1e3 * fit.median:.0f} mm after"
         )
         findings.append(Finding(level="assumed", subject=subject, text=text))
+        away = {name: float(np.linalg.norm(place - nominal[name])) for name, place in found.items()}
+    else:
+        away = fit.away
     findings += _told(fit, subject)
+    findings += _elsewhere(away, subject)
     findings += _mounts(fit, frames, observer, description, root_from_world, subject)
     return observer, tuple(findings)
 
@@ -170,6 +174,19 @@ def _told(fit: Fit, subject: str) -> Iterable[Finding]:
         text = (
             f"the person does not have the size of the one recorded ({1e3 * fit.median:.0f} mm median): "
             "correct stature and lengths"
+        )
+        yield Finding(level="warning", subject=subject, text=text)
+
+
+def _elsewhere(away: dict[str, float], subject: str) -> Iterable[Finding]:
+    """What is farther from where its name puts it than any place on that bone [m]."""
+    far = sorted((name for name, size in away.items() if size > FARTHEST), key=lambda name: -away[name])
+    if far:
+        shown = ", ".join(f"{name} {1e3 * away[name]:.0f} mm" for name in far[:6])
+        more = f" and {len(far) - 6} more" if len(far) > 6 else ""
+        text = (
+            f"not where their names put them: {shown}{more} away in most of the recording; exchanged labels "
+            "(left and right?), or worn elsewhere: correct the labels, or the mapping"
         )
         yield Finding(level="warning", subject=subject, text=text)
 

@@ -15,12 +15,13 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from msgspec import structs
 
 from seerob.human.chosen_points import between
-from seerob.human.ends import ENDS, aimed, swing
+from seerob.human.ends import ENDS, Turn, aimed, bare, swing, turned, untold
 from seerob.human.estimated import in_doubt_with
 from seerob.human.fitting import Fitter, Pulls, pulls
 from seerob.human.handover import Handover
@@ -51,6 +52,7 @@ ELSEWHERE = 0.1
 """Whoever was not seen for a while and is farther from before [rad or m] is put there, not pulled."""
 
 
+K = TypeVar("K")
 PartDoubt = tuple[str, tuple[str, ...]]
 """Why some bones may not be relied on, and which."""
 
@@ -73,9 +75,13 @@ class Followed:
     """What it was made of, in the root's frame."""
     observed: frozenset[str] = frozenset()
     """Bones that some device sees, each within its hold time."""
+    bare: frozenset[str] = frozenset()
+    """Those of them of limbs of which nothing shows where they point."""
     unaimed: Mapping[str, float] = field(default_factory=dict)
     """Hands, feet and heads of which nothing but the joint is seen: bone → bound on the angle between how
     the twin's is turned and how the person's may be [rad]."""
+    untold: frozenset[tuple[str, int]] = frozenset()
+    """Angles of the posture that nothing tells, with their side; see `seerob.human.ends.untold`."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +108,10 @@ class _Device:
     """Bone → when it was last seen, or first told of without being seen."""
     observed: dict[str, float] = field(default_factory=dict)
     """Bone → when it was last seen indeed."""
-    aimed: dict[str, float] = field(default_factory=dict)
-    """Bone → when it was last seen how it is turned."""
+    placed: dict[str, float] = field(default_factory=dict)
+    """Bone → when a place of it was last seen."""
+    turned: dict[Turn, float] = field(default_factory=dict)
+    """Bone and axis → when it was last seen how it is turned about it."""
     smoother: Smoother = field(default_factory=Smoother)
 
     def forget(self, t: float) -> None:
@@ -204,10 +212,12 @@ class Following:
         if anew:
             reasons.append("appeared elsewhere")
         observed = self._seen(t, lambda device: device.observed)
-        open_ends = ENDS & observed - self._seen(t, lambda device: device.aimed)
+        turns = self._seen(t, lambda device: device.turned)
+        open_ends = ENDS & observed - aimed(turns)
         unaimed = {bone: swing(bone, q, self._fitter.lower, self._fitter.upper) for bone in open_ends}
         reason = "; ".join(reasons[:4])
-        return Followed(t, q, reason, tuple(parts), anew, found, observed, unaimed)
+        bones = bare(observed, self._seen(t, lambda device: device.placed), turns)
+        return Followed(t, q, reason, tuple(parts), anew, found, observed, bones, unaimed, untold(turns))
 
     def _eased(self, found: Pulls, before: Array | None, t: float) -> Pulls:
         """What is seen, without a jump where another device has taken over."""
@@ -258,8 +268,10 @@ class Following:
                 device.seen[point.bone] = t
                 if _counts(point):
                     device.observed[point.bone] = t
+                if point.position is not None and point.position_weight > 0:
+                    device.placed[point.bone] = t
                 out.append(point)
-        device.aimed |= dict.fromkeys(aimed(out), t)
+        device.turned |= dict.fromkeys(turned(out), t)
         if not jumped:
             return _Told(out, reason)
         why = ", ".join(list(jumped)[:4]) + (" …" if len(jumped) > 4 else "") + " jumped"
@@ -268,8 +280,8 @@ class Following:
             return _Told([], "; ".join(filter(None, (reason, why))), jumped=True)
         return _Told(out, reason, (why, tuple(dict.fromkeys(jumped.values()))), jumped=True)
 
-    def _seen(self, t: float, what: Callable[[_Device], dict[str, float]]) -> frozenset[str]:
-        """Bones of which some device sees something, each within its hold time."""
+    def _seen(self, t: float, what: Callable[[_Device], dict[K, float]]) -> frozenset[K]:
+        """Bones, or turns of bones, of which some device sees something, each within its hold time."""
         return frozenset(
             bone
             for device in self._devices.values()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import os
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.kernels.tree import build_tree, component_of
+from seerob.whole_file import whole_file
 
 VERSION = b"seerob tree 1"
 """Changes whenever `build_tree` or the layout does."""
@@ -102,12 +101,7 @@ def _write(path: Path, tree: Tree) -> None:
     blob = payload.getvalue()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
+        with whole_file(path) as hidden:
+            hidden.write_bytes(hashlib.sha256(blob).digest() + blob)
     except OSError:
         return
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(hashlib.sha256(blob).digest() + blob)
-        os.replace(name, path)
-    except OSError:
-        Path(name).unlink(missing_ok=True)

@@ -23,7 +23,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from threading import Lock, Thread
 from types import TracebackType
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from msgspec import Meta
 from msgspec.structs import replace
@@ -76,6 +76,9 @@ class LiveSource(Source, frozen=True, kw_only=True):
 
     delay: Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})] | None = None
     """How far the twin is behind the world [s]; one period of the source and 5 ms when not given."""
+
+    asks: ClassVar[str] = ""
+    """A line of the workstation file that it needs and that no device can say: `seerob probe` shows it."""
 
     def __post_init__(self) -> None:
         if self.loop:
@@ -253,7 +256,8 @@ class Listener:
         except (OSError, EOFError, SeerobError) as error:
             return because(error)
         except Exception as error:
-            _log.exception("%s: a mistake in the source itself", self.name)
+            if self._up is not False:  # once per loss
+                _log.exception("%s: a mistake in the source itself", self.name)
             return f"{type(error).__name__}: {error}"
         return "the other end closed the connection"
 
@@ -267,7 +271,7 @@ class Listener:
                 return
         if not (self.drives and isinstance(sample, SignalSample)):
             self._arrivals.add(host, sample.t_device)
-        if not self._up:
+        if not self._up and not (self.drives and isinstance(sample, SignalSample)):
             if self._up is False:
                 _log.warning("%s: heard again", self.name)
             self._up = True

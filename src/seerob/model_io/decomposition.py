@@ -6,9 +6,7 @@ Only contacts use these parts; distances always see the mesh itself.
 from __future__ import annotations
 
 import hashlib
-import os
 import struct
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +20,7 @@ from seerob.geometry import Mesh
 from seerob.model_io.detail import display_mesh, manifold
 from seerob.model_io.moments import signed_volume
 from seerob.model_io.tidy import tidied
+from seerob.whole_file import whole_file
 
 _CONVEX = 1e-6
 _VERSION = 1
@@ -148,10 +147,8 @@ def _write(file: Path, found: ConvexParts) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     arrays: dict[str, Any] = {f"v{i}": p.vertices for i, p in enumerate(found.parts)}
     arrays |= {f"f{i}": p.faces for i, p in enumerate(found.parts)}
-    handle, temporary = tempfile.mkstemp(dir=file.parent, suffix=".part")
-    with os.fdopen(handle, "wb") as stream:
+    with whole_file(file) as hidden, hidden.open("xb") as stream:
         np.savez_compressed(stream, volumes=np.array([found.excess, found.missing]), **arrays)
-    Path(temporary).replace(file)
 
 
 def _read(file: Path, color: tuple[float, float, float, float]) -> ConvexParts | None:

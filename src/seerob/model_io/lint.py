@@ -36,6 +36,8 @@ DENSITIES = (10.0, 25_000.0)
 """From foam to the heaviest metals [kg/m³]."""
 REPAIRABLE = 0.02
 """Violation of A + B >= C, relative to the largest moment, that rounding in a file explains."""
+LIGHT = 0.05
+"""Up to this a link without a shape is a frame or the like [kg]."""
 TIPS = (
     "tool0",
     "tcp",
@@ -225,7 +227,7 @@ def _findings(description: Description) -> Iterator[tuple[str, str, str]]:
             if text:
                 yield "warning", link.name, text
         yield from misplaced_mass(link)
-        if link.inertial is not None and not link.solids and link.inertial.mass > 0.05:
+        if link.inertial is not None and not link.solids and link.inertial.mass > LIGHT:
             yield (
                 "warning",
                 link.name,

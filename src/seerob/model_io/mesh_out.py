@@ -9,6 +9,7 @@ import numpy as np
 from seerob.errors import InputError
 from seerob.geometry import Mesh
 from seerob.model_io.glb import glb_bytes
+from seerob.whole_file import whole_file
 
 _RECORD = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -48,12 +49,11 @@ def write_mesh(path: Path, mesh: Mesh) -> None:
         InputError: An ending that is no format, or a file that cannot be written.
     """
     check_format(path)
-    part = path.with_name(path.name + ".part")
+    data = WRITERS[path.suffix.lower()](mesh)
     try:
-        part.write_bytes(WRITERS[path.suffix.lower()](mesh))
-        part.replace(path)
+        with whole_file(path) as hidden:
+            hidden.write_bytes(data)
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise InputError.at(
             path, "", f"cannot be written: {error.strerror or error}", "choose another place"
         ) from error

@@ -26,11 +26,6 @@ CRUMB = 1e-5
 """A loose piece of one or two triangles of at most this area [m²] is a slip of the export, no surface."""
 
 
-def protrusions(description: Description) -> dict[str, float]:
-    """Largest distance [m] by which each link's display meshes leave its solids; links with both only."""
-    return {link.name: float(depths.max(initial=0.0)) for link, depths in _depths(description)}
-
-
 def with_protrusions(description: Description) -> Description:
     """The description with the figure on each solid that a shown shape sticks out of, and a finding.
 

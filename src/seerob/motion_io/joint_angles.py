@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from seerob.transforms import Array
 
 LENGTHS = tuple(name for name in JOINTS if name in ("pelvis_x", "pelvis_y", "pelvis_z"))
 FACTORS = {"deg": np.pi / 180, "rad": 1.0, "mm": 1e-3, "m": 1.0}
+OF_OUR_EXPORT = re.compile(r"tracking error( \[.*\])?|\w+ measured", re.IGNORECASE)
+"""Columns of the sink `csv` that are no joints."""
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 
 
@@ -32,6 +35,8 @@ class JointAngles:
     pelvis: Array
     """Where the pelvis is, z up [m], shape (n, 3); NaN where nobody says."""
     findings: tuple[Finding, ...]
+    high: bool = False
+    """The joint values themselves say how high the pelvis is."""
 
 
 def from_storage(path: Path, *, file: str) -> JointAngles:
@@ -94,6 +99,12 @@ def from_table(path: Path, *, file: str) -> JointAngles:
     header, t, values = read_columns(path, file=file)
     names, units = [], []
     problems: list[Problem] = []
+    joints = [k for k, text in enumerate(header[1:]) if not OF_OUR_EXPORT.fullmatch(text)]
+    told: tuple[Finding, ...] = ()
+    if len(joints) < values.shape[1]:
+        text = f"{file}: tracking errors, and what was measured and what estimated, are not read"
+        told = (Finding(level="assumed", subject="", text=text),)
+        header, values = [header[0], *(header[1 + k] for k in joints)], values[:, joints]
     for text in header[1:]:
         plain = understand(text)
         name = text.partition("[")[0].partition("(")[0].strip().replace(" ", "_").lower()
@@ -109,7 +120,7 @@ def from_table(path: Path, *, file: str) -> JointAngles:
         problems.append(Problem(file, header[0][:60], "no time with a unit", "the first column is time [s]"))
     if problems:
         raise InputError(problems[:20])
-    return _of_names(names, units, t * TIMES[time.unit or "s"], values, (), file)
+    return _of_names(names, units, t * TIMES[time.unit or "s"], values, told, file)
 
 
 def _of_names(
@@ -143,4 +154,4 @@ def _of_names(
         f"{file}: {len(taken)} joints given; at 0: {', '.join(unseen[:12])}{' …' if len(unseen) > 12 else ''}"
     )
     findings = said if not unseen else (*said, Finding(level="assumed", subject="", text=text))
-    return JointAngles(t, q, np.full((len(t), 3), np.nan), findings)
+    return JointAngles(t, q, np.full((len(t), 3), np.nan), findings, JOINTS.index("pelvis_z") in taken)

@@ -50,6 +50,8 @@ class Points:
     """That the file states; empty when it does not."""
     up: str = ""
     """Axis that points up, as the file states it; empty when it does not."""
+    x_forward: bool = False
+    """With y up, x points forward in it, as in OpenSim."""
     wxyz: Array | None = None
     """Orientations in the file's axes, w first, shape (n, k, 4)."""
     confidence: Array | None = None
@@ -88,7 +90,7 @@ def recording(
         orientations=None if points.wxyz is None else points.wxyz[:, chosen],
         confidence=None if points.confidence is None else points.confidence[:, chosen],
         subjects=subject,
-    ).turned(transform(world_from_file(up)))
+    ).turned(transform(world_from_file(up, x_forward=points.x_forward)))
     frames, rate, found = checked(frames, file=reading.file, subject="")
     return Captured(
         layout=Layout(seen=seen, names=names, convention=reading.convention),

@@ -92,6 +92,7 @@ def read_points(path: Path, *, file: str) -> tuple[Points, tuple[Finding, ...]]:
         t=times,
         values=np.array(flat).reshape(len(times), len(names), 3),
         unit=head.get("Units", ""),
+        x_forward=True,
     )
     return points, _findings(head, points, file)
 
@@ -169,7 +170,7 @@ def written(
         t: [s], shape (n,), evenly spaced.
         positions: World, z up [m], shape (n, k, 3); NaN where not known.
         name: That the file states of itself.
-        up: Axis of the file that points up; OpenSim has y.
+        up: Axis of the file that points up; OpenSim has y, and x forward.
         unit: Of the file.
 
     Yields:
@@ -182,7 +183,7 @@ def written(
         raise ValueError(f"{positions.shape} positions of {len(names)} markers at {len(t)} instants")
     rate = 1 / float(np.median(np.diff(t)))
     yield from head(names, len(t), rate, name=name, unit=unit)
-    rows = cells(np.asarray(positions @ world_from_file(up)), unit=unit)
+    rows = cells(np.asarray(positions @ world_from_file(up, x_forward=True)), unit=unit)
     for number, (instant, row) in enumerate(zip(t.tolist(), rows, strict=True)):
         yield "\t".join([str(number + 1), f"{instant:.6f}", *row]) + "\n"
 

@@ -39,15 +39,20 @@ _TURNS = {
     "-y": np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
     "-x": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]),
 }
+_X_FORWARD = {
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    "-y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+}
 
 
-def world_from_file(up: str) -> Array:
+def world_from_file(up: str, *, x_forward: bool = False) -> Array:
     """Rotation into a world with z up, shape (3, 3).
 
     Args:
         up: Axis of the file that points up: ``z``, ``y``, ``-y`` …
+        x_forward: With y up, x stays x, as in OpenSim (x forward, y up, z right); else z becomes x.
     """
-    return np.array(_TURNS[up])
+    return np.array(_X_FORWARD.get(up, _TURNS[up]) if x_forward else _TURNS[up])
 
 
 # -- by the names of markers and joints ---------------------------------------------------------

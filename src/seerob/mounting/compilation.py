@@ -73,11 +73,11 @@ class _Compiler:
         self.cache = cache
         self.progress = progress
         self.folder = Path(station.folder)
-        self.mounting = Mounting()
+        self.file = next(iter(station.files), "workstation")
+        self.mounting = Mounting(self.file)
         self.problems: list[Problem] = []
         self.chains: dict[str, Chain] = {}
         self.carriers: dict[str, str] = {}
-        self.file = next(iter(station.files), "workstation")
         self.bound = Bound({}, {}, ())
 
     def run(self) -> Model:

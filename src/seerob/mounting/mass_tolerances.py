@@ -53,7 +53,7 @@ class MassTolerances:
         found: list[_Off] = []
         for table in station.robots:
             if table.name == robot.name:
-                links = [i for i, name in names.items() if name.startswith(f"{robot.name}/")]
+                links = [i for i, name in names.items() if name in robot.links]
                 found += _offs(table.name, links, 2, mass=table.mass_tolerance, com=table.com_tolerance)
         for thing in (*station.tools, *station.workpieces):
             bodies = [i for i, name in names.items() if name == thing.name]

@@ -12,6 +12,7 @@ import numpy as np
 from seerob.chains import couple, unknown_masses, unweighed_links
 from seerob.model import Body, Frame, Mechanism
 from seerob.model_io.description import Description, Link
+from seerob.model_io.lint import LIGHT
 from seerob.mounting.specification import Entry
 from seerob.transforms import Array
 
@@ -137,7 +138,17 @@ def mechanism(
         on=riders.above(name),
         riders=riders.of(name),
         holders=tuple(dict.fromkeys(b.holder for b in own_bodies if b.holder and b.holder != name)),
+        unseen=_unseen(mj, name, chain, bodies) if chain.role == "robot" else (),
     )
+
+
+def _unseen(mj: Any, name: str, chain: Chain, bodies: Sequence[Body]) -> tuple[str, ...]:
+    """Links with a mass that move, and with which nothing moves that has a shape."""
+    shown = {int(mj.body_weldid[body.mj]) for body in bodies if body.role != "area"}
+    heavy = (link for link in chain.description.links if link.inertial and link.inertial.mass > LIGHT)
+    names = (f"{name}/{link.name}" for link in heavy)
+    moved = {full: int(mj.body_weldid[_body_id(mj, full)]) for full in names}
+    return tuple(full for full, weld in moved.items() if weld and weld not in shown)
 
 
 def _body_id(mj: Any, name: str) -> int:

@@ -10,6 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from seerob.errors import InputError
 from seerob.geometry import Mesh, Solid
 from seerob.model_io import glb
 from seerob.model_io.description import Inertial, Joint, JointKind, Quantity
@@ -40,6 +41,8 @@ class Entry:
 class Mounting:
     """A MuJoCo specification under construction."""
 
+    file: str = "workstation"
+    """The workstation file, for messages."""
     spec: Any = field(default_factory=mujoco.MjSpec)
     entries: list[Entry] = field(default_factory=list)
     meshes: dict[str, bytes] = field(default_factory=dict)
@@ -62,7 +65,14 @@ class Mounting:
         self.spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 
     def body(self, name: str, parent: str | None, parent_from_body: Array) -> Any:
-        """Add a body; ``parent`` None is the world."""
+        """Add a body; ``parent`` None is the world.
+
+        Raises:
+            InputError: Another body has that name: a link, a bone, a piece of a part, MuJoCo's world.
+        """
+        if name in self._bodies or name == "world":
+            what = f"the name {name!r} is taken by another body"
+            raise InputError.at(self.file, "name", what, "choose another")
         above = self.spec.worldbody if parent is None else self._bodies[parent]
         added = above.add_body(
             name=name, pos=parent_from_body[:3, 3], quat=wxyz_from_rotation(parent_from_body[:3, :3])

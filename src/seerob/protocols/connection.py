@@ -148,7 +148,11 @@ async def _link(host: str, port: int) -> socket.socket:
     loop = asyncio.get_running_loop()
     refused: OSError = OSError(f"{host} has no address")
     for family, kind, _, _, address in await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM):
-        link = socket.socket(family, kind)
+        try:
+            link = socket.socket(family, kind)
+        except OSError as error:  # a family that this machine does without, IPv6 for one
+            refused = error
+            continue
         try:
             link.setblocking(False)
             link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -42,8 +42,8 @@ class Datagrams(asyncio.DatagramProtocol):
         strangers: Datagrams from other addresses than the one that is listened to.
     """
 
-    def __init__(self, sender: str | None, answer: Answer | None) -> None:
-        self._sender, self._answer = sender, answer
+    def __init__(self, senders: frozenset[str] | None, answer: Answer | None) -> None:
+        self._senders, self._answer = senders, answer
         self._loop = asyncio.get_running_loop()
         self._waiting: deque[Datagram] = deque(maxlen=WAITING)
         self._arrived = asyncio.Event()
@@ -86,7 +86,7 @@ class Datagrams(asyncio.DatagramProtocol):
         self._take(time.monotonic(), data, addr)
 
     def _take(self, arrived: float, data: bytes, sender: tuple[str | Any, int]) -> None:
-        if self._sender is not None and sender[0] != self._sender:
+        if self._senders is not None and plain(sender[0]) not in self._senders:
             self.strangers += 1
             return
         self.dropped += len(self._waiting) == WAITING
@@ -138,6 +138,11 @@ class Datagrams(asyncio.DatagramProtocol):
                     raise TimeoutError(f"nothing sent to port {self.port} for {silence:g} s") from error
 
 
+def plain(address: Any) -> str:
+    """An address as its sender calls it: IPv4 looks otherwise through a socket of IPv6."""
+    return str(address).lower().removeprefix("::ffff:")
+
+
 @asynccontextmanager
 async def listening(
     bind: str,
@@ -152,17 +157,21 @@ async def listening(
     Args:
         bind: Own address to listen on.
         port: 0 is any free one.
-        sender: Address whose datagrams count; anyone's when None.
+        sender: Name or address of whose datagrams count; anyone's when None.
         answer: Asked at once for each datagram that counts; must not raise.
         group: Multicast group to join, on the interface that has the address ``bind``.
 
     Raises:
-        OSError: The port is taken, or the address is not of this machine.
+        OSError: The port is taken, the address is not of this machine, or nobody knows the sender's name.
     """
     loop = asyncio.get_running_loop()
+    senders: frozenset[str] | None = None
+    if sender is not None:
+        known = await loop.getaddrinfo(sender, None, type=socket.SOCK_DGRAM)
+        senders = frozenset(plain(address[0]) for *_, address in known)
     (found, *_) = await loop.getaddrinfo(bind, port, type=socket.SOCK_DGRAM)
     link = _bound(found[0], found[4]) if group is None else _member(bind, port, group)
-    heard = Datagrams(sender, answer)
+    heard = Datagrams(senders, answer)
     try:
         loop.add_reader(link, heard.attach(link))
     except NotImplementedError:  # a loop of Windows

@@ -16,13 +16,15 @@ if TYPE_CHECKING:
 
 PATIENCE = 1.0
 """With each answer [s]."""
+BUSY = (5, 6)
+"""Exceptions that will pass: what was refused so is there."""
+TRIES, PAUSE = 5, 0.02
+"""How often a busy device is asked, and how long it is left alone meanwhile [s]."""
 EXCEPTIONS = {
     1: "the device does not know the function",
     2: "the device has no such register",
     3: "the device refuses the number of registers",
     4: "the device failed to read it",
-    5: "the device needs longer to answer",
-    6: "the device is busy",
     10: "the gateway has no way to the device",
     11: "the device behind the gateway does not answer",
 }
@@ -63,7 +65,13 @@ class Device:
             Table.DISCRETE: self._client.read_discrete_inputs,
         }[block.table]
         try:
-            answer = await ask(block.first, count=block.count, device_id=self._number)
+            for _ in range(TRIES):
+                answer = await ask(block.first, count=block.count, device_id=self._number)
+                if getattr(answer, "exception_code", 0) not in BUSY:
+                    break
+                await asyncio.sleep(PAUSE)
+            else:
+                raise TimeoutError(f"busy {TRIES} times in a row")
         except ConnectionException as error:
             raise ConnectionError("the device closed the connection") from error
         except ModbusException as error:

@@ -23,6 +23,7 @@ from msgspec import Meta
 
 from seerob.errors import InputError, SeerobError
 from seerob.protocols import ProtocolError
+from seerob.protocols.opcua_address import Address, browse_name, node_name
 from seerob.protocols.opcua_link import hang_up, hung_up_on_failure
 from seerob.protocols.opcua_units import unit
 from seerob.protocols.plain_cancel import plainly_cancelled
@@ -30,6 +31,7 @@ from seerob.protocols.plain_cancel import plainly_cancelled
 if TYPE_CHECKING:
     from asyncua.client.client import Client
     from asyncua.common.node import Node
+    from asyncua.ua import NodeId, QualifiedName
 
 PATIENCE = 2.0
 """With each answer [s]."""
@@ -81,29 +83,6 @@ class Said(NamedTuple):
     """By its own stamps [s]."""
     stamp: float | None
     """Source's time [s since 1970]."""
-
-
-class Address(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A path of browse names from the server's Objects folder."""
-
-    browse: Annotated[tuple[str, ...], Meta(min_length=1, max_length=50)]
-    """Each ``namespace-uri|name``, or ``name`` for the standard's own."""
-
-
-def address(raw: object) -> str | Address:
-    """Where a variable is: ``nsu=uri;s=DB.speed``, ``ns=2;i=7``, or ``{ browse = [...] }``.
-
-    Raises:
-        ValueError: It cannot be understood.
-    """
-    if isinstance(raw, str):
-        parts = raw.split(";")
-        if not any(p[:2] in ("s=", "i=", "g=", "b=") for p in parts):
-            raise ValueError('write "nsu=urn:…;s=name", "ns=2;i=7" or { browse = ["urn:…|Folder", …] }')
-        return raw
-    if isinstance(raw, dict):
-        return msgspec.convert(raw, Address)
-    raise ValueError(f"{raw!r} is neither a node id nor a path of browse names")
 
 
 def needed() -> None:
@@ -234,16 +213,16 @@ async def find(client: Client, where: str | Address) -> Node:
         ) from error
 
 
-async def _node_id(client: Client, text: str) -> str:
-    first, _, rest = text.partition(";")
-    if not first.startswith("nsu="):
-        return text
-    return f"ns={await _namespace(client, first.removeprefix('nsu='))};{rest}"
+async def _node_id(client: Client, text: str) -> NodeId:
+    name = node_name(text)
+    return name.node_id(await _namespace(client, name.uri) if name.uri else name.number)
 
 
-async def _browse_name(client: Client, text: str) -> str:
-    uri, bar, name = text.rpartition("|")
-    return f"{await _namespace(client, uri) if bar else 0}:{name}"
+async def _browse_name(client: Client, text: str) -> QualifiedName:
+    from asyncua import ua
+
+    uri, name = browse_name(text)
+    return ua.QualifiedName(name, ua.Int16(await _namespace(client, uri) if uri else 0))
 
 
 async def _namespace(client: Client, uri: str) -> int:

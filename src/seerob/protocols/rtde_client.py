@@ -35,6 +35,8 @@ ANSWER_WITHIN = 2.0
 """Of each request [s]."""
 SILENCE = 1.0
 """Longest pause in the data before the connection is taken for dead [s]."""
+CB3_RATE = 125.0
+"""The most that a CB3 controller sends [Hz]: asked for more, some refuse."""
 TALK = 64
 """Packages that may come before an answer: text messages, data of another recipe."""
 
@@ -139,6 +141,11 @@ class _Stream:
                 raise ProtocolError(f"closed the connection instead of answering {type(request).__name__}")
 
 
+def is_cb3(controller: ControllerVersion | None) -> bool:
+    """Whether it is of the generation before the e-Series."""
+    return controller is not None and controller.major < 5
+
+
 async def _set_up(stream: _Stream, fields: tuple[str, ...], frequency: float) -> Session:
     said = list(await stream.ask(VersionRequest(2), Kind.VERSION))
     if said[-1] != Accepted(Kind.VERSION, accepted=True):
@@ -148,6 +155,8 @@ async def _set_up(stream: _Stream, fields: tuple[str, ...], frequency: float) ->
     answer = (await stream.ask(ControllerRequest(), Kind.CONTROLLER))[-1]
     if isinstance(answer, ControllerVersion):
         controller = answer
+    if is_cb3(controller):
+        frequency = min(frequency, CB3_RATE)
     recipe, missing = await _agree(stream, fields, frequency)
     (*_, started) = await stream.ask(StartRequest(), Kind.START)
     if started != Accepted(Kind.START, accepted=True):

@@ -197,6 +197,11 @@ class Node:
     seq: int | None = None
     lost: int = 0
     """Messages that were missed."""
+    _born: Value = None
+    """Number of the connection that its birth told."""
+    _questioned: bool = False
+    """Whether the death of another connection was heard: of one before this one, which a broker gives up long
+    after it broke. Whether the node lives, its next message says."""
     _known: dict[int, tuple[str, str, int | None]] = field(default_factory=dict)
     """Alias → speaker, name, type."""
     _types: dict[tuple[str, str], int | None] = field(default_factory=dict)
@@ -210,11 +215,15 @@ class Node:
         have been a birth.
         """
         if where.kind is Kind.NODE_DEATH:
+            died = _session(payload)
+            self._questioned = self.alive and None not in (died, self._born) and died != self._born
             self.alive = False
-            self.values.clear()
+            if not self._questioned:
+                self.values.clear()
             return True
         if where.kind is Kind.NODE_BIRTH:
-            self.alive, self.seq = True, payload.seq
+            self.alive, self.seq, self._born = True, payload.seq, _session(payload)
+            self._questioned = False
             self._known.clear()
             self._types.clear()
             self.values.clear()
@@ -224,12 +233,15 @@ class Node:
             return False
         if where.kind is Kind.DEVICE_DEATH:
             self.values = {key: v for key, v in self.values.items() if key[0] != where.speaker}
+            self._known = {alias: told for alias, told in self._known.items() if told[0] != where.speaker}
             return True
         if where.kind in (Kind.NODE_BIRTH, Kind.DEVICE_BIRTH):
             self._learn(where.speaker, payload.metrics)
         return self._hear(where.speaker, payload)
 
     def _follows(self, seq: int | None) -> bool:
+        if self._questioned and seq is not None:
+            self.alive, self._questioned = True, False
         if not self.alive:
             return False
         if seq is None:
@@ -262,3 +274,8 @@ class Node:
                 _, name, kind = known
             self.values[speaker, name] = typed(m, kind), m.time if m.time is not None else payload.time
         return understood
+
+
+def _session(payload: Payload) -> Value:
+    """Number of the connection that a birth or death is of; None when it does not say."""
+    return next((m.value for m in payload.metrics if m.name == "bdSeq"), None)

@@ -7,6 +7,7 @@ folder) is kept below `OUTSIDE`, to be looked at and compared: nothing finds it 
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
@@ -46,10 +47,16 @@ def filed(
 
 SOURCES = f"{OUTSIDE}/sources/"
 """Below it, files of sources that lie outside the folder: replaying needs samples, not these."""
+LARGEST = 64 * 2**20
+"""A file of a source that is larger [B] is not kept, only its hash: bags with pictures have gigabytes."""
+MOST = 1000
+"""Files of a folder, such as a bag of ROS 2, whose hashes are kept."""
 
 
 def source_files(references: Iterable[str], *, folder: Path) -> dict[str, bytes]:
     """Trajectories and motions that the sources of a workstation name, as far as they are files.
+
+    Of a folder and of a large file there are only hashes, in the words of ``sha256sum``.
 
     Args:
         references: What the workstation file calls them; ``library:walk`` is no file.
@@ -58,13 +65,28 @@ def source_files(references: Iterable[str], *, folder: Path) -> dict[str, bytes]
     found: dict[str, bytes] = {}
     for reference in references:
         path = folder / reference
+        inside = _inside(PurePosixPath(os.path.relpath(path, folder).replace(os.sep, "/")))
+        outside, hashes = SOURCES + path.name, f"{SOURCES}{path.name}.sha256"
         try:
-            content = path.read_bytes()
+            if path.is_dir() or (path.is_file() and path.stat().st_size > LARGEST):
+                found[hashes] = _hashes(path)
+            elif path.is_file():
+                found[outside if inside is None else inside] = path.read_bytes()
+            else:  # in what was unpacked from a recording; else opening the source has said so
+                kept = next((name for name in (outside, hashes) if (folder / name).is_file()), None)
+                found |= {} if kept is None else {kept: (folder / kept).read_bytes()}
         except OSError:
             continue  # opening the source has said so, or says so better
-        name = _inside(PurePosixPath(os.path.relpath(path, folder).replace(os.sep, "/")))
-        found[name if name is not None else SOURCES + path.name] = content
     return found
+
+
+def _hashes(path: Path) -> bytes:
+    lines = []
+    for part in sorted(p for p in path.rglob("*") if p.is_file())[:MOST] if path.is_dir() else [path]:
+        with part.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        lines.append(f"{digest}  {part.relative_to(path.parent).as_posix()}\n")
+    return "".join(lines).encode()
 
 
 def _candidates(

@@ -44,6 +44,8 @@ class Worst(NamedTuple):
     """Why UNDECIDED, or what governs."""
     part: str
     """The part whose verdict this is; empty when no part has it."""
+    interval: tuple[float, float] | None = None
+    """Where the true value lies, given the tolerances of the inputs; of a whole criterion only."""
 
 
 class Spread(NamedTuple):
@@ -103,6 +105,7 @@ class WorstTracker:
             result.verdict,
             result.reason,
             part,
+            result.interval,
         )
         return True
 

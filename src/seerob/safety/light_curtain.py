@@ -36,6 +36,7 @@ class LightCurtain(Criterion, frozen=True, kw_only=True):
     """Whether a light curtain is interrupted, by which body, and whether one reaches through unseen."""
 
     unit: ClassVar[str] = "m"
+    by_shape: ClassVar[bool] = True
     at_most: ClassVar[bool] = False
 
     sensor: str

@@ -27,6 +27,7 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
     """Least distance between two sets of bodies, exact on their non-convex shapes."""
 
     unit: ClassVar[str] = "m"
+    by_shape: ClassVar[bool] = True
     at_most: ClassVar[bool] = False
 
     between: tuple[str, str]

@@ -18,6 +18,7 @@ from seerob.contact import shape as contact_shape
 from seerob.contact.areas import NOT_MODELLED, area_results, margin
 from seerob.contact.clamped_regions import Clamping, floor_input
 from seerob.contact.drawn import ContactMarkers
+from seerob.contact.given import given_contacts
 from seerob.contact.impact_mass import masses_along_motion, moving_masses, simplified_mass
 from seerob.contact.limits import Judged
 from seerob.contact.regions import REGIONS, Person, without_limit
@@ -55,6 +56,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     """Power and force limiting: speed of every moving part against what each body region may be hit with."""
 
     unit: ClassVar[str] = "m/s"
+    by_shape: ClassVar[bool] = True
 
     robot: str
     """The robot, with its tools and workpieces."""
@@ -116,7 +118,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
             UnknownName: A part that the robot does not move.
         """
         moving = model.robot(self.robot).moving
-        radii = self._by_body(model, self.contact_radius)
+        radii, _ = self._contacts(model)
         known = contact_shape.body_shape
         return [
             contact_shape.round_shape(radii[i]) if i in radii else known(model.bodies[i].solids)
@@ -129,7 +131,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         Free and clamped; see `contact_limits.RegionArrays.pressure_force`.
         """
         moving = model.robot(self.robot).moving
-        given = self._by_body(model, self.contact_area)
+        _, given = self._contacts(model)
         found = [arrays.pressure_force(shape, self.largest_area) for shape in self.shapes(model)]
         for row, body in enumerate(moving):
             if body in given:
@@ -138,18 +140,12 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
 
     def given_contacts(self, model: Model) -> frozenset[int]:
         """Bodies of which the file says how they touch."""
-        return frozenset(self._by_body(model, {**self.contact_radius, **self.contact_area}))
+        radii, areas = self._contacts(model)
+        return frozenset({*radii, *areas})
 
-    def _by_body(self, model: Model, given: dict[str, float]) -> dict[int, float]:
-        moving = model.robot(self.robot).moving
-        found: dict[int, float] = {}
-        for name, value in given.items():
-            bodies = [i for i in model.select(name) if i in moving]
-            if not bodies:
-                known = [model.bodies[i].name for i in moving]
-                raise UnknownName(f"moving part of {self.robot}", name, known)
-            found |= dict.fromkeys(bodies, value)
-        return found
+    def _contacts(self, model: Model) -> tuple[dict[int, float], dict[int, float]]:
+        """Radii [m] and areas [m²] that the file gives, by moving body."""
+        return given_contacts(model, model.robot(self.robot), self.contact_radius, self.contact_area)
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
@@ -207,7 +203,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         found += [provenance.given(key, share, "") for key, share in tolerances.items() if share]
         if self.person_speed is not None:
             found.append(provenance.given("person_speed", self.person_speed, "m/s"))
-        radii, areas = self._by_body(model, self.contact_radius), self._by_body(model, self.contact_area)
+        radii, areas = self._contacts(model)
         return (
             *found,
             *(

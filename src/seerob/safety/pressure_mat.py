@@ -15,6 +15,7 @@ class PressureMat(Criterion, frozen=True, kw_only=True):
     """Whether somebody stands on a pressure-sensitive mat, and how far they walked on it."""
 
     unit: ClassVar[str] = "m"
+    by_shape: ClassVar[bool] = True
     at_most: ClassVar[bool] = False
 
     sensor: str

@@ -42,6 +42,7 @@ class ScannerField(Criterion, frozen=True, kw_only=True):
     """Whether a laser scanner's field is entered, by which body, and whether the scanner sees it."""
 
     unit: ClassVar[str] = "m"
+    by_shape: ClassVar[bool] = True
     at_most: ClassVar[bool] = False
 
     sensor: str

@@ -56,6 +56,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
     """Speed and separation monitoring: every moving part of the robot against every part of the person."""
 
     unit: ClassVar[str] = "m"
+    by_shape: ClassVar[bool] = True
     at_most: ClassVar[bool] = False
 
     between: tuple[str, str]

@@ -24,6 +24,7 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
     """Volume that a set has swept so far; no voxel that any of its points crossed is missing."""
 
     unit: ClassVar[str] = "m³"
+    by_shape: ClassVar[bool] = True
 
     of: str
     """What sweeps: a robot with everything on it, a tool, a human, a link; wildcards allowed."""
@@ -111,6 +112,8 @@ class _Way:
         if self._t is not None and state.t <= self._t:
             self.sweep.clear()
             self.unheard, self._t, self._drawn = [], None, None
+        # What a gripper holds is where it was taken, not where the file has it in the hand.
+        self.sweep.moving.mj = state.model.mj
         try:
             if self._t is None or state.t - self._t > 1.5 * self.period:
                 if self._t is not None:

@@ -41,6 +41,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
     """Speed of a point of a robot or person, or of the fastest point of a set of bodies."""
 
     unit: ClassVar[str] = "m/s"
+    by_shape: ClassVar[bool] = True
 
     at: str | None = None
     """Point: a robot (its tool's working point) or the full name of a link."""
@@ -58,6 +59,10 @@ class Velocity(Criterion, frozen=True, kw_only=True):
     def subjects(self) -> tuple[str, ...]:
         """The point or the set."""
         return (self.at or self.of or "",)
+
+    def unseen(self, model: Model) -> str:
+        """See `Criterion.unseen`; a point needs no shape."""
+        return super().unseen(model) if self.of else ""
 
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""

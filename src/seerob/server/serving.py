@@ -23,6 +23,7 @@ from seerob.server.client import Closing
 from seerob.server.connection import WholeBinaryFrames
 from seerob.server.door import Door, is_address, is_loopback
 from seerob.server.feed import Feed
+from seerob.server.http_connection import PromptRequests
 from seerob.server.hub import PATIENCE, Hub
 from seerob.server.page import FOLDER
 from seerob.snapshot import Scene
@@ -159,7 +160,8 @@ class Server:
         config = uvicorn.Config(
             self._app,
             loop="asyncio",
-            http="h11",
+            http=PromptRequests,
+            backlog=64,  # so many are accepted before one that is too many can be cut
             ws=WholeBinaryFrames,
             ws_max_size=LARGEST_MESSAGE,
             ws_ping_interval=5.0,

@@ -32,8 +32,12 @@ class AtEnd(Closing):
         # Whoever interrupts a run a second time does not want to wait for this.
         if kind is not None and issubclass(kind, KeyboardInterrupt):
             self.abandon()
-        else:
+            return
+        try:
             self.close()
+        except KeyboardInterrupt:
+            self.abandon()
+            raise
 
     def _tell(self, done: int, total: int) -> None:
         if self.progress is not None:

@@ -9,6 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, TYPE_CHECKING
 
+from seerob.whole_file import hidden_folder
+
 if TYPE_CHECKING:
     from xlsxwriter import Workbook
 
@@ -29,8 +31,8 @@ def book(file: IO[bytes] | Path) -> Iterator[Workbook]:
         OSError: The disk refuses.
     """
     if isinstance(file, Path):
-        with TemporaryDirectory(dir=file.parent, prefix=f".{file.name}.") as folder, file.open("wb") as out:
-            yield from _written(out, folder)
+        with hidden_folder(file) as beside, file.open("wb") as out:
+            yield from _written(out, str(beside))
     else:
         with TemporaryDirectory() as folder:
             yield from _written(file, folder)

@@ -6,7 +6,7 @@ import hashlib
 
 from seerob.figures import figure
 from seerob.sinks._bone_errors import bones_told
-from seerob.sinks._html import Html, joined, table, tag
+from seerob.sinks._html import Html, joined, table, tag, whole
 from seerob.sinks._report import DOUBTFUL, WHO, Report, input_row
 from seerob.sinks._sentences import number
 from seerob.sinks._setup import UNKNOWN, Setup
@@ -20,7 +20,7 @@ def assumed(report: Report) -> Html:
         mark = {"note": "note", "assumed": "! assumed", "warning": "! warning"}.get(
             finding.level, finding.level
         )
-        rows.append([finding.subject, mark, finding.text])
+        rows.append([finding.subject, whole(mark), finding.text])
     doubts: list[list[str | Html]] = []
     for name, basis in report.bases.items():
         for item in basis.inputs:
@@ -95,7 +95,7 @@ def evaluated(report: Report) -> Html:
         for name, data in sorted(report.files.items())
     ]
     bodies = [
-        [node.name, node.role, number(node.mass, "kg"), WHO[node.mass_origin], node.note or "–"]
+        [node.name, whole(node.role), whole(number(node.mass, "kg")), WHO[node.mass_origin], node.note or "–"]
         for node in scene.nodes
     ]
     heads = ["source", "drives", "from", "what it is", "time-out", "at its end"]

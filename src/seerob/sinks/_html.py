@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from html import escape
 
-_NOT_TEXT = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
+_NOT_TEXT = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 _EMPTY = {"meta", "img", "br", "col"}
 
 
@@ -19,9 +19,14 @@ class Html(str):
 Content = str | Iterable["Content"] | None
 
 
+def legal(value: str) -> str:
+    """Characters that HTML forbids become �."""
+    return _NOT_TEXT.sub("\ufffd", value)
+
+
 def text(value: str) -> Html:
-    """Escaped text; characters that HTML forbids become �."""
-    return Html(escape(_NOT_TEXT.sub("\ufffd", value), quote=True))
+    """Escaped text, all of it `legal`."""
+    return Html(escape(legal(value), quote=True))
 
 
 def joined(content: Content) -> Html:
@@ -45,6 +50,11 @@ def tag(name: str, /, *content: Content, **attributes: str | None) -> Html:
     if name in _EMPTY:
         return Html(f"<{name}{written}>")
     return Html(f"<{name}{written}>{joined(content)}</{name}>")
+
+
+def whole(figure: str) -> Html:
+    """Words or a figure that are not broken between lines."""
+    return tag("span", figure, class_="whole")
 
 
 def table(head: Iterable[Content], rows: Iterable[Iterable[Content]], *, class_: str | None = None) -> Html:

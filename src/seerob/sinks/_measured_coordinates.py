@@ -10,6 +10,7 @@ import numpy as np
 
 from seerob.human.skeleton import JOINTS
 from seerob.motion_io import opensim_coordinates
+from seerob.sinks._sentences import percent
 from seerob.transforms import Array
 
 STEP = 1e-3
@@ -41,7 +42,7 @@ class EstimatedCoordinates:
 
     def lines(self) -> list[str]:
         """Remarks for the file's header; none when everything was measured, or no device saw the person."""
-        named = [f"{name} ({100 * n / self._rows:.0f} % of the rows)" for name, n in self._estimated.items()]
+        named = [f"{name} ({percent(n / self._rows)} of the rows)" for name, n in self._estimated.items()]
         out = [
             f"estimated, no device saw the bones: {', '.join(named[k : k + PER_LINE])}\n"
             for k in range(0, len(named), PER_LINE)

@@ -8,7 +8,7 @@ from seerob.results.series import Series
 from seerob.sinks import _plots
 from seerob.sinks._added import added
 from seerob.sinks._evidence import assumed, evaluated, not_covered
-from seerob.sinks._html import Html, joined, table, tag
+from seerob.sinks._html import Html, joined, table, tag, whole
 from seerob.sinks._page_style import STYLE
 from seerob.sinks._posture_safety import told
 from seerob.sinks._report import Report, badge, input_row
@@ -87,9 +87,9 @@ def _verdicts(report: Report) -> Html:
             [
                 link,
                 badge(series.verdict),
-                _whole(reached(worst, series)),
-                _whole(_limit(series)),
-                _whole(f"{worst.t:.2f} s"),
+                whole(reached(worst, series)),
+                whole(_limit(series)),
+                whole(f"{worst.t:.2f} s"),
                 percent(shares.get(Verdict.EXCEEDED, 0.0)),
                 percent(shares.get(Verdict.UNDECIDED, 0.0)),
                 worst.reason or worst.part,
@@ -121,11 +121,6 @@ def _verdicts(report: Report) -> Html:
 def _limit(series: Series) -> str:
     worst = series.worst()
     return "–" if worst.limit is None else ("≤ " if series.at_most else "≥ ") + bound(worst, series)
-
-
-def _whole(figure: str) -> Html:
-    """A figure that is not broken between lines."""
-    return tag("span", figure, class_="whole")
 
 
 def _criteria(report: Report) -> Html:
@@ -172,20 +167,21 @@ def _parts(series: Series) -> Html | None:
         return None
     rows = []
     for part in series.parts.values():
-        worst = part.worst()
-        share = percent(part.shares().get(Verdict.EXCEEDED, 0.0))
+        worst, shares = part.worst(), part.shares()
         rows.append(
             [
                 part.name,
                 badge(part.verdict),
-                _whole(extremum(worst, part)),
-                _whole(bound(worst, part)),
-                f"{worst.t:.2f} s",
-                share,
+                whole(extremum(worst, part)),
+                whole(bound(worst, part)),
+                whole(f"{worst.t:.2f} s"),
+                percent(shares.get(Verdict.EXCEEDED, 0.0)),
+                percent(shares.get(Verdict.UNDECIDED, 0.0)),
             ]
         )
-    head = ["part", "verdict", "worst value", "limit", "at", "exceeded"]
-    return joined([tag("h4", "By part"), table(head, rows)])
+    head = ["part", "verdict", "worst value", "limit", "at", "exceeded", "undecided"]
+    text = "Shares are of the ticks in which the part was spoken of."
+    return joined([tag("h4", "By part"), table(head, rows), tag("p", text, class_="lead")])
 
 
 def _basis(basis: Basis | None) -> Html:

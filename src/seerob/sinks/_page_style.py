@@ -24,7 +24,8 @@ th, td {{ text-align: left; vertical-align: top; padding: .32rem .6rem; border-b
   font-variant-numeric: tabular-nums; font-weight: normal; }}
 thead th {{ font-weight: 600; color: var(--soft); border-bottom: 1.5px solid var(--ink);
   white-space: nowrap; }}
-tbody th {{ font-weight: 600; }}
+tbody th {{ font-weight: 600; min-width: 7rem; }}
+.instants tbody th {{ min-width: 0; }}
 td {{ min-width: 4.6rem; }}
 .overview tbody th {{ min-width: 9.5rem; }}
 .overview td:last-child {{ min-width: 9rem; }}

@@ -12,6 +12,7 @@ from seerob.sinks._canvas import Canvas, Color, font, png, words
 from seerob.sinks._close_up import close_up, inset
 from seerob.sinks._marker_shapes import draw_marker, label_of, points_of
 from seerob.sinks._palette import DARK, FILL
+from seerob.sinks._sentences import shortened
 from seerob.sinks._stage_bodies import MOVERS, poses, read_bodies
 from seerob.sinks._viewpoint import best_view, scattered
 from seerob.snapshot import Finding, Highlight, Result, Scene, Segment, Snapshot, Verdict
@@ -24,6 +25,8 @@ _CLEAREST, _LIT = 0.14, 0.3
 """Greatest opacity of what a mesh calls translucent, as a bystander and highlighted: what is behind it
 must stay readable."""
 _MOST_EDGES = 400
+_LONGEST = 48
+"""Characters of a label."""
 
 
 class Stage:
@@ -170,7 +173,7 @@ class Stage:
             screen, inverse = camera.project(np.array([at, *points_of(marker)]))
             if not text or inverse[0] <= 0:
                 continue
-            text = text if len(text) <= 48 else text[:47] + "…"
+            text = shortened(text, _LONGEST)
             half = draw.textlength(text, type_) / 2 + 6
             # Above a line, not on it.
             top = screen[inverse > 0, 1].min() if isinstance(marker, Segment) else screen[0, 1]

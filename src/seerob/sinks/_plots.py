@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Sequence
 from io import StringIO
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from seerob.results.series import CODES, Series
-from seerob.sinks._html import Html
+from seerob.sinks._html import Html, legal, text
 from seerob.sinks._palette import DARK_HEX, HEX, MARK, WORD
 from seerob.snapshot import Verdict
 
@@ -131,16 +132,17 @@ def merged(spans: Sequence[tuple[float, float]], gap: float) -> list[tuple[float
 def svg(figure: Figure, title: str) -> Html:
     """The drawing as an ``<svg>`` element without prologue, metadata and namespaces."""
     out = StringIO()
-    figure.savefig(out, format="svg", metadata={"Date": None})
-    drawing = out.getvalue()
+    with warnings.catch_warnings():
+        # Words stay words in the drawing: the fonts of who reads it count, not matplotlib's.
+        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
+        figure.savefig(out, format="svg", metadata={"Date": None})
+    drawing = legal(out.getvalue())
     drawing = drawing[drawing.index("<svg") :]
     drawing = re.sub(r"<metadata>.*?</metadata>", "", drawing, flags=re.DOTALL)
     drawing = re.sub(r' xmlns(:\w+)?="[^"]*"', "", drawing)
     drawing = re.sub(r'(<svg[^>]*?) (?:width|height)="[^"]*pt"', r"\1", drawing)
     drawing = re.sub(r'(<svg[^>]*?) (?:width|height)="[^"]*pt"', r"\1", drawing)
-    from html import escape
-
-    return Html(drawing.replace("<svg", f'<svg role="img" aria-label="{escape(title, quote=True)}"', 1))
+    return Html(drawing.replace("<svg", f'<svg role="img" aria-label="{text(title)}"', 1))
 
 
 def _bands(axes: Axes, series: Series, verdict: Verdict, span: float) -> None:

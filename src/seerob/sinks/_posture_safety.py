@@ -15,7 +15,7 @@ from seerob.figures import figure
 from seerob.human.body_area import area_in
 from seerob.results.result_log import ResultLog
 from seerob.results.series import CODES, Series
-from seerob.sinks._html import Html, joined, table, tag
+from seerob.sinks._html import Html, joined, table, tag, whole
 from seerob.sinks._palette import WORD
 from seerob.snapshot import CriterionInfo, Scene
 from seerob.transforms import Array
@@ -142,7 +142,10 @@ def told(scene: Scene, log: ResultLog) -> Html | None:
     parts = []
     for one in sides(scene, log):
         head_ = ["at", *(s.name for s in one.scores), *(s.name for s in one.measures), "where"]
-        parts += [tag("h3", one.person), table(head_, [_line(one, row) for row in worst_rows(one)])]
+        parts += [
+            tag("h3", one.person),
+            table(head_, [_line(one, row) for row in worst_rows(one)], class_="instants"),
+        ]
     if not parts:
         return None
     text = (
@@ -154,7 +157,7 @@ def told(scene: Scene, log: ResultLog) -> Html | None:
 
 def _line(one: Sides, row: list[Cell]) -> list[str | Html]:
     n = len(one.scores)
-    cells: list[str | Html] = [f"{row[1]:.2f} s"]
+    cells: list[str | Html] = [whole(f"{row[1]:.2f} s")]
     cells += [_figure(value, "") for value in row[2 : 2 + n]]
     places: dict[str, None] = {}
     for series, k in zip(one.measures, range(2 + n, len(row), 5), strict=True):

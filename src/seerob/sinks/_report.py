@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from seerob.report_section import ReportSection
 from seerob.results.result_log import ResultLog
-from seerob.sinks._html import Html, tag
+from seerob.sinks._html import Html, tag, whole
 from seerob.sinks._palette import MARK, WORD
 from seerob.sinks._sentences import number
 from seerob.sinks._setup import Setup
@@ -56,12 +56,10 @@ def badge(verdict: Verdict | None) -> Html:
 
 
 def input_row(item: Input) -> list[str | Html]:
-    value: str | Html = (
-        item.value
-        if isinstance(item.value, str)
-        else tag("span", number(item.value, item.unit), class_="whole")
-    )
+    value: str | Html = item.value if isinstance(item.value, str) else whole(number(item.value, item.unit))
     origin = (
-        tag("span", f"! {WHO[item.origin]}", class_="doubt") if item.origin in DOUBTFUL else WHO[item.origin]
+        tag("span", f"! {WHO[item.origin]}", class_="doubt whole")
+        if item.origin in DOUBTFUL
+        else WHO[item.origin]
     )
     return [item.name, value, origin, item.source or "–"]

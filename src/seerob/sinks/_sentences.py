@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 
-from seerob.figures import against, figure, margin, with_unit
+from seerob.figures import against, between, figure, margin, with_unit
 from seerob.results.result_log import ResultLog
 from seerob.results.series import CODES, Series, Worst
 from seerob.snapshot import Verdict
@@ -60,6 +60,12 @@ def bound(worst: Worst, series: Series) -> str:
     return with_unit(
         against(worst.value, worst.limit, series.unit, at_most=series.at_most).limit, series.unit
     )
+
+
+def shortened(text: str, most: int) -> str:
+    """A text of at most so many characters: what is left out is in its middle, its end often is a figure."""
+    end = (most - 1) // 2
+    return text if len(text) <= most else f"{text[: most - 1 - end]}…{text[len(text) - end :]}"
 
 
 def percent(share: float) -> str:
@@ -122,16 +128,17 @@ def about(series: Series) -> list[str]:
     worst, shares = series.worst(), series.shares()
     said = []
     if share := shares.get(Verdict.EXCEEDED):
-        stretches = series.intervals()
         beyond = "above" if series.at_most else "below"
         said.append(
-            f"The value was {beyond} the limit in {percent(share)} of the evaluated ticks, in "
-            f"{counted(len(stretches), 'stretch', 'stretches')}; the longest lasted "
-            f"{figure(max(b - a for a, b in stretches), 's')}."
+            f"The value was {beyond} the limit in {percent(share)} of the evaluated ticks, "
+            f"{_stretches(series, Verdict.EXCEEDED)}."
         )
         said.append(f"Worst at {worst.t:.2f} s: {reached(worst, series)}{_against(series)}.")
     if share := shares.get(Verdict.UNDECIDED):
-        said.append(f"In {percent(share)} of the evaluated ticks nothing can be said. {_reasons(series)}")
+        said.append(
+            f"In {percent(share)} of the evaluated ticks nothing can be said, "
+            f"{_stretches(series, Verdict.UNDECIDED)}. {_reasons(series)}"
+        )
     if series.verdict is Verdict.WITHIN:
         said.append(
             f"Within the limit throughout. Closest to it at {worst.t:.2f} s: {reached(worst, series)}"
@@ -140,11 +147,20 @@ def about(series: Series) -> list[str]:
     if series.verdict is None:
         extreme = "Largest" if series.at_most else "Smallest"
         said.append(f"No limit was given. {extreme} value {reached(worst, series)} at {worst.t:.2f} s.")
+    if worst.interval is not None and worst.value is not None:
+        there = between(*worst.interval, series.unit)
+        said.append(f"Given the tolerances of the inputs, the true value there is between {there}.")
     if worst.verdict is not Verdict.UNDECIDED and (worst.reason or worst.part):
         governs = worst.reason or worst.part
         extra = f" ({worst.part})" if worst.part and worst.part not in governs else ""
         said.append(f"What governs there: {governs}{extra}.")
     return said
+
+
+def _stretches(series: Series, verdict: Verdict) -> str:
+    found = series.intervals(verdict)
+    longest = figure(max(b - a for a, b in found), "s")
+    return f"in {counted(len(found), 'stretch', 'stretches')}; the longest lasted {longest}"
 
 
 def _against(series: Series) -> str:

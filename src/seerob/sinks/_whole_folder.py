@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 import shutil
+import weakref
 from collections.abc import Callable
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import TypeVar
 
 from seerob.errors import InputError, SeerobError
@@ -14,6 +14,7 @@ from seerob.samples import Sample
 from seerob.sinks._at_end import AtEnd
 from seerob.sinks._growing_table import GrowingTable
 from seerob.snapshot import Snapshot
+from seerob.whole_file import hidden_beside
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 """Of such a folder."""
@@ -48,6 +49,7 @@ class WholeFolder(AtEnd):
         self.tables: dict[str, GrowingTable] = {}
         """By file name without its suffix."""
         self._hidden: Path | None = None
+        self._forgotten: weakref.finalize[..., WholeFolder] | None = None
         self._error: OSError | None = None
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
@@ -93,7 +95,10 @@ class WholeFolder(AtEnd):
 
     def _folder(self) -> Path:
         if self._hidden is None:
-            self._hidden = Path(mkdtemp(dir=self.path.parent, prefix=f".{self.path.name}."))
+            self._hidden = hidden_beside(self.path)
+            # Nobody closes what was interrupted between two statements.
+            self._forgotten = weakref.finalize(self, shutil.rmtree, self._hidden, ignore_errors=True)
+            self._hidden.mkdir()
         return self._hidden
 
     def close(self) -> None:
@@ -107,9 +112,8 @@ class WholeFolder(AtEnd):
                 raise self._error
             folder = self._folder()
             self.finish()
-            folder.chmod(0o755)
             folder.rename(self.path)
-            self._hidden = None
+            self._there()
         except OSError as error:
             what = f"cannot be written: {error.strerror or error}"
             remedy = "make room, or give a folder that may be written"
@@ -123,4 +127,9 @@ class WholeFolder(AtEnd):
             table.discard()
         if self._hidden is not None:
             shutil.rmtree(self._hidden, ignore_errors=True)
-            self._hidden = None
+            self._there()
+
+    def _there(self) -> None:
+        self._hidden = None
+        if self._forgotten is not None:
+            self._forgotten.detach()

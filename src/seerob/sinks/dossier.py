@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from datetime import datetime
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Annotated
 
 from msgspec import Meta
@@ -17,6 +16,7 @@ from seerob.samples import Sample
 from seerob.sink import Sink
 from seerob.sinks._at_end import AtEndWithResults
 from seerob.snapshot import Basis, Finding, Scene, Snapshot
+from seerob.whole_file import whole_file
 
 
 class Dossier(Sink, frozen=True, kw_only=True):
@@ -137,17 +137,10 @@ def write_whole(path: Path, data: bytes) -> None:
         InputError: The folder does not exist or may not be written.
     """
     try:
-        with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
-            temporary = Path(file.name)
-            try:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            except BaseException:
-                temporary.unlink(missing_ok=True)
-                raise
-        temporary.chmod(0o644)
-        temporary.replace(path)
+        with whole_file(path) as hidden, hidden.open("xb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
     except OSError as error:
         what = f"cannot be written: {error.strerror}"
         raise InputError.at(path, "", what, "give a folder that exists and may be written") from error

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator
 from pathlib import Path
-from tempfile import mkstemp
 from typing import Annotated, Literal
 
 from msgspec import Meta
@@ -25,6 +23,7 @@ from seerob.sinks._sheet_rows import Cell
 from seerob.sinks._sheets import workbook
 from seerob.sinks._time_shares import HEAD, time_rows
 from seerob.snapshot import Basis, Scene, Snapshot
+from seerob.whole_file import whole_file
 
 _VERDICT_OF = {code: verdict for verdict, code in CODES.items()}
 
@@ -104,15 +103,8 @@ class ExcelWriter(AtEndWithResults):
             InputError: It cannot be written.
         """
         try:
-            handle, name = mkstemp(dir=self.path.parent, prefix=f".{self.path.name}.")
-            os.close(handle)
-            temporary = Path(name)
-            try:
-                self._fill(temporary)
-                temporary.chmod(0o644)
-                temporary.replace(self.path)
-            finally:
-                temporary.unlink(missing_ok=True)
+            with whole_file(self.path) as hidden:
+                self._fill(hidden)
         except OSError as error:
             what = f"cannot be written: {error.strerror}"
             raise InputError.at(self.path, "", what, "close it in Excel, or give another folder") from error

@@ -12,12 +12,14 @@ from seerob.errors import InputError, Problem, UnknownName, suggestion
 from seerob.human import mapping as names
 from seerob.human.calibration import Calibrated, CalibrationPose, calibrate
 from seerob.human.captured import CaptureFrame, Layout
+from seerob.human.ends import bare, turned
 from seerob.human.estimated import estimated as without_neighbours
 from seerob.human.observing import Observer, bind, with_mounts, with_places, without_unplaced
 from seerob.human.skeleton import BONES
 from seerob.human.smoothing import HIGHEST, LOWEST, group_delay
 from seerob.model_io.description import Description
 from seerob.quantities import Pose, Seconds
+from seerob.samples import BodyPoint
 from seerob.snapshot import Finding
 from seerob.source import Target
 from seerob.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
@@ -211,6 +213,25 @@ def _given(
     return given, problems
 
 
+def _bare(bound: Observer, calibration: Calibration) -> frozenset[str]:
+    """Bones of which the joint will be seen at most, not where they point."""
+    mounted = calibration.pose is not CalibrationPose.NONE
+    points = [
+        BodyPoint(
+            name=row.name,
+            bone=row.bone,
+            at=(float(row.at[0]), float(row.at[1]), float(row.at[2])),
+            position=(0.0, 0.0, 0.0),
+            wxyz=(1.0, 0.0, 0.0, 0.0) if mounted or row.segment_from_bone is not None else None,
+            position_weight=row.position,
+            orientation_weight=row.orientation,
+        )
+        for row in bound.rows
+    ]
+    placed = {row.bone for row in bound.rows if row.position > 0}
+    return bare({row.bone for row in bound.rows}, placed, turned(points))
+
+
 def _told(layout: Layout, bound: Observer, subject: str, calibration: Calibration) -> Iterable[Finding]:
     """What is used, what is not, and which bones nobody measures."""
     used = {row.name for row in bound.rows}
@@ -224,7 +245,7 @@ def _told(layout: Layout, bound: Observer, subject: str, calibration: Calibratio
     if estimated:
         text = f"not measured but estimated from the bones beside them: {', '.join(estimated)}"
         yield Finding(level="assumed", subject=subject, text=text)
-    if unseen := without_neighbours({row.bone for row in bound.rows}):
+    if unseen := without_neighbours({row.bone for row in bound.rows}, _bare(bound, calibration)):
         text = f"no verdict rests on {', '.join(unseen)}: neither measured nor told by the bones beside them"
         yield Finding(level="warning", subject=subject, text=text)
     if calibration.pose is CalibrationPose.NONE:

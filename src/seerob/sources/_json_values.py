@@ -9,6 +9,10 @@ from seerob.protocols.json_pointer import at, parts
 
 MILLISECONDS = 1e11
 """A time above it is in milliseconds since 1970, below in seconds."""
+LATEST = 1e15
+"""No clock counts further [ms]: also what is not finite is no time."""
+AHEAD = 1.0
+"""Of clocks that differ by more nobody knows how old a value is [s]."""
 
 
 def told(document: Any, pointer: str, time: str | None, *, now: float) -> tuple[Any, float]:
@@ -22,13 +26,16 @@ def told(document: Any, pointer: str, time: str | None, *, now: float) -> tuple[
 
     Raises:
         KeyError: A pointer leads nowhere.
-        ValueError: What is said to be a time is none.
+        ValueError: What is said to be a time is none, or lies in the future.
     """
     value = at(document, parts(pointer))
     if time is None:
         return value, 0.0
-    # Of two clocks that differ nothing is known; what lies ahead is as new as can be.
-    return value, max(0.0, now - instant(at(document, parts(time))))
+    age = now - instant(at(document, parts(time)))
+    if age < -AHEAD:
+        what = f"its time is {-age:.3g} s ahead of this computer's clock, so nobody knows how old it is"
+        raise ValueError(f"{what}: set both clocks, or state the zone of a local time")
+    return value, max(0.0, age)
 
 
 def instant(value: Any) -> float:
@@ -40,6 +47,6 @@ def instant(value: Any) -> float:
     if isinstance(value, str):
         stamp = datetime.fromisoformat(value)
         return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < LATEST:
         raise ValueError(f"{str(value)[:40]!r} is no time")
     return 1e-3 * value if abs(value) > MILLISECONDS else float(value)

@@ -151,7 +151,7 @@ class Fri(LiveSource, frozen=True, kw_only=True):
     robot: str
     """The robot it drives."""
     host: str
-    """Address of the controller; what others send is not listened to."""
+    """Name or address of the controller; what others send is not listened to."""
     bind: str = "127.0.0.1"
     """Own address on the controller's network; when not given, only this machine itself is heard."""
     port: Annotated[int, Meta(ge=0, le=65535)] = fri.PORT

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +83,7 @@ class JointAngleFile(Source, frozen=True, kw_only=True):
         found = read(path, file=self.file)
         found, left_out = _usable(found, self.file)
         q, degraded, limits = _within(found.q, target, self.file)
-        q = self._placed(q, found.pelvis, target.description)
+        q = self._placed(q, found, target.description)
         qd = np.gradient(q, found.t, axis=0)
         t = found.t - found.t[0]
         return Opened(
@@ -92,15 +92,16 @@ class JointAngleFile(Source, frozen=True, kw_only=True):
             findings=about((*found.findings, *left_out, *limits), target.name),
         )
 
-    def _placed(self, q: Array, pelvis: Array, description: Description) -> Array:
+    def _placed(self, q: Array, found: JointAngles, description: Description) -> Array:
         """Joint values with the pelvis where the file says, from where it begins, and on the floor."""
+        pelvis = found.pelvis
         known = np.isfinite(pelvis).all()
         if known:
             _, positions = bone_poses(description, q)
             q[:, PLACE] += pelvis - positions[:, 0]
             # The laboratory's origin means nothing in the workstation: begin where the person stands.
             q[:, PLACE[:2]] -= q[0, PLACE[:2]]
-        return on_floor(description, q) if self.floor or not known else q
+        return on_floor(description, q) if self.floor or not (known or found.high) else q
 
 
 def _usable(found: JointAngles, file: str) -> tuple[JointAngles, tuple[Finding, ...]]:
@@ -119,7 +120,7 @@ def _usable(found: JointAngles, file: str) -> tuple[JointAngles, tuple[Finding, 
     if np.isfinite(pelvis).all() and np.abs(pelvis - pelvis[0]).max() > FAR:
         what = f"the pelvis moves {np.abs(pelvis - pelvis[0]).max():.4g} m"
         raise InputError.at(file, "pelvis_tx", what, "lengths are in m in this format")
-    return JointAngles(found.t[keep], found.q[keep], pelvis, found.findings), tuple(said)
+    return replace(found, t=found.t[keep], q=found.q[keep], pelvis=pelvis), tuple(said)
 
 
 def _within(q: Array, target: Target, file: str) -> tuple[Array, NDArray[np.bool_], tuple[Finding, ...]]:

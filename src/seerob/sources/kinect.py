@@ -14,7 +14,7 @@ from collections.abc import AsyncGenerator
 from contextlib import aclosing
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -51,6 +51,10 @@ class Link(StrEnum):
 
 class Kinect(CaptureStream, frozen=True, kw_only=True):
     """A depth camera that tracks bodies (Azure Kinect, Orbbec Femto), live, from a sender on its PC."""
+
+    asks: ClassVar[str] = (
+        "# at = { position = [x, y, z], rpy_deg = [roll, pitch, yaw] }   # where the camera stands and looks"
+    )
 
     link: Link = Link.UDP
     """``udp``: the sender sends to this machine; ``websocket``: this machine connects to the sender."""

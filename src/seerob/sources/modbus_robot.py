@@ -19,7 +19,7 @@ from msgspec.structs import replace
 from seerob.errors import InputError
 from seerob.live.listening import LiveSource
 from seerob.protocols import ProtocolError, modbus
-from seerob.protocols.modbus import Block
+from seerob.protocols.modbus import Block, blocks
 from seerob.protocols.modbus_client import Device, Refused, connect, take
 from seerob.protocols.modbus_map import SUFFIX, Joints, RegisterMap, load
 from seerob.quantities import Seconds
@@ -86,7 +86,14 @@ class ModbusRobot(LiveSource, frozen=True, kw_only=True):
         """Read everything once: what the controller has not is said."""
         found = load(self.map, Path())
         async with connect(self.host, self.port, self.device) as device:
-            values, refused = await _read(device, found, found.questions(), may_lack=True)
+            answers = await _understood(device, found)
+        values = {
+            name: value
+            for _, said in answers
+            if not isinstance(said, Refused)
+            for name, value in said.items()
+        }
+        refused = [(str(said), block) for block, said in answers if isinstance(said, Refused)]
         if "q0" not in values:
             what = f"has no joint positions in {found.position.table} registers from {found.position.at} on"
             raise InputError.at(f"modbus_robot {self.host}", "map", what, "is it this maker's controller?")
@@ -104,41 +111,51 @@ class ModbusRobot(LiveSource, frozen=True, kw_only=True):
     async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """A joint sample and the signals, at every question."""
         found = load(self.map, Path("" if target is None else target.folder))
-        questions = found.questions()
         clock = asyncio.get_running_loop()
         async with connect(self.host, self.port, self.device) as device:
-            _, refused = await _read(device, found, questions, may_lack=True)
-            lost = [block for _, block in refused]
-            questions = tuple(b for b in questions if b not in lost)
+            answers = await _understood(device, found)
+            questions = tuple(block for block, said in answers if not isinstance(said, Refused))
             due = clock.time()
             while True:
-                values, _ = await _read(device, found, questions, may_lack=False)
+                values: dict[str, int | float | bool] = {}
+                for block in questions:
+                    values |= await _read(device, found, block)
                 now = time.monotonic()
                 states, doubts = signals(found, values)
+                sample = joint_sample(found, values, states, target=self.robot, arrived=now)
                 yield SignalSample(source="", seq=0, t=now, values=states, doubts=doubts)
-                yield joint_sample(found, values, states, target=self.robot, arrived=now)
+                yield sample
                 # What was asked late is not made up for.
                 due = max(due + self.every, clock.time())
                 await asyncio.sleep(due - clock.time())
 
 
-async def _read(
-    device: Device, found: RegisterMap, questions: tuple[Block, ...], *, may_lack: bool
-) -> tuple[dict[str, int | float | bool], list[tuple[str, Block]]]:
-    """Values by name, and the blocks that the controller refuses."""
-    places = found.places()
-    values: dict[str, int | float | bool] = {}
-    refused: list[tuple[str, Block]] = []
-    for block in questions:
+async def _understood(
+    device: Device, found: RegisterMap
+) -> list[tuple[Block, dict[str, int | float | bool] | Refused]]:
+    """Every question once, with what it says, or why the controller refuses it.
+
+    Of a question with registers between the values that this controller may not have, only the values are
+    asked for.
+    """
+    waiting = list(found.questions())
+    answers: list[tuple[Block, dict[str, int | float | bool] | Refused]] = []
+    while waiting:
+        block = waiting.pop(0)
         try:
-            words = await device.block(block)
+            answers.append((block, await _read(device, found, block)))
         except Refused as error:
-            if not may_lack:
-                raise
-            refused.append((str(error), block))
-            continue
-        values |= take(block, words, {name: p for name, p in places.items() if block.covers(p)})
-    return values, refused
+            alone = blocks(place for place in found.places().values() if block.covers(place))
+            if alone == (block,):
+                answers.append((block, error))
+            waiting[:0] = () if alone == (block,) else alone
+    return answers
+
+
+async def _read(device: Device, found: RegisterMap, block: Block) -> dict[str, int | float | bool]:
+    """Values of one block, by name."""
+    wanted = {name: place for name, place in found.places().items() if block.covers(place)}
+    return take(block, await device.block(block), wanted)
 
 
 def joint_sample(

@@ -23,6 +23,7 @@ from seerob.source import Opened, Target
 from seerob.sources._access import missing_access
 from seerob.sources._json_values import told
 from seerob.sources._variables import BEAT, LONGEST_PULSE, PULSES, Change, Node, VariablesSource
+from seerob.tables.mapping import toml_value
 from seerob.variables.dictionary import Variable
 
 if TYPE_CHECKING:
@@ -302,9 +303,16 @@ def _metric(name: str, where: Metric, node: sparkplug.Node) -> Change:
 def _nodes(topic: str, payload: bytes) -> Iterator[Node]:
     where = sparkplug.topic(topic)
     if where is None:
-        yield Node(topic, "", "", payload[:40].decode("utf-8", "replace"))
+        # What begins like a table in a dictionary is written as one.
+        found = f"{{ topic = {toml_value(topic)} }}" if topic.startswith("{") else topic
+        yield Node(found, "", "", payload[:40].decode("utf-8", "replace"))
     elif where.kind in (sparkplug.Kind.NODE_BIRTH, sparkplug.Kind.DEVICE_BIRTH):
-        for m in sparkplug.decode(payload).metrics:
-            device = f', device = "{where.device}"' if where.device else ""
-            found = f'{{ node = "{where.group}/{where.node}"{device}, metric = "{m.name}" }}'
+        try:
+            metrics = sparkplug.decode(payload).metrics
+        except ProtocolError:
+            return  # one who speaks nonsense does not hide the others
+        device = f", device = {toml_value(where.device)}" if where.device else ""
+        whose = f"node = {toml_value(f'{where.group}/{where.node}')}{device}"
+        for m in metrics:
+            found = f"{{ {whose}, metric = {toml_value(m.name)} }}"
             yield Node(found, str(m.type), "", str(m.value)[:40])

@@ -11,11 +11,11 @@ from msgspec import Meta
 
 from seerob.errors import InputError, Problem
 from seerob.protocols import ProtocolError
+from seerob.protocols.opcua_address import address, written
 from seerob.protocols.opcua_client import (
     Changes,
     Security,
     Way,
-    address,
     connect,
     find,
     needed,
@@ -163,8 +163,7 @@ async def _described(client: Client, node: Found, uris: list[str]) -> Node:
     from asyncua.ua.uaerrors import UaError
 
     number = node.nodeid.NamespaceIndex
-    text = node.nodeid.to_string().rpartition(";")[2]
-    place = f"nsu={uris[number]};{text}" if number else text
+    place = written(node.nodeid, uris[number] if number else "")
     kind, value = "", ""
     try:
         kind = (await node.read_data_type_as_variant_type()).name

@@ -20,7 +20,8 @@ from seerob.errors import InputError
 from seerob.live.listening import LiveSource, at_start, because
 from seerob.model_io.calibration import Calibration, off_by
 from seerob.protocols import ProtocolError, rtde, rtde_client, ur_primary
-from seerob.protocols.rtde import ControllerVersion, Level, TextMessage, Value
+from seerob.protocols.rtde import Level, TextMessage, Value
+from seerob.protocols.rtde_client import CB3_RATE, is_cb3
 from seerob.protocols.rtde_states import RobotMode, SafetyStatus, name, quality
 from seerob.samples import JointSample, Sample, SignalSample
 from seerob.snapshot import Finding
@@ -45,8 +46,6 @@ WANTED = (
 FIELDS = (*NEEDED, *WANTED)
 SIGNAL_PERIOD = 0.1
 """Signals are repeated after this time, or when a state changes [s]."""
-CB3_RATE = 125.0
-"""The most that a CB3 controller sends [Hz]."""
 SAME_TOOL = 2e-4
 """A tool that is nearer to where it should be is there [m]: a fraction of what such arms repeat to."""
 PRIMARY_WITHIN = 1.4
@@ -117,7 +116,12 @@ def _vector(value: Value) -> tuple[float, ...]:
 
 
 def _whole(value: Value | None) -> int | None:
-    return None if value is None else int(_number(value))
+    if value is None:
+        return None
+    number = _number(value)
+    if not number.is_integer():
+        raise ProtocolError(f"{number} where a whole number belongs")
+    return int(number)
 
 
 def _safety(values: Mapping[str, Value]) -> int | None:
@@ -205,10 +209,8 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
     async def ask(self) -> tuple[Finding, ...]:
         """Software, protocol, and what the controller does not have."""
         async with rtde_client.connect(self.host, self.port, FIELDS, self.frequency) as session:
-            lacking = [f for f in NEEDED if f in session.missing]
-            if lacking:
-                what = f"the controller has no {' and no '.join(lacking)}"
-                raise InputError.at(f"rtde {self.host}", "host", what, "is it a robot's controller?")
+            if lacking := self._lacking(session):
+                raise InputError.at(f"rtde {self.host}", "host", lacking, "is it a robot's controller?")
             where = f"rtde {self.host}:{self.port}"
             if self.origin is MotionOrigin.CONTROLLER:
                 text = f"motion heard from the controller, as it happens ({where})"
@@ -218,9 +220,17 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
             said = remarks(session, self.frequency)
             return (heard, *(Finding(level=level, subject=self.robot, text=text) for level, text in said))
 
+    @staticmethod
+    def _lacking(session: rtde_client.Session) -> str:
+        """What the controller has to have and has not; empty when it has everything."""
+        lacking = [f for f in NEEDED if f in session.missing]
+        return f"the controller has no {' and no '.join(lacking)}" if lacking else ""
+
     async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Joint samples, and signals ten times a second and whenever a state changes."""
         async with rtde_client.connect(self.host, self.port, FIELDS, self.frequency) as session:
+            if lacking := self._lacking(session):
+                raise ProtocolError(lacking)
             said: dict[str, float | bool | str] = {}
             due = 0.0
             async with aclosing(session.receive()) as heard:
@@ -228,12 +238,13 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
                     if isinstance(reading, TextMessage):
                         _tell(self.name or f"rtde {self.robot}", reading)
                         continue
+                    sample = joint_sample(reading.values, target=self.robot, arrived=reading.arrived)
                     now = states(reading.values)
                     if now != said or reading.arrived >= due:
                         said, due = now, reading.arrived + SIGNAL_PERIOD
                         values = now | figures(reading.values)
                         yield SignalSample(source="", seq=0, t=reading.arrived, values=values)
-                    yield joint_sample(reading.values, target=self.robot, arrived=reading.arrived)
+                    yield sample
 
 
 def remarks(session: rtde_client.Session, frequency: float) -> list[tuple[str, str]]:
@@ -251,13 +262,9 @@ def remarks(session: rtde_client.Session, frequency: float) -> list[tuple[str, s
         said.append(("warning", "does not say its safety status"))
     if session.version == 1:
         said.append(("note", "version 1 sends at the controller's own rate, whatever frequency is asked for"))
-    if _is_cb3(session.controller) and frequency > CB3_RATE:
+    if is_cb3(session.controller) and frequency > CB3_RATE:
         said.append(("warning", f"a CB3 controller sends {CB3_RATE:g} Hz at most, not {frequency:g}"))
     return said
-
-
-def _is_cb3(controller: ControllerVersion | None) -> bool:
-    return controller is not None and controller.major < 5
 
 
 def _tell(who: str, message: TextMessage) -> None:

@@ -183,7 +183,7 @@ def _payload(model: Model, robot: Mechanism) -> float:
     if robot.unknown_masses:
         return float("nan")
     bodies = [model.mj.body(int(i)) for i in robot.mj_bodies]
-    return float(sum(body.mass[0] for body in bodies if not body.name.startswith(f"{robot.name}/")))
+    return float(sum(body.mass[0] for body in bodies if body.name not in robot.links))
 
 
 def _chain(model: Model, robot: Mechanism, body: Body) -> Array:

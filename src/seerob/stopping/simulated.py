@@ -104,9 +104,9 @@ class StopSimulation:
         Raises:
             Undecided: Not heard, a mass that nobody gave, or brakes that do not bring it to a stand.
         """
-        state.require(self.robot.name)
-        if self.robot.unknown_masses:
-            raise Undecided("; ".join(self.robot.unknown_masses))
+        state.weigh(self.robot)
+        # What a gripper holds is where it was taken, and weighs while it is held.
+        self._mj = state.model.mj
         self._data.qpos[:] = state.data.qpos
         self._data.qvel[:] = 0.0
         trace = _Trace(self)

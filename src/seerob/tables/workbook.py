@@ -76,9 +76,28 @@ class SheetGrid:
                     raise InputError.at(self.file, f"sheet {self.sheet!r}", what)
                 yield row
 
+    def uncalculated(self) -> Iterator[tuple[int, int]]:
+        """Row and column, from 1, of formulas whose result the file does not hold.
+
+        Programs that write workbooks without calculating leave them so; their cells look empty.
+        """
+        with (
+            _opened(self.path, self.file) as book,
+            _opened(self.path, self.file, formulas=True) as written,
+        ):
+            sheets = book[self.sheet], written[self.sheet]
+            for sheet in sheets:
+                sheet.reset_dimensions()
+            values, formulas = (_parsed(sheet.iter_rows(), self.file, self.sheet) for sheet in sheets)
+            for row, cells in enumerate(zip(values, formulas, strict=True), start=1):
+                for column, (value, formula) in enumerate(zip(*cells, strict=False), start=1):
+                    # An empty text is a result.
+                    if formula.data_type == "f" and value.value is None and value.data_type == "n":
+                        yield row, column
+
 
 @contextmanager
-def _opened(path: Path, name: str) -> Iterator[Any]:
+def _opened(path: Path, name: str, *, formulas: bool = False) -> Iterator[Any]:
     from openpyxl import load_workbook
 
     # A file of its own: openpyxl leaves the one that it opens open when a part is broken.
@@ -86,7 +105,7 @@ def _opened(path: Path, name: str) -> Iterator[Any]:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                book = load_workbook(file, read_only=True, data_only=True)
+                book = load_workbook(file, read_only=True, data_only=not formulas)
         except Exception as error:  # openpyxl raises whatever a broken part makes it raise
             raise InputError.at(name, "", f"not a workbook: {error}", SAVE_AS) from error
         try:
@@ -95,7 +114,7 @@ def _opened(path: Path, name: str) -> Iterator[Any]:
             book.close()
 
 
-def _parsed(rows: Iterator[Sequence[Cell]], name: str, sheet: str) -> Iterator[Sequence[Cell]]:
+def _parsed(rows: Iterator[Sequence[Any]], name: str, sheet: str) -> Iterator[Sequence[Any]]:
     iterator = iter(rows)
     count = 0
     while True:

@@ -130,7 +130,11 @@ class Variable(Table, frozen=True, kw_only=True):
             if raw != raw // 1 or (word := self.choices.get(str(int(raw)))) is None:
                 raise BadValue(f"{self.name}: {_short(raw)} is none of {', '.join(self.choices)}")
             return word
-        return self._number(float(raw))
+        try:
+            number = float(raw)
+        except OverflowError:  # a whole number of more digits than any float has
+            number = math.inf
+        return self._number(number)
 
     def _number(self, raw: float) -> float:
         value = self.scale * raw + self.offset

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Iterator
 
 from seerob.sources._variables import Node
+from seerob.tables.mapping import toml_value
 from seerob.variables.units import unit
 
 BOOLS = ("bool", "boolean")
@@ -34,22 +34,22 @@ def skeleton(nodes: Iterable[Node], source: str) -> str:
 def _entry(node: Node, name: str, source: str) -> Iterator[str]:
     yield "[[variables]]"
     yield f'name = "{name}"'
-    yield f"source = {_text(source)}"
-    yield f"address = {node.address if node.address.startswith('{') else _text(node.address)}"
+    yield f"source = {toml_value(source)}"
+    yield f"address = {node.address if node.address.startswith('{') else toml_value(node.address)}"
     kind = node.type.lower()
     if kind in BOOLS or node.value in ("True", "False", "true", "false"):
         yield 'type = "bool"'
     elif kind in TEXTS:
         yield 'type = "text"'
     elif node.unit and unit(node.unit) is not None:
-        yield f"unit = {_text(node.unit)}"
+        yield f"unit = {toml_value(node.unit)}"
     elif node.unit:
-        yield f"# unit = …   the device says {_text(node.unit)}, not known: give unit, scale, offset"
+        yield f"# unit = …   the device says {toml_value(node.unit)}, not known: give unit, scale, offset"
     else:
         yield "# unit = …   the device does not say it; 1 for none"
     if node.type or node.value:
         said = " ".join(part for part in (node.type, node.value and f"was {node.value}") if part)
-        yield f"comment = {_text(said[:200])}"
+        yield f"comment = {toml_value(said[:200])}"
 
 
 def _name(address: str, taken: set[str]) -> str:
@@ -60,8 +60,3 @@ def _name(address: str, taken: set[str]) -> str:
         name = f"{plain}_{n}"
     taken.add(name)
     return name
-
-
-def _text(text: str) -> str:
-    # What JSON leaves as it is and TOML does not take.
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

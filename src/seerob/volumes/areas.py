@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import os
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,13 +21,15 @@ from seerob.samples import Sample
 from seerob.sink import Closing, Writer
 from seerob.snapshot import Finding, Origin, Result, Snapshot
 from seerob.transforms import Array
+from seerob.volumes.held import before
 from seerob.volumes.moving import posed, reach_box
 from seerob.volumes.reachable import reachable_volume
 from seerob.volumes.swept import BATCH, Sweep, Swept
 from seerob.volumes.voxels import check_room
+from seerob.whole_file import whole_file
 from seerob.workstation import Area, SweptArea, Workstation, content_hash
 
-VERSION = "seerob swept area 2"
+VERSION = "seerob swept area 3"
 """Changes whenever what is made does."""
 MOST = 6_000
 """Triangles of an area, about; it still contains every voxel."""
@@ -61,9 +61,10 @@ class MotionRecord(Closing):
             for name, error in snapshot.tracking.items():
                 self.off[name] = max(self.off.get(name, 0.0), error)
 
-    def motion(self) -> dict[str, Array]:
-        """Joint positions by robot and human [rad or m], shape (N, n) each."""
-        return {name: np.array([joints[name] for joints in self.joints]) for name in self.joints[0]}
+    def motion(self, start: int = 0, end: int | None = None) -> dict[str, Array]:
+        """Joint positions by robot and human [rad or m], shape (N, n) each; of some of the instants."""
+        chosen = self.joints[start:end]
+        return {name: np.array([joints[name] for joints in chosen]) for name in self.joints[0]}
 
 
 def without_swept(station: Workstation) -> Workstation:
@@ -210,6 +211,8 @@ class _Maker:
             assert found is not None
             found = _wider(found, swept.margin)
             what = f"all that {swept.of} can reach"
+            if any(self.model.bodies[i].holder for i in bodies):
+                what += ", with what it picks up in the hand, where the file has it"
         else:
             record, wanted = self._recorded(swept)
             found = self._swept(swept, bodies, record, wanted)
@@ -283,7 +286,10 @@ class _Maker:
         wanted: Sequence[dict[str, float]],
     ) -> Swept:
         qpos = posed(self.model, record.motion())
-        sweep = Sweep(self.model, bodies, voxel=swept.voxel)
+        assert self.record is not None
+        first = self.record.instants.index(record.instants[0])
+        earlier = posed(self.model, self.record.motion())[:first]
+        sweep = Sweep(self.model, bodies, voxel=swept.voxel, held=before(self.model, earlier))
         names = [self.model.bodies[core.body].name for core in sweep.moving.cores]
         largest = max((max(each.values(), default=0.0) for each in wanted), default=0.0)
         if not np.isfinite(largest) or largest > 100:
@@ -344,9 +350,7 @@ def _write(path: Path, made: MadeArea) -> None:
     blob = payload.getvalue()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-        with os.fdopen(handle, "wb") as file:
-            file.write(hashlib.sha256(blob).digest() + blob)
-        os.replace(name, path)
+        with whole_file(path) as hidden:
+            hidden.write_bytes(hashlib.sha256(blob).digest() + blob)
     except OSError:
         return

@@ -131,11 +131,17 @@ class Joints:
 
 
 class Moving:
-    """The solids of some bodies, the joints that move each, and where they are for joint positions."""
+    """The solids of some bodies, the joints that move each, and where they are for joint positions.
+
+    Attributes:
+        mj: The `mujoco.MjModel` that tells where bodies are on those that carry them: that of the
+            workstation, with what is picked up in the hand as the file has it; that of a twin that picks
+            things up (`seerob.machines.gripping`) has it there as it was taken.
+    """
 
     def __init__(self, model: Model, bodies: Sequence[int]) -> None:
         """Of a compiled workstation, and indices in `Model.bodies`."""
-        self.model, self.bodies = model, tuple(bodies)
+        self.model, self.bodies, self.mj = model, tuple(bodies), model.mj
         _refuse_open(model, self.bodies)
         self.cores = tuple(core_of(i, solid) for i in self.bodies for solid in model.bodies[i].solids)
         self.joints = Joints.of(model.mj)
@@ -155,7 +161,7 @@ class Moving:
     def place(self, qpos: Array) -> tuple[Array, Array]:
         """world_from_core of every core, (ns, 3, 3) and (ns, 3) [m]; the axes are found on the way."""
         self._data.qpos[:] = qpos
-        mujoco.mj_kinematics(self.model.mj, self._data)
+        mujoco.mj_kinematics(self.mj, self._data)
         world = self._data.xmat[self._mj].reshape(-1, 3, 3)
         return world @ self._turn, self._data.xpos[self._mj] + np.einsum("nij,nj->ni", world, self._shift)
 

@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -71,6 +72,16 @@ class Swept:
         return self.grid.mesh(most=most)
 
 
+class Holding(Protocol):
+    """What grippers hold as a motion goes on, instant by instant: see `seerob.volumes.held`."""
+
+    mj: Any
+    """See `Moving.mj`."""
+
+    def follow(self, qpos: Array) -> None:
+        """The next instant: positions of all joints [rad or m], shape (nq,)."""
+
+
 class Sweep:
     """Marks the way of bodies, piece by piece."""
 
@@ -82,6 +93,7 @@ class Sweep:
         voxel: float,
         slack: float = SLACK,
         memory: float | None = None,
+        held: Holding | None = None,
     ) -> None:
         """Prepare.
 
@@ -91,6 +103,8 @@ class Sweep:
             voxel: Edge of a voxel [m].
             slack: Dilation for motion that is aimed at [voxels]; less takes longer.
             memory: Most bytes that the voxels may take; by default half of what is free.
+            held: What grippers hold on the way; without it, all that they may pick up is in the hand as the
+                file has it, all the time.
 
         Raises:
             InputError: A voxel size that is no length or makes too many; bodies without shapes.
@@ -98,6 +112,9 @@ class Sweep:
         self.grid = VoxelGrid(voxel, memory=memory)
         self.slack = slack
         self.moving = Moving(model, bodies)
+        self._held = held
+        if held is not None:
+            self.moving.mj = held.mj
         self._cores: tuple[Core, ...] | None = None
         self.dilation = 0.0
         self.beyond = np.zeros(len(self.moving.cores))
@@ -122,6 +139,8 @@ class Sweep:
 
     def start(self, qpos: Array, qvel: Array | None = None) -> None:
         """Mark the bodies where they are now; what they did before is not known."""
+        if self._held is not None:
+            self._held.follow(qpos)
         rotations, positions = self.moving.place(qpos)
         self.grid.cover(*self.moving.box(rotations, positions, self.beyond))
         for core, beyond in enumerate(self.beyond.tolist()):
@@ -169,6 +188,8 @@ class Sweep:
                     wide = float(reach[core] + self.beyond[core])
                     self._queue[core].append((rotations[core], positions[core], wide))
         self._last = qpos.copy(), None if qvel is None else qvel.copy()
+        if self._held is not None:
+            self._held.follow(qpos)
 
     def flush(self) -> None:
         """Mark what was enqueued."""
@@ -231,6 +252,9 @@ class Sweep:
             "every voxel that a point of the bodies' shapes crosses while each joint goes straight from "
             "sample to sample, or on the cubic where velocities are given"
         )
+        moving = self.moving
+        if moving.mj is moving.model.mj and any(moving.model.bodies[i].holder for i in moving.bodies):
+            guarantee += "; what is picked up counts in the hand, where the file has it"
         return Swept(self.grid, self.dilation, mean, self.stamps, guarantee)
 
 
@@ -242,6 +266,7 @@ def swept_volume(
     voxel: float,
     slack: float = SLACK,
     memory: float | None = None,
+    held: Holding | None = None,
     progress: Progress = lambda _: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> Swept:
@@ -255,6 +280,7 @@ def swept_volume(
         voxel: Edge of a voxel [m].
         slack: See `Sweep`.
         memory: Likewise.
+        held: Likewise.
         progress: Told the share that is done.
         stop: Asked now and then; when true, what is marked so far is returned.
 
@@ -263,7 +289,7 @@ def swept_volume(
             before anything is marked.
     """
     qpos = posed(model, motion)
-    sweep = Sweep(model, bodies, voxel=voxel, slack=slack, memory=memory)
+    sweep = Sweep(model, bodies, voxel=voxel, slack=slack, memory=memory, held=held)
     box = _box(sweep, qpos)
     check_room(*box, voxel, memory)
     sweep.grid.cover(*box)

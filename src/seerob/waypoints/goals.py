@@ -37,20 +37,25 @@ class Goals:
         self.found: list[Array] = []
         """Joint positions of each waypoint that was gone to."""
         head = program.waypoints[0]
-        if start is None and head.q is None:
+        if start is None and head.q is None and (head.near is None or head.move.of_tool):
             what = (
                 f"the first waypoint ({head.shown}) is a pose: its branch depends on where the robot stands"
             )
             raise InputError.at(program.file, "start", what, "give start, the joint positions [rad or m]")
-        for where, q in (("start", start), *((w.shown, w.q) for w in program.waypoints)):
+        given = ((w.shown, q) for w in program.waypoints for q in (w.q, w.near))
+        for where, q in (("start", start), *given):
             if q is not None and len(q) != arm.n:
                 what = f"{len(q)} joint positions, the robot has {arm.n} joints"
                 raise InputError.at(program.file, where, what, f"give {arm.n}")
-        if start is None:
-            self.remarks.append(f"the motion begins in its first waypoint, {head.shown}")
         self._classic = is_classic(arm)
-        self.first: Array = np.array(head.q if start is None else start, float)
-        self._here = self.first
+        stands = start or head.q or head.near
+        self._here = np.array(stands, float)
+        if start is None:
+            if head.q is None:
+                self._here = self._solved(head)
+                self.remarks.clear()  # it is gone to again, as the first of the waypoints
+            self.remarks.append(f"the motion begins in its first waypoint, {head.shown}")
+        self.first: Array = self._here
         if arm.n > 6 and any(w.pose is not None or w.move.of_tool for w in program.waypoints):
             self.doubts.append(
                 f"{arm.n} joints for a pose of 6: the joint positions are not determined; those nearest to "
@@ -86,9 +91,10 @@ class Goals:
         pose = waypoint.pose
         assert pose is not None
         rotation, position = rotation_from_wxyz(pose.wxyz), np.array(pose.position)
-        ways = solutions(self._arm, rotation, position, self._here)
+        near = self._here if waypoint.near is None else np.array(waypoint.near, float)
+        ways = solutions(self._arm, rotation, position, near)
         if not ways:
-            what = why_not(self._arm, rotation, position, self._here)
+            what = why_not(self._arm, rotation, position, near)
             remedy = "is the base or the tool point another one?"
             raise InputError.at(self._program.file, waypoint.shown, what, remedy)
         fitting = [w for w in ways if self._wanted in (None, w.branch)]
@@ -98,11 +104,12 @@ class Goals:
             raise InputError.at(self._program.file, waypoint.shown, what, f"it is on: {there}")
         chosen = fitting[0]
         others = f", one of {len(ways)} found" if self._arm.n == 6 else ""
+        nearest = "nearest to " + ("where the robot is" if waypoint.near is None else "qnear")
         if chosen.branch is not None:
-            why = "nearest to where the robot is" if self._wanted is None else "as the source says"
+            why = nearest if self._wanted is None else "as the source says"
             self.remarks.append(f"{waypoint.shown}: branch {chosen.branch} ({why}{others})")
         elif self._arm.n <= 6:
-            self.remarks.append(f"{waypoint.shown}: solution nearest to where the robot is{others}")
+            self.remarks.append(f"{waypoint.shown}: solution {nearest}{others}")
         return chosen.q
 
     def _name(self, waypoint: Waypoint, q: Array) -> None:

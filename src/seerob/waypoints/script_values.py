@@ -33,7 +33,16 @@ class PoseValue:
     numbers: tuple[float, ...]
 
 
-Value = float | bool | str | tuple[float, ...] | PoseValue
+@dataclass(frozen=True)
+class Inverse:
+    """``get_inverse_kin(pose, qnear)``: the joint positions that reach a pose, nearest to others."""
+
+    pose: PoseValue
+    near: tuple[float, ...]
+    """[rad]"""
+
+
+Value = float | bool | str | tuple[float, ...] | PoseValue | Inverse
 
 
 @dataclass(frozen=True)
@@ -78,7 +87,11 @@ class Reader:
 
     def call(self) -> Call:
         """The whole statement as a call."""
-        name = self._take()
+        found = self._called(self._take())
+        self.end()
+        return found
+
+    def _called(self, name: str) -> Call:
         self._expect("(")
         arguments: list[Value] = []
         named: dict[str, Value] = {}
@@ -94,7 +107,6 @@ class Reader:
             if self._peek() != ")":
                 self._expect(",")
         self._take()
-        self.end()
         return Call(name, tuple(arguments), named)
 
     def end(self) -> None:
@@ -159,6 +171,8 @@ class Reader:
                 return _finite(FUNCTIONS[piece](value))
             except ValueError as error:
                 raise NotConstant(f"{piece}({value:g}) is no number") from error
+        if piece == "get_inverse_kin" and self._peek() == "(":
+            return _inverse(self._called(piece))
         if piece not in self._names and piece == "pi":
             return math.pi
         known = self._names.get(piece)
@@ -189,6 +203,16 @@ class Reader:
     def _expect(self, piece: str) -> None:
         if self._take() != piece:
             raise NotConstant(f"{piece!r} is missing")
+
+
+def _inverse(call: Call) -> Inverse:
+    given = dict(zip(("x", "qnear"), call.arguments, strict=False)) | dict(call.named)
+    pose, near = given.get("x"), given.get("qnear")
+    if given.get("tcp", "active_tcp") != "active_tcp":
+        raise NotConstant("get_inverse_kin for another tool point is not read")
+    if not isinstance(pose, PoseValue) or not isinstance(near, tuple):
+        raise NotConstant("get_inverse_kin needs a constant pose and a constant qnear")
+    return Inverse(pose, near)
 
 
 def _number(value: Value) -> float:

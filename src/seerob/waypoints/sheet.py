@@ -22,7 +22,7 @@ from seerob.tables.grid import Grid, blank, number, place
 from seerob.tables.mapping import SI
 from seerob.tables.orientation import wxyz_from
 from seerob.tables.text import TextGrid, encoding_of
-from seerob.tables.workbook import sheets
+from seerob.tables.workbook import SheetGrid, sheets
 from seerob.waypoints.point import program_of
 from seerob.waypoints.waypoint import MAX_WAYPOINTS, Program
 
@@ -32,6 +32,7 @@ WITH_UNIT = re.compile(
     r"(?P<stem>q\d{1,2}|(?:via_)?[xyz]|roll|pitch|yaw|r[xyz]|blend|duration|pause)_(?P<unit>deg|rad|mm|m|s|ms)"
 )
 KIND = {"x": "m", "y": "m", "z": "m", "blend": "m", "duration": "s", "pause": "s"}
+CALCULATE = "open it in Excel or LibreOffice and save it: what wrote it does not calculate"
 REMEDY = "columns are named in docs/sources.md, waypoints: q1_deg, x_mm, roll_deg, blend_mm …"
 
 
@@ -47,7 +48,8 @@ def read_sheet(path: Path, file: str) -> Program:
     """
     grid: Grid
     if path.suffix.lower() in WORKBOOKS:
-        grid = sheets(path, file)[0]
+        grid, *_ = sheets(path, file)
+        _check_formulas(grid)
     else:
         encoding = encoding_of(path, file)
         grids = [TextGrid(path, file, encoding, d) for d in DELIMITERS]
@@ -62,6 +64,16 @@ def read_sheet(path: Path, file: str) -> Program:
     if problems:
         raise InputError(problems[:20])
     return program_of(tables, file)
+
+
+def _check_formulas(grid: SheetGrid) -> None:
+    """A speed or pause that looks empty would be taken as not given."""
+    problems = [
+        Problem(grid.file, place(grid, row), f"cell {column}: a formula without its result", CALCULATE)
+        for row, column in islice(grid.uncalculated(), 20)
+    ]
+    if problems:
+        raise InputError(problems)
 
 
 def _columns(names: Sequence[str], file: str) -> list[float]:
@@ -100,6 +112,11 @@ def _tables(
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     for row, cells in enumerate(rows, start=2):
         values: dict[str, Any] = {}
+        if not all(blank(cell) for cell in cells[len(names) :]):
+            what = f"{len(cells)} cells, the header names {len(names)} columns"
+            remedy = "was a decimal comma taken for a separator? put ; between the cells"
+            problems.append(Problem(grid.file, place(grid, row), what, remedy))
+            continue
         for name, factor, cell in zip(names, factors, cells, strict=False):
             if blank(cell) or not name:
                 continue

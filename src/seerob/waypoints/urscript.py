@@ -2,7 +2,8 @@
 
 A program is parsed, never executed. What would need execution (branches, loops, variables that sensors or
 functions set) is named with its line and refused, because the motion behind it is not known; statements
-that move nothing are left out and counted. Defaults of speed and acceleration are those of [URScript]_.
+and blocks that move nothing are left out and counted. A program that goes round for ever is read as one
+round. Defaults of speed and acceleration are those of [URScript]_.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import numpy as np
 
 from seerob.errors import InputError, Problem
 from seerob.tables.orientation import wxyz_from
-from seerob.waypoints.script_values import Call, NotConstant, PoseValue, Reader, Value, tokens
+from seerob.waypoints.script_blocks import APART, ASSIGNMENT, ENDLESS, OPENING, Block, moving
+from seerob.waypoints.script_values import Call, Inverse, NotConstant, PoseValue, Reader, Value, tokens
 from seerob.waypoints.waypoint import MAX_WAYPOINTS, Move, Program, ToolPose, Waypoint
 
 MAX_BYTES = 16 << 20
@@ -30,27 +32,10 @@ SIGNATURES = {
     "movep": (Move.PROCESS, ("pose", "a", "v", "r")),
     "movec": (Move.CIRCULAR, ("pose_via", "pose_to", "a", "v", "r", "mode")),
 }
-MOVES_OTHERWISE = re.compile(
-    r"^(servo[jcl]|speed[jl]|stop[jl]|force_mode|freedrive_mode|teach_mode|conveyor|track_|path_|move\w+|"
-    r"teachmode|screw_driving|tool_contact|set_conveyor)"
-)
-"""Calls that move the robot in ways that are not modelled."""
-BLOCKS = (
-    "if",
-    "elif",
-    "else",
-    "while",
-    "for",
-    "thread",
-    "return",
-    "break",
-    "continue",
-    "run",
-    "kill",
-    "join",
-)
+BLOCKS = ("elif", "else", "return", "break", "continue", "kill", "join")
 DEFINITION = re.compile(r"^(def|sec)\s+[A-Za-z_]\w*\s*\(\s*\)\s*:$")
-ASSIGNMENT = re.compile(r"^(?:(?:global|local)\s+)?([A-Za-z_]\w*)\s*=(?!=)\s*(.*)$")
+NODE = re.compile(r"\$\s*\d+\b")
+"""Marks the node of PolyScope's tree that a statement comes from."""
 REMEDY = "export a program without it, or record the motion on the controller"
 
 
@@ -89,27 +74,57 @@ class _Script:
         self.problems: list[Problem] = []
         self._waypoints: list[Waypoint] = []
         self._names: dict[str, Value | None] = {}
+        self._changing: set[str] = set()
+        """Names that something beside the program gives a value."""
         self._open = self._definitions = 0
         self._tcp: ToolPose | None = None
         self._left_out: dict[str, int] = {}
+        self._block: Block | None = None
+        self._round: int | None = None
+        """Blocks that are open around the loop that never ends; None without one."""
+        self._round_line = 0
+        self._after = False
+        """Whether that loop has ended."""
 
     def take(self, line: int, statement: str) -> None:
         word = re.split(r"\W", statement, maxsplit=1)[0]
-        if DEFINITION.match(statement):
+        begun = self._definitions or self._waypoints
+        if self._block is not None:
+            if self._block.take(word, statement):
+                self._leave_out(self._block)
+                self._block = None
+        elif NODE.match(statement):
+            pass
+        elif ENDLESS.fullmatch(statement) and self._round is None and self._open == self._definitions:
+            self._round, self._round_line = self._open, line
+            self._open += 1
+        elif statement.endswith(":") and (word in OPENING or (word in APART and begun)):
+            self._block = Block(line, word)
+        elif DEFINITION.match(statement):
             self._definitions += 1
             self._open += 1
-            if self._definitions > 1:
-                self._wrong(line, "a second function", "whether and when it is called is not followed")
         elif statement == "end" and self._open:
             self._open -= 1
+            self._after |= self._open == self._round
         elif word in BLOCKS or statement.endswith(":") or word == "def":
             self._wrong(line, f"`{word}`", "what is done there only a controller knows")
         elif (match := ASSIGNMENT.match(statement)) is not None:
-            self._assign(match[1], match[2])
+            self._assign(line, match[1], match[2])
         else:
             self._statement(line, word, statement)
 
-    def _assign(self, name: str, text: str) -> None:
+    def _leave_out(self, block: Block) -> None:
+        """What a block does to the names is known to a controller alone."""
+        self._names |= dict.fromkeys(block.names)
+        self._changing |= block.names if block.apart else set()
+        if block.matters:
+            self._wrong(block.line, f"`{block.word}`", "what is done there only a controller knows")
+        else:
+            self._left_out[block.word] = self._left_out.get(block.word, 0) + 1
+
+    def _assign(self, line: int, name: str, text: str) -> None:
+        if call := moving(text):
+            self._wrong(line, f"`{call}`", "what moves the robot stands in a statement of its own")
         # A name that is no constant matters only where a waypoint needs it.
         try:
             reader = Reader(tokens(text), self._names)
@@ -119,22 +134,25 @@ class _Script:
             self._names[name] = None
             return
         # A name that is given twice is the latest, as the program runs from top to bottom.
-        self._names[name] = value
+        self._names[name] = None if name in self._changing else value
 
     def _statement(self, line: int, name: str, statement: str) -> None:
         known = name in SIGNATURES or name in ("sleep", "set_tcp")
         try:
             call = Reader(tokens(statement), self._names).call() if known else None
             if call is None:
-                if not re.fullmatch(r"[A-Za-z_]\w*\s*\(.*\)", statement):
+                started = re.fullmatch(r"run\s+\w+\s*\(\s*\)", statement)
+                if not (started or re.fullmatch(r"[A-Za-z_]\w*\s*\(.*\)", statement)):
                     raise NotConstant("is no statement that is known here")
-                if MOVES_OTHERWISE.match(name):
+                if moving(statement):
                     raise NotConstant("moves the robot in a way that is not modelled")
                 self._left_out[name] = self._left_out.get(name, 0) + 1
             elif name == "sleep":
                 self._sleep(call)
             elif name == "set_tcp":
                 self._set_tcp(call)
+            elif self._after:
+                raise NotConstant("stands behind a loop that never ends")
             else:
                 self._waypoints.append(self._waypoint(line, call))
                 if len(self._waypoints) > MAX_WAYPOINTS:
@@ -162,8 +180,10 @@ class _Script:
         move, names = SIGNATURES[call.name]
         given = _arguments(call, names)
         goal = given.get("pose_to") if move is Move.CIRCULAR else given.get(names[0])
-        q = pose = via = None
-        if isinstance(goal, PoseValue):
+        q = pose = via = near = None
+        if isinstance(goal, Inverse):
+            pose, near = _pose(goal.pose), goal.near
+        elif isinstance(goal, PoseValue):
             pose = _pose(goal)
         elif isinstance(goal, tuple):
             q = goal
@@ -190,6 +210,7 @@ class _Script:
             move=move,
             q=q,
             pose=pose,
+            near=near,
             via=via,
             speed=speed,
             acceleration=acceleration,
@@ -201,6 +222,10 @@ class _Script:
         self.problems.append(Problem(self.file, f"line {line}", f"{what}: {why}", REMEDY))
 
     def program(self) -> Program:
+        if self._block is not None:
+            self._wrong(self._block.line, f"`{self._block.word}`", "its `end` is missing")
+        if self._round is not None and not self._after:
+            self._wrong(self._round_line, "`while`", "its `end` is missing")
         if not self.problems and not self._waypoints:
             self.problems.append(
                 Problem(self.file, "", "no move with constants", "give a program that moves")
@@ -212,6 +237,8 @@ class _Script:
             f"URScript: {JOINT_SPEED:g} rad/s and {JOINT_ACCELERATION:g} rad/s² of the leading joint, "
             f"{TOOL_SPEED:g} m/s and {TOOL_ACCELERATION:g} m/s² of the tool point"
         ]
+        if self._round is not None:
+            remarks.append("the program goes round for ever; it is read as one round")
         if self._left_out:
             each = ", ".join(f"{name} ({count})" for name, count in sorted(self._left_out.items())[:12])
             remarks.append(f"statements taken to move nothing were left out, with their waiting: {each}")

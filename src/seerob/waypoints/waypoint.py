@@ -50,6 +50,9 @@ class Waypoint:
     q: tuple[float, ...] | None = None
     """Joint positions [rad or m]."""
     pose: ToolPose | None = None
+    near: tuple[float, ...] | None = None
+    """Joint positions to which those of ``pose`` are the nearest, of `Move.JOINT` [rad or m]; those where
+    the robot is when not given."""
     via: ToolPose | None = None
     """A pose on the way of `Move.CIRCULAR`; only its position counts."""
     speed: float | None = None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from seerob.human.estimated import estimated
-from seerob.human.following import PartDoubt
+from seerob.human.following import Followed, PartDoubt
 from seerob.transforms import Array
 
 SLACK = 1e-9
@@ -39,9 +39,14 @@ class Hearing:
     """The same of single bones of a person, when the rest may be relied on."""
     observed: list[tuple[float, frozenset[str]]] = field(default_factory=list)
     """Of a person that devices see: instant [s] and bones that some device sees then, oldest first."""
+    bare: list[tuple[float, frozenset[str]]] = field(default_factory=list)
+    """Likewise those of limbs of which nothing shows where they point."""
     aims: list[tuple[float, Mapping[str, float]]] = field(default_factory=list)
     """Of a person that devices see: instant [s], and hands, feet and heads of which only the joint is seen,
     with a bound on how far they may be turned from the twin's [rad]; oldest first."""
+    untold: list[tuple[float, frozenset[tuple[str, int]]]] = field(default_factory=list)
+    """Of a person that devices see: instant [s] and angles of the posture that nothing tells, each with its
+    side; oldest first."""
     lost: float = -np.inf
     """When the physics last lost it, so that it was put back [s]."""
     saturated: bool = False
@@ -49,12 +54,22 @@ class Hearing:
     coarse: str = ""
     """Why what is heard is too coarse for energies and forces; empty when it is not."""
 
+    def follow(self, found: Followed) -> None:
+        """Take what devices told of a person at one instant."""
+        self.heard.append((found.t, found.reason))
+        self.parts.append((found.t, found.parts))
+        self.observed.append((found.t, found.observed))
+        self.bare.append((found.t, found.bare))
+        self.aims.append((found.t, found.unaimed))
+        self.untold.append((found.t, found.untold))
+        self.torques.append(None)
+
     def forget(self, t: float) -> None:
         """Drop what is older than the last sample at or before ``t`` [s]."""
         while len(self.heard) > 1 and self.heard[1][0] <= t:
             del self.heard[0]
             del self.torques[:1]
-        for told in (self.parts, self.observed, self.aims):
+        for told in (self.parts, self.observed, self.bare, self.aims, self.untold):
             while len(told) > 1 and told[1][0] <= t:
                 del told[0]
 
@@ -90,6 +105,11 @@ class Hearing:
             found |= {bone: max(angle, found.get(bone, 0.0)) for bone, angle in told.items()}
         return found
 
+    def untold_angles(self, t: float) -> frozenset[tuple[str, int]]:
+        """Angles of the posture at ``t`` [s] that nothing tells, each with its side."""
+        k = sum(1 for instant, _ in self.untold if instant <= t + SLACK)
+        return frozenset().union(*(angles for _, angles in self.untold[max(k - 1, 0) : k + 1]))
+
     def unseen(self, t: float) -> tuple[str, ...]:
         """Bones that no device sees at ``t`` [s] and that the bones beside them do not tell.
 
@@ -97,4 +117,5 @@ class Hearing:
         """
         k = sum(1 for instant, _ in self.observed if instant <= t + SLACK)
         around = [seen for _, seen in self.observed[max(k - 1, 0) : k + 1]]
-        return estimated(frozenset.intersection(*around)) if around else ()
+        bare = frozenset().union(*(bones for _, bones in self.bare[max(k - 1, 0) : k + 1]))
+        return estimated(frozenset.intersection(*around), bare) if around else ()

@@ -2,13 +2,15 @@
 // of a click. It is painted on a canvas, so whatever the text says stays text.
 
 import { CanvasTexture, LinearFilter, Sprite, SpriteMaterial, SRGBColorSpace, Vector3 } from "three";
+import { shortened } from "../format";
 import { NEUTRAL_TEXT, STATE_ICONS, VERDICT_TEXT } from "../verdicts";
 import type { Verdict } from "../wire";
 import type { View } from "./drawn";
 
 const PAD_PX = 6;
 const SHARPNESS = 2;
-const LONGEST = 64;
+/** Characters; about as many as fit across the room of a telephone. */
+const LONGEST = 46;
 /** Lower edge of the plate above its point [px]. */
 const RAISED_PX = 8;
 const FAMILY = 'system-ui, "Segoe UI", "Noto Sans", sans-serif';
@@ -46,7 +48,7 @@ export class Caption {
   }
 
   update(text: string, verdict: Verdict | null): void {
-    const short = text.length > LONGEST ? `${text.slice(0, LONGEST - 1)}…` : text;
+    const short = shortened(text, LONGEST);
     const key = `${verdict} ${short}`;
     if (key === this.shown) return;
     this.shown = key;

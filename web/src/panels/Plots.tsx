@@ -105,7 +105,12 @@ function Plot({ name }: { name: string }) {
   return (
     <figure class={`plot ${chosen ? "selected" : ""}`}>
       <figcaption class={stale.value ? "stale" : ""}>
-        <button type="button" class="plot-name" onClick={() => select({ kind: "criterion", name })}>
+        <button
+          type="button"
+          class="plot-name"
+          title={name}
+          onClick={() => select({ kind: "criterion", name })}
+        >
           {name}
         </button>
         <span class="plot-value">{row && figureOf(row)}</span>

@@ -94,6 +94,7 @@ function OwnerItem({ owner, open }: { owner: Owner; open: boolean }) {
         <button
           type="button"
           class="name"
+          title={owner.name}
           aria-pressed={active}
           onClick={() => select({ kind: alone ? "node" : "owner", name: alone ? names[0]! : owner.name })}
         >

@@ -1,7 +1,7 @@
 // Time as a strip: a lane per criterion with a limit, coloured where it is exceeded or undecided.
 
 import { effect } from "@preact/signals";
-import { useEffect, useRef } from "preact/hooks";
+import { useLayoutEffect, useRef } from "preact/hooks";
 import { formatTime } from "../format";
 import { isLive, now, reach, scene, select, selection, stale, tracesRevision } from "../page_state";
 import { drawLanes, LANE_PX, type TimeRange, timeAt } from "../plots/lanes";
@@ -19,11 +19,13 @@ export function Timeline() {
   const names = judged.map((c) => c.name);
   const key = names.join("\n");
 
-  useEffect(() => {
+  // Before the names are seen: lanes beside the names of others would be a wrong statement.
+  useLayoutEffect(() => {
     const target = canvas.current;
     if (!target) return;
     const draw = (): void =>
       drawLanes(target, key === "" ? [] : key.split("\n"), stripRange(), now.peek(), stale.peek());
+    draw();
     const resized = new ResizeObserver(draw);
     resized.observe(target);
     let waiting = 0;
@@ -54,6 +56,7 @@ export function Timeline() {
             <li key={name} style={{ height: `${LANE_PX}px` }}>
               <button
                 type="button"
+                title={name}
                 class={selection.value?.name === name ? "selected" : ""}
                 onClick={() => select({ kind: "criterion", name })}
               >

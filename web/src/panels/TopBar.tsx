@@ -85,7 +85,11 @@ function StatusPill() {
         {HEADLINES[state]}
         {other && isLive.value && lookingAt.value === null && " NOW"}
       </strong>
-      {detail && <span class="pill-detail">{detail}</span>}
+      {detail && (
+        <span class="pill-detail" title={worst?.info.name}>
+          {detail}
+        </span>
+      )}
       {worst?.result && detail && worst.result.value !== null && (
         <span class="pill-value" aria-hidden="true">
           {pillFigure(worst.result)}

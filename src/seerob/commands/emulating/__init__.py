@@ -30,3 +30,5 @@ class Emulated(NamedTuple):
     """What it plays: ``ur10, a calm swing``."""
     where: str
     """Where it listens or what it sends to, for a message when that cannot be had: ``127.0.0.1:30004``."""
+    commands: tuple[str, ...] = ()
+    """That hear it, where ``seerob probe`` with its kind and address is not the way; see `_hint`."""

@@ -42,4 +42,5 @@ def emulated(options: argparse.Namespace) -> Emulated:
         edition=Edition(options.edition),
         period=1e-3 * options.period,
     )
-    return Emulated(server, f"{target.name}, {what}", f"{options.host}, to {options.to}:{options.port}")
+    where = f"{options.host}, to {options.to}:{options.port}"
+    return Emulated(server, f"{target.name}, {what}", where, (f"seerob probe fri {options.host}{{option}}",))

@@ -13,6 +13,9 @@ LIBRARY = "library:reach"
 """What is played when nothing is given."""
 PORT = 9871
 
+CONNECT = "seerob probe kinect --set link=websocket --set host={host} --port {port}"
+"""How one that listens is heard."""
+
 
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
@@ -42,4 +45,5 @@ def emulated(options: argparse.Namespace) -> Emulated:
     to = None if options.websocket else (options.to, options.port)
     server = KinectSender(scene, to=to, host=options.host, port=options.port, rate=options.rate)
     where = options.host if options.websocket else options.to
-    return Emulated(server, f"a person, {options.file}", f"{where}:{options.port}")
+    hear = (CONNECT,) if options.websocket else ()
+    return Emulated(server, f"a person, {options.file}", f"{where}:{options.port}", hear)

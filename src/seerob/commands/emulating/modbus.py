@@ -51,4 +51,9 @@ def emulated(options: argparse.Namespace) -> Emulated:
     }
     server = ModbusServer(played, host=options.host, port=options.port, refresh=found.refresh)
     belt = f"a belt in the holding registers {BELT} (i16, mm/s) to {BELT + 3}"
-    return Emulated(server, f"{target.name}, {what}; {belt}", f"{options.host}:{options.port}")
+    chosen = "" if options.map == "doosan" else f" --set map={options.map}"
+    hear = (
+        f"seerob probe modbus_robot {{host}} --port {{port}}{chosen}",
+        "seerob probe modbus {host} --port {port}",
+    )
+    return Emulated(server, f"{target.name}, {what}; {belt}", f"{options.host}:{options.port}", hear)

@@ -37,4 +37,5 @@ def emulated(options: argparse.Namespace) -> Emulated:
         variables, {"Robot": swing(HOME)}, host=options.host, port=options.port, outputs=(OUTPUT,)
     )
     what = f"variables {', '.join(variables)}; one robot; {OUTPUT} may be written"
-    return Emulated(server, what, f"{options.host}:{options.port}")
+    hear = ("seerob probe opcua_robot opc.tcp://{at}", "seerob probe opcua opc.tcp://{at}")
+    return Emulated(server, what, f"{options.host}:{options.port}", hear)

@@ -50,4 +50,5 @@ def emulated(options: argparse.Namespace) -> Emulated:
         rate=options.rate,
     )
     role = "a Unity project, " if options.unity else ""
-    return Emulated(server, f"{role}{target.name}, {what}", f"{server.host}:{server.port}")
+    hear = ("seerob probe ros_tcp --set side=endpoint --port {port}",) if options.unity else ()
+    return Emulated(server, f"{role}{target.name}, {what}", f"{server.host}:{server.port}", hear)

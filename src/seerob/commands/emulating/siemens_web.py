@@ -8,13 +8,14 @@ from seerob.commands import port
 from seerob.commands.emulating import Emulated
 
 HELP = "a Siemens PLC's web server (S7 web API): a belt, a light curtain and a door"
+PASSWORD = "seerob"  # noqa: S105 - everybody may know it
 
 
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     sub.add_argument("--port", type=port, default=8081, help="port; 0 is any free one (default: 8081)")
     sub.add_argument("--user", default="seerob", help="who may log in (default: seerob)")
-    sub.add_argument("--password", default="seerob", help="with which (default: seerob)")
+    sub.add_argument("--password", default=PASSWORD, help="with which (default: seerob)")
 
 
 def emulated(options: argparse.Namespace) -> Emulated:
@@ -38,4 +39,9 @@ def emulated(options: argparse.Namespace) -> Emulated:
         outputs=('"Twin".too_close',),
     )
     what = f"variables {', '.join(program)}; speeds in mm/s, positions in mm"
-    return Emulated(server, what, f"{options.host}:{options.port}")
+    password = options.password if options.password == PASSWORD else "…"
+    hear = (
+        f"PLC_PASSWORD={password} seerob probe siemens_web http://{{at}}"
+        f" --set user={options.user} --set password_env=PLC_PASSWORD"
+    )
+    return Emulated(server, what, f"{options.host}:{options.port}", (hear,))

@@ -10,6 +10,9 @@ from seerob.commands.emulating._people import add_person, person_of
 
 HELP = "the sender beside SteamVR (Vive trackers), which sends those of a moving person"
 
+CONNECT = "seerob probe vive --set link=websocket --set host={host} --port {port}"
+"""How one that listens is heard."""
+
 
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
@@ -32,4 +35,5 @@ def emulated(options: argparse.Namespace) -> Emulated:
     to = None if options.websocket else (options.to, options.port)
     server = ViveSender(trackers, to=to, host=options.host, port=options.port, rate=options.rate)
     where = options.host if options.websocket else options.to
-    return Emulated(server, f"trackers on a person, {options.file}", f"{where}:{options.port}")
+    hear = (CONNECT,) if options.websocket else ()
+    return Emulated(server, f"trackers on a person, {options.file}", f"{where}:{options.port}", hear)

@@ -27,7 +27,8 @@ def emulated(options: argparse.Namespace) -> Emulated:
 
     server = WebServer(_cell, host=options.host, port=options.port)
     what = f"a belt, a light curtain and a door at {STATE}, and at {LIVE} by WebSocket"
-    return Emulated(server, what, f"{options.host}:{options.port}")
+    hear = (f"seerob probe web http://{{at}}{STATE}", f"seerob probe web ws://{{at}}{LIVE}")
+    return Emulated(server, what, f"{options.host}:{options.port}", hear)
 
 
 def _cell(t: float) -> Mapping[str, Any]:

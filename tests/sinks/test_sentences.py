@@ -1,0 +1,13 @@
+"""Words of a report that are short keep what they are about."""
+
+from seerob.sinks._sentences import shortened
+
+
+def test_a_text_that_is_too_long_keeps_its_begin_and_its_end_where_the_figure_is():
+    text = "✕ Lower arms and wrist joints: 0.872 m/s of 0.202 m/s"
+    short = shortened(text, 48)
+    assert len(short) == 48
+    assert short.startswith("✕ Lower arms and")
+    assert short.endswith("0.872 m/s of 0.202 m/s")
+    assert shortened(text, len(text)) == text
+    assert len(shortened(text, len(text) - 1)) == len(text) - 1

@@ -185,9 +185,9 @@ NOTED = struct.Struct("<dd")
 """Device's time and the machine's monotonic one, of a packet that is written to a stream."""
 
 
-def emulate(notes: str, command: list[str]) -> int:
+def emulate(notes: str, command: list[str], *, nice: int) -> int:
     """``seerob emulate``, with a note of when each RTDE packet was made, just before it is written."""
-    os.nice(10)
+    os.nice(nice)
     at = RtdeServer.at
     with Path(notes).open("ab", buffering=0) as file:
 
@@ -205,16 +205,16 @@ def written(notes: Path) -> dict[float, float]:
 
 
 @contextlib.contextmanager
-def emulators(notes: Path, *commands: list[str]):
-    """Emulators, and the port of each."""
+def emulators(notes: Path, *commands: list[str], smoke: bool):
+    """Emulators, and the port of each; they step back for the twin, unless it is not judged."""
     with contextlib.ExitStack() as stack:
-        ports = []
+        started = []
         for command in commands:
-            whole = [sys.executable, __file__, "--emulate", str(notes), *command]
+            whole = [sys.executable, __file__, *["--smoke"] * smoke, "--emulate", str(notes), *command]
             process = stack.enter_context(subprocess.Popen(whole, stdout=subprocess.PIPE, text=True))
             stack.callback(process.terminate)
-            ports.append(int([re.search(r":(\d+)", process.stdout.readline()) for _ in range(2)][1][1]))
-        yield ports
+            started.append(process.stdout)
+        yield [int([re.search(r":(\d+)", said.readline()) for _ in range(2)][1][1]) for said in started]
 
 
 def free_port() -> int:
@@ -268,7 +268,7 @@ def main() -> None:
     parser.add_argument("--emulate", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.emulate:
-        sys.exit(emulate(options.emulate[0], options.emulate[1:]))
+        sys.exit(emulate(options.emulate[0], options.emulate[1:], nice=0 if options.smoke else 10))
     seconds = 0.5 if options.smoke else options.seconds
     if options.switch is not None:
         live.PROMPT = options.switch
@@ -277,7 +277,7 @@ def main() -> None:
     commands = [["rtde", "--port", "0"], ["opcua", "--port", "0"], ["fri", "--port", str(fri)]]
     with (
         tempfile.TemporaryDirectory() as folder,
-        emulators(Path(folder, "written"), *commands) as (rtde, opcua, _),
+        emulators(Path(folder, "written"), *commands, smoke=options.smoke) as (rtde, opcua, _),
     ):
         station = cell(folder, rtde, fri, opcua)
         sources = [s for s in station.workstation.sources if isinstance(s, live.LiveSource)]

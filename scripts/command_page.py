@@ -10,25 +10,25 @@ from fact_tables import markdown
 from seerob import cli
 from seerob.commands import Exit
 
-_HEAD = """<!-- Written by scripts/write-docs from the command line. Do not edit. -->
-
-# Commands
-
-`seerob --help` lists them, and each has its own `--help`, which says what stands here.
-Results, findings and files written are printed one per line; `--json` prints results for machines instead.
-Nothing is written over: a file that exists already is an error, and runs have folders of their own.
-
-"""
+_HEAD = (
+    "<!-- Written by scripts/write-docs from the command line. Do not edit. -->\n\n"
+    "# Commands\n\n"
+    "Each has a `--help`, which says what stands here.\n"
+    "Results, findings and files written are printed one per line; `--json` prints results for machines.\n"
+    "Nothing is written over: a file that exists already is an error, and runs have folders of their own.\n\n"
+)
 _EXITS = {
     Exit.WITHIN: "every limit was kept",
     Exit.EXCEEDED: "at least one limit was exceeded",
     Exit.UNDECIDED: "nothing was seen exceeded, and not everything could be decided, or nothing was judged",
     Exit.ERROR: "a mistake in a file or on the command line, or it was stopped; the message says which",
 }
-_JSON = """
-**With `--json`** one object is printed: `verdict`, `duration` [s], `ticks`, `workstation_hash`, `criteria`, `bones`, `findings`, `folder`.
-Each of `criteria` has `name`, `unit`, `verdict` and its `worst` instant: `t` [s], `value`, `limit`, `interval`, `reason`; null is what is not known.
-"""
+_JSON = (
+    "\n**With `--json`** `assess` and `report` print one object: `verdict`, `duration` [s], `ticks`, "
+    "`workstation_hash`, `criteria`, `bones`, `findings`, `folder`.\n"
+    "Each of `criteria` has `name`, `unit`, `verdict` and its `worst` instant: `t` [s], `value`, `limit`, "
+    "`interval`, `reason`; null is what is not known.\n"
+)
 
 
 def commands_page() -> str:
@@ -36,7 +36,7 @@ def commands_page() -> str:
     rows = [(str(int(code)), text) for code, text in _EXITS.items()]
     parts = [_HEAD, "## Exit codes\n\n", markdown(("code", "means"), rows), _JSON]
     for name, sub in _subcommands(cli.parser()):
-        example = (sub.epilog or "").removeprefix("example: ").strip()
+        example = (sub.epilog or "").removeprefix("example: ").split("   ")[0]
         parts += [f"\n## {name}\n\n", _sentence(sub.description), f"\n```\n{example}\n```\n", _options(sub)]
         for kind, inner in _subcommands(sub):
             parts += [f"\n### {name} {kind}\n\n", _sentence(inner.description), _options(inner)]
@@ -59,7 +59,7 @@ def _options(parser: argparse.ArgumentParser) -> str:
         if isinstance(action, argparse._HelpAction | argparse._SubParsersAction):
             continue
         shown = ", ".join(f"`{word}`" for word in _words(action))
-        text = ((action.help or "") % {"default": action.default}).replace("|", "\\|")
+        text = ((action.help or "") % {"default": action.default}).replace("|", "\\|").replace("<", "\\<")
         must = " **Must be given.**" if action.required and action.option_strings else ""
         rows.append((shown, f"{text}{must}"))
     return "\n" + markdown(("option", "meaning"), rows) if rows else ""
@@ -72,7 +72,7 @@ def _words(action: argparse.Action) -> Iterator[str]:
     value = ""
     if action.nargs != 0:
         value = action.metavar if isinstance(action.metavar, str) else action.dest.upper()
-        if action.choices is not None:
+        if action.choices is not None and not action.metavar:
             value = " or ".join(map(str, action.choices))
         value = f" [{value}]" if action.nargs == "?" else f" {value}"
     for word in action.option_strings:

@@ -122,7 +122,7 @@ def open_files():
     return len(os.listdir("/proc/self/fd"))
 
 
-def wait_for(true, seconds=60.0):
+def wait_for(true, seconds=120.0):
     end = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < end

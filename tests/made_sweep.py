@@ -44,6 +44,25 @@ def missed(model, bodies, motion, contained, count, rng, each=64):
     return wrong
 
 
+def outside(model, contained, count, rng, turns=np.pi):
+    """How many random points of moving bodies, at random joint positions within the limits, are outside."""
+    mechanism = model.mechanism("arm")
+    data, wrong = mujoco.MjData(model.mj), 0
+    low, high = np.maximum(mechanism.lower, -turns), np.minimum(mechanism.upper, turns)
+    for _ in range(count):
+        q = rng.uniform(low, high)
+        ends = rng.random(len(q)) < 0.3
+        q[ends] = np.where(rng.random(len(q)) < 0.5, low, high)[ends]
+        data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
+        mujoco.mj_kinematics(model.mj, data)
+        for i in model.select("arm"):
+            body = model.bodies[i]
+            for solid in body.solids:
+                points = points_of(solid, 20, rng) @ data.xmat[body.mj].reshape(3, 3).T + data.xpos[body.mj]
+                wrong += int((~contained(points)).sum())
+    return wrong
+
+
 def inside(mesh: Mesh, points):
     """Whether a closed mesh contains each point (n, 3)."""
     tree = tree_of(np.ascontiguousarray(mesh.vertices), mesh.faces)

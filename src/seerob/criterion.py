@@ -79,11 +79,7 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def unseen(self, model: Model) -> str:
         """Why nothing is within: what no shape shows of the robots that it speaks of; empty for nothing."""
-        if not self.by_shape:
-            return ""
-        found = (model.mechanisms[name].unseen for name in self.subjects() if name in model.mechanisms)
-        names = ", ".join(dict.fromkeys(link for links in found for link in links))
-        return f"no shape shows {names}, which has a mass: give it one, or mount one on it" if names else ""
+        return model.unseen(self.subjects()) if self.by_shape else ""
 
 
 def judge(value: float, limit: float | None, *, at_most: bool = True) -> Verdict | None:

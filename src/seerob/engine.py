@@ -31,7 +31,7 @@ from seerob.mounting.compilation import pose_matrix
 from seerob.moving_base import moved_by_poses
 from seerob.reference import Course, Reference
 from seerob.sample_values import beyond_limits, is_possible, largest_speed, torques_of
-from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
+from seerob.samples import BodySample, JointSample, PoseSample, Sample, SignalSample
 from seerob.state import Hearing, State
 from seerob.task_space import TaskPull
 from seerob.transforms import Array, rotation_from_wxyz
@@ -160,7 +160,7 @@ class Engine:
                 self._following(sample.target).hear(sample)
                 continue
             mechanism = self._target(sample)
-            reason = "" if sample.quality is Quality.GOOD else f"its source says {sample.quality.value}"
+            reason = sample.quality.doubt("its source")
             reference = self._references[mechanism.name]
             if not is_possible(sample):
                 # Nothing to be pulled to; not knowing where it is must show all the same.

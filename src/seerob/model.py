@@ -283,6 +283,12 @@ class Model:
             raise UnknownName("robot, human, tool or part with a shape", name, self.names())
         return found
 
+    def unseen(self, names: Iterable[str]) -> str:
+        """What no shape shows of whole robots that names mean, in a sentence; empty for nothing."""
+        found = (self.mechanisms[name].unseen for name in names if name in self.mechanisms)
+        links = ", ".join(dict.fromkeys(link for each in found for link in each))
+        return f"no shape shows {links}, which has a mass: give it one, or mount one on it" if links else ""
+
     def names(self) -> tuple[str, ...]:
         """Every name that `select` takes without wildcards."""
         shaped = (name for name, m in self.mechanisms.items() if m.bodies or m.carried)

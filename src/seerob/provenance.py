@@ -8,11 +8,14 @@ import numpy as np
 
 from seerob.model import Gap, Mechanism, Model
 from seerob.snapshot import Input, Origin
+from seerob.source import Source
 from seerob.workstation import Mounted, Robot
 
 FILE = "workstation file"
 PRELIMINARY = ("vendor_emulator", "simulator", "planned")
 """Origins of a motion that no real controller has executed, [Weistroffer2022]_ 2.1.3.1."""
+CAPTURED = {"live": "captured, live", "file": "captured, from a file"}
+"""By `seerob.source.Source.captured`."""
 WORST_FIRST = list(reversed(Origin))
 
 
@@ -21,15 +24,10 @@ def motion(model: Model, *names: str) -> tuple[Input, ...]:
     found = []
     for name in dict.fromkeys(names):
         mechanism = model.mechanism(name)
-        source = next((s for s in model.workstation.sources if s.target() == name), None)
-        if source is not None:
+        sources = [s for s in model.workstation.sources if s.target() == name]
+        if sources:
             # A twin follows what was heard; whether that was measured, the source's own findings say.
-            origin = getattr(source, "origin", None)
-            kind = Origin.MEASURED if origin == "controller" else Origin.GIVEN
-            said = (
-                None if origin is None else f"{origin}, preliminary" * (origin in PRELIMINARY) or str(origin)
-            )
-            found.append(Input(name=f"motion of {name}", value=said, origin=kind, source=source.name))
+            found += [_motion_of(name, source) for source in sources]
         elif mechanism.home_given:
             where = "posture" if mechanism.role == "human" else "q"
             found.append(
@@ -42,6 +40,16 @@ def motion(model: Model, *names: str) -> tuple[Input, ...]:
         else:
             found.append(Input(name=f"pose of {name}", origin=Origin.MISSING))
     return tuple(found)
+
+
+def _motion_of(name: str, source: Source) -> Input:
+    origin = getattr(source, "origin", None)
+    said = None if origin is None else f"{origin}, preliminary" * (origin in PRELIMINARY) or str(origin)
+    kind = Origin.MEASURED if origin == "controller" else Origin.GIVEN
+    if source.captured:
+        live = source.captured == "live"
+        said, kind = CAPTURED[source.captured], Origin.MEASURED if live else Origin.STATED
+    return Input(name=f"motion of {name}", value=said, origin=kind, source=source.name)
 
 
 def masses(model: Model, mechanism: Mechanism) -> tuple[Input, ...]:

@@ -15,13 +15,23 @@ Vec4 = tuple[float, float, float, float]
 
 
 class Quality(StrEnum):
-    """How good a sample is, as its source says."""
+    """How good a sample is, as its source says, or as this machine heard it."""
 
     GOOD = "good"
     DEGRADED = "degraded"
     """Usable for the picture, not for a verdict (a guessed joint, a low confidence)."""
     INVALID = "invalid"
     """The source itself says that this is not the truth (robot off, tracking lost)."""
+    LATE = "late"
+    """Heard while this machine fell behind: run time stood still, and speeds across the gap are false."""
+
+    def doubt(self, who: str) -> str:
+        """Why what somebody said may not be relied on; empty when it may."""
+        if self is Quality.GOOD:
+            return ""
+        if self is Quality.LATE:
+            return "this machine is too slow: run time fell behind"
+        return f"{who} says {self.value}"
 
 
 class SampleBase(Struct, frozen=True, kw_only=True, tag=True):

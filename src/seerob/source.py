@@ -74,6 +74,8 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Made from the kind and the target when not given."""
     shares: ClassVar[bool] = False
     """Whether several sources of its sort may drive the same target."""
+    captured: ClassVar[str] = ""
+    """How it captured a person's motion, ``live`` from a device or from a ``file``; empty when it did not."""
     reads_variables: ClassVar[bool] = False
     """Whether it reads variables of the workstation's dictionary."""
 

@@ -55,6 +55,7 @@ def test_a_name_is_one_line_of_words_on_the_terminal_and_in_the_files(capsys, tm
     assert "操作员" in line
     report = (tmp_path / "out" / "report.html").read_text()
     assert not any(unicodedata.category(c) == "Cc" and c not in "\n\t" for c in report)
+    assert not any(unicodedata.bidirectional(c) in ("RLO", "LRI") for c in report)  # would turn what follows
     assert "操作员" in report
     book = openpyxl.load_workbook(tmp_path / "out" / "results.xlsx", read_only=True)
     assert book.sheetnames

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from made_postures import UNSUPPORTED, known, made_angles
 
+from seerob.ergonomics.rula import Rula
 from seerob.scoring.rula import (
     LEAST,
     LoadUse,
@@ -243,6 +244,27 @@ def test_a_supported_back_may_lean_back_but_not_forward():
 def test_force(load, use, original, worksheet):
     assert force(load, use, Profile.ORIGINAL_1993) == exactly(original)
     assert force(load, use, Profile.WORKSHEET) == exactly(worksheet)
+
+
+def test_plain_words_are_understood_and_others_refused():
+    """A script that writes ``profile="worksheet"`` gets the worksheet, not silently the paper."""
+    for profile in Profile:
+        for use in LoadUse:
+            for kg in (1.0, 5.0, 25.0):
+                assert force(kg, str(use.value), str(profile.value)) == force(kg, use, profile)
+    assert Rula(human="op", profile="worksheet").static == Profile.WORKSHEET.static
+    for use, profile in (("sometimes", "worksheet"), ("shock", "worksheets")):
+        with pytest.raises(ValueError, match="is not a valid"):
+            force(25.0, use, profile)
+    with pytest.raises(ValueError, match="is not a valid"):
+        posture_components(
+            made_angles(),
+            thresholds=Thresholds(),
+            supported=UNSUPPORTED,
+            back_supported=None,
+            legs=None,
+            policy="projected",
+        )
 
 
 def test_the_profiles_differ_in_two_things_only():

@@ -6,7 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 from made_capture import PERSON, captured, frames_of, play, source, walking, workstation
+from msgspec.structs import replace
 
+from seerob.engine import Engine
 from seerob.human.following import Following
 from seerob.human.skeleton import BONES, JOINTS, bone_poses
 from seerob.human.smoothing import POINT_SPEED
@@ -257,3 +259,27 @@ def test_hostile_samples_are_refused_and_what_waits_is_bounded():
     assert len(following._instants) <= module.MOST_KEPT
     heard = [hear(source=f"d{k}", t=0.5) for k in range(module.MOST_DEVICES + 5)]
     assert sum(heard) == module.MOST_DEVICES - 1
+
+
+def test_who_is_seen_for_the_first_time_during_a_run_is_put_there():
+    """A live device that begins late: the twin does not fly there through the cell."""
+    station = Station(workstation(source(captured(frames_of(*walking(0.4))))))
+    late, away = 0.3, np.array([3.0, 1.0, 0.0])
+    samples = [
+        replace(
+            sample,
+            t=sample.t + late,
+            points=tuple(replace(p, position=tuple(p.position + away)) for p in sample.points),
+        )
+        for _, opened in station.sources
+        for sample in opened.samples
+    ]
+    engine = Engine(station.model, driven={"operator": 0.2}, live=["operator"])
+    mechanism = station.model.mechanisms["operator"]
+    for tick in range(50):
+        near = [s for s in samples if tick * 0.01 <= s.t - 0.02 < (tick + 1) * 0.01]
+        engine.take(near)
+        state = engine.tick() if tick else engine.start()
+        assert np.abs(state.data.qvel[mechanism.v_address]).max() < 10, state.t
+        assert bool(state.doubt("operator")) == (state.t < late - 1e-9), state.t
+    assert state.joint_positions(mechanism)[0] > 2.9

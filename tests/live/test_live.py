@@ -12,6 +12,7 @@ import time
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from live_story import wait_for as until
 from seerob.errors import InputError, SeerobError
@@ -27,7 +28,7 @@ from seerob.live.listening import (
     say_once,
 )
 from seerob.live.real_time import Clock, hear, require_recorded
-from seerob.samples import JointSample, SignalSample
+from seerob.samples import JointSample, Quality, SignalSample
 from seerob.source import Source
 from seerob.workstation import Workstation
 
@@ -59,6 +60,10 @@ def joint(t=None, device=None):
     return JointSample(
         source="", seq=0, target="arm", q=(0.0,), t=time.monotonic() if t is None else t, t_device=device
     )
+
+
+def signal(t):
+    return SignalSample(source="plc", seq=0, values={"speed": 0.25}, t=t)
 
 
 class Ears:
@@ -206,35 +211,54 @@ class Said:
         return tuple(self.ticks.pop(0)) if self.ticks else ()
 
 
-def test_a_clock_that_slips_makes_the_next_sample_doubtful_and_none_go_back():
-    """Run time stood still while the robot went on: nobody may take that for speed."""
+@pytest.mark.parametrize("said", [joint, signal])
+def test_a_clock_that_slips_makes_the_next_sample_doubtful_and_none_go_back(said):
+    """Run time stood still while the robot, or a belt, went on: nobody may take that for speed."""
     clock = Clock()
     start = time.monotonic()
-    ticks = [[joint(t=start + 0.01 * k)] for k in range(6)]
+    ticks = [[said(t=start + 0.01 * k)] for k in range(6)]
     feed = hear(iter(lambda: (), None), Said(*ticks), clock)
     heard = [*next(feed), *next(feed)]
     clock.start += 0.025
     clock.slipped += 0.025
     heard += [s for _ in range(4) for s in next(feed)]
     # What was heard last is older than run time shows; the next one came about too fast.
-    assert [s.quality for s in heard] == ["good"] * 3 + ["degraded"] * 2
+    assert [s.quality for s in heard] == ["good"] * 3 + ["late"] * 2
     assert [s.t for s in heard] == pytest.approx([0, 0.01, 0.02, 0.02, 0.025], abs=2e-6)
-    assert heard[3].q == heard[2].q
+    assert replace(heard[3], t=heard[2].t, quality=heard[2].quality) == heard[2]
     assert heard[3].t > heard[2].t
 
 
-def test_after_a_slip_nothing_is_sure_until_the_twin_has_settled():
+@pytest.mark.parametrize("said", [joint, signal])
+def test_after_a_slip_nothing_is_sure_until_the_twin_has_settled(said):
     """On its way to where the robot went it is faster than any robot, and once in the right place."""
     clock = Clock()
     start = time.monotonic()
-    ticks = [[joint(t=start + 0.12 * k)] for k in range(12)]
+    ticks = [[said(t=start + 0.12 * k)] for k in range(12)]
     feed = hear(iter(lambda: (), None), Said(*ticks), clock)
     before = next(feed)
     clock.slipped += 0.3
     after = [s for _ in range(10) for s in next(feed)]
     assert [s.quality for s in before] == ["good"] * 2
-    assert [s.quality for s in after] == ["degraded"] * 4 + ["good"] * 6
+    assert [s.quality for s in after] == ["late"] * 4 + ["good"] * 6
     assert after[4].t - before[-1].t == pytest.approx(0.6)
+
+
+def test_several_pictures_of_one_instant_are_all_heard():
+    """Of a machine; a robot is in one place."""
+    start = time.monotonic()
+    for said, heard in ((signal, 3), (joint, 1)):
+        feed = hear(iter(lambda: (), None), Said([said(t=start)], [said(t=start)] * 2), Clock())
+        assert len([*next(feed), *next(feed)]) == heard
+
+
+def test_whose_fault_a_doubt_is():
+    assert [quality.doubt("plc") for quality in Quality] == [
+        "",
+        "plc says degraded",
+        "plc says invalid",
+        "this machine is too slow: run time fell behind",
+    ]
 
 
 def test_a_run_begins_with_what_is_heard_then_and_not_with_what_was_heard_before(monkeypatch):

@@ -83,7 +83,8 @@ def scene_with_instances():
         pin, "pin_1", "pin", parent_node_name="fixture", transform=transform(None, (0.1, 0, 0))
     )
     scene.graph.update("pin_2", "fixture", matrix=np.diag([-2.0, 1, 1, 1]), geometry="pin")
-    scene.add_geometry(L_SHAPE, "plate", "plate", parent_node_name="fixture")
+    plate = L_SHAPE.copy()  # without the normals that other tests had computed, which would be exported
+    scene.add_geometry(plate, "plate", "plate", parent_node_name="fixture")
     return scene
 
 

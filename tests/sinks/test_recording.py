@@ -1,11 +1,12 @@
 """What is read back is what was written, whatever happened to the file."""
 
+import os
 import struct
 import subprocess
 import sys
 import time
 from pathlib import Path
-from threading import Event
+from threading import Event, Thread
 
 import made_run
 import msgspec
@@ -238,6 +239,22 @@ def test_a_slow_disk_drops_snapshots_before_samples_and_says_so(tmp_path, monkey
     assert writer.findings()[0].level == "warning"
 
 
+def test_an_interrupt_while_the_thread_begins_leaves_none_and_a_whole_file(tmp_path, monkeypatch):
+    begun, start = [], Thread.start
+
+    def interrupted(thread):
+        start(thread)
+        begun.append(thread)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Thread, "start", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        Recorder().open(made_run.scene(), {}, {}, tmp_path)
+    begun[0].join(60)
+    assert not begun[0].is_alive()
+    assert Recording.open(tmp_path / "run.mcap").complete
+
+
 def test_lossless_waits_instead_of_dropping(tmp_path, monkeypatch):
     from seerob.sinks._mcap_tape import McapTape
 
@@ -264,6 +281,20 @@ def test_a_disk_that_refuses_stops_the_recording_not_the_run(tmp_path, monkeypat
     assert writer.lost == 20
     assert "No space left" in writer.findings()[-1].text
     assert Recording.open(tmp_path / "run.mcap").scene == made_run.scene()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the full disk of Linux")
+def test_a_full_disk_is_told_also_when_what_waits_cannot_be_written(tmp_path, monkeypatch):
+    """Closing the file writes once more, and fails once more."""
+    monkeypatch.setattr("seerob.sinks.recorder.FLUSH_PERIOD", 0.0)
+    writer = Recorder(lossless=True).open(made_run.scene(), {}, {}, tmp_path)
+    with open("/dev/full", "wb") as full:
+        os.dup2(full.fileno(), writer._tape._file.fileno())
+    writer.write(made_run.snapshot(0), ())
+    with pytest.raises(SeerobError, match=r"run\.mcap: recording stopped early: .*No space left"):
+        writer.close()
+    assert writer.lost == 1
+    assert "No space left" in writer.findings()[-1].text
 
 
 def test_time_that_stands_still_or_turns_back_is_left_out(tmp_path):

@@ -1,6 +1,6 @@
 """Words of a report that are short keep what they are about."""
 
-from seerob.sinks._sentences import shortened
+from seerob.sinks._sentences import listed, shortened
 
 
 def test_a_text_that_is_too_long_keeps_its_begin_and_its_end_where_the_figure_is():
@@ -11,3 +11,10 @@ def test_a_text_that_is_too_long_keeps_its_begin_and_its_end_where_the_figure_is
     assert short.endswith("0.872 m/s of 0.202 m/s")
     assert shortened(text, len(text)) == text
     assert len(shortened(text, len(text) - 1)) == len(text) - 1
+
+
+def test_a_sentence_lists_so_many_names_and_counts_the_others():
+    assert listed(["a", "b", "c"]) == "a, b and c"
+    many = listed([f"n{k}" for k in range(200)])
+    assert many.startswith("n0, n1, ")
+    assert many.endswith("n13 and 186 more")

@@ -5,7 +5,7 @@ import time
 
 from seerob.live.listening import Listener
 
-PATIENCE = 30.0
+PATIENCE = 120.0
 
 
 def free_port(kind=socket.SOCK_DGRAM):

@@ -181,7 +181,7 @@ def test_messages_that_come_twice_or_out_of_order_are_heard_once_and_in_order(po
     listener.start()
     try:
         with DrflSender(motion, to=("127.0.0.1", port), way=way):
-            wait_for(lambda: sum(isinstance(s, JointSample) for s in heard) > 20, 30)
+            wait_for(lambda: sum(isinstance(s, JointSample) for s in heard) > 20)
     finally:
         listener.ask_to_stop()
         assert listener.join(10)
@@ -249,7 +249,7 @@ def test_the_program_sends_what_the_reader_reads(program, port):
     listener.start()
     bridge = subprocess.Popen([program, "192.0.2.1", "--port", str(port), "--rate", "200"])
     try:
-        wait_for(lambda: sum(isinstance(s, JointSample) for s in heard) > 10, 30)
+        wait_for(lambda: sum(isinstance(s, JointSample) for s in heard) > 10)
     finally:
         bridge.terminate()
         assert bridge.wait(30) == 0

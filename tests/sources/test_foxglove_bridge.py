@@ -160,7 +160,7 @@ def test_what_is_not_offered_is_said(monkeypatch, caplog, topic, said):
         content = Content.JOINT_STATE if topic == "/nobody" else Content.TF
         listener = Listener(source(port, topic=topic, content=content), None, lambda _: None)
         listener.start()
-        wait_for(lambda: said in caplog.text, 30.0)
+        wait_for(lambda: said in caplog.text)
         listener.ask_to_stop()
         assert listener.join(10.0)
 
@@ -188,11 +188,11 @@ def test_a_bridge_that_is_restarted_is_heard_again(monkeypatch):
         return True
 
     for _ in range(3):
-        wait_for(spoken, 30.0)
+        wait_for(spoken)
         servers[-1].stop()
-        wait_for(lambda: begin_again(port), 30.0)
+        wait_for(lambda: begin_again(port))
         samples.clear()
-    wait_for(spoken, 30.0)
+    wait_for(spoken)
     listener.ask_to_stop()
     assert listener.join(10.0)
     assert listener.statistics().losses >= 3

@@ -20,7 +20,7 @@ from seerob.sources.kinect import Kinect, Link
 from seerob.transforms import wxyz_from_rotation
 from seerob.workstation import Pose
 
-PATIENCE = 20.0
+PATIENCE = 120.0
 AT = Pose(position=tuple(CAMERA[:3, 3]), wxyz=tuple(wxyz_from_rotation(CAMERA[:3, :3])))
 
 

@@ -120,7 +120,7 @@ def good(heard):
 
 def test_variables_arrive_and_a_wrong_address_takes_none_with_it():
     with plc() as server, listening(Modbus(host="127.0.0.1", port=server.port, every=0.03), TARGET) as heard:
-        wait_for(lambda: good(heard), 20)
+        wait_for(lambda: good(heard))
         assert set(heard[-1].doubts) == {"gone"}
         assert "no such register" in heard[-1].doubts["gone"]
 
@@ -142,11 +142,11 @@ def test_a_device_that_is_switched_off_and_on_is_asked_again(monkeypatch):
     try:
         with listening(Modbus(host="127.0.0.1", port=server.port, every=0.03), TARGET) as heard:
             for _ in range(4):
-                wait_for(lambda: good(heard), 20)
+                wait_for(lambda: good(heard))
                 server.stop()
                 heard.clear()
                 server.start()
-            wait_for(lambda: good(heard), 20)
+            wait_for(lambda: good(heard))
         wait_for(lambda: open_files() <= files and threading.active_count() <= threads)
     finally:
         server.stop()
@@ -288,7 +288,7 @@ def test_the_state_says_what_joints_are_worth(state, quality):
     with robot(state) as server:
         source = ModbusRobot(robot="arm", host="127.0.0.1", port=server.port, every=0.03)
         with listening(source) as heard:
-            wait_for(lambda: any(isinstance(s, JointSample) for s in heard), 20)
+            wait_for(lambda: any(isinstance(s, JointSample) for s in heard))
     assert {s.quality for s in heard if isinstance(s, JointSample)} == {quality}
     said = next(s for s in heard if isinstance(s, SignalSample))
     assert said.values["robot_state"] == state
@@ -316,7 +316,7 @@ def test_old_software_without_torques_is_read_without_them(tmp_path):
         said = " ".join(f.text for f in source.open(tmp_path, target).findings)
         assert "no such register: holding 50 to 51 are left out" in said
         with listening(source, target) as heard:
-            wait_for(lambda: any(isinstance(s, JointSample) for s in heard), 20)
+            wait_for(lambda: any(isinstance(s, JointSample) for s in heard))
     (first, *_) = [s for s in heard if isinstance(s, JointSample)]
     assert first.q == pytest.approx((-np.pi / 2, -np.pi))
     assert (first.qd, first.tau) == (None, None)

@@ -58,7 +58,7 @@ def known(heard, name):
 
 def until(heard, true, say=lambda: None):
     """Say something again and again until it is heard: a subscription may take its time."""
-    end = time.monotonic() + 20
+    end = time.monotonic() + 120
     while not true():
         assert time.monotonic() < end, newest(heard)
         say()
@@ -70,7 +70,7 @@ def test_values_arrive_in_si_and_grow_old(port):
         until(heard, lambda: known(heard, "belt/speed") == 0.5, lambda: said(port, "belt", '{"speed": 500}'))
         until(heard, lambda: known(heard, "door") is True, lambda: said(port, "cell/door", "true"))
         # Silence: the one that must be said often grows old, the other stands.
-        wait_for(lambda: "not heard for" in newest(heard).doubts.get("belt/speed", ""), 20)
+        wait_for(lambda: "not heard for" in newest(heard).doubts.get("belt/speed", ""))
         assert known(heard, "door") is True
         until(
             heard,
@@ -101,16 +101,16 @@ def test_a_sparkplug_device_is_known_from_birth_to_death(port):
         send("DBIRTH", birth, seq=1)
 
     with broker(port), listening_to(port, COUNT) as heard:
-        wait_for(lambda: "birth was not heard" in newest(heard).doubts["count"] if heard else False, 20)
+        wait_for(lambda: "birth was not heard" in newest(heard).doubts["count"] if heard else False)
         until(heard, lambda: known(heard, "count") == 7.0, born)
         send("DDATA", Metric(alias=5, value=-8.0, type=4), seq=2)
-        wait_for(lambda: known(heard, "count") == -8.0, 20)
+        wait_for(lambda: known(heard, "count") == -8.0)
         # It stands as long as the node lives, however long it says nothing.
         beats = len(heard)
-        wait_for(lambda: len(heard) > beats + 15, 20)
+        wait_for(lambda: len(heard) > beats + 15)
         assert known(heard, "count") == -8.0
         send("NDEATH", seq=0, device="")
-        wait_for(lambda: "not alive" in newest(heard).doubts.get("count", ""), 20)
+        wait_for(lambda: "not alive" in newest(heard).doubts.get("count", ""))
 
 
 def test_a_broker_that_is_killed_is_found_again(port, monkeypatch):
@@ -122,7 +122,7 @@ def test_a_broker_that_is_killed_is_found_again(port, monkeypatch):
             with broker(port):
                 heard.clear()
                 until(heard, lambda: known(heard, "door") is True, lambda: said(port, "cell/door", "1"))
-    wait_for(lambda: open_files() <= files and threading.active_count() <= threads, 20)
+    wait_for(lambda: open_files() <= files and threading.active_count() <= threads)
 
 
 @asynccontextmanager

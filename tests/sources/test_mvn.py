@@ -29,7 +29,7 @@ from seerob.sources._mvn_frames import BETTER_GONE, MOST_CHARACTERS, Frames, Uni
 from seerob.sources.mvn import Mvn, Transport
 from seerob.transforms import rotation_from_wxyz, wxyz_from_rotation
 
-PATIENCE = 30.0
+PATIENCE = 120.0
 TARGET = Target(name="op", joints=(), units=(), lower=(), upper=(), velocity=(), description=PERSON)
 
 
@@ -319,7 +319,7 @@ def test_the_command_sends_what_it_is_told(tmp_path):
         "--rate",
         "60",
     ]
-    server, what, where = emulated(cli.parser().parse_args(words))
+    server, what, where, *_ = emulated(cli.parser().parse_args(words))
     assert (what, where) == (f"a person, {tmp_path / 'x.mvnx'}", f"127.0.0.1:{port}")
     (data, *_) = server.instant(3)
     (frame,) = fed(Frames(unit=Unit.CM), [data])

@@ -16,6 +16,7 @@ from live_story import Story, listening, lived, wait_for
 from made_cell import made
 from seerob.emulators.opcua import URI, Emulated, OpcuaServer
 from seerob.errors import InputError, SeerobError
+from seerob.live.listening import Listener
 from seerob.protocols.opcua_address import Address, address, browse_name, node_name, written
 from seerob.protocols.opcua_client import Security
 from seerob.protocols.opcua_robotics import natural
@@ -71,18 +72,18 @@ def good(heard, name="belt/speed"):
 
 def test_variables_are_subscribed_and_stand_until_they_change(server):
     with listening(Opcua(name="plc", url=server.url), target(SPEED, RUNS, GONE, OTHER)) as heard:
-        wait_for(lambda: good(heard) and good(heard, "belt/runs"), 30)
+        wait_for(lambda: good(heard) and good(heard, "belt/runs"))
         assert heard[-1].values == {"belt/speed": 0.25, "belt/runs": True}
         assert "does not exist" in heard[-1].doubts["gone"]
         assert "states the unit mm/s, the dictionary m/s" in heard[-1].doubts["other"]
         # Nothing changes, and yet it stands.
         count = len(heard)
-        wait_for(lambda: len(heard) > count + 15, 30)
+        wait_for(lambda: len(heard) > count + 15)
         assert good(heard)
         server.bad.add("Belt/speed")
-        wait_for(lambda: "BadSensorFailure" in heard[-1].doubts.get("belt/speed", ""), 30)
+        wait_for(lambda: "BadSensorFailure" in heard[-1].doubts.get("belt/speed", ""))
         server.bad.clear()
-        wait_for(lambda: good(heard), 30)
+        wait_for(lambda: good(heard))
 
 
 def test_a_server_that_is_killed_is_found_again(monkeypatch):
@@ -91,7 +92,7 @@ def test_a_server_that_is_killed_is_found_again(monkeypatch):
     server = OpcuaServer({"Belt/speed": PLC["Belt/speed"]}).start()
     try:
         with listening(Opcua(name="plc", url=server.url), target(SPEED)) as heard:
-            wait_for(lambda: good(heard), 30)
+            wait_for(lambda: good(heard))
             server.stop()
             heard.clear()
             server.start()
@@ -109,7 +110,7 @@ def test_browsing_names_what_can_be_written_into_a_dictionary(server):
     assert nodes[f"nsu={URI};s=Belt/running"].type == "Boolean"
     # What was found is an address.
     with listening(Opcua(name="plc", url=server.url), target(RUNS)) as heard:
-        wait_for(lambda: good(heard, "belt/runs"), 30)
+        wait_for(lambda: good(heard, "belt/runs"))
 
 
 def test_a_bool_that_may_be_written_is_and_nothing_else(server, tmp_path):
@@ -121,7 +122,7 @@ def test_a_bool_that_may_be_written_is_and_nothing_else(server, tmp_path):
 
     for value in (True, False):
         write("Twin/fast", value)
-        wait_for(lambda value=value: server.written["Twin/fast"][-1:] == [value], 30)
+        wait_for(lambda value=value: server.written["Twin/fast"][-1:] == [value])
     for path, why in (("Belt/running", "refuses"), ("Belt/speed", "only a Boolean"), ("Gone", "exist")):
         with pytest.raises(SeerobError, match=why):
             write(path, True)
@@ -142,10 +143,10 @@ def test_at_start_it_is_told_what_the_server_does_not_have_or_states_otherwise(s
     assert "4 of 8 variables are heard at start" in " ".join(f.text for f in findings)
 
 
-def cell(folder, server, more=""):
+def cell(folder, server, more="", robot="ur10"):
     return made(
         folder,
-        '[[robots]]\nname = "arm"\nmodel = "library:ur10"\n'
+        f'[[robots]]\nname = "arm"\nmodel = "library:{robot}"\n'
         f'[[sources]]\nkind = "opcua_robot"\nname = "controller"\nrobot = "arm"\nurl = "{server.url}"\n{more}'
         '[[safety]]\nkind = "velocity"\nname = "speed"\nat = "arm"\nlimit = 1.5\n',
     )
@@ -172,9 +173,11 @@ def test_units_are_required_and_never_guessed(tmp_path):
     with OpcuaServer(robots={"R1": motion}, axis_unit="") as silent:
         with pytest.raises(InputError, match="Axis_1 states no unit"):
             _ = cell(tmp_path / "a", silent).sources
+        with pytest.raises(InputError, match="Axis_1 is in m, its joint in rad"):
+            _ = cell(tmp_path / "b", silent, 'position_unit = "mm"\n').sources
         source = OpcuaRobot(robot="arm", url=silent.url, position_unit="deg")
         with listening(source) as heard:
-            wait_for(lambda: any(isinstance(s, JointSample) for s in heard), 30)
+            wait_for(lambda: any(isinstance(s, JointSample) for s in heard))
         sample = next(s for s in heard if isinstance(s, JointSample))
         assert np.abs(np.array(sample.q) - HOME).max() < 0.51
         assert sample.qd is None
@@ -187,6 +190,24 @@ def test_which_robot_and_which_axes_must_be_clear(tmp_path, server):
     with pytest.raises(InputError, match="no axis J1"):
         _ = cell(tmp_path / "b", server, f'device = "R2"\naxes = [{names}]\n').sources
     _ = cell(tmp_path / "c", server, 'device = "R2"\n').sources
+    with pytest.raises(InputError, match=r"R2 has the axes Axis_1, .*, arm has 7 joints; name one"):
+        _ = cell(tmp_path / "d", server, 'device = "R2"\n', robot="iiwa14").sources
+
+
+def test_a_server_that_comes_late_with_other_axes_is_not_heard(server, caplog):
+    """At its start the run could not ask it; a robot of seven joints is not moved by six axes."""
+    names = tuple(f"j{k}" for k in range(7))
+    free = (math.inf,) * 7
+    low = tuple(-x for x in free)
+    target = Target(name="arm", joints=names, units=("rad",) * 7, lower=low, upper=free, velocity=(None,) * 7)
+    samples = []
+    source = OpcuaRobot(name="arm", robot="arm", url=server.url, device="R1")
+    listener = Listener(source, target, samples.append)
+    listener.start()
+    wait_for(lambda: "arm has 7 joints" in caplog.text)
+    listener.ask_to_stop()
+    assert listener.join(30)
+    assert samples == []
 
 
 # -- protection ---------------------------------------------------------------------------------
@@ -234,7 +255,7 @@ def test_only_who_is_known_comes_in(tmp_path):
             return Opcua(name="plc", url=server.url, server_certificate="server.pem", **(options | more))
 
         with listening(source("twin"), target(SPEED, folder=tmp_path)) as heard:
-            wait_for(lambda: good(heard), 30)
+            wait_for(lambda: good(heard))
         said = " ".join(f.text for f in source("stranger").open(tmp_path, target()).findings)
         assert "not reached at start" in said
         said = " ".join(f.text for f in Opcua(name="plc", url=server.url).open(tmp_path, target()).findings)

@@ -57,13 +57,13 @@ def test_unity_connects_to_us_and_may_come_back(edition):
     listener.start()
     try:
         for _ in range(2):
-            wait_for(lambda: len(samples) > 5, 30.0)
+            wait_for(lambda: len(samples) > 5)
             check(samples[:5], project.epoch)
             project.stop()
             samples.clear()
             project.start()
         # It took the serialisation from our handshake.
-        wait_for(lambda: len(samples) > 5, 30.0)
+        wait_for(lambda: len(samples) > 5)
         assert project.edition is edition
     finally:
         listener.ask_to_stop()
@@ -87,7 +87,7 @@ def test_what_the_endpoint_refuses_is_said(caplog):
         said = RosTcp(robot="arm", host="127.0.0.1", port=server.port, topic="/nobody")
         listener = Listener(said, None, lambda _: None)
         listener.start()
-        wait_for(lambda: "Failed to resolve message name" in caplog.text, 30.0)
+        wait_for(lambda: "Failed to resolve message name" in caplog.text)
         listener.ask_to_stop()
         assert listener.join(10.0)
 
@@ -153,13 +153,13 @@ def asked(*arguments):
 
 
 def test_an_emulated_endpoint_and_an_emulated_unity_project_are_heard():
-    server, what, _ = asked("--port", "0")
+    server, what, *_ = asked("--port", "0")
     assert what == "ur10, a calm swing"
     with server:
         samples = heard(RosTcp(robot="arm", host="127.0.0.1", port=server.port), lambda s: len(s) > 2)
     assert {len(s.q) for s in samples} == {6}
     port = free_port(socket.SOCK_STREAM)
-    project, what, where = asked("--unity", "127.0.0.1", "--port", str(port))
+    project, what, where, *_ = asked("--unity", "127.0.0.1", "--port", str(port))
     assert (what, where) == ("a Unity project, ur10, a calm swing", f"127.0.0.1:{port}")
     with project:
         samples = heard(RosTcp(robot="arm", side=Side.ENDPOINT, port=port), lambda s: len(s) > 2)

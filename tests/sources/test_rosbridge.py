@@ -238,7 +238,7 @@ def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch):
     try:
         for _ in range(8):
             samples.clear()
-            wait_for(lambda: len(samples) > 3, 30.0)
+            wait_for(lambda: len(samples) > 3)
             server.stop()
             server.start()
     finally:
@@ -254,13 +254,13 @@ def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch):
 FOREIGN = """
 import json, sys, time, roslibpy
 ros = roslibpy.Ros(host="127.0.0.1", port=int(sys.argv[1]))
-ros.run(timeout=20)
+ros.run(timeout=120)
 heard = []
 roslibpy.Topic(ros, "/joint_states", "sensor_msgs/JointState").subscribe(heard.append)
 talker = roslibpy.Topic(ros, "/target", "geometry_msgs/PoseStamped")
 talker.advertise()
 talker.publish(roslibpy.Message({"pose": {"position": {"x": 1.0}}}))
-end = time.monotonic() + 30
+end = time.monotonic() + 120
 while len(heard) < 5 and time.monotonic() < end:
     time.sleep(0.01)
 print(json.dumps(heard[:5]))
@@ -275,7 +275,7 @@ def test_roslibpy_reads_our_server(edition):
             [sys.executable, "-W", "ignore", "-c", FOREIGN, str(server.port)],
             capture_output=True,
             text=True,
-            timeout=90,
+            timeout=240,
             check=False,
         )
         assert done.returncode == 0, done.stderr

@@ -59,7 +59,7 @@ def good(heard):
 def test_variables_arrive_and_the_session_is_given_back():
     with plc() as server:
         with listening(source(server), TARGET) as heard:
-            wait_for(lambda: good(heard), 20)
+            wait_for(lambda: good(heard))
             assert heard[-1].values == {"belt/speed": 0.25, "belt/runs": True}
             assert "Address does not exist" in heard[-1].doubts["gone"]
             assert len(server.sessions) == 1
@@ -72,11 +72,11 @@ def test_a_plc_that_is_switched_off_and_on_is_asked_again(monkeypatch):
     try:
         with listening(source(server), TARGET) as heard:
             for _ in range(3):
-                wait_for(lambda: good(heard), 20)
+                wait_for(lambda: good(heard))
                 server.stop()
                 heard.clear()
                 server.start()
-            wait_for(lambda: good(heard), 20)
+            wait_for(lambda: good(heard))
             # A token that the PLC has forgotten is asked for anew.
             server.sessions.clear()
             wait_for(
@@ -128,7 +128,7 @@ def test_only_the_certificate_that_was_given_is_trusted(tmp_path):
         with listening(
             source(server, ca="plc.pem"), msgspec.structs.replace(TARGET, folder=str(tmp_path))
         ) as heard:
-            wait_for(lambda: good(heard), 20)
+            wait_for(lambda: good(heard))
         opened = source(server, ca="plc.pem").open(tmp_path, TARGET)
         assert "asked from https" in opened.findings[1].text
         said = " ".join(f.text for f in source(server).open(tmp_path, TARGET).findings)

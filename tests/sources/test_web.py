@@ -52,14 +52,14 @@ def pushed(server, **more):
 def test_values_arrive_and_what_is_not_there_is_doubted(way):
     files = open_files()
     with WebServer(told) as server, listening(way(server), ALL) as heard:
-        wait_for(lambda: good(heard), 20)
+        wait_for(lambda: good(heard))
         doubts = heard[-1].doubts
         assert "not heard for" in doubts["old"]
         assert "gone" in doubts["gone"] or "nothing heard" in doubts["gone"]
         server.stop()
         heard.clear()
         server.start()
-        wait_for(lambda: good(heard), 30)
+        wait_for(lambda: good(heard))
     wait_for(lambda: open_files() <= files)
 
 
@@ -67,7 +67,7 @@ def test_values_arrive_and_what_is_not_there_is_doubted(way):
 def test_only_who_has_the_token_is_answered(way):
     with WebServer(told, token="secret") as server:
         with listening(way(server, token_env="PLC_TOKEN"), ALL) as heard:
-            wait_for(lambda: good(heard), 20)
+            wait_for(lambda: good(heard))
         said = " ".join(f.text for f in way(server).open(None, ALL).findings)
         assert "not reached at start" in said
         assert "401" in said or "403" in said
@@ -86,7 +86,7 @@ def test_several_documents_of_one_server_and_none_of_another(tmp_path):
         WebServer(told) as server,
         listening(polled(server), Target(variables=(SPEED, RUNS, other))) as heard,
     ):
-        wait_for(lambda: good(heard) and "HTTP 404" in heard[-1].doubts.get("other", ""), 20)
+        wait_for(lambda: good(heard) and "HTTP 404" in heard[-1].doubts.get("other", ""))
     for path in ("http://elsewhere/x", "//elsewhere/x", "https://127.0.0.1/x"):
         away = Variable(name="away", source="plc", address={"pointer": "", "path": path}, unit="1")
         with pytest.raises(InputError, match="leads to another server"):

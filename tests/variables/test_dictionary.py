@@ -36,6 +36,25 @@ def test_a_dictionary_is_read(tmp_path):
     assert (state.timeout, state.value(1)) == (0.2, "running")
 
 
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ({"type": Kind.BOOL, "scale": 2.0}, "a bool has no scale, offset or range"),
+        ({"type": Kind.TEXT, "offset": 1.0}, "a text has no scale, offset or range"),
+        ({"type": Kind.CHOICE, "choices": {"0": "a"}, "range": (0.0, 1.0)}, "a choice has no scale"),
+        ({"type": Kind.TEXT, "inverted": True}, "inverted belongs to a bool"),
+        ({"unit": "1", "inverted": True}, "scale = -1 turns the sign"),
+        *(
+            ({"type": Kind.CHOICE, "choices": {n: "a"}}, "whole numbers")
+            for n in ("01", "-0", "\u0663", "1.0", "")
+        ),
+    ],
+)
+def test_what_would_change_nothing_is_a_mistake(more, why):
+    with pytest.raises(ValueError, match=why):
+        Variable(name="v", source="plc", address=1, **more)
+
+
 def test_every_mistake_is_named_at_once(tmp_path):
     file = tmp_path / "variables.toml"
     head = '[[variables]]\nname = "{}"\nsource = "plc"\naddress = 1\n'

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from made_cell import TWO_R, made, two_r
-from made_sweep import inside, points_of
+from made_sweep import inside, outside, points_of
 from seerob.errors import InputError
 from seerob.volumes.reachable import reachable_volume
 
@@ -29,25 +29,6 @@ LIMITED = """<robot name="arm"><link name="base"/>
 def limited(folder, kind="revolute", limits='<limit lower="-1" upper="0.7" effort="1" velocity="1"/>'):
     text = LIMITED.replace("{kind}", kind).replace("{range}", limits)
     return made(folder, TWO_R, {"arm.urdf": text}).model
-
-
-def outside(model, contained, count, rng, turns=np.pi):
-    """How many random points of the moving bodies, at random joint positions within the limits, are outside."""
-    mechanism = model.mechanism("arm")
-    data, wrong = mujoco.MjData(model.mj), 0
-    low, high = np.maximum(mechanism.lower, -turns), np.minimum(mechanism.upper, turns)
-    for _ in range(count):
-        q = rng.uniform(low, high)
-        ends = rng.random(len(q)) < 0.3
-        q[ends] = np.where(rng.random(len(q)) < 0.5, low, high)[ends]
-        data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
-        mujoco.mj_kinematics(model.mj, data)
-        for i in model.select("arm"):
-            body = model.bodies[i]
-            for solid in body.solids:
-                points = points_of(solid, 20, rng) @ data.xmat[body.mj].reshape(3, 3).T + data.xpos[body.mj]
-                wrong += int((~contained(points)).sum())
-    return wrong
 
 
 @pytest.mark.parametrize(

@@ -65,13 +65,13 @@ def published(server):
 def test_targets_are_published_in_the_frame_of_the_controller(tmp_path, server):
     model = station(tmp_path, server).model
     with CartesianTargets(model, on_command_line=True) as targets:
-        wait_for(lambda: any(r["op"] == "advertise" for r in list(server.received)), 30.0)
+        wait_for(lambda: any(r["op"] == "advertise" for r in list(server.received)))
 
         def sent():
             targets.write(at(0.0), (pose(1.25),))
             return published(server)
 
-        wait_for(sent, 30.0)
+        wait_for(sent)
     (asked, first, *_) = server.received
     assert (asked["topic"], asked["type"]) == ("/target_pose", "geometry_msgs/msg/PoseStamped")
     # 0.25 m along x of the world is 0.25 m along -y of a base that is turned by 90 degrees.
@@ -143,7 +143,7 @@ def test_targets_reach_an_endpoint_of_ros_tcp_as_it_serialises(tmp_path, edition
                 targets.write(at(0.0), (pose(1.25),))
                 return [f for f in list(server.received) if f.destination == "/target_pose"]
 
-            wait_for(sent, 30.0)
+            wait_for(sent)
     announced = server.received[0]
     assert announced.destination == "__publish"
     assert announced.fields()["message_name"] == "geometry_msgs/PoseStamped"

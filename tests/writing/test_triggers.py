@@ -38,11 +38,11 @@ def test_edges_are_written_and_nothing_else(tmp_path, plc):
             triggers.write(said(Verdict.WITHIN), ())
         triggers.write(said(Verdict.UNDECIDED), ())
         triggers.write(said(Verdict.EXCEEDED), ())
-        wait_for(lambda: written == [True], 30)
+        wait_for(lambda: written == [True])
         for _ in range(5):
             triggers.write(said(Verdict.EXCEEDED), ())
         triggers.write(said(Verdict.WITHIN), ())
-        wait_for(lambda: written == [True, False], 30)
+        wait_for(lambda: written == [True, False])
 
 
 def test_how_it_is_at_the_start_is_no_edge(tmp_path, plc):
@@ -50,7 +50,7 @@ def test_how_it_is_at_the_start_is_no_edge(tmp_path, plc):
     with Triggers(made(tmp_path, plc.url).model, on_command_line=True) as triggers:
         triggers.write(said(Verdict.EXCEEDED), ())
         triggers.write(said(Verdict.WITHIN), ())
-        wait_for(lambda: written == [False], 30)
+        wait_for(lambda: written == [False])
 
 
 def test_a_flutter_is_written_no_faster_than_allowed(tmp_path, plc):
@@ -60,7 +60,7 @@ def test_a_flutter_is_written_no_faster_than_allowed(tmp_path, plc):
         for seq in range(300):
             triggers.write(said((Verdict.WITHIN, Verdict.EXCEEDED)[seq % 2]), ())
             time.sleep(0.002)
-        wait_for(lambda: plc.written['"Twin".fast'][-1:] == [True], 30)
+        wait_for(lambda: plc.written['"Twin".fast'][-1:] == [True])
     assert len(plc.written['"Twin".fast']) <= 1 + (time.monotonic() - begun) / 0.1
 
 
@@ -70,9 +70,9 @@ def test_what_a_dead_plc_missed_is_written_when_it_is_back(tmp_path, plc, caplog
     with Triggers(station.model, on_command_line=True) as triggers:
         triggers.write(said(Verdict.WITHIN), ())
         triggers.write(said(Verdict.EXCEEDED), ())
-        wait_for(lambda: "could not be written" in caplog.text, 30)
+        wait_for(lambda: "could not be written" in caplog.text)
         plc.start()
-        wait_for(lambda: plc.written['"Twin".fast'] == [True], 30)
+        wait_for(lambda: plc.written['"Twin".fast'] == [True])
     assert caplog.text.count("could not be written") == 1
 
 

@@ -102,11 +102,10 @@ def add_workstation(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("workstation", type=Path, help="folder with a workstation.toml, or the file itself")
 
 
-def add_output(sub: argparse.ArgumentParser) -> None:
+def add_output(sub: argparse.ArgumentParser, *, beside: str = "workstation") -> None:
     """Options of commands that write files."""
-    sub.add_argument(
-        "-o", "--output", type=Path, help="folder to write to (default: runs/<time> beside the workstation)"
-    )
+    text = f"folder to write to (default: runs/<time> beside the {beside})"
+    sub.add_argument("-o", "--output", type=Path, help=text)
     sub.add_argument("--json", action="store_true", help="results as JSON on standard output")
 
 

@@ -12,6 +12,7 @@ from importlib import import_module
 from seerob.commands import Exit, line, seconds
 from seerob.commands.interruption import Stopped
 from seerob.errors import InputError
+from seerob.host_name import check_host
 from seerob.plugin import kinds
 
 HELP = "be a controller or a device without the hardware: a real server that plays a motion"
@@ -39,6 +40,12 @@ def run(options: argparse.Namespace) -> int:
     from seerob.commands.emulating._hint import probes_of
     from seerob.live.listening import because
 
+    for key in ("host", "to", "unity"):
+        if host := getattr(options, key, None):
+            try:
+                check_host(f"--{key}", host)
+            except ValueError as error:
+                raise InputError.at("seerob emulate", f"--{key}", str(error)) from None
     made = import_module(f"seerob.{PACKAGE}.{options.kind}").emulated(options)
     server, where = made.server, made.where
     stopped = Stopped()

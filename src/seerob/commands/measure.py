@@ -28,7 +28,7 @@ def add_person(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("kind", help="kind of source that reads the file, such as kinect_recording or bvh")
     sub.add_argument("file", help="the recording")
     sub.add_argument("--mass", type=float, required=True, help="body mass [kg]")
-    sub.add_argument("--sex", choices=("male", "female"), required=True)
+    sub.add_argument("--sex", choices=("male", "female"), required=True, help="of the person")
     sub.add_argument("--stature", type=float, help="[m]; estimated from the lengths when not given")
     sub.add_argument("--name", default="operator", help="of the person")
     sub.add_argument("--subject", default="", help="which person of the recording")

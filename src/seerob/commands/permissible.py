@@ -92,19 +92,16 @@ def add(sub: argparse.ArgumentParser) -> None:
         text = f"limit of the joints [{unit}], one for all or one each with commas, {own}"
         sub.add_argument(f"--{name}", type=per_joint, help=text)
     sub.add_argument("--not-faster", action="store_true", help="nowhere faster than the given motion")
-    sub.add_argument("--margin", type=share, default=0.02, help="share of the map that is not used")
-    sub.add_argument("--tolerance", type=above_zero, default=5e-4, help="of the path, per joint [rad or m]")
-    sub.add_argument("--spacing", type=above_zero, default=0.02, help="of the map, in joint space [rad or m]")
-    sub.add_argument(
-        "--segment", type=above_zero, default=0.25, help="longest way of the tool point in a segment [m]"
-    )
-    sub.add_argument(
-        "--verify", type=seconds, default=1e-3, help="period at which the criteria are asked of the plan [s]"
-    )
-    sub.add_argument("--period", type=seconds, default=0.008, help="of the rescaled motion [s]")
-    sub.add_argument(
-        "--bound", type=above_zero, default=1e-3, help="tolerance of bounds between samples [m, m/s]"
-    )
+    for name, type_, default, text in (
+        ("margin", share, 0.02, "share of the map that is not used"),
+        ("tolerance", above_zero, 5e-4, "of the path, per joint [rad or m]"),
+        ("spacing", above_zero, 0.02, "of the map, in joint space [rad or m]"),
+        ("segment", above_zero, 0.25, "longest way of the tool point in a segment [m]"),
+        ("verify", seconds, 1e-3, "period at which the criteria are asked of the plan [s]"),
+        ("period", seconds, 8e-3, "of the rescaled motion [s]"),
+        ("bound", above_zero, 1e-3, "tolerance of bounds between samples [m, m/s]"),
+    ):
+        sub.add_argument(f"--{name}", type=type_, default=default, help=f"{text} (default: {default:g})")
     add_output(sub)
 
 

@@ -44,7 +44,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("recording", type=Path, help="an MCAP file that seerob wrote")
     sub.add_argument("--workstation", type=Path, help="judge by this workstation instead of the recorded one")
     add_permissible(sub)
-    add_output(sub)
+    add_output(sub, beside="recording")
 
 
 def run(options: argparse.Namespace) -> int:

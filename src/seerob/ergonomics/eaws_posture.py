@@ -190,7 +190,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
                 ),
                 Input(
                     name="between columns",
-                    value=self.interpolation.value,
+                    value=method.Interpolation(self.interpolation).value,
                     origin=Origin.CHOICE,
                     source="option interpolation",
                 ),

@@ -97,7 +97,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         """Possible codes of postures in a phase, each of shape (..., number of codes)."""
         if phase.legs is None:
             legs = np.ones(7, bool)
-        elif phase.legs is method.Legs.POSTURE:
+        elif phase.legs == method.Legs.POSTURE:
             legs = method.leg_codes(angles, self.thresholds, accuracy)
         else:
             legs = method.only(list(method.Legs).index(phase.legs) + 1, 7)

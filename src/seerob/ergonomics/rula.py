@@ -95,7 +95,7 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
     @property
     def static(self) -> float:
         """See `ScoredPosture.static`."""
-        return self.profile.static
+        return method.Profile(self.profile).static
 
     def components(
         self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: Watch | None = None
@@ -129,7 +129,7 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
-        usual = self.profile is method.Profile.ORIGINAL_1993
+        usual = self.profile == method.Profile.ORIGINAL_1993
         return self.based(
             model,
             formula="RULA tables A, B and C of the components' scores; the worse side counts",
@@ -138,7 +138,7 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
             options=(
                 Input(
                     name="profile",
-                    value=self.profile.value,
+                    value=method.Profile(self.profile).value,
                     origin=Origin.CHOICE if usual else Origin.GIVEN,
                     source="option profile, original1993 when not given",
                 ),
@@ -148,7 +148,7 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
                 *(
                     (
                         "static and repeated postures are entered, not detected "
-                        f"(static in this profile: longer than {self.profile.static:g} s)",
+                        f"(static in this profile: longer than {self.static:g} s)",
                     )
                     if self.detect is None
                     else ()

@@ -203,13 +203,13 @@ class Following:
         before, since = (None, np.inf) if last is None or lost else (last.q, t - last.t)
         q, error = self._fitter.fit(self._eased(found, before, t), before, reach=reach, since=since)
         moved = np.zeros(len(q)) if last is None else np.abs(q - last.q)
-        anew = lost and bool(moved.max() > ELSEWHERE)
+        elsewhere = lost and bool(moved.max() > ELSEWHERE)
         self._waits = False
         if (moved >= 0.999 * reach).any():
             joint = AXES[int((moved / reach).argmax())].name
             reasons.append(f"{joint} would move faster than a person can")
         reasons += _residual(found, error)
-        if anew:
+        if elsewhere:
             reasons.append("appeared elsewhere")
         observed = self._seen(t, lambda device: device.observed)
         turns = self._seen(t, lambda device: device.turned)
@@ -217,6 +217,8 @@ class Following:
         unaimed = {bone: swing(bone, q, self._fitter.lower, self._fitter.upper) for bone in open_ends}
         reason = "; ".join(reasons[:4])
         bones = bare(observed, self._seen(t, lambda device: device.placed), turns)
+        # Wherever the twin waited, nobody knows how a person who is seen for the first time came.
+        anew = last is None or elsewhere
         return Followed(t, q, reason, tuple(parts), anew, found, observed, bones, unaimed, untold(turns))
 
     def _eased(self, found: Pulls, before: Array | None, t: float) -> Pulls:
@@ -241,7 +243,7 @@ class Following:
             share = age / (device.times[k + 1] - device.times[k])
             instant = t
             points = between(points, device.samples[k + 1].points, share)
-        reason = "" if sample.quality is Quality.GOOD else f"{name} says {sample.quality.value}"
+        reason = sample.quality.doubt(name)
         if sample.quality is Quality.INVALID:
             return _Told([], reason)
         return self._believed(device, points, instant, reason)

@@ -29,6 +29,7 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from seerob.errors import InputError, SeerobError
+from seerob.host_name import check_host, check_url
 from seerob.live.arrivals import Arrivals, Statistics
 from seerob.live.device_clock import DeviceClock
 from seerob.samples import Mailbox, Sample, SignalSample, key
@@ -81,6 +82,11 @@ class LiveSource(Source, frozen=True, kw_only=True):
     """A line of the workstation file that it needs and that no device can say: `seerob probe` shows it."""
 
     def __post_init__(self) -> None:
+        for option in ("host", "bind", "sender"):
+            if host := getattr(self, option, None):
+                check_host(option, host)
+        if url := getattr(self, "url", None):
+            check_url("url", url)
         if self.loop:
             raise ValueError("a live source has no end to start again from: remove loop")
         if self.behind() >= self.timeout:

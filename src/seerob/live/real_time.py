@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from seerob.errors import InputError, Problem
 from seerob.live.listening import Listening, LiveSource
-from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample, key
+from seerob.samples import Quality, Sample, SignalSample, key
 from seerob.workstation import Workstation
 
 AFTER = 1e-6
@@ -53,8 +53,8 @@ def hear(
 
     Run time t is the world's instant ``clock.start + t - delay``: when a tick is computed, what it
     speaks of is a delay old, and samples on either side of it have been heard. The run begins at the
-    first sample, or without one when that takes too long. Where the clock slipped, what each robot said
-    last is older than run time shows, and is degraded from then on; so are its next and those of `SETTLE`.
+    first sample, or without one when that takes too long. Where the clock slipped, what each source said
+    last is older than run time shows, and is late from then on; so are its next and those of `SETTLE`.
 
     Args:
         recorded: From `seerob.run.pump`, endless.
@@ -64,7 +64,7 @@ def hear(
     heard = listening.first()
     origin = max((sample.t for sample in heard), default=time.monotonic() - listening.delay)
     clock.begin(origin + listening.delay)
-    newest: dict[tuple[str, ...], JointSample | PoseSample | BodySample] = {}
+    newest: dict[tuple[str, ...], Sample] = {}
     doubtful: set[tuple[str, ...]] = set()
     settled: dict[tuple[str, ...], float] = {}
     slipped = clock.slipped
@@ -77,27 +77,29 @@ def hear(
         taken: list[Sample] = []
         for sample in (*heard, *listening.take()):
             t = sample.t - zero
-            if isinstance(sample, SignalSample):
-                taken.append(replace(sample, t=t))
-                continue
             what = key(sample)
-            if what in newest and t <= newest[what].t:
+            if what in newest and not _is_newer(sample, t, newest[what].t):
                 continue
             quality = sample.quality
             swings = what in doubtful or t < settled.get(what, t)
             if swings and quality is Quality.GOOD:
                 # Run time stood still while the robot went on: the speed between both samples is false.
-                quality = Quality.DEGRADED
+                quality = Quality.LATE
             doubtful.discard(what)
             waiting.discard(what)
             newest[what] = replace(sample, t=t, quality=quality)
             taken.append(newest[what])
         for what in sorted(waiting):
             if newest[what].quality is Quality.GOOD:
-                newest[what] = replace(newest[what], t=newest[what].t + AFTER, quality=Quality.DEGRADED)
+                newest[what] = replace(newest[what], t=newest[what].t + AFTER, quality=Quality.LATE)
                 taken.append(newest[what])
         yield (*samples, *taken)
         heard = ()
+
+
+def _is_newer(sample: Sample, t: float, last: float) -> bool:
+    # A source may tell of several changes of one instant.
+    return t >= last if isinstance(sample, SignalSample) else t > last
 
 
 def require_recorded(workstation: Workstation) -> None:

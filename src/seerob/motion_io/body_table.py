@@ -17,6 +17,7 @@ import numpy as np
 
 from seerob.errors import InputError, Problem
 from seerob.motion_io.body_columns import TIMES, Column, column
+from seerob.motion_io.decimal_comma import Commas
 from seerob.motion_io.frame_arrays import MAX_VALUES, check_size
 from seerob.tables.candidates import candidates
 from seerob.tables.grid import MAX_COLUMNS, MAX_PROBLEMS, Grid
@@ -127,6 +128,9 @@ class _Numbers:
     file: str
     problems: list[Problem] = field(default_factory=list)
 
+    def __post_init__(self) -> None:
+        self._commas = Commas(self.file)
+
     def row(self, cells: list[object], number: int) -> list[float]:
         """Numbers; NaN for what is empty."""
         try:
@@ -139,7 +143,7 @@ class _Numbers:
         if cell is None or text.lower() in _EMPTY:
             return float("nan")
         try:
-            return float(text)
+            return self._commas.number(text)
         except ValueError:
             self.problems.append(Problem(self.file, f"row {number}", f"{text[:40]!r} is no number"))
             if len(self.problems) >= MAX_PROBLEMS:
@@ -150,6 +154,7 @@ class _Numbers:
         """Raise what was wrong."""
         if self.problems:
             raise InputError(self.problems)
+        self._commas.check()
 
 
 def _rows(grid: Grid, header: int) -> Iterator[tuple[int, Sequence[object]]]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from seerob.errors import InputError, Problem
+from seerob.motion_io.decimal_comma import Commas
 from seerob.motion_io.frame_arrays import check_size
 from seerob.tables.candidates import candidates
 from seerob.tables.grid import MAX_COLUMNS, MAX_PROBLEMS, Grid
@@ -33,6 +34,7 @@ def _read(grid: Grid, header: list[str]) -> tuple[list[str], Array, Array]:
     flat = array("d")
     count = 0
     problems: list[Problem] = []
+    commas = Commas(grid.file)
     for number, row in enumerate(islice(grid.rows(), 1, None), start=2):
         cells = [str(cell).strip() for cell in row]
         if not any(cells):
@@ -41,7 +43,7 @@ def _read(grid: Grid, header: list[str]) -> tuple[list[str], Array, Array]:
             problems.append(Problem(grid.file, f"row {number}", f"{len(cells)} cells, {len(header)} names"))
         else:
             try:
-                flat.extend([float(cell or "nan") for cell in cells])
+                flat.extend([commas.number(cell or "nan") for cell in cells])
                 count += 1
             except ValueError as error:
                 problems.append(Problem(grid.file, f"row {number}", str(error)[:120]))
@@ -50,5 +52,6 @@ def _read(grid: Grid, header: list[str]) -> tuple[list[str], Array, Array]:
         check_size(grid.file, count, len(header))
     if problems:
         raise InputError(problems)
+    commas.check()
     table = np.array(flat).reshape(count, len(header)) if count else np.empty((0, len(header)))
     return header, table[:, 0], table[:, 1:]

@@ -128,8 +128,13 @@ class BetweenSamples:
             else ""
         )
 
-    def _require(self, bodies: Iterable[int]) -> None:
-        """Raise `Undecided` unless it is known how everybody moves on whom the place of a body depends."""
+    def _require(self, bodies: Iterable[int], *names: str) -> None:
+        """Raise `Undecided` unless it is known how everybody moves on whom the place of a body depends.
+
+        And where no shape shows a part of a robot that a name means.
+        """
+        if unseen := self._model.unseen(names):
+            raise Undecided(unseen)
         followed = {m.name for m in self._model.workstation.machines if m.motion.variables()}
         ids: set[int] = set()
         for i in bodies:
@@ -162,10 +167,10 @@ class BetweenSamples:
         Raises:
             UnknownName: A name that means no body.
             InputError: A tolerance that is not above 0.
-            Undecided: Somebody whose place nobody gave, or who follows variables.
+            Undecided: Somebody whose place nobody gave, or who follows variables; a part without a shape.
         """
         gap = self._model.gap(self._model.select(a), self._model.select(b))
-        self._require((*gap.a, *gap.b))
+        self._require((*gap.a, *gap.b), a, b)
         first, second = (chains_of(self._model, side, self._slid) for side in (gap.a, gap.b))
 
         def middle(t: float) -> tuple[Array, Array]:
@@ -202,7 +207,7 @@ class BetweenSamples:
             Undecided: Somebody whose place nobody gave, or who follows variables.
         """
         bodies = self._model.select(of)
-        self._require(bodies)
+        self._require(bodies, of)
         chains = chains_of(self._model, bodies, self._slid)
 
         def middle(t: float) -> tuple[Array, Array]:

@@ -43,13 +43,15 @@ def ceilings_of(criterion: Criterion, model: Model, robot: str, *, anywhere: boo
         ask = _power(criterion, model, robot, criterion.limit, 2)
     if ask is None:
         return None
-    inner = ask
+    inner, unseen = ask, criterion.unseen(model)
 
     def muted(state: State) -> bool:
         return criterion.active is not None and not state.signal(criterion.active)
 
     def decided(state: State) -> tuple[Ceiling, ...]:
         try:
+            if unseen and not muted(state):
+                raise Undecided(unseen)
             found = inner(state) if not muted(state) else (_not_asked(criterion),)
         except Undecided as why:
             found = (Ceiling(criterion.name, math.nan, reason=str(why)),)

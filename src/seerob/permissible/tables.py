@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from seerob.no_formula import no_formula
 from seerob.permissible.ceiling import Ceiling
 from seerob.permissible.evaluation import PermissibleSpeed
 from seerob.permissible.segments import PathSegment
@@ -179,10 +180,12 @@ def csv_bytes(head: Sequence[str], rows: Iterator[list[Cell]]) -> bytes:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(head)
     for row in rows:
-        writer.writerow(
-            ["" if cell is None else repr(cell) if isinstance(cell, float) else cell for cell in row]
-        )
+        writer.writerow([no_formula(cell) if isinstance(cell, str) else _exact(cell) for cell in row])
     return out.getvalue().encode()
+
+
+def _exact(cell: float | None) -> str:
+    return "" if cell is None else repr(cell)
 
 
 COST_HEAD: tuple[str, ...] = ("what governs", "time [s]", "share of the cycle")

@@ -25,6 +25,8 @@ EXCEPTIONS = {
     2: "the device has no such register",
     3: "the device refuses the number of registers",
     4: "the device failed to read it",
+    5: "the device needs longer to answer",
+    6: "the device is busy",
     10: "the gateway has no way to the device",
     11: "the device behind the gateway does not answer",
 }
@@ -33,6 +35,10 @@ EXCEPTIONS = {
 
 class Refused(ProtocolError):
     """The device answers that it has not what is asked for."""
+
+
+class Busy(ProtocolError):
+    """The device answers that it has no time now."""
 
 
 class Device:
@@ -52,6 +58,7 @@ class Device:
 
         Raises:
             Refused: The device has them not.
+            Busy: It may have them, and does not say it now.
             TimeoutError: No answer in time.
             OSError: The connection is gone.
             ProtocolError: It answers with something else.
@@ -65,13 +72,7 @@ class Device:
             Table.DISCRETE: self._client.read_discrete_inputs,
         }[block.table]
         try:
-            for _ in range(TRIES):
-                answer = await ask(block.first, count=block.count, device_id=self._number)
-                if getattr(answer, "exception_code", 0) not in BUSY:
-                    break
-                await asyncio.sleep(PAUSE)
-            else:
-                raise TimeoutError(f"busy {TRIES} times in a row")
+            answer = await ask(block.first, count=block.count, device_id=self._number)
         except ConnectionException as error:
             raise ConnectionError("the device closed the connection") from error
         except ModbusException as error:
@@ -80,11 +81,26 @@ class Device:
             raise TimeoutError(f"no answer in {PATIENCE:g} s") from error
         if answer.isError():
             code = int(getattr(answer, "exception_code", 0))
+            if code in BUSY:
+                raise Busy("the device is busy")
             raise Refused(EXCEPTIONS.get(code, f"exception {code}"))
         found: Sequence[int | bool] = answer.bits if block.table.bits else answer.registers
         if len(found) < block.count:
             raise ProtocolError(f"{len(found)} values where {block.count} were asked for")
         return found
+
+    async def patient_block(self, block: Block) -> Sequence[int | bool]:
+        """The same of a device that may be busy for a moment; raises as `block` does otherwise.
+
+        Raises:
+            TimeoutError: It stays busy.
+        """
+        for _ in range(TRIES):
+            try:
+                return await self.block(block)
+            except Busy:
+                await asyncio.sleep(PAUSE)
+        raise TimeoutError(f"busy {TRIES} times in a row")
 
     async def write_coil(self, at: int, value: bool) -> None:
         """Write one coil (function 5).
@@ -118,7 +134,7 @@ class Device:
             inside = {name: place for name, place in wanted.items() if block.covers(place)}
             if block not in self._split:
                 try:
-                    found |= take(block, await self.block(block), inside)
+                    found |= take(block, await self.patient_block(block), inside)
                 except Refused as error:
                     if len(inside) == 1:
                         found |= dict.fromkeys(inside, error)
@@ -128,7 +144,7 @@ class Device:
                 for name, place in inside.items():
                     single = Block(place.table, place.at, place.type.size)
                     try:
-                        found |= take(single, await self.block(single), {name: place})
+                        found |= take(single, await self.patient_block(single), {name: place})
                     except Refused as error:
                         found[name] = error
         return found

@@ -70,8 +70,8 @@ def choices(thresholds: Thresholds, arm: ArmPolicy) -> tuple[Input, ...]:
         *chosen(thresholds, Thresholds()),
         Input(
             name="arm angle",
-            value=arm.value,
-            origin=Origin.CHOICE if arm is ArmPolicy.PROJECTION else Origin.GIVEN,
+            value=ArmPolicy(arm).value,
+            origin=Origin.CHOICE if arm == ArmPolicy.PROJECTION else Origin.GIVEN,
             source="option arm, projection when not given",
         ),
     )

@@ -83,7 +83,7 @@ def line_points(line: str, share: float, interpolation: Interpolation = Interpol
     """Points of a posture that lasts for a share of the time, 0 to 1."""
     points = lines()[line].points
     shares = published("eaws_posture")["shares"][: len(points)]
-    if interpolation is Interpolation.STEP:
+    if Interpolation(interpolation) is Interpolation.STEP:
         reached = int(np.searchsorted(shares, share + _ROUNDING, side="right"))
         return points[reached - 1] if reached else 0.0
     return float(np.interp(share, [0.0, *shares], [0.0, *points]))

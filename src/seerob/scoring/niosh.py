@@ -104,7 +104,7 @@ def frequency_multiplier(F: float, V: float, spell: Duration) -> float:
 
 def coupling_multiplier(grip: Grip, V: float) -> float:
     """CM of the table, V being where the multiplier is taken [m]."""
-    return float(published("niosh")["coupling"][grip.value][int(V >= MIDDLE - _ROUNDING)])
+    return float(published("niosh")["coupling"][Grip(grip).value][int(V >= MIDDLE - _ROUNDING)])
 
 
 @dataclass(frozen=True, kw_only=True)

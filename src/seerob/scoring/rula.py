@@ -175,8 +175,8 @@ def force(load: float | None, use: LoadUse | None, profile: Profile) -> Span:
 
     Less than 2 kg, static or repeated, has no row: it counts as 0, muscle use apart.
     """
-    uses = list(LoadUse) if use is None else [use]
-    heavy = 3 if profile is Profile.WORKSHEET else 2
+    uses = list(LoadUse) if use is None else [LoadUse(use)]
+    heavy = 3 if Profile(profile) is Profile.WORKSHEET else 2
     loads = [0.0, math.inf] if load is None else [load]
     scores = []
     for each in uses:

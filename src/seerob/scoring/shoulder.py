@@ -45,7 +45,7 @@ def arm_score(measured: Measured, score: Callable[[Array], Ints], policy: ArmPol
     accuracy = measured.error("shoulder_flexion", "shoulder_elevation")
     flexion, side = angles.shoulder_flexion, angles.shoulder_abduction
     spread = _turned(accuracy, np.cos(side))
-    if policy is ArmPolicy.PROJECTION:
+    if ArmPolicy(policy) is ArmPolicy.PROJECTION:
         return _projected(flexion, score, spread)
     azimuth = np.abs(np.arctan2(np.sin(side), np.cos(side) * np.sin(flexion)))
     swing = _turned(accuracy, np.sin(angles.shoulder_elevation))

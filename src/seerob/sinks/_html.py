@@ -6,7 +6,9 @@ import re
 from collections.abc import Iterable
 from html import escape
 
-_NOT_TEXT = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+_NOT_TEXT = re.compile(
+    r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+)
 _EMPTY = {"meta", "img", "br", "col"}
 
 
@@ -20,7 +22,7 @@ Content = str | Iterable["Content"] | None
 
 
 def legal(value: str) -> str:
-    """Characters that HTML forbids become �."""
+    """Characters that HTML forbids, or that turn the direction of what stands around them, become �."""
     return _NOT_TEXT.sub("\ufffd", value)
 
 

@@ -6,6 +6,7 @@ import json
 import math
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -197,7 +198,8 @@ class McapTape:
 
     def abandon(self) -> None:
         """Close as it is, after an error."""
-        self._file.close()
+        with suppress(OSError):  # a full disk does not take what waits to be written either
+            self._file.close()
 
     def _put(self, topic: str, seq: int, t: float, data: bytes) -> None:
         time = nanoseconds(t)

@@ -27,6 +27,9 @@ _NUMBERS = (
     "twelve",
 )
 
+_LISTED = 15
+"""Names in a sentence."""
+
 
 def number(value: float | None, unit: str = "") -> str:
     """Four significant digits with the unit, for inputs; a dash for what is not there."""
@@ -84,7 +87,9 @@ def counted(n: int, what: str, many: str | None = None) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """``a, b and c``."""
+    """``a, b and c``; of very many the first, as the table has all."""
+    if len(names) > _LISTED:
+        names = [*names[: _LISTED - 1], f"{len(names) - _LISTED + 1} more"]
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
 
 

@@ -28,6 +28,8 @@ ORIGINS = {
     "simulator": "a generic simulator: preliminary until it is confirmed on the controller",
     "planned": "a planned path that nobody has executed: preliminary until it is confirmed on the controller",
     "recording": "one of our recordings; what fed it is written there",
+    "live": "measured: a person captured as they move",
+    "file": "a captured person, as the file has it",
 }
 _ADDRESSES = ("file", "host", "url", "port", "address", "stream")
 
@@ -98,7 +100,8 @@ def _source(entry: dict[str, Any]) -> tuple[str, ...]:
         source, drives = None, str(rest.get("robot") or rest.get("human") or "")
     name = str(rest.get("name") or f"{kind} {drives}".strip())
     places = [str(rest[key]) for key in _ADDRESSES if key in rest]
-    origin = getattr(source, "origin", None) or rest.get("origin")
+    captured = "" if source is None else source.captured
+    origin = getattr(source, "origin", None) or rest.get("origin") or captured or None
     says = "this kind does not say: see what was assumed" if origin is None else str(origin)
     if source is None:
         timeout, end = str(rest.get("timeout", "unknown")), "unknown"

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from seerob.no_formula import FORMULA
 from seerob.sinks._cell_formats import WORDS, Formats
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ _LARGEST = 9.99999999999999e307
 _LONGEST_TEXT = 32_767
 """UTF-16 units."""
 _NOT_TEXT = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 _MOST_KNOWN = 4096
 """Texts that are kept as they are written: verdicts and reasons come again and again."""
 
@@ -80,7 +80,7 @@ class SheetRows:
         if known is None:
             shown = plain(value)
             look = shown if shown in WORDS else word
-            known = shown, self._formats.of(look, quoted=shown.startswith(_FORMULA))
+            known = shown, self._formats.of(look, quoted=shown.startswith(FORMULA))
             if len(self._known) < _MOST_KNOWN:
                 self._known[value, word] = known
         shown, look_ = known

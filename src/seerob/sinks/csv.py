@@ -11,6 +11,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from seerob.errors import InputError
+from seerob.no_formula import no_formula
 from seerob.results.bone_errors import BoneErrors
 from seerob.samples import Sample
 from seerob.sink import Sink
@@ -25,7 +26,6 @@ from seerob.snapshot import Scene, Snapshot
 
 Value = str | float | bool | None
 _LINE_ENDS = str.maketrans("\r\n\x00", "   ")
-_FORMULA = ("=", "+", "-", "@", "\t")
 
 
 class Separator(StrEnum):
@@ -185,10 +185,7 @@ class CsvWriter(WholeFolder):
             return "" if math.isnan(value) else self._marked(repr(value))
         if value is None or isinstance(value, bool | int):
             return "" if value is None else str(value)
-        text = value.translate(_LINE_ENDS)
-        # A text that spreadsheets would take for a formula stays a text.
-        if text.startswith(_FORMULA):
-            text = "'" + text
+        text = no_formula(value.translate(_LINE_ENDS))
         if self._separator in text or '"' in text or text != text.strip():
             text = '"' + text.replace('"', '""') + '"'
         return text

@@ -96,7 +96,11 @@ class RecorderWriter(Closing):
         self._last = (-1, -math.inf)
         self._taken = 0
         self._thread = Thread(target=self._run, name="seerob recorder", daemon=True)
-        self._thread.start()
+        try:
+            self._thread.start()
+        except KeyboardInterrupt:  # while its beginning was waited for: nobody will close this
+            self._end()
+            raise
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Take one tick; returns at once unless ``lossless`` and the queue is full.
@@ -134,11 +138,14 @@ class RecorderWriter(Closing):
         Raises:
             SeerobError: The disk refused; the recording ends before the run did.
         """
+        self._end()
+        self._thread.join()
+        self._refuse_after_error()
+
+    def _end(self) -> None:
         with self._condition:
             self._closing = True
             self._condition.notify_all()
-        self._thread.join()
-        self._refuse_after_error()
 
     def findings(self) -> tuple[Finding, ...]:
         """What is missing from the recording."""

@@ -14,6 +14,7 @@ from msgspec import field
 from seerob.errors import InputError
 from seerob.human.calibration import CalibrationPose
 from seerob.human.captured import Captured, CaptureFrame
+from seerob.human.exchanged import Exchanges
 from seerob.human.mapping import read_conventions
 from seerob.human.observing import Observer
 from seerob.quantities import Pose, Seconds
@@ -41,6 +42,7 @@ class CaptureFile(Source, frozen=True, kw_only=True):
     """Base of a file of captured motion: one module, one class, one function `read`."""
 
     shares: ClassVar[bool] = True
+    captured: ClassVar[str] = "file"
 
     human: str
     """The person it drives; several devices may drive the same one."""
@@ -173,6 +175,7 @@ def _check(samples: BodySamples, rows: int, subject: str, file: str) -> tuple[fl
     first: float | None = None
     people: Counter[str] = Counter()
     unseen: Counter[str] = Counter()
+    exchanges = Exchanges()
     for frame in samples.captured.frames:
         if len(frame.positions) != rows:
             what = f"frame {count} has {len(frame.positions)} rows, the layout has {rows}"
@@ -189,6 +192,7 @@ def _check(samples: BodySamples, rows: int, subject: str, file: str) -> tuple[fl
             gap, gap_at = t - last, last
         last = t
         people[frame.subject] += 1
+        exchanges.add(t, np.asarray(frame.positions, float))
         for point in samples.observer.points(frame):
             if point.position is None and point.wxyz is None:
                 unseen[point.name] += 1
@@ -204,6 +208,8 @@ def _check(samples: BodySamples, rows: int, subject: str, file: str) -> tuple[fl
     if unseen:
         worst = ", ".join(f"{name} ({100 * n / count:.0f} %)" for name, n in unseen.most_common(6))
         notes.append(("warning", f"not seen in a share of the frames: {worst}"))
+    if text := exchanges.text(samples.captured.layout.names):
+        notes.append(("warning", text))
     if len(people) > 1:
         shown = ", ".join(f"{name or 'nameless'} ({n})" for name, n in people.most_common(4))
         notes.append(("warning", f"the device changed its name of the person: {shown}"))

@@ -45,6 +45,7 @@ class CaptureStream(LiveSource, frozen=True, kw_only=True):
     """Base of a stream of captured motion: one module, one class, one generator `frames`."""
 
     shares: ClassVar[bool] = True
+    captured: ClassVar[str] = "live"
 
     human: str
     """The person it drives; several devices may drive the same one."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,8 @@ class _Samples:
 
 class JointAngleFile(Source, frozen=True, kw_only=True):
     """Joint angles of a person from OpenSim (.mot, .sto) or from a table (.csv, .txt)."""
+
+    captured: ClassVar[str] = "file"
 
     human: str
     """The person it drives."""

@@ -155,7 +155,7 @@ async def _understood(
 async def _read(device: Device, found: RegisterMap, block: Block) -> dict[str, int | float | bool]:
     """Values of one block, by name."""
     wanted = {name: place for name, place in found.places().items() if block.covers(place)}
-    return take(block, await device.block(block), wanted)
+    return take(block, await device.patient_block(block), wanted)
 
 
 def joint_sample(

@@ -94,9 +94,13 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
 
     async def ask(self) -> tuple[Finding, ...]:
         """What the server says of the robot; whether its axes can be bound."""
+        return await self.inquire(Path(), None)
+
+    async def inquire(self, folder: Path, target: Target | None) -> tuple[Finding, ...]:
+        """The same, and whether they are those of the robot that it drives."""
         async with connect(self.way(), Path()) as client:
             found = self._chosen(await robots(client))
-            self._factors(found)
+            self._factors(found, target)
             text = ", ".join(v for v in found.about.values() if v) or "nothing of its maker"
             said = [
                 f"OPC 40010 at {self.url}: {found.name}, {text}; axes {', '.join(a.name for a in found.axes)}"
@@ -121,7 +125,7 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
         """Joint samples whenever an axis changes or the server shows that none has, and signals."""
         async with connect(self.way(), Path("" if target is None else target.folder)) as client:
             found = self._chosen(await robots(client))
-            positions, speeds = self._factors(found)
+            positions, speeds = self._factors(found, target)
             nodes = {f"q{k}": axis.position for k, axis in enumerate(found.axes)}
             if speeds is not None:
                 nodes |= {f"v{k}": axis.speed for k, axis in enumerate(found.axes) if axis.speed is not None}
@@ -162,10 +166,17 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
             return dataclasses.replace(robot, axes=tuple(by_name[name] for name in self.axes))
         return robot
 
-    def _factors(self, robot: Robot) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
+    def _factors(
+        self, robot: Robot, target: Target | None
+    ) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
         """From the server's positions and speeds to SI; None when not every axis has a speed with a unit."""
+        if target is not None and len(robot.axes) != len(target.joints):
+            there = ", ".join(axis.name for axis in robot.axes) or "none"
+            what = f"{robot.name} has the axes {there}, {target.name} has {len(target.joints)} joints"
+            raise InputError.at(f"opcua_robot {self.url}", "axes", what, "name one per joint")
+        joints = [None] * len(robot.axes) if target is None else target.units
         positions, problems = [], []
-        for axis in robot.axes:
+        for axis, joint in zip(robot.axes, joints, strict=True):
             known = unit(axis.unit or self.position_unit or "?")
             if axis.unit and self.position_unit is not None and known != unit(self.position_unit):
                 what = f"{axis.name} states {axis.unit}, and position_unit is {self.position_unit!r}"
@@ -180,6 +191,11 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
                 problems.append(
                     Problem(f"opcua_robot {self.url}", "position_unit", what, 'write it: "deg", "mm"')
                 )
+                continue
+            if joint not in (None, known.si):
+                what = f"{axis.name} is in {known.si}, its joint in {joint}"
+                remedy = "name the axes in the order of the robot's joints, or another robot"
+                problems.append(Problem(f"opcua_robot {self.url}", "axes", what, remedy))
                 continue
             positions.append(known.factor)
         if problems:

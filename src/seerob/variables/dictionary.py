@@ -7,6 +7,7 @@ may be. Units are stated, never guessed; what cannot be read is a doubt, never a
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable
 from enum import StrEnum
@@ -22,6 +23,8 @@ from seerob.toml_file import read_toml
 from seerob.variables.units import UNITS, unit
 
 MOST_VARIABLES = 10_000
+WHOLE = re.compile(r"0|-?[1-9][0-9]{0,18}")
+"""As a number is written: another spelling would never be heard."""
 LONGEST_TEXT = 1000
 """Of a value that is a text."""
 
@@ -90,6 +93,11 @@ class Variable(Table, frozen=True, kw_only=True):
                 raise ValueError(f"{self.name}: scale = {self.scale}, offset = {self.offset} lose the value")
         elif self.unit is not None:
             raise ValueError(f"{self.name}: a {self.type} has no unit")
+        elif (self.scale, self.offset, self.range) != (1.0, 0.0, None):
+            raise ValueError(f"{self.name}: a {self.type} has no scale, offset or range")
+        if self.inverted and self.type is not Kind.BOOL:
+            what = "inverted belongs to a bool; of a number scale = -1 turns the sign"
+            raise ValueError(f"{self.name}: {what}")
         if self.range is not None and not self.range[0] < self.range[1]:
             raise ValueError(
                 f"{self.name}: range = {list(self.range)} is no interval: the lower end comes first"
@@ -98,8 +106,9 @@ class Variable(Table, frozen=True, kw_only=True):
             raise ValueError(
                 f'{self.name}: type = "choice" and choices = {{ 0 = "idle", … }} belong together'
             )
-        if any(not number.removeprefix("-").isdecimal() for number in self.choices):
-            raise ValueError(f"{self.name}: the keys of choices are whole numbers")
+        if wrong := [number for number in self.choices if not WHOLE.fullmatch(number)]:
+            what = f"the keys of choices are whole numbers such as 0, 12, -1, not {wrong[0][:20]!r}"
+            raise ValueError(f"{self.name}: {what}")
 
     @property
     def si_unit(self) -> str:

@@ -95,8 +95,7 @@ def reachable_volume(
     moving = Moving(model, bodies)
     low, high = reach_box(model, bodies)
     if not np.isfinite([low, high]).all():
-        what = "a joint that slides has no limits"
-        raise InputError.at("reachable volume", "of", what, "give lower and upper, or sweep a trajectory")
+        raise _without_limits()
     check_room(low, high, voxel, memory)
     rotations, positions = moving.place(np.asarray(model.mj.qpos0, float))
     screws = _screws(model, moving)
@@ -189,8 +188,10 @@ class _Work:
             factor = round(self.voxel / each.grid.pitch)
             low, high = each.grid.bounds()
             grid.cover(low * each.grid.pitch, (high + 1) * each.grid.pitch)
-            for i, layer in enumerate(each.grid.cells, int(each.grid.first[0])):
-                j, k = ((np.argwhere(layer) + each.grid.first[1:]) // factor - grid.first[1:]).T
+            # Its empty layers may lie beyond what is covered.
+            for i in range(int(low[0]), int(high[0]) + 1):
+                marked = np.argwhere(each.grid.cells[i - int(each.grid.first[0])])
+                j, k = ((marked + each.grid.first[1:]) // factor - grid.first[1:]).T
                 grid.cells[i // factor - grid.first[0], j, k] = 1
             # From the centre of a voxel to that of one of the finer voxels in it.
             apart = HALF_DIAGONAL * (self.voxel - each.grid.pitch)
@@ -337,6 +338,11 @@ def _core_of(grid: VoxelGrid, band: float) -> Core:
     )
 
 
+def _without_limits() -> InputError:
+    what = "a joint that slides has no limits"
+    return InputError.at("reachable volume", "of", what, "give lower and upper, or sweep a trajectory")
+
+
 def _screws(model: Model, moving: Moving) -> dict[int, _Screw]:
     """Axes at the last placement and what is left of each joint's range from there."""
     limits: dict[str, tuple[float | None, float | None]] = {}
@@ -346,11 +352,12 @@ def _screws(model: Model, moving: Moving) -> dict[int, _Screw]:
         for row, joint in enumerate(every):
             low, high = joint.lower, joint.upper
             if joint.mimic is not None:
-                # As far as the joint that it follows takes it.
+                # As far as the joint that it follows takes it; where that has no limits its own count.
                 factor = mechanism.coupling[row]
                 with np.errstate(invalid="ignore"):
                     reached = np.where(factor == 0, 0.0, factor * span).sum(axis=1) + mechanism.offset[row]
-                low, high = float(reached.min()), float(reached.max())
+                if np.isfinite(reached).all():
+                    low, high = float(reached.min()), float(reached.max())
             limits[f"{name}/{joint.name}"] = low, high
     screws = {}
     for j in {j for chain in moving.chains for j in chain}:
@@ -361,5 +368,7 @@ def _screws(model: Model, moving: Moving) -> dict[int, _Screw]:
         ends = (-np.pi, np.pi)
         if low is not None and high is not None and np.isfinite(high - low):
             ends = low - now, high - now
+        elif slide:
+            raise _without_limits()
         screws[j] = _Screw(slide, moving.anchors[j].copy(), moving.axes[j].copy(), *ends)
     return screws

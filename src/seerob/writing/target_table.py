@@ -7,6 +7,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from seerob.host_name import check_host
 from seerob.quantities import PathName, Table, unit
 
 Topic = Annotated[
@@ -61,5 +62,6 @@ class CartesianTarget(Table, frozen=True, kw_only=True):
     """Least time between two targets [s]; of what comes faster, the newest is published."""
 
     def __post_init__(self) -> None:
+        check_host("host", self.host)
         if self.tls and self.wire is TargetWire.ROS_TCP:
             raise ValueError("an endpoint of ROS-TCP has no encryption: leave out tls, or use rosbridge")

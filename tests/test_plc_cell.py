@@ -36,8 +36,9 @@ def known(snapshot):
 def only_the_robot_is_known(snapshot):
     results = {r.name: r for r in snapshot.results}
     silent = ("crate – operator", "crate speed", "door – operator", "light curtain")
+    # A busy machine may fall behind just then, which is another reason.
     return results["robot – operator"].verdict == "within" and all(
-        results[n].verdict == "undecided" for n in silent
+        results[n].verdict == "undecided" and "not heard" in results[n].reason for n in silent
     )
 
 

@@ -33,6 +33,7 @@ ZONE = '[[areas]]\nname = "zone"\nshape = { sphere = 0.1 }\nat = { position = [0
 def cell(folder, urdf, x=9.0, more=""):
     kinds = (f'[[safety]]\nkind = "{kind}"\nname = "{kind}"\n{rest}' for kind, rest in ABOUT.items())
     point = '[[safety]]\nkind = "velocity"\nname = "point"\nat = "arm"\nlimit = 9\n'
+    point += '[[safety]]\nkind = "minimum_distance"\nname = "figure"\nbetween = ["arm", "op"]\n'
     text = FLOATING + TWO_R + more + person("op", x, 0, -1) + ZONE + "".join(kinds) + point
     return made(folder, text, {"arm.urdf": urdf})
 
@@ -48,6 +49,7 @@ def test_nothing_about_shapes_is_within(tmp_path):
         assert (kind, results[kind].verdict) == (kind, "undecided")
         assert "no shape shows arm/l2, which has a mass" in results[kind].reason
     assert results["point"].verdict == "within"
+    assert results["figure"].verdict is None  # nothing to be within of
     still = {"arm": np.zeros((2, 2))}
     batch = station.batch(still, still)
     assert {kind: int(batch[kind].answers.verdict.min()) for kind in ABOUT} == dict.fromkeys(ABOUT, 2)
@@ -67,6 +69,7 @@ def test_what_is_shown_is_enough(tmp_path, shown):
     urdf, more = shown
     found = verdicts(cell(tmp_path, urdf, more=more))
     assert found.pop("power_and_force") is None  # nobody is near
+    assert found.pop("figure") is None
     assert set(found.values()) == {"within"}
 
 

@@ -48,6 +48,9 @@ def test_nothing_about_shapes_is_within(tmp_path):
     for kind in ABOUT:
         assert (kind, results[kind].verdict) == (kind, "undecided")
         assert "no shape shows arm/l2, which has a mass" in results[kind].reason
+        coloured = [getattr(marker, "verdict", None) for marker in results[kind].markers]
+        assert set(coloured) <= {None, "undecided"}
+    assert results["minimum_distance"].markers[0].verdict == "undecided"
     assert results["point"].verdict == "within"
     assert results["figure"].verdict is None  # nothing to be within of
     still = {"arm": np.zeros((2, 2))}
@@ -71,6 +74,20 @@ def test_what_is_shown_is_enough(tmp_path, shown):
     assert found.pop("power_and_force") is None  # nobody is near
     assert found.pop("figure") is None
     assert set(found.values()) == {"within"}
+
+
+def test_a_robot_that_must_stay_outside_counts_whole(tmp_path):
+    """The area is that of a robot whose shapes are all there."""
+    other = '[[robots]]\nname = "other"\nmodel = "{}.urdf"\nbase = {{ position = [0, 8, 0] }}\nq = [0, 0]\n'
+    kinds = (
+        f'[[safety]]\nkind = "{kind}"\nname = "{kind}"\n{ABOUT[kind].replace(old, new)}'
+        for kind, old, new in (("separation", "", ""), ("separation_area", '"op"', '"other"'))
+    )
+    text = FLOATING + TWO_R + person("op", 9.0, 0, -1) + "".join(kinds)
+    for name, verdict in (("bare", "undecided"), ("arm", "within")):
+        files = {"arm.urdf": two_r(), "bare.urdf": BARE}
+        station = made(tmp_path / name, text + other.format(name), files)
+        assert verdicts(station) == {"separation": "within", "separation_area": verdict}
 
 
 def test_what_is_seen_exceeds_by_itself(tmp_path):

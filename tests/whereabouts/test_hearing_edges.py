@@ -29,13 +29,13 @@ def heard(*instants: float, timeout: float = 0.5) -> Hearing:
 )
 def test_what_is_older_than_the_last_sample_is_forgotten(t: float, kept: list[float]) -> None:
     hearing = heard(0.0, 1.0, 2.0)
-    told = (hearing.parts, hearing.observed, hearing.aims)
+    told = (hearing.parts, hearing.observed, hearing.bare, hearing.aims, hearing.untold)
     for instants in told:
         instants += [(float(k), ()) for k in range(3)]  # type: ignore[arg-type]
     hearing.forget(t)
     assert [instant for instant, _ in hearing.heard] == kept
     assert [float(tau[0]) for tau in hearing.torques if tau is not None] == kept
-    assert [[instant for instant, _ in instants] for instants in told] == [kept] * 3
+    assert [[instant for instant, _ in instants] for instants in told] == [kept] * 5
 
 
 def test_a_sample_counts_from_its_instant_on_and_to_the_end_of_the_time_out() -> None:
@@ -74,3 +74,22 @@ def test_what_is_said_of_bones_counts_between_the_samples_beside_an_instant() ->
     hearing.observed += [(0.0, blind), (1.0, everything), (2.0, everything), (3.0, armless)]
     for t, unseen in {0.5: ("head",), 1.0 - SLACK: (), 1.5: (), 2.5: ("right_hand",)}.items():
         assert hearing.unseen(t) == unseen, t
+
+
+def test_angles_that_nothing_tells_count_between_the_samples_beside_an_instant() -> None:
+    hearing = heard(0.0)
+    wrist, neck = ("wrist_flexion", 1), ("neck_twist", 0)
+    hearing.untold += [(0.0, frozenset({wrist})), (1.0, frozenset()), (2.0, frozenset()), (3.0, {neck})]
+    assert hearing.untold_angles(0.5) == {wrist}
+    assert hearing.untold_angles(1.0 - SLACK) == hearing.untold_angles(1.5) == frozenset()
+    assert hearing.untold_angles(2.5) == hearing.untold_angles(9.0) == {neck}
+
+
+def test_a_joint_beyond_which_nothing_is_seen_tells_nothing_of_its_bone() -> None:
+    hearing = heard(0.0)
+    armless = frozenset(BONES) - {"right_hand"}
+    elbow = frozenset({"right_forearm"})
+    hearing.observed += [(t, armless) for t in (0.0, 1.0, 2.0, 3.0)]
+    hearing.bare += [(0.0, elbow), (1.0, frozenset()), (2.0, frozenset()), (3.0, elbow)]
+    found = {t: "right_forearm" in hearing.unseen(t) for t in (0.5, 1.0 - SLACK, 1.5, 2.5)}
+    assert found == {0.5: True, 1.0 - SLACK: False, 1.5: False, 2.5: True}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from seerob.human.estimated import estimated
 from seerob.human.following import Followed, PartDoubt
 from seerob.transforms import Array
 
+Told = TypeVar("Told")
 SLACK = 1e-9
 """Instants that differ by less are the same [s]: a source's clock and the run's are sums of decimals."""
 
@@ -91,31 +93,33 @@ class Hearing:
 
     def doubted(self, t: float) -> tuple[PartDoubt, ...]:
         """Bones that may not be relied on at ``t`` [s], with the reasons."""
-        k = sum(1 for instant, _ in self.parts if instant <= t + SLACK)
-        return tuple(part for _, told in self.parts[max(k - 1, 0) : k + 1] for part in told)
+        return tuple(part for told in _around(self.parts, t) for part in told)
 
     def unaimed(self, t: float) -> dict[str, float]:
         """Hands, feet and heads at ``t`` [s] of which only the joint is seen, each with a bound [rad].
 
         It bounds the angle between how the twin's is turned and how the person's may be.
         """
-        k = sum(1 for instant, _ in self.aims if instant <= t + SLACK)
         found: dict[str, float] = {}
-        for _, told in self.aims[max(k - 1, 0) : k + 1]:
+        for told in _around(self.aims, t):
             found |= {bone: max(angle, found.get(bone, 0.0)) for bone, angle in told.items()}
         return found
 
     def untold_angles(self, t: float) -> frozenset[tuple[str, int]]:
         """Angles of the posture at ``t`` [s] that nothing tells, each with its side."""
-        k = sum(1 for instant, _ in self.untold if instant <= t + SLACK)
-        return frozenset().union(*(angles for _, angles in self.untold[max(k - 1, 0) : k + 1]))
+        return frozenset().union(*_around(self.untold, t))
 
     def unseen(self, t: float) -> tuple[str, ...]:
         """Bones that no device sees at ``t`` [s] and that the bones beside them do not tell.
 
         Empty for a person whom no device sees, whom joints or keyframes move.
         """
-        k = sum(1 for instant, _ in self.observed if instant <= t + SLACK)
-        around = [seen for _, seen in self.observed[max(k - 1, 0) : k + 1]]
-        bare = frozenset().union(*(bones for _, bones in self.bare[max(k - 1, 0) : k + 1]))
+        around = _around(self.observed, t)
+        bare = frozenset().union(*_around(self.bare, t))
         return estimated(frozenset.intersection(*around), bare) if around else ()
+
+
+def _around(told: list[tuple[float, Told]], t: float) -> list[Told]:
+    """What was told last by ``t`` [s] and what next: between two samples either may hold."""
+    k = sum(1 for instant, _ in told if instant <= t + SLACK)
+    return [what for _, what in told[max(k - 1, 0) : k + 1]]

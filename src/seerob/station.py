@@ -183,9 +183,11 @@ class Station:
         with ExitStack() as until_the_end:
             if clock and heard:
                 road.warm_up(self.model)
+                # What takes a while holds up whoever listens: it is done before.
+                until_the_end.enter_context(road.settled())
                 targets = [(source, source_target(self.model, source)) for source in heard]
                 feed = hear(feed, until_the_end.enter_context(Listening(targets)), clock)
-            bound = self.bound  # takes a while: before anything is open
+            bound = self.bound  # refused, if so, before anything is open
             opened = self.open_sinks(sinks, Path(folder or "."), scene) if sinks else []
             return road.run(
                 self.model,

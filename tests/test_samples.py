@@ -69,3 +69,12 @@ def test_threads_never_lose_the_newest_nor_see_one_twice():
         thread.join()
     assert last == {f"r{k}": n - 1 for k in range(4)}
     assert key(joints("a", 0)) != key(pose("a", 0))
+
+
+def test_whose_fault_a_doubt_is():
+    assert [quality.doubt("plc") for quality in Quality] == [
+        "",
+        "plc says degraded",
+        "plc says invalid",
+        "this machine is too slow: run time fell behind",
+    ]

@@ -22,7 +22,7 @@ def check_host(key: str, host: str) -> None:
     shown = f"{key} = {host[:80]!r}"
     if "/" in host or "[" in host:
         raise ValueError(f"{shown} is no name or address: write it alone, such as 192.168.0.10")
-    if ":" in host and not _is_address(host):
+    if ":" in host and not is_address(host):
         raise ValueError(f"{shown} is no name or address: a port is an option of its own, port = …")
     if len(host) > LONGEST or any(c.isspace() or not c.isprintable() for c in host) or not _has_labels(host):
         raise ValueError(f"{shown} is no name or address such as 192.168.0.10")
@@ -43,12 +43,18 @@ def check_url(key: str, url: str) -> None:
         check_host(key, host)
 
 
-def _is_address(host: str) -> bool:
+def is_address(host: str) -> bool:
+    """Whether a host is an IP address; a name can be made to point elsewhere, an address cannot."""
     try:
         ip_address(host)
     except ValueError:
         return False
     return True
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host is this machine itself: nobody else can reach it, and nobody listens on the way."""
+    return host == "localhost" or (is_address(host) and ip_address(host).is_loopback)
 
 
 def _has_labels(host: str) -> bool:

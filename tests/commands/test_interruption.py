@@ -203,23 +203,27 @@ def test_other_errors_of_destroyed_objects_are_still_told(monkeypatch):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+def ended(folder, program):
+    """Exit code and errors of a program of its own."""
+    (folder / "of_its_own.py").write_text(program)
+    found = subprocess.run([sys.executable, "-m", "of_its_own"], cwd=folder, capture_output=True, text=True)
+    return found.returncode, found.stderr
+
+
 def test_an_interrupt_in_generated_code_ends_with_the_exit_code_too(tmp_path):
     """Dataclasses and the like run text; CPython remembers an interrupt in there and ends by a signal."""
-    (tmp_path / "interrupted_kinds.py").write_text(
+    program = (
         "import sys\n"
         "from seerob import cli\n"
         "from seerob.commands import kinds\n"
         "kinds.run = lambda options: exec('raise KeyboardInterrupt')\n"
         "sys.exit(cli.main(['kinds']))\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-m", "interrupted_kinds"], cwd=tmp_path, capture_output=True, text=True
-    )
-    assert (ended.returncode, ended.stderr) == (3, "stopped\n")
+    assert ended(tmp_path, program) == (3, "stopped\n")
 
 
 def test_ctrl_c_before_the_command_line_is_there_and_after_its_end_needs_no_traceback(tmp_path):
-    (tmp_path / "early_and_late.py").write_text(
+    program = (
         "import atexit, signal, sys\n"
         "from seerob.__main__ import program\n"
         "def press(*_): signal.raise_signal(signal.SIGINT)\n"
@@ -231,7 +235,4 @@ def test_ctrl_c_before_the_command_line_is_there_and_after_its_end_needs_no_trac
         "atexit.register(press)\n"
         "sys.exit(program())\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-m", "early_and_late"], cwd=tmp_path, capture_output=True, text=True
-    )
-    assert (ended.returncode, ended.stderr) == (3, "stopped\n")
+    assert ended(tmp_path, program) == (3, "stopped\n")

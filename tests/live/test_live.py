@@ -12,10 +12,9 @@ import time
 
 import msgspec
 import pytest
-from msgspec.structs import replace
 
 from live_story import wait_for as until
-from seerob.errors import InputError, SeerobError
+from seerob.errors import SeerobError
 from seerob.live.listening import (
     FIRST_PAUSE,
     LONGEST_PAUSE,
@@ -27,10 +26,9 @@ from seerob.live.listening import (
     delay_of,
     say_once,
 )
-from seerob.live.real_time import Clock, hear, require_recorded
-from seerob.samples import JointSample, Quality, SignalSample
+from seerob.live.real_time import Clock, hear
+from seerob.samples import JointSample, SignalSample
 from seerob.source import Source
-from seerob.workstation import Workstation
 
 
 class Made(LiveSource, frozen=True, kw_only=True):
@@ -60,10 +58,6 @@ def joint(t=None, device=None):
     return JointSample(
         source="", seq=0, target="arm", q=(0.0,), t=time.monotonic() if t is None else t, t_device=device
     )
-
-
-def signal(t):
-    return SignalSample(source="plc", seq=0, values={"speed": 0.25}, t=t)
 
 
 class Ears:
@@ -196,71 +190,6 @@ def test_run_time_begins_at_the_first_sample_and_the_tick_that_speaks_of_it_come
     assert listening.delay == delay_of([source]) == source.behind() == 0.01 + MARGIN
 
 
-class Said:
-    """Stands where `Listening` does, with what a test says."""
-
-    delay = 0.02
-
-    def __init__(self, *ticks):
-        self.ticks = list(ticks)
-
-    def first(self):
-        return self.take()
-
-    def take(self):
-        return tuple(self.ticks.pop(0)) if self.ticks else ()
-
-
-@pytest.mark.parametrize("said", [joint, signal])
-def test_a_clock_that_slips_makes_the_next_sample_doubtful_and_none_go_back(said):
-    """Run time stood still while the robot, or a belt, went on: nobody may take that for speed."""
-    clock = Clock()
-    start = time.monotonic()
-    ticks = [[said(t=start + 0.01 * k)] for k in range(6)]
-    feed = hear(iter(lambda: (), None), Said(*ticks), clock)
-    heard = [*next(feed), *next(feed)]
-    clock.start += 0.025
-    clock.slipped += 0.025
-    heard += [s for _ in range(4) for s in next(feed)]
-    # What was heard last is older than run time shows; the next one came about too fast.
-    assert [s.quality for s in heard] == ["good"] * 3 + ["late"] * 2
-    assert [s.t for s in heard] == pytest.approx([0, 0.01, 0.02, 0.02, 0.025], abs=2e-6)
-    assert replace(heard[3], t=heard[2].t, quality=heard[2].quality) == heard[2]
-    assert heard[3].t > heard[2].t
-
-
-@pytest.mark.parametrize("said", [joint, signal])
-def test_after_a_slip_nothing_is_sure_until_the_twin_has_settled(said):
-    """On its way to where the robot went it is faster than any robot, and once in the right place."""
-    clock = Clock()
-    start = time.monotonic()
-    ticks = [[said(t=start + 0.12 * k)] for k in range(12)]
-    feed = hear(iter(lambda: (), None), Said(*ticks), clock)
-    before = next(feed)
-    clock.slipped += 0.3
-    after = [s for _ in range(10) for s in next(feed)]
-    assert [s.quality for s in before] == ["good"] * 2
-    assert [s.quality for s in after] == ["late"] * 4 + ["good"] * 6
-    assert after[4].t - before[-1].t == pytest.approx(0.6)
-
-
-def test_several_pictures_of_one_instant_are_all_heard():
-    """Of a machine; a robot is in one place."""
-    start = time.monotonic()
-    for said, heard in ((signal, 3), (joint, 1)):
-        feed = hear(iter(lambda: (), None), Said([said(t=start)], [said(t=start)] * 2), Clock())
-        assert len([*next(feed), *next(feed)]) == heard
-
-
-def test_whose_fault_a_doubt_is():
-    assert [quality.doubt("plc") for quality in Quality] == [
-        "",
-        "plc says degraded",
-        "plc says invalid",
-        "this machine is too slow: run time fell behind",
-    ]
-
-
 def test_a_run_begins_with_what_is_heard_then_and_not_with_what_was_heard_before(monkeypatch):
     posted, begun = threading.Event(), threading.Event()
 
@@ -307,12 +236,6 @@ def test_a_live_source_cannot_loop_and_its_time_out_is_longer_than_its_delay():
             msgspec.convert({**wrong}, Made)
     assert Made(delay=0.1).behind() == 0.1
     assert delay_of([Source(), Made(delay=0.03), Made(delay=0.05)]) == 0.05
-
-
-def test_a_live_source_is_refused_where_time_is_not_real():
-    with pytest.raises(InputError, match=r"sources\[1\].*real time only.*seerob run"):
-        require_recorded(Workstation(folder="", sources=(Source(), Made())))
-    require_recorded(Workstation(folder="", sources=(Source(),)))
 
 
 def test_a_cancellation_that_a_library_forgets_is_a_stop_all_the_same():

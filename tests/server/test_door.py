@@ -7,7 +7,8 @@ import pytest
 from websockets.exceptions import InvalidStatus
 
 from seerob.errors import InputError
-from seerob.server.door import HEADERS, is_loopback
+from seerob.host_name import is_loopback
+from seerob.server.door import HEADERS
 from seerob.server.live import Live
 from seerob.server.player import Player
 from seerob.server.serving import Server

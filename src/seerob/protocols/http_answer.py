@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from ipaddress import ip_address
 from typing import TYPE_CHECKING
 
 from seerob.protocols import ProtocolError
@@ -54,13 +53,3 @@ async def answer(
         raise TimeoutError("no answer in time") from error
     except (httpx.HTTPError, httpx.InvalidURL) as error:
         raise ConnectionError(str(error) or type(error).__name__) from error
-
-
-def is_here(host: str) -> bool:
-    """Whether a name or address is this machine itself, to which a secret may travel unencrypted."""
-    if host == "localhost":
-        return True
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return False

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import re
 from hmac import compare_digest
-from ipaddress import ip_address
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from seerob.host_name import is_address
 
 HEADERS = {
     # Together they make the page cross-origin isolated: without that there is no SharedArrayBuffer.
@@ -31,20 +32,6 @@ HEADERS = {
 """On every answer. ``blob:`` is for textures inside a mesh and for a bundled worker."""
 
 _HOST = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([A-Za-z0-9.-]+))(?::\d{1,5})?")
-
-
-def is_address(host: str) -> bool:
-    """Whether a host is an IP address; a name can be made to point here, an address cannot."""
-    try:
-        ip_address(host)
-    except ValueError:
-        return False
-    return True
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach a host that is listened on."""
-    return host == "localhost" or (is_address(host) and ip_address(host).is_loopback)
 
 
 class Door:

@@ -18,10 +18,11 @@ import uvicorn
 from starlette.applications import Starlette
 
 from seerob.errors import InputError
+from seerob.host_name import is_address, is_loopback
 from seerob.server.app import build
 from seerob.server.client import Closing
 from seerob.server.connection import WholeBinaryFrames
-from seerob.server.door import Door, is_address, is_loopback
+from seerob.server.door import Door
 from seerob.server.feed import Feed
 from seerob.server.http_connection import PromptRequests
 from seerob.server.hub import PATIENCE, Hub

@@ -15,8 +15,9 @@ from urllib.parse import urlsplit
 from msgspec import Meta
 
 from seerob.errors import InputError, Problem
+from seerob.host_name import is_loopback
 from seerob.protocols import ProtocolError, s7_web
-from seerob.protocols.http_answer import answer, is_here
+from seerob.protocols.http_answer import answer
 from seerob.protocols.trusted_certificates import trusting
 from seerob.quantities import Seconds
 from seerob.snapshot import Finding
@@ -57,7 +58,7 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         parts = urlsplit(self.url)
-        if parts.scheme == "http" and not is_here(parts.hostname or ""):
+        if parts.scheme == "http" and not is_loopback(parts.hostname or ""):
             raise ValueError(f"url = {self.url!r} would send a password unencrypted: write https://")
 
     def period(self) -> float:

@@ -16,8 +16,9 @@ import msgspec
 from msgspec import Meta
 
 from seerob.errors import InputError, Problem
+from seerob.host_name import is_loopback
 from seerob.protocols import ProtocolError
-from seerob.protocols.http_answer import LARGEST, answer, is_here
+from seerob.protocols.http_answer import LARGEST, answer
 from seerob.protocols.json_pointer import document, parts
 from seerob.protocols.trusted_certificates import trusting
 from seerob.protocols.websocket_link import linked_to
@@ -105,7 +106,7 @@ class Web(VariablesSource, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         asked = urlsplit(self.url)
-        if self.token_env is not None and not self._encrypted and not is_here(asked.hostname or ""):
+        if self.token_env is not None and not self._encrypted and not is_loopback(asked.hostname or ""):
             raise ValueError(f"url = {self.url!r} would send a token unencrypted: write https:// or wss://")
         if "@" in asked.netloc:
             raise ValueError("url holds a password: put a token into an environment variable, token_env")

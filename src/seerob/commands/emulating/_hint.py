@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from seerob.protocols.http_answer import is_here
+from seerob.host_name import is_loopback
 
 ANYWHERE = ("0.0.0.0", "::", "")  # noqa: S104 - compared with, not listened on
 
@@ -20,7 +20,7 @@ def probes_of(kind: str, host: str, port: int, *, sends: bool, commands: tuple[s
     """
     option = _option(kind, port)
     if sends:
-        option += "" if is_here(host) else f" --set bind={host}"
+        option += "" if is_loopback(host) else f" --set bind={host}"
     host = "127.0.0.1" if host in ANYWHERE else host
     at = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
     if commands:

@@ -9,31 +9,44 @@ the velocity is :math:`\sigma_v = \frac{\sigma}{T}\sqrt{\frac{12 (2n-1)(8n-11)}{
 from __future__ import annotations
 
 from collections import deque
-
-import numpy as np
-
-from seerob.transforms import Array
+from collections.abc import Sequence
+from operator import mul
 
 SAMPLES = 7
 """That the parabola is fitted to."""
+FLAT = 1e-9
+"""Sum of the squares that a parabola has beside the best line, in units of the span, below which its
+curvature is not told by the instants: all but two of them fall together."""
 
 
-def end_slope(times: Array, values: Array) -> Array:
-    """Slope, at the last instant, of the parabola that fits best in the least squares.
+def end_weights(times: Sequence[float]) -> list[float]:
+    """What each value counts for in the slope, at the last instant, of the parabola that fits best.
+
+    Least squares by polynomials that are orthogonal over the instants, in plain numbers: this runs between a
+    packet and the mailbox, where calls of a linear-algebra library cost more than they compute. Where the
+    instants do not tell a parabola from a line, that of the line.
 
     Args:
         times: Ascending [s], shape (m,), m >= 3.
-        values: Shape (m, n).
 
     Returns:
-        Per second, shape (n,).
+        [1/s], shape (m,).
     """
-    # Seen from the last instant, in units of the span: well conditioned, and the slope is a coefficient.
-    span = times[-1] - times[0]
-    s = (times - times[-1]) / span
-    design = np.stack([np.ones_like(s), s, s * s], axis=1)
-    coefficients, *_ = np.linalg.lstsq(design, values, rcond=None)
-    return np.asarray(coefficients[1] / span)
+    count, last = len(times), times[-1]
+    span = last - times[0]
+    s = [(t - last) / span for t in times]
+    mean = sum(s) / count
+    line = [x - mean for x in s]
+    squares = list(map(mul, line, line))
+    second = sum(squares)
+    tilt, level = sum(map(mul, squares, line)) / second, second / count
+    bend = [x * (x - tilt) - level for x in line]
+    fourth = sum(map(mul, bend, bend))
+    by_line = 1.0 / (second * span)
+    if fourth < FLAT:
+        return [by_line * x for x in line]
+    by_bend = (2.0 * line[-1] - tilt) / (fourth * span)
+    return [by_line * x + by_bend * y for x, y in zip(line, bend, strict=True)]
 
 
 class Differentiator:
@@ -65,5 +78,5 @@ class Differentiator:
         self._values.append(values)
         if len(self._times) < 3:
             return None
-        slope = end_slope(np.array(self._times), np.array(self._values))
-        return tuple(slope.tolist())
+        weights = end_weights(self._times)
+        return tuple([sum(map(mul, weights, column)) for column in zip(*self._values, strict=True)])

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 
+from seerob.protocols.bell import Bell
 from seerob.protocols.reception import Received, Reception
 
 CHUNK = 1 << 16
@@ -32,7 +33,7 @@ class Connection:
         self._loop = asyncio.get_running_loop()
         self._waiting: deque[Received] = deque()
         self._bytes = 0
-        self._arrived = asyncio.Event()
+        self._bell = Bell()
         self._error: OSError | None = None
         self._ended = self._listens = False
         self._tells = True
@@ -58,10 +59,8 @@ class Connection:
             OSError: The other end is gone.
         """
         if not self._waiting and not self._ended:
-            self._arrived.clear()
             try:
-                async with asyncio.timeout(patience):
-                    await self._more()
+                await self._more(patience)
             except TimeoutError as error:
                 # On a busy machine this thread may have slept, with data waiting: look again.
                 self._read()
@@ -81,19 +80,20 @@ class Connection:
         self._ended = True
         self._deafen()
 
-    async def _more(self) -> None:
+    async def _more(self, patience: float) -> None:
         if self._tells:
             if self._error is None:
-                await self._arrived.wait()
+                await self._bell.wait(patience)
             return
-        data = await self._loop.sock_recv(self._link, CHUNK)
+        async with asyncio.timeout(patience):
+            data = await self._loop.sock_recv(self._link, CHUNK)
         self._take(Received(time.monotonic(), data, None))
 
     def _take(self, received: Received) -> None:
         self._waiting.append(received)
         self._bytes += len(received.data)
         self._ended = self._ended or not received.data
-        self._arrived.set()
+        self._bell.ring()
 
     def _read(self) -> None:
         try:
@@ -102,7 +102,7 @@ class Connection:
             return
         except OSError as error:
             self._error = error
-            self._arrived.set()
+            self._bell.ring()
         if self._ended or self._error is not None or self._bytes > MOST:
             self._deafen()
 

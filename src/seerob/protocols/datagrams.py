@@ -11,6 +11,7 @@ from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from typing import Any, NamedTuple
 
+from seerob.protocols.bell import Bell
 from seerob.protocols.reception import Reception
 
 WAITING = 512
@@ -46,7 +47,7 @@ class Datagrams(asyncio.DatagramProtocol):
         self._senders, self._answer = senders, answer
         self._loop = asyncio.get_running_loop()
         self._waiting: deque[Datagram] = deque(maxlen=WAITING)
-        self._arrived = asyncio.Event()
+        self._bell = Bell()
         self._error: OSError | None = None
         self._send: Callable[[bytes, Any], object] = lambda data, to: None
         self.port = 0
@@ -91,7 +92,7 @@ class Datagrams(asyncio.DatagramProtocol):
             return
         self.dropped += len(self._waiting) == WAITING
         self._waiting.append(Datagram(arrived, data))
-        self._arrived.set()
+        self._bell.ring()
         if self._answer is not None:
             self._loop.call_soon(self._reply, data, sender)
 
@@ -109,7 +110,7 @@ class Datagrams(asyncio.DatagramProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Called by the loop."""
         self._error = exc if isinstance(exc, OSError) else OSError("closed")
-        self._arrived.set()
+        self._bell.ring()
 
     async def receive(self, silence: float) -> AsyncGenerator[Datagram, None]:
         """What arrives, oldest first.
@@ -126,10 +127,8 @@ class Datagrams(asyncio.DatagramProtocol):
                 yield self._waiting.popleft()
             if self._error is not None:
                 raise self._error
-            self._arrived.clear()
             try:
-                async with asyncio.timeout(silence):
-                    await self._arrived.wait()
+                await self._bell.wait(silence)
             except TimeoutError as error:
                 # On a busy machine this thread may have slept, with data waiting: the loop looks twice.
                 await asyncio.sleep(0)

@@ -23,6 +23,12 @@ class Wire(IntEnum):
     FIXED32 = 5
 
 
+_VARINT, _FIXED64, _LENGTH = Wire.VARINT, Wire.FIXED64, Wire.LENGTH
+_WIRES = {int(wire): wire for wire in Wire}
+_NUMBERS = 1 << 29
+"""Numbers of fields are below."""
+
+
 class Field(NamedTuple):
     """One field as it stands in a message."""
 
@@ -97,29 +103,37 @@ def fields(data: bytes) -> Iterator[Field]:
     Raises:
         ProtocolError: The bytes are no message.
     """
+    # Live messages come hundreds of times a second, and most numbers in them are of one byte.
     at, end = 0, len(data)
     while at < end:
-        tag, at = _varint(data, at)
-        number, kind = tag >> 3, tag & 7
-        if not 1 <= number < 1 << 29:
-            raise ProtocolError(f"a field with the number {number}")
-        if kind == Wire.VARINT:
-            value, at = _varint(data, at)
-            yield Field(number, Wire.VARINT, value)
-            continue
-        if kind == Wire.LENGTH:
-            length, at = _varint(data, at)
-        elif kind in (Wire.FIXED64, Wire.FIXED32):
-            length = 8 if kind == Wire.FIXED64 else 4
+        tag = data[at]
+        if tag < 0x80:
+            at += 1
         else:
+            tag, at = _varint(data, at)
+        number, kind = tag >> 3, tag & 7
+        if not 0 < number < _NUMBERS:
+            raise ProtocolError(f"a field with the number {number}")
+        wire = _WIRES.get(kind)
+        if wire is None:
             raise ProtocolError(f"field {number} has the unknown wire type {kind}")
+        if wire is _VARINT:
+            value, at = _varint(data, at)
+            yield Field(number, _VARINT, value)
+            continue
+        if wire is _LENGTH:
+            length, at = _varint(data, at)
+        else:
+            length = 8 if wire is _FIXED64 else 4
         if length > end - at:
             raise ProtocolError(f"field {number} of {length} bytes, {end - at} are left")
-        yield Field(number, Wire(kind), data[at : at + length])
+        yield Field(number, wire, data[at : at + length])
         at += length
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:
+    if at < len(data) and (value := data[at]) < 0x80:
+        return value, at + 1
     value = shift = 0
     while at < len(data):
         byte = data[at]

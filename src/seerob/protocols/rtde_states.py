@@ -6,6 +6,7 @@ Numbers as in ``datatypes.h`` of the maker's client library, 2.14.0.
 from __future__ import annotations
 
 from enum import IntEnum
+from functools import cache
 
 from seerob.samples import Quality
 
@@ -82,4 +83,9 @@ def quality(robot_mode: int | None, safety_status: int | None) -> Quality:
 
 def name(numbers: type[IntEnum], number: int) -> str | None:
     """Name of a number; None for one that nobody explained."""
-    return numbers(number).name if number in numbers.__members__.values() else None
+    return _names(numbers).get(number)
+
+
+@cache
+def _names(numbers: type[IntEnum]) -> dict[int, str]:
+    return {int(one): one.name for one in numbers}

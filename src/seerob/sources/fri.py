@@ -218,7 +218,7 @@ class Fri(LiveSource, frozen=True, kw_only=True):
     async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Joint samples, and signals ten times a second and whenever a state changes."""
         device, slope = DeviceTime(), Differentiator(GAP * self.period())
-        said: dict[str, float | bool | str] = {}
+        said: tuple[object, ...] = ()
         due, newest = 0.0, -math.inf
         answering = _Answering()
         async with (
@@ -229,10 +229,6 @@ class Fri(LiveSource, frozen=True, kw_only=True):
                 m = answering.monitoring(datagram.data)
                 if len(m.q) != JOINTS:
                     raise ProtocolError(f"sends {len(m.q)} joints where an LBR has {JOINTS}")
-                now = states(m)
-                if now != said or datagram.arrived >= due:
-                    said, due = now, datagram.arrived + SIGNAL_PERIOD
-                    yield SignalSample(source="", seq=0, t=datagram.arrived, values=now | figures(m))
                 t = device(m)
                 instant = datagram.arrived if t is None else t
                 qd = None
@@ -240,3 +236,8 @@ class Fri(LiveSource, frozen=True, kw_only=True):
                     newest = instant
                     qd = slope.add(instant, m.q)
                 yield joint_sample(m, target=self.robot, arrived=datagram.arrived, device=t, qd=qd)
+                now = m.session, m.quality, m.safety, m.operation, m.control, m.drives
+                if now != said or datagram.arrived >= due:
+                    said, due = now, datagram.arrived + SIGNAL_PERIOD
+                    values = states(m) | figures(m)
+                    yield SignalSample(source="", seq=0, t=datagram.arrived, values=values)

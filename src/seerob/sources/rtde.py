@@ -44,6 +44,8 @@ WANTED = (
     "actual_TCP_speed",
 )
 FIELDS = (*NEEDED, *WANTED)
+STATES = ("robot_mode", "safety_status", "safety_mode", "runtime_state")
+"""Fields whose change is told at once."""
 SIGNAL_PERIOD = 0.1
 """Signals are repeated after this time, or when a state changes [s]."""
 SAME_TOOL = 2e-4
@@ -112,7 +114,7 @@ def _number(value: Value) -> float:
 def _vector(value: Value) -> tuple[float, ...]:
     if not isinstance(value, tuple) or len(value) != 6:
         raise ProtocolError(f"not six values: {value}")
-    return tuple(float(x) for x in value)
+    return tuple(map(float, value))
 
 
 def _whole(value: Value | None) -> int | None:
@@ -231,20 +233,19 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
         async with rtde_client.connect(self.host, self.port, FIELDS, self.frequency) as session:
             if lacking := self._lacking(session):
                 raise ProtocolError(lacking)
-            said: dict[str, float | bool | str] = {}
+            said: tuple[Value | None, ...] = ()
             due = 0.0
             async with aclosing(session.receive()) as heard:
                 async for reading in heard:
                     if isinstance(reading, TextMessage):
                         _tell(self.name or f"rtde {self.robot}", reading)
                         continue
-                    sample = joint_sample(reading.values, target=self.robot, arrived=reading.arrived)
-                    now = states(reading.values)
+                    yield joint_sample(reading.values, target=self.robot, arrived=reading.arrived)
+                    now = tuple([reading.values.get(field) for field in STATES])
                     if now != said or reading.arrived >= due:
                         said, due = now, reading.arrived + SIGNAL_PERIOD
-                        values = now | figures(reading.values)
+                        values = states(reading.values) | figures(reading.values)
                         yield SignalSample(source="", seq=0, t=reading.arrived, values=values)
-                    yield sample
 
 
 def remarks(session: rtde_client.Session, frequency: float) -> list[tuple[str, str]]:

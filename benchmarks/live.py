@@ -9,14 +9,14 @@ twin (``nice``).
 The peer is the same listeners with no twin beside them: what this machine makes late. A machine that does
 other things beside makes everything late: ``chrt -f 1 python benchmarks/live.py`` goes before them.
 
-``--seconds`` is the length of either part, ``--switch`` how long a thread keeps the interpreter
-[s] instead of what a live run sets, ``--smoke`` a short run without judgement.
+``--seconds`` is the length of either part, ``--smoke`` a short run without judgement.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import os
 import re
 import socket
@@ -24,7 +24,6 @@ import struct
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections import defaultdict
 from itertools import pairwise
@@ -35,7 +34,8 @@ import numpy as np
 import seerob as sr
 from seerob import cli
 from seerob.emulators.rtde import RtdeServer
-from seerob.live import listening as live
+from seerob.live import apart, ears, listening_process
+from seerob.live.listening import Listener, LiveSource, name_of
 from seerob.opening import source_target
 from seerob.samples import SignalSample, key
 
@@ -69,46 +69,36 @@ MAILBOX, BEYOND_TICK = 2e-3, 3e-3
 
 
 class Post:
-    """Notes every sample between its arrival and the mailbox, and what each tick took."""
+    """Every sample between its arrival and the mailbox, and what each tick took."""
 
-    def __init__(self) -> None:
-        self.lock = threading.Lock()
+    def __init__(self, notes: Path) -> None:
+        self._notes = notes
         self.came: dict[tuple[str, bool], list[tuple[int, float, float | None]]] = defaultdict(list)
         """Sequence number, arrival and device's time of samples, by source and whether they are signals."""
         self.posted: dict[tuple[str, int], float] = {}
         self.taken: list[tuple[float, tuple]] = []
+        self.heard: set[str] = set()
 
     @contextlib.contextmanager
     def watching(self):
-        """Patch the road while it is driven on."""
-        hear, take = live.Listener._take, live.Listening.take
-
-        def heard(listener, sample):
-            before = listener._seq
-            hear(listener, sample)
-            posted = time.monotonic()
-            if listener._seq == before:
-                return
-            with self.lock:
-                self.posted[listener.name, before] = posted
-                signals = isinstance(sample, SignalSample)
-                self.came[listener.name, signals].append((before, sample.t, sample.t_device))
+        """Note what is taken while the road is driven on, and afterwards what the listeners noted."""
+        take = ears.Listening.take
 
         def taking(listening):
             now, found = time.monotonic(), take(listening)
             self.taken.append((now, found))
+            self.heard.update(sample.source for sample in found)
             return found
 
-        live.Listener._take, live.Listening.take = heard, taking
+        ears.Listening.take = taking
+        apart.COMMAND = (sys.executable, __file__, "--listen", str(self._notes))
         try:
             yield self
         finally:
-            live.Listener._take, live.Listening.take = hear, take
-
-    def heard(self, names: set[str]) -> bool:
-        """Whether each of these sources was."""
-        with self.lock:
-            return {source for source, _ in self.came} >= names
+            ears.Listening.take = take
+        for name, signals, seq, instant, device, posted in json.loads(self._notes.read_bytes()):
+            self.posted[name, seq] = posted
+            self.came[name, signals].append((seq, instant, device))
 
     def arrived(self, written: dict[float, float]) -> dict[tuple[str, int], float]:
         """When each sample came in at the earliest, by source and sequence number [s].
@@ -199,6 +189,23 @@ def emulate(notes: str, command: list[str], *, nice: int) -> int:
         return cli.main(["emulate", *command])
 
 
+def listen(notes: str) -> int:
+    """The process that listens, with a note of when each sample was in the mailbox."""
+    hear, noted = Listener._take, []
+
+    def heard(listener, sample):
+        seq = listener._seq
+        hear(listener, sample)
+        if listener._seq > seq:
+            signals = isinstance(sample, SignalSample)
+            noted.append((listener.name, signals, seq, sample.t, sample.t_device, time.monotonic()))
+
+    Listener._take = heard
+    code = listening_process.main()
+    Path(notes).write_text(json.dumps(noted))
+    return code
+
+
 def written(notes: Path) -> dict[float, float]:
     """When each packet was written, by the device's time."""
     return dict(NOTED.iter_unpack(notes.read_bytes()))
@@ -263,15 +270,15 @@ def used_late(post: Post, period: float) -> int:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=10.0)
-    parser.add_argument("--switch", type=float)
     parser.add_argument("--smoke", action="store_true")
     parser.add_argument("--emulate", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
+    parser.add_argument("--listen", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.emulate:
         sys.exit(emulate(options.emulate[0], options.emulate[1:], nice=0 if options.smoke else 10))
+    if options.listen:
+        sys.exit(listen(options.listen))
     seconds = 0.5 if options.smoke else options.seconds
-    if options.switch is not None:
-        live.PROMPT = options.switch
     print(f"work that waits on this machine before: {os.getloadavg()[0]:.1f} of {os.cpu_count()} cores")
     fri = free_port()
     commands = [["rtde", "--port", "0"], ["opcua", "--port", "0"], ["fri", "--port", str(fri)]]
@@ -280,20 +287,20 @@ def main() -> None:
         emulators(Path(folder, "written"), *commands, smoke=options.smoke) as (rtde, opcua, _),
     ):
         station = cell(folder, rtde, fri, opcua)
-        sources = [s for s in station.workstation.sources if isinstance(s, live.LiveSource)]
+        sources = [s for s in station.workstation.sources if isinstance(s, LiveSource)]
+        names = {name_of(source) for source in sources}
         _ = station.sources
-        with Post().watching() as alone:
+        with Post(Path(folder, "alone")).watching() as alone:
             pairs = [(source, source_target(station.model, source)) for source in sources]
-            with live.Listening(pairs) as listening:
+            with ears.Listening(pairs) as listening:
                 listening.first(5.0)
                 time.sleep(seconds)
-                names = {listener.name for listener in listening.listeners}
                 end = time.monotonic() + PATIENCE
-                while not alone.heard(names) and time.monotonic() < end:
+                while listening.take() and not alone.heard >= names and time.monotonic() < end:
                     time.sleep(0.05)
-        with Post().watching() as post:
+        with Post(Path(folder, "beside")).watching() as post:
             states = States(seconds)
-            summary = station.run(live=True, writers=[states], stop=lambda: states.over(post.heard(names)))
+            summary = station.run(live=True, writers=[states], stop=lambda: states.over(post.heard >= names))
         made = written(Path(folder, "written"))
     period = station.workstation.engine.tick
     base = table("packet to mailbox, listeners alone", alone.mailbox(made))

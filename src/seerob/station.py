@@ -17,7 +17,8 @@ from seerob.batch import Batch
 from seerob.criterion import Criterion
 from seerob.errors import InputError
 from seerob.given_states import motion_of
-from seerob.live.listening import Listening, LiveSource
+from seerob.live.ears import Listening
+from seerob.live.listening import LiveSource
 from seerob.live.real_time import Clock, hear, require_recorded
 from seerob.model import Model
 from seerob.mounting.compilation import Progress, compile_workstation

@@ -2,8 +2,8 @@
 
 A `LiveSource` says in one asynchronous generator what it hears, `LiveSource.listen`. A `Listener` runs
 that in a thread of its own, begins anew when it ends, puts each sample's time on the host's clock and
-posts it to a `Mailbox`, where only the newest waits. `Listening` is all of them together, from which a
-run takes once per tick.
+posts it to a mailbox, where only the newest waits. `seerob.live.ears.Listening` is all of them together, from
+which a run takes once per tick.
 
 The twin runs a fixed delay behind the world, one period of the slowest source and a margin, so that
 there is a sample on either side of what is shown and references interpolate.
@@ -15,15 +15,13 @@ import asyncio
 import contextlib
 import logging
 import os
-import sys
 import time
 from collections.abc import AsyncGenerator, Callable, Coroutine, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import ContextVar
 from pathlib import Path
 from threading import Lock, Thread
-from types import TracebackType
-from typing import Annotated, Any, ClassVar, Self, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
 from msgspec import Meta
 from msgspec.structs import replace
@@ -32,7 +30,7 @@ from seerob.errors import InputError, SeerobError
 from seerob.host_name import check_host, check_url
 from seerob.live.arrivals import Arrivals, Statistics
 from seerob.live.device_clock import DeviceClock
-from seerob.samples import Mailbox, Sample, SignalSample, key
+from seerob.samples import Sample, SignalSample
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
 
@@ -47,12 +45,9 @@ STOP_WITHIN = 1.0
 """A listener that does not end by then is left behind [s]; its thread keeps no process alive."""
 ASK_WITHIN = 1.5
 """At start [s]."""
-PATIENCE = 1.0
-"""How long a run waits for the first samples before it begins without them [s]."""
-
 PROMPT = 1e-4
-"""How long a thread keeps the interpreter while others wait for it [s], during a live run. Python's own 5 ms
-is as long as samples then wait for the twin's computations."""
+"""How long a thread keeps the interpreter while others wait for it [s], where several listen or something is
+shown. Python's own 5 ms is as long as samples then wait for others' computations."""
 
 
 _said: ContextVar[set[str]] = ContextVar("said")
@@ -78,6 +73,10 @@ class LiveSource(Source, frozen=True, kw_only=True):
     delay: Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})] | None = None
     """How far the twin is behind the world [s]; one period of the source and 5 ms when not given."""
 
+    apart: ClassVar[bool] = True
+    """Whether it may listen in another process: not who takes what this one has."""
+    loads: ClassVar[tuple[str, ...]] = ()
+    """Libraries that it needs when it listens: loaded before anybody does, since that holds others up."""
     asks: ClassVar[str] = ""
     """A line of the workstation file that it needs and that no device can say: `seerob probe` shows it."""
 
@@ -191,7 +190,7 @@ class Listener:
     """
 
     def __init__(self, source: LiveSource, target: Target | None, post: Callable[[Sample], None]) -> None:
-        self.name = source.name or f"{type(source).__module__.rpartition('.')[2]} {source.target()}".strip()
+        self.name = name_of(source)
         self.drives = bool(source.target())
         """Whether it drives a robot or a person, or only has signals."""
         self._source, self._target, self._post = source, target, post
@@ -292,58 +291,35 @@ class Listener:
             self._up = False
 
 
-class Listening:
-    """The live sources of one run: started on entry, stopped on exit.
+def name_of(source: LiveSource) -> str:
+    """What a source is called where a run tells of it."""
+    return source.name or f"{type(source).__module__.rpartition('.')[2]} {source.target()}".strip()
+
+
+class Listeners:
+    """Several sources in this process, each in a thread of its own.
 
     Args:
         sources: With what each drives.
-
-    Attributes:
-        delay: How far the run is behind the world [s].
-        listeners: One per source.
+        post: As of `Listener`.
     """
 
-    def __init__(self, sources: Sequence[tuple[LiveSource, Target | None]]) -> None:
-        self._box = Mailbox()
-        self.delay = delay_of(source for source, _ in sources)
-        self.listeners = tuple(Listener(source, target, self._box.post) for source, target in sources)
-
-    def __enter__(self) -> Self:
-        self._interval = sys.getswitchinterval()
-        sys.setswitchinterval(min(self._interval, PROMPT))
-        for listener in self.listeners:
-            listener.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    def __init__(
+        self, sources: Sequence[tuple[LiveSource, Target | None]], post: Callable[[Sample], None]
     ) -> None:
-        for listener in self.listeners:
+        self._listeners = tuple(Listener(source, target, post) for source, target in sources)
+
+    def start(self) -> None:
+        """Begin to listen; returns at once."""
+        for listener in self._listeners:
+            listener.start()
+
+    def stop(self) -> None:
+        """End all of them; one that does not end in time is left behind."""
+        for listener in self._listeners:
             listener.ask_to_stop()
         end = time.monotonic() + STOP_WITHIN
-        for listener in self.listeners:
+        for listener in self._listeners:
             if not listener.join(max(0.0, end - time.monotonic())):
                 _log.warning("%s: did not stop within %g s", listener.name, STOP_WITHIN)
             _log.info("%s: %s", listener.name, listener.statistics())
-        sys.setswitchinterval(self._interval)
-
-    def first(self, patience: float = PATIENCE) -> tuple[Sample, ...]:
-        """What is heard from now on, once all that drive something were, or when that takes too long."""
-        end = time.monotonic() + patience
-        self.take()
-        heard: dict[tuple[str, ...], Sample] = {}
-        while time.monotonic() < end:
-            heard |= {key(sample): sample for sample in self.take()}
-            spoke = {sample.source for sample in heard.values() if not isinstance(sample, SignalSample)}
-            if spoke >= {listener.name for listener in self.listeners if listener.drives}:
-                break
-            time.sleep(0.001)
-        return tuple(heard.values())
-
-    def take(self) -> tuple[Sample, ...]:
-        """What was heard since the last call, the newest of each; ``t`` on the host's clock."""
-        return self._box.take()
-
-    def statistics(self) -> dict[str, Statistics]:
-        """What arrived so far, by source."""
-        return {listener.name: listener.statistics() for listener in self.listeners}

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator
 from msgspec.structs import replace
 
 from seerob.errors import InputError, Problem
-from seerob.live.listening import Listening, LiveSource
+from seerob.live.ears import Listening
+from seerob.live.listening import LiveSource
 from seerob.samples import Quality, Sample, SignalSample, key
 from seerob.workstation import Workstation
 

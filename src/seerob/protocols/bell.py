@@ -1,8 +1,7 @@
 """Waking whoever waits for bytes in the very call that brings them.
 
 What asyncio's events and futures wake is run in the next turn of the loop, which asks the kernel for news
-before: there a thread gives up the interpreter's lock and waits for it anew, behind one that computes. Between
-a packet and the mailbox that is the longest part.
+before: there a thread gives up the interpreter's lock and waits for it anew, behind one that computes.
 """
 
 from __future__ import annotations
@@ -16,12 +15,10 @@ from typing import Any
 class _Wait(asyncio.Future[None]):
     """What one task awaits; it goes on within `end`, unless another task calls that."""
 
-    _then: Callable[[asyncio.Future[None]], object] | None = None
+    _then: Callable[[Any], object] | None = None
     _context: Context | None = None
 
-    def add_done_callback(
-        self, fn: Callable[[asyncio.Future[None]], object], /, *, context: Context | None = None
-    ) -> None:
+    def add_done_callback(self, fn: Callable[[Any], object], /, *, context: Context | None = None) -> None:
         """Called by the task that awaits it, and by no one else."""
         self._then, self._context = fn, context
 

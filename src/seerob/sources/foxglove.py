@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import AsyncGenerator
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
@@ -23,6 +23,8 @@ _log = logging.getLogger(__name__)
 
 class Foxglove(RosSource, frozen=True, kw_only=True):
     """A robot behind a Foxglove bridge, live."""
+
+    loads: ClassVar[tuple[str, ...]] = ("websockets.asyncio.client", "rosbags.typesys")
 
     host: str
     """Name or address of the computer with the bridge."""

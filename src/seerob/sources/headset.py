@@ -13,7 +13,7 @@ import logging
 from collections import deque
 from collections.abc import AsyncGenerator, Iterable
 from contextlib import aclosing
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -41,6 +41,8 @@ BODY = "hips"
 class Headset(CaptureStream, frozen=True, kw_only=True):
     """A person who wears a headset that shows this run's page."""
 
+    apart: ClassVar[bool] = False
+    """The page's server is of the run's own process."""
     frequency: Annotated[float, Meta(ge=30, le=144, extra={"unit": "Hz"})] = 72.0
     """Pictures per second of the headset [Hz]."""
 

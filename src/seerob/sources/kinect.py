@@ -52,6 +52,7 @@ class Link(StrEnum):
 class Kinect(CaptureStream, frozen=True, kw_only=True):
     """A depth camera that tracks bodies (Azure Kinect, Orbbec Femto), live, from a sender on its PC."""
 
+    loads: ClassVar[tuple[str, ...]] = ("websockets.asyncio.client",)
     asks: ClassVar[str] = (
         "# at = { position = [x, y, z], rpy_deg = [roll, pitch, yaw] }   # where the camera stands and looks"
     )

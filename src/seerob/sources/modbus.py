@@ -24,6 +24,7 @@ from seerob.variables.dictionary import Variable
 class Modbus(VariablesSource, frozen=True, kw_only=True):
     """Variables of a PLC or machine through Modbus TCP."""
 
+    loads: ClassVar[tuple[str, ...]] = ("pymodbus.client",)
     by_exception: ClassVar[bool] = False
 
     host: str

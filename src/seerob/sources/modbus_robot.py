@@ -11,7 +11,7 @@ import time
 from collections.abc import AsyncGenerator, Mapping
 from math import degrees
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from msgspec import Meta
 from msgspec.structs import replace
@@ -35,6 +35,8 @@ COARSE = "its registers are too coarse for energies, impact and measured torques
 
 class ModbusRobot(LiveSource, frozen=True, kw_only=True):
     """A robot whose controller has its joints in Modbus registers."""
+
+    loads: ClassVar[tuple[str, ...]] = ("pymodbus.client",)
 
     robot: str
     """The robot it drives."""

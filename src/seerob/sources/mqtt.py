@@ -121,6 +121,7 @@ def plain_change(name: str, where: Plain, payload: bytes, *, retained: bool, now
 class Mqtt(VariablesSource, frozen=True, kw_only=True):
     """Variables of machines that publish through an MQTT broker."""
 
+    loads: ClassVar[tuple[str, ...]] = ("aiomqtt",)
     by_exception: ClassVar[bool] = False
 
     host: str

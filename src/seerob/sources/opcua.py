@@ -42,6 +42,7 @@ DEEPEST = 12
 class Opcua(VariablesSource, frozen=True, kw_only=True):
     """Variables of a PLC or machine through OPC UA."""
 
+    loads: ClassVar[tuple[str, ...]] = ("asyncua",)
     by_exception: ClassVar[bool] = True
 
     url: Annotated[

@@ -6,7 +6,7 @@ import dataclasses
 import time
 from collections.abc import AsyncGenerator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import msgspec
 from msgspec import Meta
@@ -31,6 +31,8 @@ SIGNAL_PERIOD = 0.1
 
 class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
     """A robot, live, through OPC UA for Robotics (OPC 40010)."""
+
+    loads: ClassVar[tuple[str, ...]] = ("asyncua",)
 
     robot: str
     """The robot it drives."""

@@ -11,7 +11,7 @@ import time
 from collections import Counter
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -30,6 +30,8 @@ ASKED = 0.6
 
 class Rokoko(CaptureStream, frozen=True, kw_only=True):
     """A person in a Rokoko suit, live, through Rokoko Studio."""
+
+    loads: ClassVar[tuple[str, ...]] = ("lz4.frame",)
 
     bind: str = "127.0.0.1"
     """Own address on the network of the computer with Studio; when not given, only this machine is heard."""

@@ -13,7 +13,7 @@ from collections.abc import AsyncGenerator
 from contextlib import aclosing, asynccontextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
@@ -47,6 +47,8 @@ class Side(StrEnum):
 
 class RosTcp(RosSource, frozen=True, kw_only=True):
     """A robot over Unity's ROS-TCP wire, live, as either side."""
+
+    loads: ClassVar[tuple[str, ...]] = ("rosbags.typesys",)
 
     side: Side = Side.CLIENT
     """``client`` connects to an endpoint at ``host``; ``endpoint`` waits for Unity."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncGenerator
 from contextlib import aclosing
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
@@ -22,6 +22,8 @@ from seerob.sources._ros import RosSource
 
 class Rosbridge(RosSource, frozen=True, kw_only=True):
     """A robot of ROS 1 or 2, live, through rosbridge."""
+
+    loads: ClassVar[tuple[str, ...]] = ("websockets.asyncio.client", "cbor2", "rosbags.typesys")
 
     host: str
     """Name or address of the computer with the rosbridge server."""

@@ -40,6 +40,7 @@ DEEPEST = 4
 class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
     """Variables of a Siemens PLC, asked through its web server."""
 
+    loads: ClassVar[tuple[str, ...]] = ("httpx",)
     by_exception: ClassVar[bool] = False
 
     url: Annotated[

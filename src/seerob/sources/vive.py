@@ -13,7 +13,7 @@ from collections.abc import AsyncGenerator
 from contextlib import aclosing
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta, field
@@ -53,6 +53,8 @@ class Link(StrEnum):
 
 class Vive(CaptureStream, frozen=True, kw_only=True):
     """Worn trackers (Vive, or others of SteamVR), live."""
+
+    loads: ClassVar[tuple[str, ...]] = ("websockets.asyncio.client",)
 
     link: Link = Link.UDP
     """``udp``: the sender sends to this machine; ``websocket``: this machine connects to it; ``openvr``:

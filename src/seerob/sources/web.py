@@ -82,6 +82,7 @@ def spot(raw: object) -> Spot:
 class Web(VariablesSource, frozen=True, kw_only=True):
     """Variables of machines that tell them as JSON documents, over HTTP or by WebSocket."""
 
+    loads: ClassVar[tuple[str, ...]] = ("httpx", "websockets.asyncio.client")
     by_exception: ClassVar[bool] = False
 
     url: Url

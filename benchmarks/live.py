@@ -73,6 +73,7 @@ class Post:
 
     def __init__(self, notes: Path) -> None:
         self._notes = notes
+        notes.mkdir()
         self.came: dict[tuple[str, bool], list[tuple[int, float, float | None]]] = defaultdict(list)
         """Sequence number, arrival and device's time of samples, by source and whether they are signals."""
         self.posted: dict[tuple[str, int], float] = {}
@@ -96,9 +97,10 @@ class Post:
             yield self
         finally:
             ears.Listening.take = take
-        for name, signals, seq, instant, device, posted in json.loads(self._notes.read_bytes()):
-            self.posted[name, seq] = posted
-            self.came[name, signals].append((seq, instant, device))
+        for notes in self._notes.iterdir():
+            for name, signals, seq, instant, device, posted in json.loads(notes.read_bytes()):
+                self.posted[name, seq] = posted
+                self.came[name, signals].append((seq, instant, device))
 
     def arrived(self, written: dict[float, float]) -> dict[tuple[str, int], float]:
         """When each sample came in at the earliest, by source and sequence number [s].
@@ -202,7 +204,7 @@ def listen(notes: str) -> int:
 
     Listener._take = heard
     code = listening_process.main()
-    Path(notes).write_text(json.dumps(noted))
+    Path(notes, str(os.getpid())).write_text(json.dumps(noted))
     return code
 
 

@@ -1,9 +1,10 @@
-"""Live sources in a process of their own, seen from the one in which the twin computes.
+"""A live source in a process of its own, seen from the one in which the twin computes.
 
-Python lets one thread of a process compute at a time. Beside a twin that computes, each packet would wait for
-it several times on the way from the socket to the mailbox; in another process none does, and the twin does
-not wait for who decodes. `seerob.live.listening_process` is that process; what it hears lies in memory that
-both see (`seerob.live.shared_mailbox`), and what it logs is logged here. Should it end, it is started again.
+Python lets one thread of a process compute at a time. Beside a twin that computes, or another source that
+decodes, each packet would wait for them several times on the way from the socket to the mailbox; in a process
+of its own it waits for none, and the twin for no one who decodes. `seerob.live.listening_process` is that
+process; what it hears lies in memory that both see (`seerob.live.shared_mailbox`), and what it logs is logged
+here. Should it end, it is started again.
 """
 
 from __future__ import annotations
@@ -16,13 +17,12 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from threading import Event, Lock, Thread
 from typing import IO, NamedTuple
 
 import msgspec
 
-from seerob.live.listening import FIRST_PAUSE, LONGEST_PAUSE, STOP_WITHIN, LiveSource
+from seerob.live.listening import FIRST_PAUSE, LONGEST_PAUSE, STOP_WITHIN, LiveSource, because, name_of
 from seerob.live.shared_mailbox import SharedMailbox, memory
 from seerob.samples import Sample
 from seerob.source import Target
@@ -31,14 +31,12 @@ _log = logging.getLogger(__name__)
 
 COMMAND = (sys.executable, "-P", "-m", "seerob.live.listening_process")
 """``-P``: the folder it is started in is none to take modules from."""
-READY_WITHIN = 10.0
+BEGIN_WITHIN = 10.0
 """How long a run waits until it listens [s]."""
 LONGEST_LINE = 1 << 20
 """Of what it logs [byte]."""
 SPARE = 2.0
 """Beyond the time in which listeners end [s]; then it is killed."""
-
-Pair = tuple[LiveSource, Target | None]
 
 
 class Order(NamedTuple):
@@ -50,8 +48,10 @@ class Order(NamedTuple):
     """Of the log."""
     memory: int
     """Descriptor of the mailbox's memory, inherited."""
-    sources: bytes
-    """Pairs of sources and what each drives, pickled."""
+    again: bool
+    """Whether another one listened before."""
+    pair: bytes
+    """The source and what it drives, pickled."""
 
 
 class Said(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -66,8 +66,8 @@ class Said(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 def may_be_apart(source: LiveSource, target: Target | None) -> bool:
     """Whether a source may listen in another process: what only this one knows cannot be told to it."""
-    if os.name != "posix" or not sys.executable:
-        return False  # memory is inherited by its descriptor
+    if os.name != "posix" or not sys.executable or getattr(sys, "frozen", False):
+        return False  # memory is inherited by its descriptor; a frozen program is no interpreter
     if not type(source).apart or type(source).__module__ == "__main__":
         return False
     try:
@@ -78,25 +78,31 @@ def may_be_apart(source: LiveSource, target: Target | None) -> bool:
 
 
 class Apart:
-    """The process, its end and its beginning anew.
+    """One source's process, its end and its beginning anew.
 
     Args:
-        sources: With what each drives; of each `may_be_apart` is true.
+        source: `may_be_apart` is true of it.
+        target: What it drives.
     """
 
-    def __init__(self, sources: Sequence[Pair]) -> None:
-        self._sources = pickle.dumps(list(sources))
+    def __init__(self, source: LiveSource, target: Target | None) -> None:
+        self.name = name_of(source)
+        self._pair = pickle.dumps((source, target))
         self._box: SharedMailbox | None = None
-        self._ready, self._stopping = Event(), Event()
+        self._begun, self._stopping = Event(), Event()
         self._lock = Lock()
         self._process: subprocess.Popen[bytes] | None = None
-        self._thread = Thread(target=self._keep, name="seerob-apart", daemon=True)
+        self._listens = False
+        self._thread = Thread(target=self._keep, name=f"seerob-apart-{self.name}", daemon=True)
 
     def start(self) -> None:
-        """Start it, and wait until it listens."""
+        """Start it; returns at once."""
         self._thread.start()
-        if not self._ready.wait(READY_WITHIN):
-            _log.warning("the process that listens did not begin within %g s", READY_WITHIN)
+
+    def wait(self) -> None:
+        """Until it listens, or cannot."""
+        if not self._begun.wait(BEGIN_WITHIN):
+            _log.warning("%s: its process did not begin to listen within %g s", self.name, BEGIN_WITHIN)
 
     def take(self) -> tuple[Sample, ...]:
         """What was heard since the last call, the newest of each."""
@@ -106,12 +112,18 @@ class Apart:
         """Ask it to end; returns at once."""
         with self._lock:
             self._stopping.set()
-            if self._process is not None and self._process.stdin is not None:
+            if self._process is None:
+                return
+            if self._listens and self._process.stdin is not None:
                 with contextlib.suppress(OSError):  # it has ended
                     self._process.stdin.close()
+            else:  # it may be in the middle of being told, and has nothing yet to leave in order
+                self._process.terminate()
 
     def join(self) -> None:
         """Wait for its end."""
+        if self._thread.ident is None:
+            return
         self._thread.join(STOP_WITHIN + SPARE)
         if self._thread.is_alive():
             with self._lock:
@@ -120,23 +132,24 @@ class Apart:
             self._thread.join(SPARE)
 
     def _keep(self) -> None:
-        pause = FIRST_PAUSE
+        pause, again = FIRST_PAUSE, False
         while not self._stopping.is_set():
             begun = time.monotonic()
             try:
-                how = self._once()
+                how = self._once(again)
             except OSError as error:
-                how = os.strerror(error.errno) if error.errno else str(error)
-            self._ready.set()
+                how = because(error)
+            self._begun.set()
             if self._stopping.is_set():
                 return
             if time.monotonic() - begun > LONGEST_PAUSE:
                 pause = FIRST_PAUSE
-            _log.error("the process that listens to devices ended: %s; it is started again", how)
+            _log.error("%s: the process that listened has ended (%s) and is started again", self.name, how)
+            again = True
             self._stopping.wait(pause)
             pause = min(2 * pause, LONGEST_PAUSE)
 
-    def _once(self) -> str:
+    def _once(self, again: bool) -> str:
         """Have it run from its start to its end; how it ended.
 
         Raises:
@@ -149,13 +162,13 @@ class Apart:
                 if self._stopping.is_set():
                     return ""
                 process = self._process = _started(file)
+                self._listens = False
         finally:
             os.close(file)
         self._box = box
         with process:
             level = logging.getLogger("seerob").getEffectiveLevel()
-            order = Order(sys.path, level, file, self._sources)
-            self._tell(process, pickle.dumps(tuple(order)))
+            self._tell(process, Order(sys.path, level, file, again, self._pair))
             if process.stdout is not None:
                 self._hear(process.stdout)
             try:
@@ -163,13 +176,13 @@ class Apart:
             except subprocess.TimeoutExpired:  # nobody can hear it any more
                 process.kill()
         code = process.returncode
-        return f"signal {signal.Signals(-code).name}" if code < 0 else f"code {code}"
+        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
-    def _tell(self, process: subprocess.Popen[bytes], order: bytes) -> None:
-        # Whoever is asked to stop meanwhile closes it, and what has ended reads nothing.
-        with contextlib.suppress(OSError, ValueError):
+    def _tell(self, process: subprocess.Popen[bytes], order: Order) -> None:
+        # What has ended reads nothing; that is found out by hearing nothing of it.
+        with contextlib.suppress(OSError):
             if process.stdin is not None:
-                process.stdin.write(order)
+                process.stdin.write(pickle.dumps(tuple(order)))
                 process.stdin.flush()
 
     def _hear(self, said: IO[bytes]) -> None:
@@ -181,7 +194,11 @@ class Apart:
                 _log.warning("the process that listens says what nobody understands: %.200r", line)
                 continue
             if found.ready:
-                self._ready.set()
+                with self._lock:
+                    self._listens = True
+                    if self._stopping.is_set() and self._process is not None:
+                        self._process.terminate()  # it was asked in between
+                self._begun.set()
             else:
                 _log_again(found)
 

@@ -1,7 +1,7 @@
 """The live sources of one run together, from which it takes once per tick.
 
-They listen in a process of their own (`seerob.live.apart`), where nobody computes: in this one a packet would
-wait for the interpreter's lock while the twin has it. Only those listen here that take what this process has.
+Each listens in a process of its own (`seerob.live.apart`). Only those listen here that take what this process
+has.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
-from seerob.live.apart import Apart, Pair, may_be_apart
-from seerob.live.listening import PROMPT, Listeners, delay_of, name_of
+from seerob.live.apart import Apart, may_be_apart
+from seerob.live.listening import PROMPT, Listener, LiveSource, delay_of, name_of, stop
 from seerob.samples import Mailbox, Sample, SignalSample, key
+from seerob.source import Target
 
 PATIENCE = 1.0
 """How long a run waits for the first samples before it begins without them [s]."""
@@ -30,24 +31,28 @@ class Listening:
         delay: How far the run is behind the world [s].
     """
 
-    def __init__(self, sources: Sequence[Pair]) -> None:
+    def __init__(self, sources: Sequence[tuple[LiveSource, Target | None]]) -> None:
         self.delay = delay_of(source for source, _ in sources)
         self._awaited = {name_of(source) for source, _ in sources if source.target()}
         self._box = Mailbox()
-        here: list[Pair] = []
-        apart: list[Pair] = []
-        for pair in sources:
-            (apart if may_be_apart(*pair) else here).append(pair)
-        self._here = Listeners(here, self._box.post)
-        self._apart = Apart(apart) if apart else None
+        self._here: list[Listener] = []
+        self._apart: list[Apart] = []
+        for source, target in sources:
+            if may_be_apart(source, target):
+                self._apart.append(Apart(source, target))
+            else:
+                self._here.append(Listener(source, target, self._box.post))
 
     def __enter__(self) -> Self:
         self._interval = sys.getswitchinterval()
         sys.setswitchinterval(min(self._interval, PROMPT))
         try:
-            self._here.start()
-            if self._apart is not None:
-                self._apart.start()
+            for listener in self._here:
+                listener.start()
+            for process in self._apart:
+                process.start()
+            for process in self._apart:
+                process.wait()
         except BaseException:  # an interrupt while it waits
             self.__exit__(None, None, None)
             raise
@@ -56,11 +61,11 @@ class Listening:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._apart is not None:
-            self._apart.ask_to_stop()
-        self._here.stop()
-        if self._apart is not None:
-            self._apart.join()
+        for process in self._apart:
+            process.ask_to_stop()
+        stop(self._here)
+        for process in self._apart:
+            process.join()
         sys.setswitchinterval(self._interval)
 
     def first(self, patience: float = PATIENCE) -> tuple[Sample, ...]:
@@ -77,5 +82,4 @@ class Listening:
 
     def take(self) -> tuple[Sample, ...]:
         """What was heard since the last call, the newest of each; ``t`` on the host's clock."""
-        here = self._box.take()
-        return here if self._apart is None else (*here, *self._apart.take())
+        return (*self._box.take(), *(sample for process in self._apart for sample in process.take()))

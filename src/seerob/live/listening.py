@@ -187,9 +187,17 @@ class Listener:
         source: The source.
         target: What it drives.
         post: Called with each sample, on the host's clock; from the listener's thread.
+        again: Whether it was heard before, and lost.
     """
 
-    def __init__(self, source: LiveSource, target: Target | None, post: Callable[[Sample], None]) -> None:
+    def __init__(
+        self,
+        source: LiveSource,
+        target: Target | None,
+        post: Callable[[Sample], None],
+        *,
+        again: bool = False,
+    ) -> None:
         self.name = name_of(source)
         self.drives = bool(source.target())
         """Whether it drives a robot or a person, or only has signals."""
@@ -200,7 +208,7 @@ class Listener:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._task: asyncio.Task[None] | None = None
         self._stopping = False
-        self._up: bool | None = None
+        self._up: bool | None = False if again else None
         self._seq = 0
 
     def start(self) -> None:
@@ -216,8 +224,9 @@ class Listener:
                     self._loop.call_soon_threadsafe(self._task.cancel)
 
     def join(self, seconds: float) -> bool:
-        """Wait for the thread to end; whether it has."""
-        self._thread.join(seconds)
+        """Wait for the thread to end; whether it has, or never began."""
+        if self._thread.ident is not None:
+            self._thread.join(seconds)
         return not self._thread.is_alive()
 
     def statistics(self) -> Statistics:
@@ -296,30 +305,12 @@ def name_of(source: LiveSource) -> str:
     return source.name or f"{type(source).__module__.rpartition('.')[2]} {source.target()}".strip()
 
 
-class Listeners:
-    """Several sources in this process, each in a thread of its own.
-
-    Args:
-        sources: With what each drives.
-        post: As of `Listener`.
-    """
-
-    def __init__(
-        self, sources: Sequence[tuple[LiveSource, Target | None]], post: Callable[[Sample], None]
-    ) -> None:
-        self._listeners = tuple(Listener(source, target, post) for source, target in sources)
-
-    def start(self) -> None:
-        """Begin to listen; returns at once."""
-        for listener in self._listeners:
-            listener.start()
-
-    def stop(self) -> None:
-        """End all of them; one that does not end in time is left behind."""
-        for listener in self._listeners:
-            listener.ask_to_stop()
-        end = time.monotonic() + STOP_WITHIN
-        for listener in self._listeners:
-            if not listener.join(max(0.0, end - time.monotonic())):
-                _log.warning("%s: did not stop within %g s", listener.name, STOP_WITHIN)
-            _log.info("%s: %s", listener.name, listener.statistics())
+def stop(listeners: Sequence[Listener]) -> None:
+    """End all of them and log what they heard; one that does not end in time is left behind."""
+    for listener in listeners:
+        listener.ask_to_stop()
+    end = time.monotonic() + STOP_WITHIN
+    for listener in listeners:
+        if not listener.join(max(0.0, end - time.monotonic())):
+            _log.warning("%s: did not stop within %g s", listener.name, STOP_WITHIN)
+        _log.info("%s: %s", listener.name, listener.statistics())

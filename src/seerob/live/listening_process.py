@@ -1,4 +1,4 @@
-"""The process in which live sources listen, started by `seerob.live.apart`.
+"""The process in which one live source listens, started by `seerob.live.apart`.
 
 It is told on its standard input what to listen to, and ends when that is closed: with whoever started it.
 """
@@ -12,15 +12,16 @@ import logging
 import os
 import pickle
 import sys
-from collections.abc import Iterable
 from threading import Lock
 from typing import BinaryIO
 
 import msgspec
 
-from seerob.live.apart import Order, Pair, Said
-from seerob.live.listening import PROMPT, Listeners
+from seerob.live.apart import Order, Said
+from seerob.live.listening import Listener, LiveSource, stop
 from seerob.live.shared_mailbox import SharedMailbox
+from seerob.live.wake_promptly import wake_promptly
+from seerob.source import Target
 
 
 class _Told(logging.Handler):
@@ -32,27 +33,40 @@ class _Told(logging.Handler):
         self._encoder = msgspec.json.Encoder()
 
     def say(self, said: Said) -> None:
-        """One line."""
+        """One line.
+
+        Raises:
+            OSError: Nobody is left to be told.
+        """
         with self._lines:
             self._to.write(self._encoder.encode(said) + b"\n")
 
     def emit(self, record: logging.LogRecord) -> None:
         """Called by the log."""
-        trace = logging.Formatter().formatException(record.exc_info) if record.exc_info else None
-        text = record.getMessage()
         try:
-            self.say(Said(logger=record.name, level=record.levelno, text=text, trace=trace))
-        except OSError:  # nobody is left to be told
+            trace = logging.Formatter().formatException(record.exc_info) if record.exc_info else None
+            self.say(Said(logger=record.name, level=record.levelno, text=record.getMessage(), trace=trace))
+        except Exception:  # as every handler does: a log is no reason to end
             self.handleError(record)
 
 
-def _load(modules: Iterable[str]) -> None:
-    for module in modules:
-        with contextlib.suppress(ImportError):  # whoever needs it will say so
+def _listener(order: Order) -> Listener:
+    """What it is to do.
+
+    Raises:
+        Exception: Whatever stands in the way of knowing that here.
+    """
+    sys.path[:] = order.path
+    source: LiveSource
+    target: Target | None
+    source, target = pickle.loads(order.pair)  # noqa: S301 - of the process that started this one
+    for module in source.loads:
+        with contextlib.suppress(ImportError):  # the source itself will say so
             importlib.import_module(module)
     # All of this stays: it need not be looked through while somebody listens.
     gc.collect()
     gc.freeze()
+    return Listener(source, target, SharedMailbox(order.memory).post, again=order.again)
 
 
 def main() -> int:
@@ -62,24 +76,24 @@ def main() -> int:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
         told = _Told(out)
         try:
-            order = Order(*pickle.load(sys.stdin.buffer))  # noqa: S301 - of our own process
+            order = Order(*pickle.load(sys.stdin.buffer))  # noqa: S301 - of the process that started this one
         except EOFError:  # nobody wants it already
             return 0
         logging.basicConfig(level=order.level, handlers=[told])
-        sys.path[:] = order.path
         try:
-            sources: list[Pair] = pickle.loads(order.sources)  # noqa: S301
-            _load(name for source, _ in sources for name in source.loads)
-            listeners = Listeners(sources, SharedMailbox(order.memory).post)
+            listener = _listener(order)
         except Exception:
-            logging.getLogger("seerob.live").exception("what is to be listened to is not known there")
+            logging.getLogger("seerob.live").exception(
+                "a source cannot be listened to in a process of its own"
+            )
             return 1
         os.close(order.memory)
-        sys.setswitchinterval(PROMPT)
-        listeners.start()
-        told.say(Said(ready=True))
-        sys.stdin.buffer.read(1)
-        listeners.stop()
+        wake_promptly()
+        listener.start()
+        with contextlib.suppress(OSError):
+            told.say(Said(ready=True))
+            sys.stdin.buffer.read(1)
+        stop((listener,))
     return 0
 
 

@@ -21,6 +21,8 @@ ITERATIONS = 40
 DAMPING = 1e-3
 LARGEST_STEP = 0.3
 """Of one iteration and joint [rad or m]."""
+LEAST_DAMPING = 1e-12
+"""Of the sum of the squares: far above what is rounded, far below what slows convergence."""
 
 
 class Miss(NamedTuple):
@@ -81,9 +83,11 @@ def solve_pose(
             break
         mujoco.mj_jac(mj, data, jacobian_p, jacobian_r, at, frame.mj)
         J = np.vstack([jacobian_p, jacobian_r])[:, mechanism.v_address] @ mechanism.coupling
-        # The damping fades with the error, so that convergence is quadratic in the end.
-        damping = min(DAMPING, miss.larger**2)
-        step = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), twist)
+        squares = J @ J.T
+        # The damping fades with the error, so that convergence is quadratic in the end; what is left of it
+        # keeps the system of an arm with fewer than six joints solvable.
+        damping = max(min(DAMPING, miss.larger**2), LEAST_DAMPING * max(1.0, float(squares.trace())))
+        step = J.T @ np.linalg.solve(squares + damping * np.eye(6), twist)
         step *= min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), 1e-12))
         q = np.clip(q + step, mechanism.lower, mechanism.upper)
     return q, miss

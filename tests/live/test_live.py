@@ -15,13 +15,13 @@ import pytest
 
 from live_story import wait_for as until
 from seerob.errors import SeerobError
+from seerob.live.ears import Listening
 from seerob.live.listening import (
     FIRST_PAUSE,
     LONGEST_PAUSE,
     MARGIN,
     PROMPT,
     Listener,
-    Listening,
     LiveSource,
     delay_of,
     say_once,
@@ -159,10 +159,12 @@ def test_the_newest_wins_and_nothing_queues():
     async def script():
         for k in range(1000):
             yield joint(t=float(k))
+        said.set()
         await asyncio.sleep(60)
 
+    said = threading.Event()
     with Listening([(Made(script=script), None)]) as listening:
-        until(lambda: listening.listeners[0].statistics().count == 1000)
+        assert said.wait(60)
         (sample,) = listening.take()
         assert (sample.t, sample.seq) == (999.0, 999)
         assert listening.take() == ()
@@ -216,10 +218,12 @@ def test_a_run_begins_with_what_is_heard_then_and_not_with_what_was_heard_before
 def test_a_run_begins_without_a_source_that_is_not_there():
     async def script():
         yield joint()
+        said.set()
         await asyncio.sleep(60)
 
+    said = threading.Event()
     with Listening([(Made(script=script), None)]) as listening:
-        until(lambda: listening.listeners[0].statistics().count)
+        assert said.wait(60)
         assert listening.first(patience=0.05) == ()
 
 

@@ -12,7 +12,6 @@ from live_story import Story, lived, open_files, wait_for
 from made_cell import made
 from seerob.emulators.fri import FriServer
 from seerob.errors import InputError
-from seerob.live.differentiation import Differentiator, end_slope
 from seerob.live.listening import Listener
 from seerob.protocols.fri import Edition, Monitoring, encode_monitoring
 from seerob.samples import JointSample, SignalSample
@@ -165,30 +164,7 @@ def test_doubled_and_overtaken_datagrams_are_no_news_and_cost_no_speed(port):
     assert np.array([s.qd for s in known()][2:]) == pytest.approx(np.full((7, 7), 2.0))
 
 
-# -- time and speed -----------------------------------------------------------------------------
-
-
-def test_slope_is_exact_for_constant_acceleration_at_uneven_instants():
-    t = np.array([0.0, 0.004, 0.011, 0.015, 0.02])
-    values = np.stack([1 + 2 * t + 3 * t**2, -t], axis=1)
-    assert end_slope(t, values) == pytest.approx([2 + 6 * 0.02, -1.0], abs=1e-11)
-
-
-def test_noise_of_the_slope_is_what_the_formula_says():
-    n, T, sigma, rng = 7, 0.005, 1e-5, np.random.default_rng(1)
-    t = T * np.arange(n)
-    spread = np.std(end_slope(t, sigma * rng.standard_normal((n, 20_000))))
-    stated = sigma / T * np.sqrt(12 * (2 * n - 1) * (8 * n - 11) / (n * (n**2 - 1) * (n**2 - 4)))
-    assert spread == pytest.approx(stated, rel=0.02)
-
-
-def test_a_gap_begins_anew():
-    slope = Differentiator(0.1)
-    ramp = [slope.add(0.01 * k, (0.02 * k,)) for k in range(4)]
-    assert ramp[:2] == [None, None]
-    assert ramp[3] == pytest.approx((2.0,))
-    assert slope.add(1.0, (5.0,)) is None
-    assert slope.add(0.5, (5.0,)) is None
+# -- time -----------------------------------------------------------------------------
 
 
 def test_messages_are_the_clock_where_there_is_none_and_the_count_comes_round():

@@ -106,7 +106,8 @@ class Apart:
 
     def take(self) -> tuple[Sample, ...]:
         """What was heard since the last call, the newest of each."""
-        return () if self._box is None else self._box.take()
+        box = self._box
+        return () if box is None else box.take()
 
     def ask_to_stop(self) -> None:
         """Ask it to end; returns at once."""
@@ -130,6 +131,7 @@ class Apart:
                 if self._process is not None:
                     self._process.kill()
             self._thread.join(SPARE)
+        self._box = None
 
     def _keep(self) -> None:
         pause, again = FIRST_PAUSE, False

@@ -74,8 +74,13 @@ class SharedMailbox:
 
         Raises:
             SeerobError: It is too large, or one kind too many.
+            TypeError: A mistake of the source: what it says is no sample.
         """
         data = self._encoder.encode(sample)
+        try:
+            self._decoder.decode(data)
+        except msgspec.ValidationError as error:
+            raise TypeError(f"no {type(sample).__name__}: {error}") from None
         if len(data) > LARGEST:
             raise SeerobError(f"a sample of {len(data)} bytes; the most is {LARGEST}")
         what = key(sample)
@@ -130,4 +135,4 @@ def _plain(value: Any) -> float | bool | int:
     """Numbers of numpy, which some libraries give."""
     if isinstance(value, np.generic):
         return value.item()  # type: ignore[no-any-return]
-    raise NotImplementedError(f"a {type(value).__name__} in a sample")
+    raise TypeError(f"a {type(value).__name__} in a sample")

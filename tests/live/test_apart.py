@@ -1,0 +1,204 @@
+"""Sources in processes of their own: told, heard, logged, ended, and begun anew."""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import told_sources
+from live_story import open_files, wait_for
+from seerob.live import apart
+from seerob.live.apart import may_be_apart
+from seerob.live.ears import Listening
+from seerob.live.listening import LiveSource
+from seerob.plugin import kinds, load
+from seerob.samples import JointSample, SignalSample
+from seerob.source import Source
+from seerob.sources.headset import Headset
+from told_sources import AtOnce, Large, Missing, Mistaken, Stubborn, Told
+
+
+def taken(listening, kind=JointSample):
+    """The next samples of a kind."""
+    found = []
+    wait_for(lambda: found.extend(s for s in listening.take() if isinstance(s, kind)) or found)
+    return found
+
+
+def process_of(listening):
+    (sample,) = taken(listening, SignalSample)
+    return int(sample.values["process"])
+
+
+def is_there(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+def test_it_is_heard_from_another_process_whose_end_is_waited_for():
+    before = open_files()
+    with Listening([(Told(name="controller"), None)]) as listening:
+        pid = process_of(listening)
+        first, later = taken(listening)[-1], taken(listening)[-1]
+    assert pid != os.getpid()
+    assert not is_there(pid)
+    assert (later.source, later.q) == ("controller", (0.5,))
+    assert later.seq > first.seq
+    assert 0 <= time.monotonic() - later.t < 30
+    assert open_files() == before
+
+
+def test_each_has_a_process_of_its_own_and_what_drives_something_is_waited_for():
+    sources = [(Told(name="a", robot="left"), None), (Told(name="b", robot="right"), None)]
+    with Listening(sources) as listening:
+        heard = listening.first(patience=60.0)
+        assert {s.target for s in heard if isinstance(s, JointSample)} == {"left", "right"}
+        processes = {}
+        wait_for(lambda: processes.update({s.source: s for s in taken(listening)}) or len(processes) == 2)
+    assert {"a", "b"} == set(processes)
+
+
+def test_the_newest_wins_and_nothing_queues():
+    with Listening([(AtOnce(), None)]) as listening:
+        found = []
+        wait_for(lambda: found.extend(listening.take()) or (found and found[-1].seq == 999))
+        assert len(found) < 1000 or len(found) == len({s.seq for s in found})
+        assert found[-1].q == (999.0,)
+        assert listening.take() == ()
+
+
+def test_what_it_logs_is_logged_here_with_its_place_and_what_a_library_prints_is_not_taken_for_it(caplog):
+    with (
+        caplog.at_level(logging.INFO),
+        Listening([(Told(name="a"), None), (Mistaken(name="b", robot="other"), None)]) as listening,
+    ):
+        taken(listening)
+        wait_for(lambda: any(r.getMessage().startswith("b: not heard") for r in caplog.records))
+    lines = {r.getMessage(): r for r in caplog.records}
+    assert (lines["one line\nand another"].name, lines["one line\nand another"].levelname) == ("told", "INFO")
+    assert "raise KeyError" in lines["b: a mistake in the source itself"].exc_text
+    assert lines["b: not heard: KeyError: 'gone'"].levelname == "WARNING"
+    assert any(line.startswith("a: ") and "samples at" in line for line in lines)  # at the end
+    assert not any("nobody understands" in line for line in lines)
+
+
+def test_a_process_that_is_killed_is_started_again_with_one_line_each(caplog):
+    with caplog.at_level(logging.WARNING), Listening([(Told(name="arm"), None)]) as listening:
+        for k in range(3):
+            pid = process_of(listening)
+            os.kill(pid, signal.SIGKILL)
+            wait_for(lambda k=k: caplog.text.count("has ended (SIGKILL) and is started again") == k + 1)
+        process_of(listening)
+        taken(listening)
+        wait_for(lambda: caplog.text.count("arm: heard again") == 3)
+    assert len([r for r in caplog.records if r.name.startswith("seerob")]) == 6
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
+def test_it_ends_with_the_run_however_that_ends(how):
+    run = subprocess.Popen(
+        [sys.executable, "-c", "import told_sources; told_sources.run()"],
+        cwd=Path(told_sources.__file__).parent,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    with run:
+        pid = int(run.stdout.readline())
+        assert is_there(pid)
+        run.send_signal(how)
+        run.wait(60)
+        wait_for(lambda: not is_there(pid))
+
+
+def test_an_interrupt_of_the_terminal_is_not_for_it():
+    with Listening([(Told(), None)]) as listening:
+        assert os.getpgid(process_of(listening)) != os.getpgid(0)
+
+
+def test_one_that_does_not_end_is_not_waited_for_long(monkeypatch):
+    monkeypatch.setattr(apart, "SPARE", 0.5)
+    begun = 0.0
+    with Listening([(Stubborn(), None)]) as listening:
+        taken(listening)
+        (process,) = [p._process for p in listening._apart]
+        begun = time.monotonic()
+    assert time.monotonic() - begun < 30
+    assert process.returncode is not None
+
+
+def test_one_that_is_stopped_while_it_begins_ends():
+    before = open_files()
+    for pause in (0.0, 0.02, 0.1):
+        listening = Listening([(Told(), None)])
+        (process,) = listening._apart
+        process.start()
+        time.sleep(pause)
+        process.ask_to_stop()
+        process.join()
+        assert not process._thread.is_alive()
+    assert open_files() == before
+
+
+def test_an_interrupt_while_it_begins_leaves_nothing_behind(monkeypatch):
+    def interrupted(process):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(apart.Apart, "wait", interrupted)
+    listening = Listening([(Told(), None), (Told(robot="other"), None)])
+    with pytest.raises(KeyboardInterrupt), listening:
+        pass
+    assert not any(process._thread.is_alive() for process in listening._apart)
+
+
+def test_what_only_this_process_has_listens_here():
+    class Local(Told, frozen=True, kw_only=True):
+        """Defined where no other process finds it."""
+
+    assert may_be_apart(Told(), None)
+    for source in (Local(), Headset(human="operator")):
+        assert not may_be_apart(source, None)
+    with Listening([(Local(), None)]) as listening:
+        assert process_of(listening) == os.getpid()
+
+
+def test_modules_of_the_folder_it_is_started_in_are_not_taken(tmp_path, monkeypatch):
+    for name in ("msgspec", "pickle", "seerob", "sitecustomize"):
+        (tmp_path / f"{name}.py").write_text("import os\nopen('taken', 'w')\nos._exit(7)\n")
+    monkeypatch.chdir(tmp_path)
+    with Listening([(Told(), None)]) as listening:
+        taken(listening)
+    assert not (tmp_path / "taken").exists()
+
+
+def test_a_source_that_is_not_known_there_is_told_with_its_place(caplog):
+    with caplog.at_level(logging.WARNING), Listening([(Missing(name="odd"), None)]):
+        wait_for(lambda: "odd: the process that listened has ended (exit code 1)" in caplog.text)
+    assert "No module named 'of_a_notebook'" in caplog.text
+    assert "a source cannot be listened to in a process of its own" in caplog.text
+
+
+def test_a_sample_that_has_no_room_is_a_loss(caplog):
+    with caplog.at_level(logging.WARNING), Listening([(Large(name="odd"), None)]) as listening:
+        wait_for(lambda: "odd: not heard: a sample of 200" in caplog.text)
+        assert listening.take() == ()
+
+
+def test_what_a_kind_loads_before_it_listens_can_be_loaded():
+    """What cannot is left to the source, which loads it when it listens: a slip would only be late."""
+    found = [load("sources", kind, Source) for kind in kinds("sources")]
+    modules = {m for source in found if issubclass(source, LiveSource) for m in source.loads}
+    assert modules >= {"asyncua", "aiomqtt", "pymodbus.client"}
+    for module in sorted(modules):
+        importlib.import_module(module)

@@ -1,0 +1,58 @@
+"""Speeds from positions, against closed forms and numpy's least squares."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seerob.live.differentiation import SAMPLES, Differentiator, end_weights
+
+steps = st.lists(st.floats(1e-3, 0.1), min_size=2, max_size=SAMPLES - 1)
+
+
+def end_slope(times, values):
+    return np.array(end_weights(list(times))) @ np.asarray(values)
+
+
+@given(steps, st.floats(0, 2e9), st.integers(0, 2**32))
+def test_it_is_the_slope_of_the_least_squares(steps, start, seed):
+    t = np.cumsum([0.0, *steps])
+    values = np.random.default_rng(seed).uniform(-3, 3, (len(t), 2))
+    oracle = [np.polyfit(t - t[-1], column, 2)[1] for column in values.T]
+    assert end_slope(t, values) == pytest.approx(oracle, rel=1e-6, abs=1e-6)
+    assert sum(end_weights(list(t))) == pytest.approx(0.0, abs=1e-6 / t[-1])
+    shifted = (start + t).tolist()  # a clock of seconds since 1970 says them only so exactly
+    if start < 1e3:
+        assert end_slope(shifted, values) == pytest.approx(oracle, rel=1e-4, abs=1e-2)
+
+
+def test_slope_is_exact_for_constant_acceleration_at_uneven_instants():
+    t = np.array([0.0, 0.004, 0.011, 0.015, 0.02])
+    values = np.stack([1 + 2 * t + 3 * t**2, -t], axis=1)
+    assert end_slope(t, values) == pytest.approx([2 + 6 * 0.02, -1.0], abs=1e-11)
+
+
+def test_instants_that_tell_no_parabola_have_the_slope_of_a_line():
+    for t in ([0.0, 1e-9, 0.1], [0.0, 0.1 - 1e-9, 0.1], [5.0, 5.0 + 1e-15, 6.0]):
+        assert end_slope(t, np.multiply(2.0, t)) == pytest.approx(2.0)
+        assert np.abs(end_weights(t)).max() < 100
+
+
+def test_noise_of_the_slope_is_what_the_formula_says():
+    n, T, sigma, rng = SAMPLES, 0.005, 1e-5, np.random.default_rng(1)
+    t = T * np.arange(n)
+    spread = np.std(end_slope(t, sigma * rng.standard_normal((n, 20_000))))
+    stated = sigma / T * np.sqrt(12 * (2 * n - 1) * (8 * n - 11) / (n * (n**2 - 1) * (n**2 - 4)))
+    assert spread == pytest.approx(stated, rel=0.02)
+
+
+def test_a_gap_begins_anew():
+    slope = Differentiator(0.1)
+    ramp = [slope.add(0.01 * k, (0.02 * k, -0.01 * k)) for k in range(10)]
+    assert ramp[:2] == [None, None]
+    for speeds in ramp[2:]:
+        assert speeds == pytest.approx((2.0, -1.0))
+    assert slope.add(1.0, (5.0, 5.0)) is None
+    assert slope.add(0.5, (5.0, 5.0)) is None

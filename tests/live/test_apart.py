@@ -83,7 +83,7 @@ def test_what_it_logs_is_logged_here_with_its_place_and_what_a_library_prints_is
         caplog.at_level(logging.INFO),
         Listening([(Told(name="a"), None), (Mistaken(name="b", robot="other"), None)]) as listening,
     ):
-        taken(listening)
+        wait_for(lambda: taken(listening)[-1].seq > 3)
         wait_for(lambda: any(r.getMessage().startswith("b: not heard") for r in caplog.records))
     lines = {r.getMessage(): r for r in caplog.records}
     assert (lines["one line\nand another"].name, lines["one line\nand another"].levelname) == ("told", "INFO")

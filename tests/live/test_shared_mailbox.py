@@ -18,8 +18,14 @@ from seerob.live.shared_mailbox import SharedMailbox, memory
 from seerob.samples import BodyPoint, BodySample, JointSample, Mailbox, PoseSample, Quality, SignalSample
 
 
-@pytest.fixture(name="ends")
-def made():
+@pytest.fixture(name="ends", params=["memory", "file"])
+def made(request, monkeypatch):
+    if request.param == "file":
+
+        def forbidden(name):
+            raise PermissionError
+
+        monkeypatch.setattr(os, "memfd_create", forbidden, raising=False)
     file = memory()
     ends = SharedMailbox(file), SharedMailbox(file)
     os.close(file)

@@ -7,6 +7,7 @@ is copied while it is overwritten is found by that half's own number and checksu
 
 from __future__ import annotations
 
+import contextlib
 import mmap
 import os
 import struct
@@ -38,14 +39,26 @@ _WHOLE = _HEAD + SLOTS * _SLOT
 
 
 def memory() -> int:
-    """A descriptor of memory for one mailbox; another process inherits it, and whoever has it closes it."""
-    if hasattr(os, "memfd_create"):
-        file = os.memfd_create("seerob-mailbox")
-    else:  # a file without a name
-        with tempfile.TemporaryFile() as found:
-            file = os.dup(found.fileno())
-    os.ftruncate(file, _WHOLE)
+    """A descriptor of memory for one mailbox; another process inherits it, and whoever has it closes it.
+
+    Raises:
+        OSError: There is none.
+    """
+    file = _nameless()
+    try:
+        os.ftruncate(file, _WHOLE)
+    except BaseException:
+        os.close(file)
+        raise
     return file
+
+
+def _nameless() -> int:
+    if hasattr(os, "memfd_create"):
+        with contextlib.suppress(OSError):  # some containers forbid it
+            return os.memfd_create("seerob-mailbox")
+    with tempfile.TemporaryFile() as found:
+        return os.dup(found.fileno())
 
 
 class _Slot(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import subprocess
 import sys
 import threading
 
@@ -76,6 +77,24 @@ def test_silence_is_undecided_within_the_time_out_and_the_robot_is_followed_agai
     assert back > 110
     assert story.decided(back) > 10
     # It was put where the robot is by then: that is no speed.
+    assert story.fastest(back) < FASTEST
+
+
+def test_a_process_that_listens_and_is_killed_is_a_silence_that_ends(tmp_path, monkeypatch):
+    processes, started = [], subprocess.Popen.__init__
+
+    def noted(process, *args, **options):
+        processes.append(process)
+        started(process, *args, **options)
+
+    monkeypatch.setattr(subprocess.Popen, "__init__", noted)
+    story = Story(300, lambda story: story.decided(200) > 10, at_50=lambda: processes[-1].kill())
+    with RtdeServer(motion) as server:
+        lived(cell(tmp_path, server), story)
+    assert len(processes) == 2
+    verdicts, lost = story.verdicts(), story.lost(50)
+    back = lost + verdicts[lost:].index("within")
+    assert set(verdicts[lost:back]) == {"undecided"}
     assert story.fastest(back) < FASTEST
 
 

@@ -183,11 +183,11 @@ class Station:
             feed = road.pump(self.sources, self.workstation.engine.tick, endless=live)
         with ExitStack() as until_the_end:
             if clock and heard:
-                road.warm_up(self.model)
-                # What takes a while holds up whoever listens: it is done before.
-                until_the_end.enter_context(road.settled())
                 targets = [(source, source_target(self.model, source)) for source in heard]
-                feed = hear(feed, until_the_end.enter_context(Listening(targets)), clock)
+                listening = until_the_end.enter_context(Listening(targets))
+                road.warm_up(self.model)  # while they begin
+                until_the_end.enter_context(road.settled())
+                feed = hear(feed, listening, clock)
             bound = self.bound  # refused, if so, before anything is open
             opened = self.open_sinks(sinks, Path(folder or "."), scene) if sinks else []
             return road.run(

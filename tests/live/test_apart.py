@@ -158,7 +158,7 @@ def test_an_interrupt_while_it_begins_leaves_nothing_behind(monkeypatch):
     monkeypatch.setattr(apart.Apart, "wait", interrupted)
     listening = Listening([(Told(), None), (Told(robot="other"), None)])
     with pytest.raises(KeyboardInterrupt), listening:
-        pass
+        listening.first()
     assert not any(process._thread.is_alive() for process in listening._apart)
 
 

@@ -46,16 +46,10 @@ class Listening:
     def __enter__(self) -> Self:
         self._interval = sys.getswitchinterval()
         sys.setswitchinterval(min(self._interval, PROMPT))
-        try:
-            for listener in self._here:
-                listener.start()
-            for process in self._apart:
-                process.start()
-            for process in self._apart:
-                process.wait()
-        except BaseException:  # an interrupt while it waits
-            self.__exit__(None, None, None)
-            raise
+        for listener in self._here:
+            listener.start()
+        for process in self._apart:
+            process.start()
         return self
 
     def __exit__(
@@ -69,7 +63,13 @@ class Listening:
         sys.setswitchinterval(self._interval)
 
     def first(self, patience: float = PATIENCE) -> tuple[Sample, ...]:
-        """What is heard from now on, once all that drive something were, or when that takes too long."""
+        """What is heard from now on, once all that drive something were, or when that takes too long.
+
+        Args:
+            patience: How long that is, once everybody listens [s].
+        """
+        for process in self._apart:
+            process.wait()
         end = time.monotonic() + patience
         self.take()
         heard: dict[tuple[str, ...], Sample] = {}

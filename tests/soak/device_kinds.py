@@ -10,6 +10,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from free_ports import free_port
 from seerob.emulators.background import Emulator
 from seerob.emulators.motions import swing
 from seerob.live.headset_offers import OFFERS, read
@@ -18,7 +19,6 @@ from seerob.page_messages import Tracking
 from seerob.source import Target
 from seerob.variables.dictionary import Variable
 from soak.elsewhere import Elsewhere
-from sources.listening import free_port
 
 SILENCE = 0.2
 """After which a sender of datagrams counts as gone here [s]: an hour less for a thousand of them."""
@@ -195,7 +195,7 @@ def natnet(patch):
 
     patch.setattr("seerob.protocols.natnet_session.SILENCE", SILENCE)
     patch.setattr("seerob.protocols.natnet_session.ASK_AGAIN", 0.02)
-    server = NatnetServer({"Anna": person()}, port=0).start()
+    server = NatnetServer({"Anna": person()}, port=free_port()).start()
     options = {"human": "anna", "timeout": 1.0, "transmission": Transmission.UNICAST}
     return Made(server, Natnet(host=HERE, port=server.port, **options))
 

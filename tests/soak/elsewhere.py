@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Self
 
 import seerob
-from sources.listening import free_port
+from free_ports import free_port
 
 HERE = "127.0.0.1"
 

@@ -10,12 +10,12 @@ from urllib.parse import urlsplit
 import pytest
 from msgspec.structs import replace
 
+from free_ports import free_port
 from live_story import wait_for
 from relay import Datagrams, Garbled, Stream
 from seerob.live.listening import Listener
 from seerob.samples import Quality, SignalSample
 from soak.device_kinds import KINDS
-from sources.listening import free_port
 
 SENDERS = {"fri", "drfl", "mvn", "rokoko"}
 """Devices that send datagrams to a port of ours."""

@@ -1,17 +1,10 @@
 """A live source on a real socket, until enough is heard."""
 
-import socket
 import time
 
 from seerob.live.listening import Listener
 
 PATIENCE = 120.0
-
-
-def free_port(kind=socket.SOCK_DGRAM):
-    with socket.socket(socket.AF_INET, kind) as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 def heard(source, enough):

@@ -1,13 +1,13 @@
 """A depth camera's sender on real sockets: the person who is heard is the one that was sent."""
 
 import asyncio
-import socket
 import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from free_ports import free_port
 from seerob.emulators.kinect import KinectSender
 from seerob.emulators.kinect_person import CAMERA, animated
 from seerob.errors import InputError
@@ -22,12 +22,6 @@ from seerob.workstation import Pose
 
 PATIENCE = 120.0
 AT = Pose(position=tuple(CAMERA[:3, 3]), wxyz=tuple(wxyz_from_rotation(CAMERA[:3, :3])))
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 def sender(link, scene, **more):

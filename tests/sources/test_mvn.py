@@ -14,6 +14,7 @@ from made_mvnx import PERSON, Q, made
 from test_bvh import ROOT
 from test_bvh import made as made_bvh
 
+from free_ports import free_port
 from seerob import cli
 from seerob.commands.emulating.mvn import emulated
 from seerob.emulators.mvn import MvnSender
@@ -47,12 +48,6 @@ def playing(t):
 
 def one(kind=Kind.QUATERNION, k=0, **options):
     return datagrams(kind, POSES[k % len(POSES)], **{"sample": k, "t": k / 60, **options})
-
-
-def free_port(kind=socket.SOCK_DGRAM):
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def hear(source, count, **options):

@@ -6,6 +6,7 @@ import struct
 import numpy as np
 import pytest
 
+from free_ports import free_port
 from seerob.emulators import natnet_datagrams
 from seerob.emulators.mvn_person import animated
 from seerob.emulators.natnet import BONES, NatnetServer
@@ -16,7 +17,7 @@ from seerob.protocols.natnet_models import models
 from seerob.samples import Quality
 from seerob.sources.natnet import Coordinates, Natnet, Tracked, Transmission, _composed
 from seerob.transforms import inverse, rotation_from_wxyz, transform, wxyz_from_rotation
-from sources.listening import by_name, free_port, heard
+from sources.listening import by_name, heard
 
 VERSIONS = [(2, 0), (2, 1), (2, 3), (2, 6), (2, 7), (2, 9), (2, 11), (3, 0), (3, 1), (4, 0), (4, 1), (4, 2)]
 PERSON = animated("library:reach")

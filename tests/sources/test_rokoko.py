@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from free_ports import free_port
 from seerob.emulators.mvn_person import animated
 from seerob.emulators.rokoko import RokokoSender
 from seerob.protocols import ProtocolError
@@ -15,7 +16,7 @@ from seerob.protocols.rokoko import SEGMENTS, WORLD_FROM_UNITY, Actor, Scene, de
 from seerob.samples import Quality
 from seerob.sources.rokoko import Rokoko, remarks
 from seerob.transforms import rotation_from_axis_angle, wxyz_from_rotation
-from sources.listening import by_name, free_port, heard
+from sources.listening import by_name, heard
 
 
 def some_actor(seed=1):

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from listening import free_port, heard
+from listening import heard
 
+from free_ports import free_port
 from live_story import wait_for
 from seerob.commands.emulating import ros_tcp as emulating
 from seerob.emulators.ros_tcp import RosTcpEndpoint, UnityProject

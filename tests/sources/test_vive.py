@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from free_ports import free_port
 from seerob.emulators.mvn_person import animated
 from seerob.emulators.vive import FIVE, WORN, ViveSender, recorded, worn
 from seerob.errors import InputError
@@ -25,7 +26,7 @@ from seerob.sources._worn_trackers import OriginWatch
 from seerob.sources.vive import Link, Vive
 from seerob.sources.vive_recording import ViveRecording
 from seerob.transforms import rotation_from_axis_angle
-from sources.listening import by_name, free_port, heard
+from sources.listening import by_name, heard
 
 PERSON = animated("library:reach")
 TRACKERS = worn(PERSON)

@@ -13,6 +13,7 @@ from msgspec.structs import replace as changed
 
 from amqtt_broker import broker
 from foreign_opcua import URI, foreign_opcua
+from free_ports import free_port
 from in_a_loop import in_a_loop
 from live_story import wait_for
 from seerob.errors import InputError
@@ -32,12 +33,6 @@ def edges(station, *verdicts):
         for seq, (verdict, written) in enumerate(verdicts):
             triggers.write(said(verdict, seq), ())
             wait_for(written, 60)
-
-
-def free_port():
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return free.getsockname()[1]
 
 
 # -- Modbus -------------------------------------------------------------------------------------
@@ -77,7 +72,7 @@ def coil(port):
 
 
 def test_a_coil_of_a_modbus_device_is_written(tmp_path):
-    port = free_port()
+    port = free_port(socket.SOCK_STREAM)
     station = triggering(tmp_path, coil(port), '{ table = "coil", at = 5, type = "bit" }')
     with modbus_device(port) as written:
         edges(
@@ -137,7 +132,7 @@ def test_a_node_that_its_server_protects_stays_as_it_is(tmp_path, server, caplog
 def test_a_topic_is_published(tmp_path):
     from paho.mqtt.client import CallbackAPIVersion, Client
 
-    port, heard = free_port(), []
+    port, heard = free_port(socket.SOCK_STREAM), []
     station = triggering(tmp_path, f'kind = "mqtt"\nhost = "127.0.0.1"\nport = {port}', '"twin/fast"')
     with broker(port):
         machine, up = Client(CallbackAPIVersion.VERSION2), threading.Event()

@@ -1,0 +1,23 @@
+"""Ports of this machine that nobody has, and that nobody is given unasked."""
+
+from __future__ import annotations
+
+import random
+import socket
+
+_CHOICE = random.SystemRandom()  # other processes choose, too
+_RANGE = range(20_000, 32_000)
+"""Below those that the system gives to whoever asks for any: a server that is killed and restarted would now
+and then find its port taken by a client."""
+
+
+def free_port(kind=socket.SOCK_DGRAM):
+    """One that can be listened on now."""
+    while True:
+        port = _CHOICE.choice(_RANGE)
+        with socket.socket(socket.AF_INET, kind) as probe:
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+            return port

@@ -208,9 +208,9 @@ def run(
         engine = engine_of(model)
         for out, samples in ticks(engine, Judge(bound), feed):
             count, t = count + 1, out.t
-            log.add(out)
             for writer in writers:
                 writer.write(out, samples)
+            log.add(out)  # after those who look on
             progress(t)
             if stop():
                 break

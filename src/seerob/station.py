@@ -186,7 +186,6 @@ class Station:
                 targets = [(source, source_target(self.model, source)) for source in heard]
                 listening = until_the_end.enter_context(Listening(targets))
                 road.warm_up(self.model)  # while they begin
-                until_the_end.enter_context(road.settled())
                 feed = hear(feed, listening, clock)
             bound = self.bound  # refused, if so, before anything is open
             opened = self.open_sinks(sinks, Path(folder or "."), scene) if sinks else []

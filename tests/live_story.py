@@ -11,6 +11,7 @@ import numpy as np
 
 from kept_run import Kept
 from seerob.live.listening import Listener
+from seerob.live.real_time import SETTLE
 from seerob.samples import JointSample
 
 
@@ -61,7 +62,8 @@ class Story(Kept):
         """Per tick: whether samples lie on either side that agree about the device's clock, and its time.
 
         The offset between both clocks becomes better known as a run goes on, and run time may slip on a
-        busy machine: only what the samples on either side say holds for a tick.
+        busy machine: only what the samples on either side say holds for a tick, once the twin has had the
+        time to swing to it.
         """
         heard = []
         found = np.zeros(len(self.snapshots), bool)
@@ -72,7 +74,8 @@ class Story(Kept):
             after = next((offset for t, offset in heard[-50:] if t >= snapshot.t), None)
             if before is not None:
                 device[k] = snapshot.t - before
-                found[k] = after is not None and abs(after - before) < 5e-4
+                of_late = [offset for t, offset in heard if t >= snapshot.t - SETTLE]
+                found[k] = after is not None and max(of_late) - min(of_late) < 5e-4
         return found, device
 
     def seen_enough(self):

@@ -300,7 +300,8 @@ def main() -> None:
                 begun = time.monotonic()
                 time.sleep(seconds)
                 end = time.monotonic() + PATIENCE
-                while listening.take() and not alone.heard >= names and time.monotonic() < end:
+                while not alone.heard >= names and time.monotonic() < end:
+                    listening.take()
                     time.sleep(0.05)
         with Post(Path(folder, "beside")).watching() as post:
             states = States(seconds)

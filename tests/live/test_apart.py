@@ -16,7 +16,7 @@ import pytest
 import told_sources
 from live_story import open_files, wait_for
 from seerob.live import apart
-from seerob.live.apart import may_be_apart
+from seerob.live.apart import told
 from seerob.live.ears import Listening
 from seerob.live.listening import LiveSource
 from seerob.plugin import kinds, load
@@ -166,9 +166,9 @@ def test_what_only_this_process_has_listens_here():
     class Local(Told, frozen=True, kw_only=True):
         """Defined where no other process finds it."""
 
-    assert may_be_apart(Told(), None)
+    assert told(Told(), None)
     for source in (Local(), Headset(human="operator")):
-        assert not may_be_apart(source, None)
+        assert told(source, None) is None
     with Listening([(Local(), None)]) as listening:
         assert process_of(listening) == os.getpid()
 

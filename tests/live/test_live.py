@@ -15,12 +15,11 @@ import pytest
 
 from live_story import wait_for as until
 from seerob.errors import SeerobError
-from seerob.live.ears import Listening
+from seerob.live.ears import PROMPT, Listening
 from seerob.live.listening import (
     FIRST_PAUSE,
     LONGEST_PAUSE,
     MARGIN,
-    PROMPT,
     Listener,
     LiveSource,
     delay_of,

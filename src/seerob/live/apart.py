@@ -22,7 +22,7 @@ from typing import IO, NamedTuple
 
 import msgspec
 
-from seerob.live.listening import FIRST_PAUSE, LONGEST_PAUSE, STOP_WITHIN, LiveSource, because, name_of
+from seerob.live.listening import FIRST_PAUSE, LONGEST_PAUSE, STOP_WITHIN, LiveSource, because
 from seerob.live.shared_mailbox import SharedMailbox, memory
 from seerob.samples import Sample
 from seerob.source import Target
@@ -51,7 +51,7 @@ class Order(NamedTuple):
     again: bool
     """Whether another one listened before."""
     pair: bytes
-    """The source and what it drives, pickled."""
+    """From `told`."""
 
 
 class Said(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -64,30 +64,29 @@ class Said(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     trace: str | None = None
 
 
-def may_be_apart(source: LiveSource, target: Target | None) -> bool:
-    """Whether a source may listen in another process: what only this one knows cannot be told to it."""
+def told(source: LiveSource, target: Target | None) -> bytes | None:
+    """A source and what it drives, as another process can be told; None when only this one knows it."""
     if os.name != "posix" or not sys.executable or getattr(sys, "frozen", False):
-        return False  # memory is inherited by its descriptor; a frozen program is no interpreter
+        return None  # memory is inherited by its descriptor; a frozen program is no interpreter
     if not type(source).apart or type(source).__module__ == "__main__":
-        return False
+        return None
     try:
-        pickle.dumps((source, target))
+        return pickle.dumps((source, target))
     except Exception:  # whatever stands in its way
-        return False
-    return True
+        return None
 
 
 class Apart:
     """One source's process, its end and its beginning anew.
 
     Args:
-        source: `may_be_apart` is true of it.
-        target: What it drives.
+        name: Of the source.
+        pair: It and what it drives, from `told`.
     """
 
-    def __init__(self, source: LiveSource, target: Target | None) -> None:
-        self.name = name_of(source)
-        self._pair = pickle.dumps((source, target))
+    def __init__(self, name: str, pair: bytes) -> None:
+        self.name = name
+        self._pair = pair
         self._box: SharedMailbox | None = None
         self._begun, self._stopping = Event(), Event()
         self._lock = Lock()
@@ -123,8 +122,6 @@ class Apart:
 
     def join(self) -> None:
         """Wait for its end."""
-        if self._thread.ident is None:
-            return
         self._thread.join(STOP_WITHIN + SPARE)
         if self._thread.is_alive():
             with self._lock:
@@ -198,8 +195,6 @@ class Apart:
             if found.ready:
                 with self._lock:
                     self._listens = True
-                    if self._stopping.is_set() and self._process is not None:
-                        self._process.terminate()  # it was asked in between
                 self._begun.set()
             else:
                 _log_again(found)

@@ -12,13 +12,16 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
-from seerob.live.apart import Apart, may_be_apart
-from seerob.live.listening import PROMPT, Listener, LiveSource, delay_of, name_of, stop
+from seerob.live.apart import Apart, told
+from seerob.live.listening import Listener, LiveSource, delay_of, name_of, stop
 from seerob.samples import Mailbox, Sample, SignalSample, key
 from seerob.source import Target
 
 PATIENCE = 1.0
 """How long a run waits for the first samples before it begins without them [s]."""
+PROMPT = 1e-4
+"""How long a thread keeps the interpreter while others wait for it [s], during a live run. Python's own 5 ms
+is as long as what is heard here, or shown to somebody, would wait for the twin's computations."""
 
 
 class Listening:
@@ -38,10 +41,11 @@ class Listening:
         self._here: list[Listener] = []
         self._apart: list[Apart] = []
         for source, target in sources:
-            if may_be_apart(source, target):
-                self._apart.append(Apart(source, target))
-            else:
+            pair = told(source, target)
+            if pair is None:
                 self._here.append(Listener(source, target, self._box.post))
+            else:
+                self._apart.append(Apart(name_of(source), pair))
 
     def __enter__(self) -> Self:
         self._interval = sys.getswitchinterval()

@@ -45,9 +45,6 @@ STOP_WITHIN = 1.0
 """A listener that does not end by then is left behind [s]; its thread keeps no process alive."""
 ASK_WITHIN = 1.5
 """At start [s]."""
-PROMPT = 1e-4
-"""How long a thread keeps the interpreter while others wait for it [s], where several listen or something is
-shown. Python's own 5 ms is as long as samples then wait for others' computations."""
 
 
 _said: ContextVar[set[str]] = ContextVar("said")
@@ -224,9 +221,8 @@ class Listener:
                     self._loop.call_soon_threadsafe(self._task.cancel)
 
     def join(self, seconds: float) -> bool:
-        """Wait for the thread to end; whether it has, or never began."""
-        if self._thread.ident is not None:
-            self._thread.join(seconds)
+        """Wait for the thread to end; whether it has."""
+        self._thread.join(seconds)
         return not self._thread.is_alive()
 
     def statistics(self) -> Statistics:

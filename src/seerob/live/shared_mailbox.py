@@ -13,8 +13,7 @@ import os
 import struct
 import tempfile
 import zlib
-from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -61,14 +60,8 @@ def _nameless() -> int:
         return os.dup(found.fileno())
 
 
-class _Slot(NamedTuple):
-    place: int
-    written: int
-    """Samples so far."""
-
-
 class SharedMailbox:
-    """One end; any thread of the process that writes may `post`, one thread of that which reads may `take`.
+    """One end; one thread may `post`, of the process that writes, and one `take`, of that which reads.
 
     Args:
         file: From `memory`; may be closed afterwards.
@@ -76,8 +69,9 @@ class SharedMailbox:
 
     def __init__(self, file: int) -> None:
         self._memory = mmap.mmap(file, _WHOLE)
-        self._lock = Lock()
-        self._slots: dict[tuple[str, ...], _Slot] = {}
+        self._places: dict[tuple[str, ...], int] = {}
+        self._written: list[int] = []
+        """Samples so far, by slot."""
         self._encoder = msgspec.msgpack.Encoder(enc_hook=_plain)
         self._decoder = msgspec.msgpack.Decoder(Sample)
         self._seen: list[int] = []
@@ -96,20 +90,20 @@ class SharedMailbox:
             raise TypeError(f"no {type(sample).__name__}: {error}") from None
         if len(data) > LARGEST:
             raise SeerobError(f"a sample of {len(data)} bytes; the most is {LARGEST}")
-        what = key(sample)
-        with self._lock:
-            index, written = self._slots.get(what, (len(self._slots), 0))
-            if index == SLOTS:
-                raise SeerobError(f"more than {SLOTS} different things are told")
-            number = written + 1
-            start = _HEAD + index * _SLOT
-            half = start + _HEAD + (number & 1) * _ROOM
-            _HALF.pack_into(self._memory, half, number, len(data), zlib.crc32(data))
-            self._memory[half + _HALF.size : half + _HALF.size + len(data)] = data
-            _COUNT.pack_into(self._memory, start, number)
-            self._slots[what] = _Slot(index, number)
-            if number == 1:
-                _COUNT.pack_into(self._memory, 0, index + 1)
+        index = self._places.setdefault(key(sample), len(self._places))
+        if index == SLOTS:
+            del self._places[key(sample)]
+            raise SeerobError(f"more than {SLOTS} different things are told")
+        if index == len(self._written):
+            self._written.append(0)
+        number = self._written[index] = self._written[index] + 1
+        start = _HEAD + index * _SLOT
+        half = start + _HEAD + (number & 1) * _ROOM
+        _HALF.pack_into(self._memory, half, number, len(data), zlib.crc32(data))
+        self._memory[half + _HALF.size : half + _HALF.size + len(data)] = data
+        _COUNT.pack_into(self._memory, start, number)
+        if number == 1:
+            _COUNT.pack_into(self._memory, 0, index + 1)
 
     def take(self) -> tuple[Sample, ...]:
         """The samples posted since the last call, in order of the first one of their kind."""
@@ -138,10 +132,6 @@ class SharedMailbox:
                 self._seen[index] = number
                 return data
         return None
-
-    def close(self) -> None:
-        """Let the memory go."""
-        self._memory.close()
 
 
 def _plain(value: Any) -> float | bool | int:

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
-from seerob.judging import Judge
+from seerob import batch
+from seerob.given_states import motion_of
+from seerob.judging import Judge, undecided
+from seerob.markers import Label, Segment
+from seerob.snapshot import Finding, Result, Row, Verdict
+
+WITHIN, EXCEEDED = Verdict.WITHIN, Verdict.EXCEEDED
 
 TWO_ARMS = FLOATING + TWO_R + TWO_R.replace('"arm"', '"other"')
 ENERGY = '[[safety]]\nkind = "kinetic_energy"\nname = "E"\nrobot = "arm"\nlimit = 4\n'
@@ -103,3 +111,102 @@ def test_an_answer_of_later_says_nothing_when_time_is_set_back(asked):
     judge(state)
     state.refresh(1.0)
     assert judge(state)[0].t == 1.0
+
+
+# -- what findings hold -------------------------------------------------------------------------
+
+TWO_PARTS = (
+    '[[parts]]\nname = "{0}"\nshape = {{ sphere = 0.1 }}\nat = {{ position = [0, 0, {1}] }}\nmass = 1\n'
+)
+THREE = "".join(
+    f'[[safety]]\nkind = "{kind}"\nname = "{name}"\n{rest}\nlimit = {limit}\n'
+    for kind, name, rest, limit in (
+        ("minimum_distance", "to post", 'between = ["arm", "post"]', 1),
+        ("minimum_distance", "to wall", 'between = ["arm", "wall"]', 1),
+        ("minimum_distance", "of the rest", 'between = ["post", "wall"]', 1),
+        ("velocity", "point", 'at = "arm"', 9),
+        ("velocity", "too fast", 'at = "arm"', 0.1),
+        ("kinetic_energy", "energy", 'robot = "arm"', 9),
+    )
+)
+
+
+@pytest.fixture(scope="module")
+def surrounded(tmp_path_factory):
+    """An arm between two parts, and six criteria: one is exceeded, all others are within."""
+    text = FLOATING + TWO_R + TWO_PARTS.format("post", 5) + TWO_PARTS.format("wall", 9) + THREE
+    return made(tmp_path_factory.mktemp("surrounded"), text, {"arm.urdf": two_r()})
+
+
+@pytest.mark.parametrize(
+    ("name", "kept"),
+    [
+        ("arm", {"of the rest"}),
+        ("arm/l2", {"of the rest"}),
+        ("post", {"to wall", "point", "energy"}),
+        ("w*", {"to post", "point", "energy"}),
+        ("*", set()),
+        ("nobody", {"to post", "to wall", "of the rest", "point", "energy"}),
+    ],
+)
+def test_nothing_is_within_of_what_a_finding_holds(surrounded, name, kept):
+    """By whatever name of it the criterion speaks; what is exceeded stays so; a batch says the same."""
+    holding = Finding(level="warning", subject="file", text="it may be elsewhere", holds=(name,))
+    found = {r.name: r for r in Judge(surrounded.bound, [holding])(state_at(surrounded, arm=MOVING))}
+    kept = kept - {"point", "energy"} if name == "arm/l2" else kept
+    expected = {"to post", "to wall", "of the rest", "point", "energy"} - kept
+    assert {n for n, r in found.items() if r.verdict == "undecided"} == expected
+    assert {n for n, r in found.items() if r.verdict == "within"} == kept
+    assert all("it may be elsewhere" in found[n].reason and found[n].value is not None for n in expected)
+    assert found["too fast"].verdict == "exceeded"
+    coloured = {m.verdict for n in expected for m in found[n].markers}
+    assert coloured <= {None, "undecided"}
+
+    q, v = (np.array([part]) for part in MOVING)
+    motion = motion_of(surrounded.model, {"arm": q}, {"arm": v}, None)
+    at_once = batch.judged(surrounded.model, surrounded.bound, motion, threads=1, findings=[holding])
+    assert {n: column.verdict for n, column in at_once.items()} == {n: r.verdict for n, r in found.items()}
+    assert all("it may be elsewhere" in at_once[n].reasons[0] for n in expected)
+
+
+def test_what_an_answer_depended_on_is_held_like_what_it_is_about(surrounded):
+    """A criterion that does not say whom it speaks of depends on them all the same."""
+    bound = [b for b in surrounded.bound if b.criterion.name == "energy"]
+
+    class Anonymous(type(bound[0].criterion), frozen=True, kw_only=True):
+        def subjects(self):
+            return ()
+
+    quiet = Anonymous(name="energy", robot="arm", limit=9.0)
+    about = type(bound[0])(quiet, "safety", quiet.bind(surrounded.model), bound[0].basis)
+    holding = Finding(level="warning", subject="file", text="its mass is doubtful", holds=("arm",))
+    (result,) = Judge([about], [holding])(state_at(surrounded, arm=MOVING))
+    assert (result.verdict, result.reason.startswith("its mass is doubtful")) == ("undecided", True)
+
+
+def test_what_is_taken_back_is_taken_back_whole():
+    drawn = (
+        Segment(start=(0, 0, 0), end=(1, 0, 0), verdict=WITHIN),
+        Label(position=(0, 0, 0), text="near", verdict=EXCEEDED),
+        Label(position=(0, 0, 0), text="plain"),
+    )
+    rows = (Row(name="Palm", verdict=WITHIN), Row(name="Skull", verdict=EXCEEDED), Row(name="Face"))
+    inner = Result(name="link", value=1.0, verdict=WITHIN, parts=(Result(name="deep", verdict=WITHIN),))
+    quiet = Result(name="other")
+    whole = Result(name="d", value=1.0, verdict=WITHIN, reason="a ↔ b", parts=(inner, quiet), rows=rows)
+    found = undecided(replace(whole, markers=drawn), "nobody knows")
+    assert (found.verdict, found.reason, found.value) == ("undecided", "nobody knows; a ↔ b", 1.0)
+    assert [m.verdict for m in found.markers] == ["undecided", "exceeded", None]
+    assert [(r.verdict, r.reason) for r in found.rows] == [
+        ("undecided", "nobody knows"),
+        ("exceeded", ""),
+        (None, ""),
+    ]
+    assert [p.verdict for p in found.parts] == ["undecided", None]
+    assert found.parts[0].parts[0].verdict == "undecided"
+    bad = undecided(replace(whole, verdict=EXCEEDED), "nobody knows")
+    assert (bad.verdict, bad.reason, bad.parts[0].verdict) == ("exceeded", "a ↔ b", "undecided")
+    figure = undecided(Result(name="d", value=1.0), "nobody knows")
+    assert (figure.verdict, figure.reason) == (None, "")
+    nobody = undecided(Result(name="d", reason="nobody is near"), "nobody knows")
+    assert (nobody.verdict, nobody.reason) == ("undecided", "nobody knows; nobody is near")

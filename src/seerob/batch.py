@@ -8,7 +8,7 @@ memory of earlier instants, is asked instant by instant as on the road, in the o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -17,15 +17,14 @@ import mujoco
 import numpy as np
 from msgspec.structs import replace as changed
 
-from seerob.answers import UNDECIDED, Answers
+from seerob.answers import UNDECIDED, WITHIN, Answers
 from seerob.criterion import Criterion, EvaluateMany
 from seerob.errors import Undecided, UnknownName
-from seerob.judging import Judge
-from seerob.judging import bound as evaluation
+from seerob.judging import Judge, held, held_names
 from seerob.model import Model
 from seerob.results.series import CODES
 from seerob.run import Bound, Feed, engine_of, settled
-from seerob.snapshot import Result, Verdict
+from seerob.snapshot import Finding, Result, Verdict
 from seerob.state import Hearing, State
 from seerob.states import Bench, Motion, Questions, Reasons
 from seerob.transforms import Array
@@ -43,7 +42,7 @@ class Column:
     at_most: bool
     answers: Answers
     reasons: Reasons
-    """Why an instant is UNDECIDED for what was not heard or given; empty otherwise, shape (N,)."""
+    """Why an instant is UNDECIDED, as far as it is said, shape (N,)."""
     note: str = ""
     """Why it was asked instant by instant; empty when it was not."""
 
@@ -114,7 +113,14 @@ def recorded(model: Model, feed: Feed) -> Motion:
     return Motion(np.array(t), np.array(q), np.array(v), reasons)
 
 
-def judged(model: Model, bound: Sequence[Bound], motion: Motion, *, threads: int) -> Batch:
+def judged(
+    model: Model,
+    bound: Sequence[Bound],
+    motion: Motion,
+    *,
+    threads: int,
+    findings: Iterable[Finding] = (),
+) -> Batch:
     """Judge a motion.
 
     Args:
@@ -122,9 +128,11 @@ def judged(model: Model, bound: Sequence[Bound], motion: Motion, *, threads: int
         bound: Its criteria.
         motion: Where everybody is.
         threads: How many work at once.
+        findings: Of sources, besides those of the model (`Finding.holds`).
     """
     n = len(motion.t)
-    asked, notes = _able(model, bound, motion)
+    findings = tuple(dict.fromkeys((*model.findings, *findings)))
+    asked, notes = _able(model, bound, findings)
     parts = [motion.part(begin, end) for begin, end in pairwise([*range(0, n, STRETCH), n]) if begin < end]
     questions = Questions(model)
     found: dict[str, list[tuple[Answers, Reasons]]] = {name: [] for name in asked}
@@ -138,7 +146,7 @@ def judged(model: Model, bound: Sequence[Bound], motion: Motion, *, threads: int
             for name, answers in made[k % len(shares)][k // len(shares)].items():
                 found[name].append(answers)
     slow = [one for one in bound if one.criterion.name not in asked]
-    walked = _walked(model, slow, motion) if slow else {}
+    walked = _walked(model, slow, motion, findings) if slow else {}
     columns = {}
     for one in bound:
         name = one.criterion.name
@@ -149,23 +157,34 @@ def judged(model: Model, bound: Sequence[Bound], motion: Motion, *, threads: int
 
 
 def _able(
-    model: Model, bound: Sequence[Bound], motion: Motion
-) -> tuple[dict[str, tuple[Criterion, EvaluateMany]], dict[str, str]]:
+    model: Model, bound: Sequence[Bound], findings: Sequence[Finding]
+) -> tuple[dict[str, _Able], dict[str, str]]:
     """Criteria that judge many instants at once; why others do not."""
-    able: dict[str, tuple[Criterion, EvaluateMany]] = {}
+    able: dict[str, _Able] = {}
+    names = held_names(findings)
     notes: dict[str, str] = {}
     for one in bound:
         criterion = one.criterion
         many = criterion.batch(model)
         if many is None:
             notes[criterion.name] = "asked instant by instant: with these options it is not made for batches"
-        elif criterion.unseen(model):
-            notes[criterion.name] = "asked instant by instant: parts of a robot have no shape"
+        elif held(criterion, model, findings):
+            notes[criterion.name] = "asked instant by instant: a finding holds what it is about"
         elif criterion.variables():
             notes[criterion.name] = "asked instant by instant: it follows variables"
         else:
-            able[criterion.name] = criterion, many
+            able[criterion.name] = _Able(criterion, many, names)
     return able, notes
+
+
+@dataclass(frozen=True)
+class _Able:
+    """A criterion that judges many instants at once."""
+
+    criterion: Criterion
+    many: EvaluateMany
+    held: Mapping[str, str]
+    """By name that findings hold, why nothing that depends on it is within."""
 
 
 Stretch = dict[str, tuple[Answers, Reasons]]
@@ -174,7 +193,7 @@ Stretch = dict[str, tuple[Answers, Reasons]]
 def _share(
     model: Model,
     questions: Questions,
-    asked: dict[str, tuple[Criterion, EvaluateMany]],
+    asked: dict[str, _Able],
     parts: Sequence[Motion],
 ) -> list[Stretch]:
     """The work of one thread."""
@@ -182,19 +201,23 @@ def _share(
     return [_stretch(bench, asked, part) for part in parts]
 
 
-def _stretch(bench: Bench, asked: dict[str, tuple[Criterion, EvaluateMany]], motion: Motion) -> Stretch:
+def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> Stretch:
     states = bench.place(motion)
     found: Stretch = {}
-    for name, (criterion, many) in asked.items():
+    for name, one in asked.items():
         states.asked.clear()
         reasons = np.full(len(states), "", object)
         try:
-            answers = many(states)
+            answers = one.many(states)
         except Undecided as reason:
-            answers, reasons[:] = _nothing(criterion, len(states)), str(reason)
+            answers, reasons[:] = _nothing(one.criterion, len(states)), str(reason)
         for who in sorted(states.asked):
             reasons = np.where(motion.doubts[who] != "", motion.doubts[who], reasons)
-        found[name] = _doubted(answers, criterion, reasons), reasons
+        answers = _doubted(answers, one.criterion, reasons)
+        if texts := [text for held_name, text in one.held.items() if held_name in states.asked]:
+            reasons = np.where(answers.verdict == WITHIN, "; ".join(dict.fromkeys(texts)), reasons)
+            answers = answers.open()
+        found[name] = answers, reasons
     return found
 
 
@@ -239,17 +262,17 @@ def _joined(parts: Sequence[tuple[Answers, Reasons]]) -> tuple[Answers, Reasons]
     return joined, np.concatenate([np.zeros(0, object), *(reasons for _, reasons in parts)])
 
 
-def _walked(model: Model, bound: Sequence[Bound], motion: Motion) -> Stretch:
+def _walked(model: Model, bound: Sequence[Bound], motion: Motion, findings: Sequence[Finding]) -> Stretch:
     """The same instant by instant, as on the road, each criterion at every instant."""
     hearings = {name: Hearing(given=False, driven=True) for name in model.mechanisms}
     data = mujoco.MjData(model.mj)
     state = State(model, data, hearings)
     # With criteria that were bound for another run, what they remember of it would be in the way.
     fresh = [
-        Bound(changed(one.criterion, every=None), one.group, evaluation(one.criterion, model), one.basis)
+        Bound(changed(one.criterion, every=None), one.group, one.criterion.bind(model), one.basis)
         for one in bound
     ]
-    judge = Judge(fresh)
+    judge = Judge(fresh, findings)
     rows: list[tuple[Result, ...]] = []
     with settled():
         for k, t in enumerate(motion.t.tolist()):
@@ -274,5 +297,5 @@ def _of_results(results: Sequence[Result]) -> tuple[Answers, Reasons]:
     if any(r.interval for r in results):
         low, high = (numbers([r.interval[k] if r.interval else r.value for r in results]) for k in range(2))
         answers = replace(answers, interval=(low, high))
-    reasons = [r.reason if r.verdict is Verdict.UNDECIDED and r.value is None else "" for r in results]
+    reasons = [r.reason if r.verdict is Verdict.UNDECIDED else "" for r in results]
     return answers, np.array(reasons, object)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from seerob.quantities import Seconds
 from seerob.snapshot import Basis, Result, Verdict
@@ -45,6 +45,9 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What results are called; made from the kind and the subject when not given."""
     every: Seconds | None = None
     """Period [s]; each tick when not given."""
+    between_samples: Annotated[str, Meta(pattern="^accepted: .*[^ ]")] | None = None
+    """``accepted: why``: that nobody knows what happens between the instants at which it is asked, where
+    nothing bounds it, is accepted for the verdict of a run; it stays undecided there when not given."""
     active: str | None = None
     """Variable of the dictionary, a bool: while it is false, it is not asked (muted, another mode of
     operation); while nobody knows, it is undecided."""

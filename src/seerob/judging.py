@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from msgspec.structs import replace
 
 from seerob.criterion import Criterion, Evaluate
-from seerob.errors import Undecided
+from seerob.errors import Undecided, UnknownName
 from seerob.model import Model
-from seerob.snapshot import Basis, Result, Verdict
+from seerob.snapshot import Basis, Finding, Result, Verdict
 from seerob.state import State
 from seerob.whereabouts.hearing import SLACK
 
@@ -27,25 +27,70 @@ class Bound:
     basis: Basis
 
 
-def bound(criterion: Criterion, model: Model) -> Evaluate:
-    """The criterion with its names resolved; never within where parts of a robot have no shape."""
-    evaluate, unseen = criterion.bind(model), criterion.unseen(model)
-    if not unseen:
-        return evaluate
+def undecided(result: Result, reason: str) -> Result:
+    """The same without anything that is within: its verdict, parts, rows and markers are undecided instead.
 
-    def judged(state: State) -> Result:
-        result = evaluate(state)
-        nobody = result.verdict is None and result.value is None
-        if result.verdict is not Verdict.WITHIN and not nobody:
-            return result
-        reason = f"{unseen}; {result.reason}".removesuffix("; ")
-        markers = tuple(
-            replace(marker, verdict=Verdict.UNDECIDED) if getattr(marker, "verdict", None) else marker
+    The one way in which what a criterion said is taken back, whoever has reason to. What is exceeded stays,
+    for what is known suffices; a figure without a verdict informs as before. That there is nothing to judge
+    (neither a figure nor a verdict: nobody is near) is taken back too.
+    """
+    nothing = result.verdict is None and result.value is None
+    taken_back = nothing or result.verdict is Verdict.WITHIN
+    return replace(
+        result,
+        verdict=Verdict.UNDECIDED if taken_back else result.verdict,
+        reason=f"{reason}; {result.reason}".removesuffix("; ") if taken_back else result.reason,
+        parts=tuple(_open(part, reason) for part in result.parts),
+        rows=tuple(
+            replace(row, verdict=Verdict.UNDECIDED, reason=f"{reason}; {row.reason}".removesuffix("; "))
+            if row.verdict is Verdict.WITHIN
+            else row
+            for row in result.rows
+        ),
+        markers=tuple(
+            replace(marker, verdict=Verdict.UNDECIDED) if marker.verdict is Verdict.WITHIN else marker
             for marker in result.markers
-        )
-        return replace(result, verdict=Verdict.UNDECIDED, reason=reason, markers=markers)
+        ),
+    )
 
-    return judged
+
+def _open(part: Result, reason: str) -> Result:
+    return part if part.verdict is None and part.value is None else undecided(part, reason)
+
+
+def held(criterion: Criterion, model: Model, findings: Iterable[Finding]) -> str:
+    """Why nothing that a criterion says of its subjects is within; empty for nothing.
+
+    Shapes that are missing (`Criterion.unseen`), and findings that hold a name (`Finding.holds`) that means
+    some of what the criterion's subjects mean.
+    """
+    reasons = [criterion.unseen(model)]
+    subjects = criterion.subjects()
+    bodies = {i for name in subjects for i in _meant(model, name)}
+    for finding in findings:
+        if any(
+            name == "*" or name in subjects or not bodies.isdisjoint(_meant(model, name))
+            for name in finding.holds
+        ):
+            reasons.append(finding.text)
+    return "; ".join(dict.fromkeys(filter(None, reasons)))
+
+
+def held_names(findings: Iterable[Finding]) -> dict[str, str]:
+    """By name that findings hold, why nothing that depends on it is within."""
+    found: dict[str, list[str]] = {}
+    for finding in findings:
+        for name in finding.holds:
+            found.setdefault(name, []).append(finding.text)
+    return {name: "; ".join(dict.fromkeys(texts)) for name, texts in found.items()}
+
+
+def _meant(model: Model, name: str) -> tuple[int, ...]:
+    """Bodies that a name means; none for one that has no shape."""
+    try:
+        return model.select(name)
+    except UnknownName:
+        return ()
 
 
 class _Kept(NamedTuple):
@@ -63,14 +108,27 @@ class _Kept(NamedTuple):
 
 
 class Judge:
-    """Asks every criterion at its period; what it cannot know becomes UNDECIDED."""
+    """Asks every criterion at its period; what it cannot know becomes UNDECIDED.
 
-    def __init__(self, bound: Sequence[Bound]) -> None:
+    Args:
+        bound: The criteria.
+        findings: Of sources and of the run, besides those of the model (`Finding.holds`).
+    """
+
+    def __init__(self, bound: Sequence[Bound], findings: Iterable[Finding] = ()) -> None:
         self._bound = bound
+        self._findings = tuple(findings)
+        self._held: tuple[str, ...] | None = None
+        self._held_names: dict[str, str] = {}
         self._kept: dict[int, _Kept] = {}
 
     def __call__(self, state: State) -> tuple[Result, ...]:
         """Results at this state, in the order of the file."""
+        if self._held is None:
+            model = state.model
+            findings = tuple(dict.fromkeys((*model.findings, *self._findings)))
+            self._held = tuple(held(bound.criterion, model, findings) for bound in self._bound)
+            self._held_names = held_names(findings)
         return tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
 
     def _one(self, i: int, bound: Bound, state: State) -> Result:
@@ -85,6 +143,8 @@ class Judge:
             result = muted or bound.evaluate(state)
             if result.value is not None and not math.isfinite(result.value):
                 raise Undecided(f"the value is {result.value}, not a finite number")
+            if muted is None and (reason := self._reason(i, state)):
+                result = undecided(result, reason)
         except Undecided as reason:
             result = Result(
                 name=criterion.name,
@@ -100,6 +160,15 @@ class Judge:
             due, asked = state.t + criterion.every, tuple(sorted(state.asked))
             self._kept[i] = _Kept(result, state.t, due, muted is not None, asked)
         return result
+
+    def _reason(self, i: int, state: State) -> str:
+        """Why nothing that a criterion has just said is within; empty for nothing."""
+        assert self._held is not None
+        reason = self._held[i]
+        if not self._held_names:
+            return reason
+        texts = (text for name, text in self._held_names.items() if name in state.asked)
+        return "; ".join(dict.fromkeys(filter(None, (reason, *(t for t in texts if t not in reason)))))
 
     @staticmethod
     def _lasts(kept: _Kept, criterion: Criterion, state: State) -> bool:

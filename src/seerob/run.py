@@ -15,7 +15,6 @@ from seerob.engine import Engine
 from seerob.errors import InputError, Problem, SeerobError
 from seerob.judging import Bound as Bound  # noqa: PLC0414
 from seerob.judging import Judge as Judge  # noqa: PLC0414
-from seerob.judging import bound as evaluation
 from seerob.live.listening import LiveSource, delay_of
 from seerob.live.real_time import Clock
 from seerob.machines.displays import Looks
@@ -53,8 +52,7 @@ def bind(model: Model) -> tuple[Bound, ...]:
     for group in ("safety", "ergonomics"):
         for i, criterion in enumerate(getattr(model.workstation, group)):
             try:
-                judge = evaluation(criterion, model)
-                bound.append(Bound(criterion, group, judge, criterion.basis(model)))
+                bound.append(Bound(criterion, group, criterion.bind(model), criterion.basis(model)))
             except SeerobError as error:
                 # Many messages begin with the name of the criterion, which the key already says.
                 text = str(error).removeprefix(f"{criterion.name}: ")
@@ -206,7 +204,7 @@ def run(
             if isinstance(writer, KeepsResults):
                 writer.share(log)
         engine = engine_of(model)
-        for out, samples in ticks(engine, Judge(bound), feed):
+        for out, samples in ticks(engine, Judge(bound, scene.findings), feed):
             count, t = count + 1, out.t
             for writer in writers:
                 writer.write(out, samples)

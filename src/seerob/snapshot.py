@@ -124,6 +124,9 @@ class Finding(Struct, frozen=True, kw_only=True):
     subject: str
     """Full name of the thing it is about."""
     text: str
+    holds: tuple[str, ...] = ()
+    """Robots, people, machines, parts, variables (``variable door``), or ``*`` for everything, of which no
+    criterion is WITHIN as long as it stands."""
 
 
 # -- results ------------------------------------------------------------------------------------

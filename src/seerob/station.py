@@ -33,7 +33,7 @@ from seerob.recordings.recording import Recording
 from seerob.run import Bound, Feed, Summary
 from seerob.scene import scene_of
 from seerob.sink import Sink, Writer
-from seerob.snapshot import Scene
+from seerob.snapshot import Finding, Scene
 from seerob.source import Opened, Source
 from seerob.workstation import Workstation
 
@@ -226,14 +226,17 @@ class Station:
         Raises:
             InputError: Arrays that do not fit, or a live source without them.
         """
+        findings: list[Finding] = []
         if q is None:
             if qd is not None or t is not None:
                 raise InputError.at("batch", "q", "missing", "give positions with qd and t, or none of them")
             require_recorded(self.workstation)
             motion = batch.recorded(self.model, road.pump(self.sources, self.workstation.engine.tick))
+            findings = [found for _, opened in self.sources for found in opened.findings]
         else:
             motion = motion_of(self.model, q, qd or {}, t)
-        return batch.judged(self.model, self.bound, motion, threads=threads or os.cpu_count() or 1)
+        threads = threads or os.cpu_count() or 1
+        return batch.judged(self.model, self.bound, motion, threads=threads, findings=findings)
 
     def permissible_speed(
         self,

@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "7cd3c1b87f492a97";
+export const SCHEMA = "0b33ab654be7c1ca";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -187,6 +187,11 @@ export interface Finding {
   /** Full name of the thing it is about. */
   subject: string;
   text: string;
+  /**
+   * Robots, people, machines, parts, variables (`variable door`), or `*` for everything, of which no
+   * criterion is WITHIN as long as it stands.
+   */
+  holds: string[];
 }
 
 /**

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from seerob.criterion import Criterion
 from seerob.errors import Undecided
+from seerob.judging import held
 from seerob.model import Model
 from seerob.permissible.ceiling import Answer, Ask, Ceiling, Figure, Look, Method
 from seerob.permissible.contact_ceiling import contact
@@ -43,15 +44,15 @@ def ceilings_of(criterion: Criterion, model: Model, robot: str, *, anywhere: boo
         ask = _power(criterion, model, robot, criterion.limit, 2)
     if ask is None:
         return None
-    inner, unseen = ask, criterion.unseen(model)
+    inner, withheld = ask, held(criterion, model, model.findings)
 
     def muted(state: State) -> bool:
         return criterion.active is not None and not state.signal(criterion.active)
 
     def decided(state: State) -> tuple[Ceiling, ...]:
         try:
-            if unseen and not muted(state):
-                raise Undecided(unseen)
+            if withheld and not muted(state):
+                raise Undecided(withheld)
             found = inner(state) if not muted(state) else (_not_asked(criterion),)
         except Undecided as why:
             found = (Ceiling(criterion.name, math.nan, reason=str(why)),)

@@ -132,7 +132,8 @@ def witness(
     model: Model, sources: Sources, bound: Sequence[Bound], infos: Sequence[CriterionInfo], say: Say
 ) -> tuple[Witness, ResultLog, Snapshot]:
     """Run the given motion once: where everybody is, what the criteria say of it, and its first tick."""
-    seen, log = Witness(Judge(bound)), ResultLog(infos)
+    findings = [found for _, opened in sources for found in opened.findings]
+    seen, log = Witness(Judge(bound, findings)), ResultLog(infos)
     duration = max((opened.duration for _, opened in sources), default=0.0)
     first: Snapshot | None = None
     for out, _ in ticks(engine_of(model), seen, pump(sources, model.workstation.engine.tick)):

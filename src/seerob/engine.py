@@ -103,6 +103,8 @@ class Engine:
         }
         # What a variable says of a machine stands until it says something else.
         coasting = set(live) - {machine.name for machine in model.workstation.machines}
+        self._ahead = set(driven) - set(live)
+        """Whose future is known: past their newest sample nothing will be said."""
         self._unread = coasting  # what a file says was looked at when it was read
         self._references = {
             m.name: Reference(m.home, largest_speed(m), coast=driven[m.name] if m.name in coasting else 0.0)
@@ -184,6 +186,7 @@ class Engine:
             for found in following.until((self._tick + 1) * self._period):
                 self._references[name].take(found.t, found.q, None, anew=found.anew and self._tick > 0)
                 hearing.follow(found)
+                hearing.leaves_at = self._references[name].leaves_at if name in self._ahead else 0.0
 
     def _silent(self, name: str) -> bool:
         """Whether what drives it was silent: of a live source only the newest sample is ever this old."""
@@ -205,6 +208,7 @@ class Engine:
             jump = f"its samples jump at {t:.3f} s" if self._references[name].jumped else ""
             hearing.heard.append((t, reason or jump))
             hearing.torques.append(torques)
+            hearing.leaves_at = self._references[name].leaves_at if name in self._ahead else 0.0
 
     def _following(self, name: str) -> Following:
         """What captured motion of a person goes through.

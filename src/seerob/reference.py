@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.kernels.pull import along
+from seerob.kernels.pull import SLACK, along
 from seerob.transforms import Array
 
 Knots = tuple[Array, Array, Array, NDArray[np.bool_]]
@@ -67,6 +67,11 @@ class Reference:
     def newest(self) -> Array:
         """Position of the newest sample, or the home position, shape (n,) [rad or m]."""
         return self._points[-1]
+
+    @property
+    def leaves_at(self) -> float:
+        """Largest speed of a joint at the newest sample [rad/s or m/s]; 0 before the first."""
+        return float(np.abs(self._velocities[-1]).max(initial=0.0))
 
     @property
     def until(self) -> float:
@@ -133,7 +138,7 @@ class Reference:
 
     def lands(self, t: float) -> bool:
         """Whether a jump ended by ``t`` [s]; told once."""
-        due = [jump for jump in self._landings if jump <= t]
+        due = [jump for jump in self._landings if jump <= t + SLACK]
         del self._landings[: len(due)]
         return bool(due)
 

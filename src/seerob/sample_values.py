@@ -7,11 +7,9 @@ import math
 import numpy as np
 
 from seerob.model import Mechanism
-from seerob.samples import JointSample, PoseSample
+from seerob.samples import LARGEST_SPEED, JointSample, PoseSample
 from seerob.transforms import Array
 
-LARGEST_SPEED = {"rad": 30.0, "m": 10.0}
-"""Above it two samples are a jump [rad/s or m/s]: no arm and no person at work moves like that."""
 LARGEST = 1e6
 """No position and no speed is larger [rad or m, per second]."""
 BEYOND = 0.1

@@ -13,6 +13,9 @@ from msgspec import Struct, field
 Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
 
+LARGEST_SPEED = {"rad": 30.0, "m": 10.0}
+"""Above it two samples are a jump [rad/s or m/s]: no arm and no person at work moves like that."""
+
 
 class Quality(StrEnum):
     """How good a sample is, as its source says, or as this machine heard it."""

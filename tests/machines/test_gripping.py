@@ -287,7 +287,8 @@ def test_without_a_run_nobody_knows_what_a_robot_weighs_that_picks_things_up(tmp
 def test_nor_while_its_gripper_is_silent(tmp_path):
     station = weighed(tmp_path)
     engine, judge = Engine(station.model, driven={"arm": 0.5, "hand": 0.05}), Judge(station.bound)
-    engine.take([heard("arm", 0.0, (0.3, 1.2), (0.1, 0.2)), heard("hand", 0.0, (0.04,), (0.0,))])
+    engine.take([heard("arm", 0.4 * k, (0.3 + 0.04 * k, 1.2 + 0.08 * k), (0.1, 0.2)) for k in range(2)])
+    engine.take([heard("hand", 0.0, (0.04,), (0.0,))])
     known = judge(engine.start())
     for _ in range(8):
         state = engine.tick()

@@ -4,8 +4,14 @@ from msgspec.structs import replace
 
 from seerob.errors import InputError
 from seerob.source import Target
-from seerob.trajectories.checks import Beyond, limit_check, sampling_findings, velocity_check
-from seerob.trajectories.trajectory import Trajectory
+from seerob.trajectories.checks import (
+    Beyond,
+    larger_velocities,
+    limit_check,
+    sampling_findings,
+    velocity_check,
+)
+from seerob.trajectories.trajectory import Trajectory, derive_velocities
 
 TARGET = Target(
     name="ur10",
@@ -125,6 +131,20 @@ def test_noise_quantisation_and_coarse_sampling_are_not_mistakes(period):
     qd = np.column_stack([np.cos(t), np.zeros_like(t)])
     noisy = np.round(q + rng.normal(0, 2e-5, q.shape), 6)
     assert velocity_check(made(noisy, np.round(qd + rng.normal(0, 1e-3, qd.shape), 6), t), TARGET) == ()
+
+
+@pytest.mark.parametrize("factor", [0.9, 0.97, 1.1])
+def test_columns_that_are_a_little_off_are_said_and_the_faster_of_both_counts(factor):
+    motion = made(qd=factor * QD)
+    derived = derive_velocities(motion.t, motion.q).qd
+    qd, findings = larger_velocities(motion, TARGET, derived)
+    assert [f"{factor - 1:+.1%}" in f.text for f in findings] == [True] * len(findings)
+    assert findings
+    np.testing.assert_array_equal(np.abs(qd) >= np.abs(motion.qd), True)
+    assert np.abs(qd).max() == pytest.approx(max(1.0, factor) * np.abs(QD).max(), rel=1e-3)
+    right, none = larger_velocities(made(qd=QD), TARGET, derived)
+    assert none == ()
+    np.testing.assert_array_equal(right, QD)
 
 
 def test_gaps_beyond_the_timeout_and_odd_sampling_are_said():

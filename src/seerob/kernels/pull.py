@@ -14,6 +14,9 @@ from seerob.transforms import Array
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 
+SLACK = 1e-9
+"""Instants that differ by less are the same [s]: a source's clock and the run's are sums of decimals."""
+
 _ROW, _ROWS = "f8[::1]", "f8[:,::1]"
 
 
@@ -51,7 +54,7 @@ def along(
     n = points.shape[1]
     for row in range(len(t)):
         k = -1
-        while k < last and instants[k + 1] <= t[row]:
+        while k < last and instants[k + 1] <= t[row] + SLACK:
             k += 1
         if k < 0 or (k < last and jumps[k + 1]):
             for i in range(n):
@@ -59,7 +62,7 @@ def along(
             continue
         after = t[row] - instants[k]
         if k == last:
-            moving = after == 0 or after < coast
+            moving = after <= coast + SLACK
             for i in range(n):
                 q[row, i] = points[k, i] + min(after, coast) * speeds[k, i]
                 v[row, i] = speeds[k, i] if moving else 0.0

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.errors import InputError
-from seerob.samples import JointSample, Quality
+from seerob.kernels.pull import SLACK
+from seerob.samples import LARGEST_SPEED, JointSample, Quality
 from seerob.trajectories.trajectory import derive_velocities
 from seerob.transforms import Array
 
@@ -62,7 +63,12 @@ class GivenMotion:
             raise InputError.at("motion", name, what, "give two samples or more, in the order of time")
         q = np.array([s.q for s in samples], float)
         derived = any(s.qd is None for s in samples)
-        qd = derive_velocities(t, q).qd if derived else np.array([s.qd for s in samples], float)
+        known = np.array([s.quality is not Quality.INVALID for s in samples])
+        qd = (
+            derive_velocities(t, q, largest=max(LARGEST_SPEED.values()), known=known).qd
+            if derived
+            else np.array([s.qd for s in samples], float)
+        )
         if not (np.isfinite(q).all() and np.isfinite(qd).all() and np.isfinite(t).all()):
             raise InputError.at("motion", name, "a value that is not finite", "correct the source")
         good = np.array([s.quality is Quality.GOOD for s in samples])
@@ -92,7 +98,7 @@ class GivenMotion:
         t = np.asarray(t, float)
         k = self.interval(t)
         T = np.diff(self.t)[k][:, None]
-        inside = (t >= self.t[0]) & (t <= self.t[-1])
+        inside = (t >= self.t[0] - SLACK) & (t <= self.t[-1] + SLACK)
         x = np.clip((t[:, None] - self.t[k][:, None]) / T, 0.0, 1.0)
         p0, p1, p2, p3 = self.powers()[:, k]
         q = p0 + x * (p1 + x * (p2 + x * p3))

@@ -5,15 +5,18 @@ from __future__ import annotations
 from enum import StrEnum
 from pathlib import Path
 
+import numpy as np
+
 from seerob.errors import InputError
+from seerob.samples import LARGEST_SPEED
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
 from seerob.trajectories.checks import (
     Beyond,
     joint_count_check,
+    larger_velocities,
     limit_check,
     sampling_findings,
-    velocity_check,
 )
 from seerob.trajectories.trajectory import (
     MotionOrigin,
@@ -87,9 +90,14 @@ class TrajectoryFile(Source, frozen=True, kw_only=True):
         )
 
     def _velocities(self, trajectory: Trajectory, target: Target) -> tuple[Array, tuple[Finding, ...]]:
+        derived = derive_velocities(
+            trajectory.t,
+            trajectory.q,
+            largest=np.array([LARGEST_SPEED[unit] for unit in target.units]),
+            known=None if trajectory.invalid is None else ~trajectory.invalid,
+        )
         if trajectory.qd is not None and self.velocities is Velocities.GIVEN:
-            return trajectory.qd, velocity_check(trajectory, target)
-        derived = derive_velocities(trajectory.t, trajectory.q)
+            return larger_velocities(trajectory, target, derived.qd)
         why = "on request" if trajectory.qd is not None else "the file gives none"
         size = "too few samples to estimate their error"
         if derived.error is not None:

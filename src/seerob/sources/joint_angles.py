@@ -17,9 +17,10 @@ from seerob.model_io.description import Description
 from seerob.motion_io import joint_angles
 from seerob.motion_io.frame_arrays import LATEST, SHORTEST, about
 from seerob.motion_io.joint_angles import JointAngles
-from seerob.samples import JointSample, Quality
+from seerob.samples import LARGEST_SPEED, JointSample, Quality
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
+from seerob.trajectories.trajectory import derive_velocities
 from seerob.transforms import Array
 
 STORAGES = (".mot", ".sto")
@@ -87,7 +88,8 @@ class JointAngleFile(Source, frozen=True, kw_only=True):
         found, left_out = _usable(found, self.file)
         q, degraded, limits = _within(found.q, target, self.file)
         q = self._placed(q, found, target.description)
-        qd = np.gradient(q, found.t, axis=0)
+        largest = np.array([LARGEST_SPEED[unit] for unit in target.units])
+        qd = derive_velocities(found.t, q, largest=largest).qd
         t = found.t - found.t[0]
         return Opened(
             samples=_Samples(t, q, qd, degraded, self.name or f"joint_angles {self.human}", target.name),

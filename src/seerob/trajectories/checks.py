@@ -28,6 +28,9 @@ MOVES = {"rad": 0.02, "m": 0.002}
 
 RESTS = 0.05
 """Angles that stay below it say nothing of their unit: the robot rests at its zero [as stated]."""
+OFF = 0.02
+"""Velocity columns that differ from the positions by a larger share disagree with them: of samples close
+enough to tell a motion, differences alone are off by less than 1 %."""
 STARTS = 5e-4
 """A first instant nearer to 0 is 0 [s]."""
 
@@ -189,6 +192,27 @@ def _wrapped(trajectory: Trajectory, slopes: Array, j: int) -> Problem | None:
     return Problem(trajectory.file, trajectory.place(i), what, "export continuous joint angles")
 
 
+def larger_velocities(
+    trajectory: Trajectory, target: Target, derived: Array
+) -> tuple[Array, tuple[Finding, ...]]:
+    """The velocity columns after their check; of joints whose columns disagree, at each row the faster.
+
+    Args:
+        trajectory: With velocity columns.
+        target: The robot it is to drive.
+        derived: Velocities from its positions [rad/s or m/s], shape (n, dof).
+
+    Raises:
+        InputError: See `velocity_check`.
+    """
+    assert trajectory.qd is not None
+    found = _compared(trajectory, target)
+    qd = trajectory.qd.copy()
+    for j in found:
+        qd[:, j] = np.where(np.abs(derived[:, j]) > np.abs(qd[:, j]), derived[:, j], qd[:, j])
+    return qd, tuple(finding for each in found.values() for finding in each)
+
+
 def velocity_check(trajectory: Trajectory, target: Target) -> tuple[Finding, ...]:
     r"""Whether the velocity columns are the derivative of the position columns.
 
@@ -197,20 +221,32 @@ def velocity_check(trajectory: Trajectory, target: Target) -> tuple[Finding, ...
     :math:`\pi/180` when velocities are in deg/s and positions in rad, and so on.
 
     Returns:
-        Warnings where single intervals disagree by more than a tenth of the largest speed.
+        Warnings where the columns are off by more than `OFF`, and where single intervals disagree by more
+        than a tenth of the largest speed.
 
     Raises:
         InputError: The columns differ by a factor, a sign or altogether; a velocity column that is
             too small would flatter every result.
     """
+    return tuple(finding for each in _compared(trajectory, target).values() for finding in each)
+
+
+def _compared(trajectory: Trajectory, target: Target) -> dict[int, list[Finding]]:
+    """Joints whose velocity columns are not quite the derivative of their positions, and what is off."""
     judged = _judged(trajectory)
     if trajectory.qd is None or judged.sum() < 2:
-        return ()
+        return {}
     slopes = _slopes(trajectory)
     pairs = judged[1:] & judged[:-1]
     h = np.where(pairs, np.diff(trajectory.t), 0.0)
     means = np.where(pairs[:, None], trajectory.qd[1:] + trajectory.qd[:-1], 0.0) / 2
-    problems, findings = [], []
+    problems: list[Problem] = []
+    found: dict[int, list[Finding]] = {}
+
+    def say(j: int, text: str) -> None:
+        text = f"velocity of {target.joints[j]!r} in the file {text}; the faster of both counts"
+        found.setdefault(j, []).append(Finding(level="warning", subject=target.name, text=text))
+
     for j, joint in enumerate(target.joints):
         q, unit = trajectory.q[judged, j], target.units[j]
         s, v, w = slopes[:, j], means[:, j], h**2
@@ -222,18 +258,17 @@ def velocity_check(trajectory: Trajectory, target: Target) -> tuple[Finding, ...
             remedy = 'correct the unit or the columns, or set velocities = "derive" to use the positions'
             problems.append(Problem(trajectory.file, f"velocity of {joint!r}", reason, remedy))
             continue
+        if abs(cross / power_v - 1) > OFF:
+            say(j, f"is {power_v / cross - 1:+.1%} off what positions move at")
         gap = np.abs(s - v)
         worst = int(np.argmax(gap))
         # The median is the noise of positions; a peak far above it is a disagreement.
         if gap[worst] > 0.1 * max(np.abs(s).max(), np.abs(v).max()) + 5 * float(np.median(gap)):
-            text = (
-                f"velocity of {joint!r} in the file is {_shown(v[worst], unit + '/s')} at "
-                f"{trajectory.instant(worst):.3f} s where positions move at {_shown(s[worst], unit + '/s')}"
-            )
-            findings.append(Finding(level="warning", subject=target.name, text=text))
+            here, there = _shown(v[worst], unit + "/s"), _shown(s[worst], unit + "/s")
+            say(j, f"is {here} at {trajectory.instant(worst):.3f} s where positions move at {there}")
     if problems:
         raise InputError(problems)
-    return tuple(findings)
+    return found
 
 
 def _disagreement(power_s: float, power_v: float, cross: float) -> str:

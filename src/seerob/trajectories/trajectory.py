@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -210,8 +211,17 @@ class Derived:
     """Largest estimated error [rad/s or m/s]; None when there are too few samples to tell."""
 
 
-def derive_velocities(t: Array, q: Array) -> Derived:
+def derive_velocities(
+    t: Array,
+    q: Array,
+    *,
+    largest: Array | float = np.inf,
+    known: NDArray[np.bool_] | None = None,
+) -> Derived:
     r"""Second-order central differences, one-sided at the ends, for any spacing.
+
+    Nothing is differentiated across a jump or a row that is not known: there a motion ends and another
+    begins. A row between two of them has no velocity, and gets 0.
 
     The error is Richardson's estimate :math:`|\dot q_h - \dot q_{2h}| / 3` where every other sample
     is left out; noise in the positions raises it, as it should.
@@ -219,16 +229,23 @@ def derive_velocities(t: Array, q: Array) -> Derived:
     Args:
         t: Instants [s], shape (n,), strictly increasing, n >= 2.
         q: Positions [rad or m], shape (n, dof).
+        largest: Above it two rows are a jump [rad/s or m/s], shape (dof,) or one for all.
+        known: Whether each row says where it is, shape (n,); all do when not given.
     """
-    if len(t) > 2:
-        qd = np.asarray(np.gradient(q, t, axis=0, edge_order=2))
-    else:
-        qd = np.asarray(np.gradient(q, t, axis=0))
-    if len(t) < 7:
-        return Derived(qd, None)
-    coarse = np.gradient(q[::2], t[::2], axis=0, edge_order=2)
-    # The ends are one-sided there; the estimate holds inside.
-    return Derived(qd, float(np.abs(coarse - qd[::2])[1:-1].max()) / 3)
+    known = np.ones(len(t), bool) if known is None else known
+    slopes = np.abs(np.diff(q, axis=0)) / np.diff(t)[:, None]
+    apart = (slopes > largest).any(axis=1) | ~known[1:] | ~known[:-1]
+    starts = np.concatenate([[0], np.flatnonzero(apart) + 1, [len(t)]])
+    qd, errors = np.zeros_like(q, dtype=float), []
+    for a, b in pairwise(starts.tolist()):
+        if b - a < 2:
+            continue
+        qd[a:b] = np.gradient(q[a:b], t[a:b], axis=0, edge_order=2 if b - a > 2 else 1)
+        if b - a >= 7:
+            coarse = np.gradient(q[a:b:2], t[a:b:2], axis=0, edge_order=2)
+            # The ends are one-sided there; the estimate holds inside.
+            errors.append(float(np.abs(coarse - qd[a:b:2])[1:-1].max()) / 3)
+    return Derived(qd, max(errors, default=None))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,11 +10,13 @@ import numpy as np
 
 from seerob.human.estimated import estimated
 from seerob.human.following import Followed, PartDoubt
+from seerob.kernels.pull import SLACK as SLACK  # noqa: PLC0414
 from seerob.transforms import Array
 
 Told = TypeVar("Told")
-SLACK = 1e-9
-"""Instants that differ by less are the same [s]: a source's clock and the run's are sums of decimals."""
+STANDS = 1e-2
+"""Speed below which a motion that ends has stopped [rad/s or m/s]: noise of encoders makes standing robots
+as fast, and within the time-out nothing gets farther than some millimetres."""
 
 
 @dataclass
@@ -53,6 +55,8 @@ class Hearing:
     """When the physics last lost it, so that it was put back [s]."""
     saturated: bool = False
     """A joint's torque limit was reached: the twin cannot do what was heard."""
+    leaves_at: float = 0.0
+    """Of a source that is known ahead: largest speed of a joint at its newest sample [rad/s or m/s]."""
     coarse: str = ""
     """Why what is heard is too coarse for energies and forces; empty when it is not."""
 
@@ -86,9 +90,13 @@ class Hearing:
         k = sum(1 for instant, _ in self.heard if instant <= t + SLACK)
         if k == 0:
             return "nothing heard yet"
-        age = t - self.heard[k - 1][0]
+        last = self.heard[k - 1][0]
+        age = t - last
         if age > self.timeout + SLACK:
             return f"not heard for {age:.2f} s (time-out {self.timeout:.3g} s)"
+        if k == len(self.heard) and age > SLACK and self.leaves_at > STANDS:
+            speed = f"{self.leaves_at:.3g} rad/s or m/s"
+            return f"what drives it ends in motion, with {speed} at {last:.3f} s: nobody says that it stopped"
         return next((reason for _, reason in self.heard[k - 1 : k + 1] if reason), "")
 
     def doubted(self, t: float) -> tuple[PartDoubt, ...]:

@@ -1,0 +1,112 @@
+"""Where motions begin and end: nothing stands still because nobody spoke, and a rounding is no end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, heard, made, two_r
+from seerob.engine import Engine
+from seerob.reference import Reference
+from seerob.source import Opened, Pump
+from seerob.trajectories.trajectory import derive_velocities
+
+TICK = 0.01
+PLACED = "engine = { gravity = [0, 0, 0], physics = false }\n"
+WATCHED = '[[safety]]\nkind = "velocity"\nname = "v"\nat = "arm/l1"\noffset = [1, 0, 0]\nlimit = 0.5\n'
+
+
+@pytest.fixture(scope="module")
+def cells(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ends")
+    return {
+        physics: made(folder / str(physics), head + TWO_R + WATCHED, {"arm.urdf": two_r()}).model
+        for physics, head in ((True, FLOATING), (False, PLACED))
+    }
+
+
+def run(model, samples, until, *, live=()):
+    """The states' speeds of the first joint at each tick [rad/s], None where they may not be relied on."""
+    engine = Engine(model, driven={"arm": 0.2}, live=live)
+    pump = Pump(Opened(samples=samples, duration=samples[-1].t))
+    found = []
+    for k in range(round(until / TICK) + 1):
+        engine.take(list(pump.until(k * TICK)))
+        state = engine.tick() if k else engine.start()
+        found.append(None if state.doubt("arm") else float(state.qd(model.robot("arm"))[0]))
+    return found
+
+
+def accelerating(end, rate=100.0, *, speeds=True):
+    """At 2 rad/s² from rest until an instant."""
+    times = np.append(np.arange(0.0, end - 0.5 / rate, 1 / rate), end).tolist()
+    return tuple(heard("arm", t, (t * t, 0.0), (2 * t, 0.0) if speeds else None) for t in times)
+
+
+@pytest.mark.parametrize("physics", [True, False])
+@pytest.mark.parametrize("off", [-1, 0, 1])
+def test_the_last_tick_of_a_log_moves_whatever_its_length_is_rounded_to(cells, physics, off):
+    end = 0.35
+    for _ in range(abs(off)):
+        end = float(np.nextafter(end, np.inf * off))
+    speeds = run(cells[physics], accelerating(end), 0.35)
+    assert speeds[-1] == pytest.approx(0.70, abs=0.02)
+
+
+@pytest.mark.parametrize("period", [0.01, 0.008, 1 / 3, 0.1, 1e-3 * 7])
+def test_no_multiple_of_any_tick_is_past_a_log_that_ends_there(period):
+    """Sums of decimals: k · tick against the last stamp as a file has it, with a few digits."""
+    for k in range(1, 400, 7):
+        for end in (float(f"{k * period:.12g}"), k * period, sum([period] * k)):
+            reference = Reference(np.zeros(1))
+            reference.take(end - period, np.array([0.0]), np.array([1.0]))
+            reference.take(end, np.array([period]), np.array([1.0]))
+            assert reference.at(k * period)[1][0] == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("physics", [True, False])
+@pytest.mark.parametrize("speeds", [True, False])
+def test_a_motion_that_ends_is_not_a_motion_that_stopped(cells, physics, speeds):
+    found = run(cells[physics], accelerating(0.35, speeds=speeds), 0.4)
+    assert found[35] == pytest.approx(0.70, abs=0.02)
+    assert found[36:] == [None] * 5
+
+
+def test_a_motion_that_ends_at_rest_stands_until_its_time_out(cells):
+    times = np.arange(0, 0.3 + 1e-9, 0.01).tolist()
+    rest = tuple(heard("arm", t, (0.5 + 1e-4 * (-1) ** k, 0.0), (0.0, 0.0)) for k, t in enumerate(times))
+    found = run(cells[False], rest, 0.52)
+    assert found[:50] == [0.0] * 50
+    assert found[-1] is None
+
+
+def test_what_is_heard_live_coasts_until_its_time_out(cells):
+    found = run(cells[False], accelerating(0.35), 0.6, live=["arm"])
+    assert found[36:55] == [pytest.approx(0.70)] * 19
+    assert found[-3:] == [None] * 3
+
+
+@pytest.mark.parametrize("cut", [0.05, 0.123, 0.2, 0.35])
+def test_a_log_that_is_cut_never_moves_more_slowly_at_its_last_tick(cells, cut):
+    def motion(end):
+        times = [*np.arange(0.0, end, 0.008).tolist(), end]
+        return tuple(heard("arm", t, (np.sin(3 * t), 0.0), (3 * np.cos(3 * t), 0.0)) for t in times)
+
+    whole, short = (run(cells[False], motion(end), 0.4) for end in (0.4, cut))
+    last = int(cut / TICK + 1e-9)
+    assert short[last] == pytest.approx(whole[last], rel=1e-4)
+    assert short[last + 1 :] == [None] * (40 - last)
+
+
+def test_no_velocity_is_derived_across_a_jump_or_a_row_that_is_not_known():
+    t = np.arange(12) * 0.01
+    q = np.column_stack([t * t, -t])
+    known = np.ones(12, bool)
+    known[8] = False
+    broken = q.copy()
+    broken[4:] += 0.4
+    broken[8] = 17.0
+    found = derive_velocities(t, broken, largest=30.0, known=known).qd
+    right = np.column_stack([2 * t, np.full(12, -1.0)])
+    np.testing.assert_allclose(found[known], right[known], atol=1e-9)
+    np.testing.assert_array_equal(found[8], 0.0)

@@ -219,7 +219,8 @@ class Engine:
         if name not in self._followings:
             human = self.model.human(name)
             at = next(h.at for h in self.model.workstation.humans if h.name == name)
-            self._followings[name] = Following(human.description, pose_matrix(at))
+            timeout = self._hearings[name].timeout
+            self._followings[name] = Following(human.description, pose_matrix(at), timeout)
         return self._followings[name]
 
     def _target(self, sample: JointSample | PoseSample) -> Mechanism:

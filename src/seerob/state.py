@@ -25,7 +25,7 @@ from seerob.model import Frame, Gap, Mechanism, Model
 from seerob.transforms import Array
 from seerob.variables.dictionary import Value
 from seerob.variables.signals import Signals
-from seerob.whereabouts.hearing import SLACK
+from seerob.whereabouts.hearing import SLACK, nobody_says
 from seerob.whereabouts.hearing import Hearing as Hearing  # noqa: PLC0414
 from seerob.whereabouts.seen_bones import bones_of, unseen_reason
 
@@ -128,19 +128,46 @@ class State:
         """
         if reason := self.interrupted(name):
             return reason
-        return "" if name.startswith(VARIABLE) else unseen_reason(name, self.hearings[name].unseen(self.t))
+        if name.startswith(VARIABLE):
+            return ""
+        hearing = self.hearings[name]
+        if reason := unseen_reason(name, hearing.unseen(self.t)):
+            return reason
+        reason = nobody_says(hearing.unplaced(self.t))
+        return f"{name}: {reason}" if reason else ""
 
     def interrupted(self, name: str) -> str:
         """The same without what no device ever saw: why an answer of a moment ago may not hold any more."""
         if name.startswith(VARIABLE):
             return self.signals.at(name.removeprefix(VARIABLE), self.t).doubt
-        parts = self.hearings[name].doubted(self.t)
-        return self.whole_doubt(name) or (f"{name}: {parts[0][0]}" if parts else "")
+        if reason := self.whole_doubt(name):
+            return reason
+        hearing = self.hearings[name]
+        parts = hearing.doubted(self.t)
+        reason = parts[0][0] if parts else hearing.displaced(self.t)
+        return f"{name}: {reason}" if reason else ""
 
     def bones_in_doubt(self, name: str) -> tuple[str, ...]:
         """Bones of a person that may not be where the twin shows them, when the others are.
 
-        What is in doubt, and what no device sees and its neighbours do not tell.
+        What is turned in doubt, and what nobody says the place of.
+
+        Raises:
+            Undecided: Nothing of the person may be relied on.
+        """
+        turned = self.bones_turned_in_doubt(name)
+        key = ("bones in doubt", name)
+        if key not in self._cache:
+            unplaced = self.hearings[name].unplaced(self.t)
+            self._cache[key] = tuple(dict.fromkeys((*turned, *unplaced))) if unplaced else turned
+        bones: tuple[str, ...] = self._cache[key]
+        return bones
+
+    def bones_turned_in_doubt(self, name: str) -> tuple[str, ...]:
+        """Bones of a person that may not be turned as the twin shows them, when the others are.
+
+        What is in doubt, and what no device sees and its neighbours do not tell: enough for whoever asks
+        for angles between bones, and not where they are.
 
         Raises:
             Undecided: Nothing of the person may be relied on.
@@ -148,7 +175,7 @@ class State:
         self.asked.add(name)
         if reason := self.whole_doubt(name):
             raise Undecided(reason)
-        key = ("bones in doubt", name)
+        key = ("bones turned in doubt", name)
         if key not in self._cache:
             hearing = self.hearings[name]
             doubted = (bone for _, bones in hearing.doubted(self.t) for bone in bones)

@@ -77,13 +77,14 @@ def test_a_hand_that_jumps_is_left_out_and_named():
     assert max(e[0] for _, _, bones, *_ in told for e in bones.values() if e[0] is not None) < 0.1
 
 
-def test_a_bone_that_is_lost_counts_for_the_hold_time_and_not_longer():
+@pytest.mark.parametrize(("hold", "counts"), [(0.1, 0.1), (0.4, 0.2)])
+def test_a_bone_that_is_lost_counts_for_the_hold_time_and_the_time_out_and_not_longer(hold, counts):
     frames = frames_of(*walking(), turned=False)
     for frame in frames[30:75]:
         frame.positions[HAND] = np.nan
-    told = play(source(captured(frames), hold=0.4))
+    told = play(source(captured(frames), hold=hold))
     lost = [t for t, doubt, *_ in told if "not seen any more: right_hand" in doubt]
-    assert min(lost) == pytest.approx(29 / 60 + 0.4, abs=0.03)
+    assert min(lost) == pytest.approx(29 / 60 + counts, abs=0.03)
     assert max(lost) == pytest.approx(75 / 60, abs=0.03)
     assert "right_hand" not in told[60][2]
 

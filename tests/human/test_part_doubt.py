@@ -58,9 +58,9 @@ def test_all_of_it_comes_back():
     blind(frames, ARM)
     for frame, positions in zip(frames[60:], seen[60:], strict=True):
         frame.positions[:] = positions
-    told = play(source(captured(frames), hold=0.3))
+    told = play(source(captured(frames), hold=0.18))
     lost = [t for t, doubt, *_ in told if doubt]
-    assert 19 / 60 + 0.27 < min(lost) < 19 / 60 + 0.35
+    assert 19 / 60 + 0.15 < min(lost) < 19 / 60 + 0.23
     # The arm swings back into the place where it is seen again.
     assert max(lost) < 1.2
     assert max(speed for *_, speed, _ in told) < 15.0

@@ -43,6 +43,31 @@ def _estimated(seen: frozenset[str], bare: frozenset[str]) -> tuple[str, ...]:
     return tuple(bone for bone in BONES if bone not in known or bone in bare)
 
 
+def located(directed: Collection[str], placed: Collection[str]) -> frozenset[str]:
+    """Bones of which it is told where they begin, by the places of some and by where the bones between point.
+
+    A bone begins at the end of the one before it. So a place goes on over every bone of which it is known
+    where it points, and no further: a suit that tells how all bones are turned, and no place, tells of
+    nobody where he stands.
+
+    Args:
+        directed: Bones that are seen or told by the bones beside them.
+        placed: Bones of which a place is seen.
+    """
+    return _located(frozenset(directed), frozenset(placed))
+
+
+@lru_cache(maxsize=256)
+def _located(directed: frozenset[str], placed: frozenset[str]) -> frozenset[str]:
+    found, before = set(placed), -1
+    while len(found) != before:
+        before = len(found)
+        for bone, parent in PARENTS.items():
+            if parent in directed and (bone in found or parent in found):
+                found |= {bone, parent}
+    return frozenset(found)
+
+
 LIMBS = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot", "toes", "head")
 """Bones at whose beginning the bone before them ends: without the one, the direction of the other is open."""
 

@@ -22,10 +22,10 @@ from msgspec import structs
 
 from seerob.human.chosen_points import between
 from seerob.human.ends import ENDS, Turn, aimed, bare, swing, turned, untold
-from seerob.human.estimated import in_doubt_with
+from seerob.human.estimated import estimated, in_doubt_with, located
 from seerob.human.fitting import Fitter, Pulls, pulls
 from seerob.human.handover import Handover
-from seerob.human.skeleton import AXES, BONES
+from seerob.human.skeleton import AXES, BONES, without_side
 from seerob.human.smoothing import HIGHEST, LOWEST, POINT_SLACK, POINT_SPEED, Smoother
 from seerob.model_io.description import Description, JointKind
 from seerob.samples import BodyPoint, BodySample, Quality, Vec3
@@ -48,6 +48,11 @@ SLACK = 1e-9
 """Instants that differ by less are the same [s]."""
 MANY = 0.3
 """Share of a device's points that jump at once, beyond which none of them is believed."""
+HELD_SPEED = 2.0
+"""What is held may have moved so fast meanwhile [m/s]: a reaching hand, K of ISO 13855:2010, 6.2 (2+)."""
+SWUNG_SPEED = 5.0
+"""The same of legs [m/s]: the foot of somebody who walks swings at up to 4 to 5 m/s (M)."""
+LEGS = ("thigh", "shank", "foot", "toes")
 ELSEWHERE = 0.1
 """Whoever was not seen for a while and is farther from before [rad or m] is put there, not pulled."""
 
@@ -82,6 +87,13 @@ class Followed:
     the twin's is turned and how the person's may be [rad]."""
     untold: frozenset[tuple[str, int]] = frozenset()
     """Angles of the posture that nothing tells, with their side; see `seerob.human.ends.untold`."""
+    unplaced: frozenset[str] = frozenset()
+    """Bones that point as they are seen, or as the bones beside them tell, and nobody says where they are."""
+    displaced: frozenset[str] = frozenset()
+    """Those of them of which a place was seen before, or all when nobody says where anything is."""
+    slack: Mapping[str, float] = field(default_factory=dict)
+    """Bone → how much farther a point of it may be than the newest of what is seen shows [m]: what is held
+    may have moved, and another device may see it elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -124,13 +136,17 @@ class _Device:
 class Following:
     """One person and all devices that see it."""
 
-    def __init__(self, description: Description, world_from_root: Array) -> None:
+    def __init__(self, description: Description, world_from_root: Array, timeout: float = np.inf) -> None:
         """Know the person.
 
         Args:
             description: Of `seerob.human.manikin.build`.
             world_from_root: Where its root stands, (4, 4).
+            timeout: Age from which on nothing that was seen of the person may be relied on [s], whatever
+                the devices' hold.
         """
+        self._timeout = timeout
+        self._placed_before: set[str] = set()
         self._fitter = Fitter(description)
         self._root_from_world = inverse(world_from_root)
         self._speed = np.array([SPEED["m" if a.kind is JointKind.PRISMATIC else "rad"] for a in AXES])
@@ -212,14 +228,27 @@ class Following:
         if elsewhere:
             reasons.append("appeared elsewhere")
         observed = self._seen(t, lambda device: device.observed)
+        placed = self._seen(t, lambda device: device.placed)
         turns = self._seen(t, lambda device: device.turned)
-        open_ends = ENDS & observed - aimed(turns)
+        open_ends = ENDS & observed.keys() - aimed(turns)
         unaimed = {bone: swing(bone, q, self._fitter.lower, self._fitter.upper) for bone in open_ends}
         reason = "; ".join(reasons[:4])
-        bones = bare(observed, self._seen(t, lambda device: device.placed), turns)
+        bones = bare(observed, placed, turns)
+        ages = _told_ages(observed, placed, turns)
+        unplaced = frozenset(BONES).difference(ages, estimated(observed, bones))
+        displaced = unplaced & self._placed_before if ages else unplaced
+        self._placed_before |= placed.keys()
+        apart = self._apart(told, t, q)
+        parts += [(f"devices see it {far:.2f} m apart: {bone}", (bone,)) for bone, far in apart if far > FAR]
+        slack = {bone: held_speed(bone) * age for bone, age in ages.items() if age > SLACK}
+        for bone, far in apart:
+            slack[bone] = max(far, slack.get(bone, 0.0))
         # Wherever the twin waited, nobody knows how a person who is seen for the first time came.
         anew = last is None or elsewhere
-        return Followed(t, q, reason, tuple(parts), anew, found, observed, bones, unaimed, untold(turns))
+        return Followed(
+            t, q, reason, tuple(parts), anew, found, frozenset(observed), bones, unaimed, untold(turns),
+            unplaced, displaced, slack,
+        )  # fmt: skip
 
     def _eased(self, found: Pulls, before: Array | None, t: float) -> Pulls:
         """What is seen, without a jump where another device has taken over."""
@@ -282,15 +311,29 @@ class Following:
             return _Told([], "; ".join(filter(None, (reason, why))), jumped=True)
         return _Told(out, reason, (why, tuple(dict.fromkeys(jumped.values()))), jumped=True)
 
-    def _seen(self, t: float, what: Callable[[_Device], dict[K, float]]) -> frozenset[K]:
-        """Bones, or turns of bones, of which some device sees something, each within its hold time."""
-        return frozenset(
-            bone
-            for device in self._devices.values()
-            if device.samples
-            for bone, seen in what(device).items()
-            if t - seen <= device.samples[-1].hold
-        )
+    def _hold(self, device: _Device) -> float:
+        """Age from which on what a device saw does not count [s]."""
+        return min(device.samples[-1].hold, self._timeout) + SLACK
+
+    def _seen(self, t: float, what: Callable[[_Device], dict[K, float]]) -> dict[K, float]:
+        """Bones, or turns of bones, of which some device sees something, each with its age [s]."""
+        found: dict[K, float] = {}
+        for device in self._devices.values():
+            hold = self._hold(device) if device.samples else -1.0
+            for bone, seen in what(device).items():
+                if t - seen <= min(hold, found.get(bone, hold)):
+                    found[bone] = max(t - seen, 0.0)
+        return found
+
+    def _apart(self, told: Sequence[_Told], t: float, q: Array) -> list[tuple[str, float]]:
+        """Bones that several devices see, and how far from the posture ``q`` one of them sees it [m]."""
+        if sum(bool(each.points) for each in told) < 2:
+            return []
+        every = pulls([point for each in told for point in each.points], self._root_from_world)
+        names = [{BONES.index(p.bone) for p in each.points if p.position is not None} for each in told]
+        twice = {bone for k, own in enumerate(names) for bone in own if any(bone in n for n in names[:k])}
+        found = self._fitter.errors(every, q)
+        return [(BONES[bone], found[BONES[bone]][0] or 0.0) for bone in twice if BONES[bone] in found]
 
     def _lost(self, t: float) -> list[PartDoubt]:
         """Bones that a device has and that nobody has seen for too long."""
@@ -298,7 +341,7 @@ class Following:
         for device in self._devices.values():
             if not device.samples:
                 continue
-            hold = device.samples[-1].hold
+            hold = self._hold(device)
             for bone, seen in device.seen.items():
                 before = newest.get(bone, (-np.inf, hold))
                 newest[bone] = max(seen, before[0]), max(hold, before[1])
@@ -330,6 +373,28 @@ class Following:
         if here.seen.same(after.seen):
             return self._fitter.errors(here.seen.toward(after.seen, share), q)
         return self._fitter.errors(here.seen if share < 0.5 else after.seen, q)
+
+
+def held_speed(bone: str) -> float:
+    """How fast a bone that is not seen just now may move [m/s]."""
+    return SWUNG_SPEED if without_side(bone) in LEGS else HELD_SPEED
+
+
+def _told_ages(
+    observed: Mapping[str, float], placed: Mapping[str, float], turns: Mapping[Turn, float]
+) -> dict[str, float]:
+    """Bones of which it is told where they are, each with the age of the oldest that it takes [s]."""
+    found: dict[str, float] = {}
+    ends: dict[str, float] = {}
+    for age in sorted({*observed.values(), *placed.values(), *turns.values()}):
+        seen, places = ({bone for bone, own in each.items() if own <= age} for each in (observed, placed))
+        ways = {turn for turn, own in turns.items() if own <= age}
+        directed = frozenset(BONES).difference(estimated(seen, bare(seen, places, ways)))
+        for bone in located(directed, places):
+            found.setdefault(bone, age)
+        for bone in aimed(ways):
+            ends.setdefault(bone, age)
+    return {bone: max(age, ends.get(bone, 0.0)) for bone, age in found.items()}
 
 
 def _with_others(bones: Sequence[str], seen: Collection[str]) -> tuple[str, ...]:

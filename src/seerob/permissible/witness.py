@@ -14,6 +14,7 @@ from seerob.snapshot import Result
 from seerob.state import Hearing, State
 from seerob.transforms import Array
 from seerob.variables.dictionary import Value
+from seerob.whereabouts.hearing import Places
 
 
 class Seen(NamedTuple):
@@ -22,6 +23,8 @@ class Seen(NamedTuple):
     bones: dict[str, tuple[float | None, float | None]]
     unaimed: Mapping[str, float]
     """Hands, feet and heads of which only the joint was seen, each with a bound [rad]."""
+    slack: Mapping[str, float]
+    """Bones that are held or seen elsewhere, too, each with how much farther they may be [m]."""
 
 
 class Witness:
@@ -49,7 +52,8 @@ class Witness:
         asked = {c.active for c in state.model.workstation.safety if c.active is not None}
         self._heard.append({name: _heard(state, name) for name in asked})
         people = {name: h for name, h in state.hearings.items() if h.bones}
-        self._seen.append({name: Seen(dict(h.bones), h.unaimed(state.t)) for name, h in people.items()})
+        t = state.t
+        self._seen.append({name: Seen(dict(h.bones), h.unaimed(t), h.slack(t)) for name, h in people.items()})
         return self._judge(state)
 
     def _tick(self, t: float) -> int:
@@ -116,8 +120,9 @@ class Posed(State):
         self.doubts = {**doubts, robot.name: own_doubt}
         self._said, seen = self._witness.heard(others_at)
         for name, hearing in self.hearings.items():
-            hearing.bones, unaimed = seen.get(name, Seen({}, {}))
+            hearing.bones, unaimed, slack = seen.get(name, Seen({}, {}, {}))
             hearing.aims = [(t, unaimed)]
+            hearing.places = [(t, Places(frozenset(), frozenset(), slack))]
         self.asked.clear()
         self.refresh(t)
 

@@ -50,7 +50,7 @@ def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> C
     def read(state: State) -> Angles:
         hearing = state.hearings[human.name]
         # How a hand is turned of which only the wrist is seen is a guess, too.
-        doubted = (*state.bones_in_doubt(human.name), *hearing.unaimed(state.t))
+        doubted = (*state.bones_turned_in_doubt(human.name), *hearing.unaimed(state.t))
         found = angles(state.rotations[rows], state.positions[rows])
         # What devices see changes with time: of a leg that nobody sees no score is made.
         lost = (*unmeasured, *doubted) if doubted else unmeasured

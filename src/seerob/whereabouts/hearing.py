@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from seerob.human.estimated import estimated
 from seerob.human.following import Followed, PartDoubt
+<<<<<<< HEAD
 from seerob.kernels.pull import SLACK as SLACK  # noqa: PLC0414
+=======
+from seerob.human.skeleton import BONES
+>>>>>>> 85e3f92 (Where a person stands has an age of its own; what is held or seen apart widens distances)
 from seerob.transforms import Array
 
 Told = TypeVar("Told")
 STANDS = 1e-2
 """Speed below which a motion that ends has stopped [rad/s or m/s]: noise of encoders makes standing robots
 as fast, and within the time-out nothing gets farther than some millimetres."""
+
+
+class Places(NamedTuple):
+    """What devices leave open of where the bones of a person are, however well they see them turned."""
+
+    unplaced: frozenset[str]
+    """Bones of which nobody says where they are."""
+    displaced: frozenset[str]
+    """Those of them of which somebody said it before, or all when nobody says where anything is."""
+    slack: Mapping[str, float]
+    """Bone → how much farther a point of it may be, as it is held or seen elsewhere, too [m]."""
 
 
 @dataclass
@@ -51,6 +66,9 @@ class Hearing:
     untold: list[tuple[float, frozenset[tuple[str, int]]]] = field(default_factory=list)
     """Of a person that devices see: instant [s] and angles of the posture that nothing tells, each with its
     side; oldest first."""
+    places: list[tuple[float, Places]] = field(default_factory=list)
+    """Of a person that devices see: instant [s], and of which bones nobody says where they are; oldest
+    first."""
     lost: float = -np.inf
     """When the physics last lost it, so that it was put back [s]."""
     saturated: bool = False
@@ -68,6 +86,7 @@ class Hearing:
         self.bare.append((found.t, found.bare))
         self.aims.append((found.t, found.unaimed))
         self.untold.append((found.t, found.untold))
+        self.places.append((found.t, Places(found.unplaced, found.displaced, found.slack)))
         self.torques.append(None)
 
     def forget(self, t: float) -> None:
@@ -75,7 +94,7 @@ class Hearing:
         while len(self.heard) > 1 and self.heard[1][0] <= t:
             del self.heard[0]
             del self.torques[:1]
-        for told in (self.parts, self.observed, self.bare, self.aims, self.untold):
+        for told in (self.parts, self.observed, self.bare, self.aims, self.untold, self.places):
             while len(told) > 1 and told[1][0] <= t:
                 del told[0]
 
@@ -113,6 +132,23 @@ class Hearing:
             found |= {bone: max(angle, found.get(bone, 0.0)) for bone, angle in told.items()}
         return found
 
+    def unplaced(self, t: float) -> tuple[str, ...]:
+        """Bones of which it is known how they are turned at ``t`` [s], and nobody says where they are."""
+        found = frozenset[str]().union(*(places.unplaced for places in _around(self.places, t)))
+        return tuple(bone for bone in BONES if bone in found) if found else ()
+
+    def displaced(self, t: float) -> str:
+        """Why nobody may rely any more on where bones are that were placed before; empty when all may."""
+        found = frozenset[str]().union(*(places.displaced for places in _around(self.places, t)))
+        return nobody_says(tuple(bone for bone in BONES if bone in found)) if found else ""
+
+    def slack(self, t: float) -> dict[str, float]:
+        """Bones of which a point may be farther than what is seen shows at ``t`` [s], and by how much [m]."""
+        found: dict[str, float] = {}
+        for places in _around(self.places, t):
+            found |= {bone: max(size, found.get(bone, 0.0)) for bone, size in places.slack.items()}
+        return found
+
     def untold_angles(self, t: float) -> frozenset[tuple[str, int]]:
         """Angles of the posture at ``t`` [s] that nothing tells, each with its side."""
         return frozenset().union(*_around(self.untold, t))
@@ -125,6 +161,13 @@ class Hearing:
         around = _around(self.observed, t)
         bare = frozenset().union(*_around(self.bare, t))
         return estimated(frozenset.intersection(*around), bare) if around else ()
+
+
+def nobody_says(bones: Sequence[str]) -> str:
+    """Why nothing rests on where bones are of which only the directions are known; empty for none."""
+    shown = ", ".join(bones[:6]) + (f" and {len(bones) - 6} more" if len(bones) > 6 else "")
+    which = "the person is" if len(bones) == len(BONES) else f"{shown} {'is' if len(bones) == 1 else 'are'}"
+    return f"no device says where {which}, only how bones are turned" if bones else ""
 
 
 def _around(told: list[tuple[float, Told]], t: float) -> list[Told]:

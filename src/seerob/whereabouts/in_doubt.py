@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from seerob.state import State
+from seerob.whereabouts.hearing import nobody_says
 
 
 def in_doubt(state: State) -> dict[str, str]:
@@ -18,6 +19,8 @@ def in_doubt(state: State) -> dict[str, str]:
         elif reason := state.doubt(name):
             hearing = state.hearings[name]
             found |= {f"{name}/{bone}": "no device sees it" for bone in hearing.unseen(state.t)}
+            unplaced = hearing.unplaced(state.t)
+            found |= {f"{name}/{bone}": nobody_says(unplaced) for bone in unplaced}
             found |= {f"{name}/{bone}": why for why, bones in hearing.doubted(state.t) for bone in bones}
             held = (body.name for body in state.model.bodies if body.mover == name and body.owner != name)
             found |= dict.fromkeys(held, reason)

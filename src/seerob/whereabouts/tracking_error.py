@@ -21,8 +21,9 @@ class TrackingError:
     are from its origin. Of a hand, foot or head of which only the joint is seen, α is not known but bounded
     by φ (`seerob.human.ends`), and the chord :math:`2 ρ \sin(φ/2)` takes its place. What no device sees adds
     what the file accepts (``unseen_uncertainty``), else nothing: how wrong it is nobody knows, and
-    `State.require_bodies` leaves it undecided. A bone between two that are seen adds how far the lengths of
-    bones let its ends be (`seerob.whereabouts.told_bones`).
+    `State.require_bodies` leaves it undecided. What is held because it was not seen just now, or what
+    another device sees elsewhere, adds `Hearing.slack`. A bone between two that are seen adds how far the
+    lengths of bones let its ends be (`seerob.whereabouts.told_bones`).
 
     Args:
         model: The compiled workstation.
@@ -70,8 +71,12 @@ class TrackingError:
             told = self._told(state, person, errors) if errors else {}
             for row, bone, _ in bones if told else ():
                 found[row] = max(found[row], told.get(bone, 0.0))
+            slack = state.hearings[person].slack(state.t) if errors else {}
+            for row, bone, _ in bones if slack else ():
+                found[row] += slack.get(bone, 0.0)
             if person in self._accepted:
-                unseen = state.hearings[person].unseen(state.t)
+                hearing = state.hearings[person]
+                unseen = (*hearing.unseen(state.t), *hearing.unplaced(state.t))
                 for row, bone, _ in bones if unseen else ():
                     found[row] = max(found[row], self._accepted[person] * (bone in unseen))
         return found

@@ -1,0 +1,125 @@
+"""Where a person stands has an age of its own: how all bones are turned does not tell it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_capture import captured, frames_of, source, walking, workstation
+from msgspec.structs import replace
+
+from seerob import run as road
+from seerob.engine import Engine
+from seerob.human.estimated import located
+from seerob.human.following import HELD_SPEED
+from seerob.human.skeleton import BONES
+from seerob.postures.ergonomic_posture import bind_posture
+from seerob.run import Judge
+from seerob.safety.minimum_distance import MinimumDistance
+from seerob.snapshot import Verdict
+from seerob.sources._capture_options import Weights
+from seerob.station import Station
+
+TIMEOUT = 0.2
+POST = {"name": "post", "at": {"position": [1.6, 0.0, 1.0]}, "shape": {"box": [0.1, 1.0, 1.6]}}
+CRITERIA = (
+    MinimumDistance(name="whole", between=("post", "operator"), limit=0.3),
+    MinimumDistance(name="hand", between=("post", "operator/right_hand"), limit=0.3),
+)
+
+
+def watched(*sources, criteria=CRITERIA, person=None, look=None, physics=False):
+    """Tick by tick the results, and what ``look`` finds in the state."""
+    station = workstation(*sources, person=person, parts=[POST], engine={"physics": physics})
+    stage = Station(replace(station, safety=criteria))
+    engine, judge = Engine(stage.model, driven={"operator": TIMEOUT}), Judge(stage.bound)
+    told = []
+    for seq, samples in enumerate(road.pump(stage.sources, 0.01)):
+        engine.take(samples)
+        state = engine.tick() if seq else engine.start()
+        told.append((state.t, judge(state), None if look is None else look(state)))
+    return told
+
+
+def without_places(frames, begin, bones=BONES):
+    for frame in frames[begin:]:
+        frame.positions[[BONES.index(bone) for bone in bones]] = np.nan
+    return frames
+
+
+def posture_of(state):
+    return bind_posture(state.model, "operator")(state)
+
+
+def test_who_walks_on_while_only_directions_are_heard_is_undecided_and_the_posture_is_not():
+    frames = without_places(frames_of(*walking(1.2)), 20)
+    told = watched(source(captured(frames)), look=posture_of)
+    late = [(results, found) for t, results, found in told if t > 19 / 60 + TIMEOUT + 0.01]
+    assert len(late) > 50
+    for results, found in late:
+        assert {r.verdict for r in results} == {Verdict.UNDECIDED}
+        assert "no device says where the person is" in results[0].reason
+        assert np.isfinite(found.trunk_flexion)
+        assert np.isfinite(found.elbow_flexion).all()
+
+
+@pytest.mark.parametrize("physics", [True, False])
+def test_whoever_was_never_placed_is_undecided_at_once_whatever_estimate_the_file_accepts(physics):
+    frames = frames_of(*walking(0.3))
+    suit = source(captured(frames), weights=Weights(position=0.0))
+    told = watched(suit, person={"unseen_uncertainty": 0.3}, physics=physics)
+    assert {r.verdict for _, results, _ in told for r in results} == {Verdict.UNDECIDED}
+
+
+def test_a_hand_that_is_turned_and_no_longer_placed_hangs_on_an_arm_that_is_both():
+    frames = without_places(frames_of(*walking(0.8)), 10, ["right_hand"])
+    told = watched(source(captured(frames)))
+    assert {r.verdict for _, results, _ in told[:60] for r in results} == {Verdict.WITHIN}
+
+
+def test_a_hand_that_is_turned_and_no_longer_placed_is_undecided_where_nobody_sees_the_arm():
+    frames = without_places(frames_of(*walking(0.8)), 10, ["right_hand"])
+    arm = dict.fromkeys(("right_clavicle", "right_upper_arm", "right_forearm"), "")
+    told = watched(source(captured(frames), mapping=arm), person={"unseen_uncertainty": 0.1})
+    hands = [(t, results[1].verdict) for t, results, _ in told]
+    assert {verdict for t, verdict in hands if t < 0.1} == {Verdict.WITHIN}
+    assert {verdict for t, verdict in hands if t > 9 / 60 + TIMEOUT + 0.01} == {Verdict.UNDECIDED}
+
+
+def test_what_is_held_may_have_moved_meanwhile():
+    frames = frames_of(*walking(0.8), turned=False)
+    lost = without_places(frames[:], 30, ["right_hand"])
+    told = watched(source(captured(lost)), criteria=CRITERIA[1:])
+    t, (result,), _ = next(each for each in told if each[0] >= 29 / 60 + 0.1)
+    low, high = result.interval
+    age = (np.ceil(t * 60) - 29) / 60
+    assert high - result.value >= HELD_SPEED * age - 1e-6
+    assert result.value - low >= HELD_SPEED * age - 1e-6
+
+
+def test_places_go_on_over_bones_of_which_it_is_known_where_they_point():
+    assert located(BONES, ()) == frozenset()
+    assert located(BONES, ["left_foot"]) == frozenset(BONES)
+    assert located({"pelvis"}, ["pelvis"]) == {"pelvis", "lumbar", "left_thigh", "right_thigh"}
+    arm = set(BONES) - {"right_upper_arm"}
+    assert located(arm, ["pelvis"]) == frozenset(BONES) - {"right_forearm", "right_hand"}
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_dropping_any_bones_from_any_frames_never_makes_anything_within(seed):
+    random = np.random.default_rng(seed)
+    whole = frames_of(*walking(1.2), turned=bool(seed % 2))
+    full = watched(source(captured(whole)))
+    assert {r.verdict for _, results, _ in full for r in results} >= {Verdict.WITHIN, Verdict.EXCEEDED}
+    frames = frames_of(*walking(1.2), turned=bool(seed % 2))
+    begin = int(random.integers(5, 60))
+    for frame in frames[begin:]:
+        drop = random.random(len(BONES)) < random.choice([0.0, 0.3, 1.0])
+        frame.positions[drop] = np.nan
+        if frame.orientations is not None:
+            frame.orientations[drop & (random.random(len(BONES)) < 0.5)] = np.nan
+    for (_, before, _), (t, after, _) in zip(full, watched(source(captured(frames))), strict=False):
+        for a, b in zip(before, after, strict=True):
+            # The posture before is in a fit: it is the same but for some millimetres.
+            near = a.interval or (a.value, a.value)
+            assert b.verdict is not Verdict.WITHIN or near[0] >= a.limit - 0.01, (t, a, b)
+            assert b.verdict is not Verdict.WITHIN or a.verdict is not Verdict.EXCEEDED, (t, a, b)

@@ -10,11 +10,8 @@ import numpy as np
 
 from seerob.human.estimated import estimated
 from seerob.human.following import Followed, PartDoubt
-<<<<<<< HEAD
-from seerob.kernels.pull import SLACK as SLACK  # noqa: PLC0414
-=======
 from seerob.human.skeleton import BONES
->>>>>>> 85e3f92 (Where a person stands has an age of its own; what is held or seen apart widens distances)
+from seerob.kernels.pull import SLACK as SLACK  # noqa: PLC0414
 from seerob.transforms import Array
 
 Told = TypeVar("Told")

@@ -225,7 +225,7 @@ def test_tool_without_mass_makes_energies_unknown_only_while_it_is_mounted(tmp_p
     tool = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = { box = [0.1, 0.1, 0.1] }\n'
     station = made(tmp_path, TWO_R + tool, {"arm.urdf": two_r()})
     state = state_at(station, arm=((0, 1), (1, 1)))
-    with pytest.raises(Undecided, match="mass or the density of grip"):
+    with pytest.raises(Undecided, match="mass of grip is unknown: nobody gave its mass or its density"):
         state.mass_matrix(station.model.robot("arm"))
     assert state.jacobian(station.model.robot("arm").tip, station.model.robot("arm")).shape == (6, 2)
 

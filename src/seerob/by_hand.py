@@ -60,15 +60,17 @@ def by_hand(description: Description, robot: Robot, file: str) -> Description:
     findings = list(description.findings)
     for link in description.links:
         joints = tuple(replace(j, **changes[j.name]) if changes.get(j.name) else j for j in link.joints)
-        inertial, impossible = link.inertial, link.impossible_mass
+        inertial, refused, impossible = link.inertial, link.refused_mass, link.impossible_mass
         if link.name in robot.masses:
-            impossible = None
+            refused, impossible = "", None
             try:
                 inertial, more = link_by_hand(robot.masses[link.name], link, robot=robot.name, file=file)
                 findings += more
             except InputError as error:
                 problems += error.problems
-        links.append(replace(link, joints=joints, inertial=inertial, impossible_mass=impossible))
+        links.append(
+            replace(link, joints=joints, inertial=inertial, refused_mass=refused, impossible_mass=impossible)
+        )
     if problems:
         raise InputError(problems)
     return replace(description, links=tuple(links), findings=tuple(findings))

@@ -1,22 +1,27 @@
-"""What follows from a chain of links alone: coupled joints, and masses that nobody gave."""
+"""What follows from a chain of links alone: coupled joints, and what each link weighs or nobody knows."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from msgspec.structs import replace
 
 from seerob.geometry import Solid
 from seerob.model import Mechanism
 from seerob.model_io.description import Description, Inertial, Joint, Link
-from seerob.model_io.lint import TIPS
+from seerob.model_io.lint import DENSITIES, LIGHT, TIPS, too_light
+from seerob.model_io.pose import base_from_links
+from seerob.model_io.rigid import groups
 from seerob.mounting.specification import extreme_points
-from seerob.snapshot import Finding, Origin
+from seerob.snapshot import Finding, LinkMass, Origin
 from seerob.transforms import Array
 
 PLACEHOLDER_DENSITY = 500.0
 """Of the box around a moving link that nobody gave a mass [kg/m³]: it lets the twin move, and no
 criterion may use it."""
+ONE_PLACE = 1e-3
+"""Joints that are no farther from each other are in one place [m]: frames are written to the millimetre."""
 MAX_PAYLOAD = 500.0
 """More than this on a robot is a mistake in a unit rather than a payload [kg]."""
 
@@ -45,39 +50,103 @@ def couple(every: Sequence[Joint], commanded: Sequence[Joint]) -> tuple[Array, A
     return coupling, offset
 
 
-def unweighed_links(description: Description, *, loaded: Collection[str]) -> list[Link]:
-    """Links that joints move and whose mass nobody gave.
+def weighed(description: Description, *, carried: bool) -> tuple[LinkMass, ...]:
+    """What each link of a robot weighs: a mass is known, or what moves it is undecided; none is dropped.
 
-    A frame between two joints has no mass of its own; a joint that moves nothing heavy has no
-    mass matrix.
+    A link weighs what its file says. Where it says nothing, a link with a shape is a body whose mass nobody
+    gave, and so is one that a joint moves; a frame, which has neither, weighs nothing. A joint without a body
+    of its own is one of several in one place, as a ball joint is written: its link weighs nothing either.
 
     Args:
         description: Of the robot.
-        loaded: Links that something is mounted on.
+        carried: Whether its root moves too.
+
+    Returns:
+        In the order of the links. What is unknown and moves has no mass.
     """
-    heavy = {link.name for link in description.links if link.inertial is not None or link.name in loaded}
-    for link in reversed(description.links):
-        if link.name in heavy and link.parent is not None:
-            heavy.add(link.parent)
-    return [
-        link
+    found: dict[str, LinkMass] = {}
+    carrying = _joints_without_body(description)
+    spare = LIGHT
+    moving: set[str] = set()
+    for group in groups(description.links):
+        for link in group:
+            if carried or link.joints or link.parent in moving:
+                moving.add(link.name)
+            row = _weighed(description.name, link, bodiless=link.name in carrying)
+            silent = link.inertial is None and not link.refused_mass and not link.joints
+            bound = _heaviest(link) if silent and row.mass is None else 0.0
+            if 0 < bound < spare:
+                spare -= bound
+                note = f"at most {bound:.2g} kg, its shape in the heaviest metal: taken as a frame"
+                row = LinkMass(name=row.name, mass=0.0, origin=Origin.COMPUTED, note=note)
+            head = "" if link is group[0] else f"{description.name}/{group[0].name}"
+            found[link.name] = replace(row, moves=link.name in moving, merged=head)
+    return tuple(found[link.name] for link in description.links)
+
+
+def _weighed(robot: str, link: Link, *, bodiless: bool) -> LinkMass:
+    """What one link weighs by what its file says of it alone."""
+    name, inertial = f"{robot}/{link.name}", link.inertial
+    if inertial is not None:
+        doubt = f"it is a guess ({inertial.source})" if inertial.origin is Origin.ASSUMED else too_light(link)
+        if doubt:
+            return LinkMass(name=name, origin=Origin.MISSING, note=doubt)
+        return LinkMass(name=name, mass=inertial.mass, origin=inertial.origin, source=inertial.source)
+    if link.refused_mass:
+        return LinkMass(name=name, origin=Origin.MISSING, note=link.refused_mass)
+    if link.solids or link.visual or (link.joints and not bodiless):
+        return LinkMass(name=name, origin=Origin.MISSING)
+    what = "a joint without a body of its own" if link.joints else "a frame"
+    return LinkMass(name=name, mass=0.0, origin=Origin.COMPUTED, note=what)
+
+
+def _joints_without_body(description: Description) -> set[str]:
+    """Links that joints move, that nothing is said of, and that need not be there.
+
+    They have what they carry in one place with themselves, or are fixed to what has a mass.
+    """
+    poses = base_from_links(description, {})
+    places = {
+        link.name: [poses[link.name][:3, :3] @ j.anchor + poses[link.name][:3, 3] for j in link.joints]
         for link in description.links
-        if link.joints and link.inertial is None and (link.solids or link.name not in heavy)
-    ]
+    }
+    found: set[str] = set()
+    heavy: set[str] = set()
+    every = groups(description.links)
+    for group in reversed(every):
+        names = {link.name for link in group}
+        onward = [other[0] for other in every if other[0].parent in names]
+        if any(link.inertial or link.refused_mass or link.solids or link.visual for link in group):
+            heavy |= names
+        elif onward and all(link.name in heavy for link in onward):
+            ends = [place for link in (group[0], *onward) for place in places[link.name]]
+            if max(float(np.linalg.norm(end - ends[0])) for end in ends) > ONE_PLACE:
+                continue
+            heavy |= names
+        else:
+            continue
+        found |= {link.name for link in group if link.joints}
+    return found
 
 
-def unknown_masses(name: str, links: Sequence[Link], things: Mapping[str, bool]) -> tuple[str, ...]:
-    """What of a robot's moving bodies has a mass that nobody gave, one sentence each.
+def _heaviest(link: Link) -> float:
+    """What a link of its shape weighs at most [kg]: the box around it in the heaviest metal."""
+    solids = (*link.solids, *(Solid(mesh=mesh) for mesh in link.visual))
+    points, radius = extreme_points(solids)
+    if not len(points):
+        return 0.0
+    stands_out = max(solid.deviation for solid in solids)
+    return float(DENSITIES[1] * (np.ptp(points, axis=0) + 2 * (radius + stands_out)).prod())
 
-    Args:
-        name: The robot.
-        links: Of it, whose mass nobody gave.
-        things: Tools and workpieces mounted on it, and whether their mass is known.
-    """
-    unweighed = [thing for thing, known in things.items() if not known]
-    return (
-        *(f"nobody gave the mass of {name}/{link.name}" for link in links),
-        *(f"nobody gave the mass or the density of {thing}" for thing in unweighed),
+
+def unknown_masses(rows: Sequence[LinkMass]) -> tuple[str, ...]:
+    """What of a robot's moving bodies has a mass that nobody knows, one sentence each."""
+    return tuple(
+        f"the mass of {row.name} is unknown: {row.note}"
+        if row.note
+        else f"nobody gave the mass of {row.name}"
+        for row in rows
+        if row.moves and row.mass is None
     )
 
 

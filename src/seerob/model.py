@@ -19,7 +19,7 @@ from seerob.distances.least import Query, Shapes
 from seerob.errors import InputError, Problem, UnknownName
 from seerob.geometry import Solid
 from seerob.model_io.description import Description, Joint, Quantity
-from seerob.snapshot import Finding, Origin
+from seerob.snapshot import Finding, LinkMass, Origin
 from seerob.transforms import Array
 from seerob.variables.dictionary import Variable
 from seerob.workstation import Workstation
@@ -112,6 +112,8 @@ class Mechanism:
     """Of both, those that its joints move."""
     mj_bodies: Indices
     """Every `mujoco` body that its joints move, tools and workpieces included."""
+    masses: tuple[LinkMass, ...]
+    """What each of its links weighs, and each thing on it."""
     unknown_masses: tuple[str, ...]
     """What of its moving bodies has a mass that nobody gave, one sentence each."""
     velocity_limits: tuple[Quantity | None, ...]

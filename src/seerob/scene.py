@@ -48,6 +48,7 @@ def scene_of(
                     for joint, unit in zip(m.joints, m.units, strict=True)
                 ),
                 coarse=too_coarse.get(m.name, ""),
+                masses=() if m.role == "human" else m.masses,
             )
             for m in model.mechanisms.values()
         ),

@@ -47,6 +47,7 @@ __all__ = [
     "JointInfo",
     "Label",
     "Level",
+    "LinkMass",
     "Marker",
     "MechanismInfo",
     "Node",
@@ -306,6 +307,22 @@ class JointInfo(Struct, frozen=True, kw_only=True):
     upper: float | None = None
 
 
+class LinkMass(Struct, frozen=True, kw_only=True):
+    """What one link of a robot, or one thing mounted on it, weighs: a row of its mass table."""
+
+    name: str
+    """Full name."""
+    mass: float | None = None
+    """[kg]; None where nobody knows it."""
+    origin: Origin
+    source: str = ""
+    moves: bool = True
+    merged: str = ""
+    """Link that it is fixed to and moves as one with; empty for that one itself."""
+    note: str = ""
+    """Why it weighs nothing, or why its mass is not known."""
+
+
 class MechanismInfo(Struct, frozen=True, kw_only=True):
     """A robot or a human, as the page lists it."""
 
@@ -315,6 +332,8 @@ class MechanismInfo(Struct, frozen=True, kw_only=True):
     joints: tuple[JointInfo, ...]
     coarse: str = ""
     """Why what its source says is too coarse for energies and forces; empty when it is not."""
+    masses: tuple[LinkMass, ...] = ()
+    """Of a robot or machine: what each link and each thing on it weighs."""
 
 
 class Scene(Struct, frozen=True, kw_only=True, tag="scene"):

@@ -15,7 +15,10 @@ from seerob.permissible.given_motion import GivenMotion
 
 LAST = re.compile(r'(<link name="l2">.*?)<collision>.*?</collision>')
 BARE = LAST.sub(r"\1", two_r())
-FIXED = '<link name="tip"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
+FIXED = (
+    '<link name="tip"><inertial><mass value="0.1"/><inertia ixx="4e-4" iyy="4e-4" izz="4e-4" ixy="0" ixz="0" '
+    'iyz="0"/></inertial><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
+)
 TERMS = "intrusion = 0\nhuman_uncertainty = 0\nrobot_uncertainty = 0\n"
 STOP = "stop = { reaction = 0.01, stopping = 0.01 }\n"
 ABOUT = {

@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "0b33ab654be7c1ca";
+export const SCHEMA = "c2c6b6fb1dc45254";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -365,6 +365,21 @@ export interface JointInfo {
   upper: number | null;
 }
 
+/** What one link of a robot, or one thing mounted on it, weighs: a row of its mass table. */
+export interface LinkMass {
+  /** Full name. */
+  name: string;
+  /** [kg]; None where nobody knows it. */
+  mass: number | null;
+  origin: Origin;
+  source: string;
+  moves: boolean;
+  /** Link that it is fixed to and moves as one with; empty for that one itself. */
+  merged: string;
+  /** Why it weighs nothing, or why its mass is not known. */
+  note: string;
+}
+
 /** A robot or a human, as the page lists it. */
 export interface MechanismInfo {
   name: string;
@@ -373,6 +388,8 @@ export interface MechanismInfo {
   joints: JointInfo[];
   /** Why what its source says is too coarse for energies and forces; empty when it is not. */
   coarse: string;
+  /** Of a robot or machine: what each link and each thing on it weighs. */
+  masses: LinkMass[];
 }
 
 /** Everything about a run that does not change while it runs; sent once. */

@@ -99,6 +99,8 @@ class Link:
     """Several are applied in this order, each in the frame that the ones before it left."""
     inertial: Inertial | None = None
     """None: nobody gave one. Frames without shape or mass are such links too."""
+    refused_mass: str = ""
+    """Why what its file says of its mass cannot be used; empty where it can, or says nothing."""
     impossible_mass: Problem | None = None
     """What its file says of its mass that no body has, where that cannot be overlooked."""
     visual: tuple[Mesh, ...] = ()

@@ -14,6 +14,7 @@ import numpy as np
 
 from seerob.errors import Problem
 from seerob.geometry import Solid
+from seerob.model_io import moments
 from seerob.model_io.description import Description, Inertial, Joint, JointKind, Link
 from seerob.model_io.mesh_bodies import is_closed
 from seerob.model_io.rigid import groups
@@ -75,7 +76,7 @@ def plausible_limit(which: str, value: float | None) -> tuple[float | None, str]
     return value, ""
 
 
-def plausible_inertial(inertial: Inertial, *, moves: bool) -> tuple[Inertial | None, str, str]:
+def plausible_inertial(inertial: Inertial, *, body: bool) -> tuple[Inertial | None, str, str]:
     """Mass properties that a body can have, with the level and text of a finding (empty when all is well).
 
     A rigid body's second moment ``Σ = ½ tr(I) 1 - I`` has no negative eigenvalue; that is the triangle
@@ -83,18 +84,18 @@ def plausible_inertial(inertial: Inertial, *, moves: bool) -> tuple[Inertial | N
 
     Args:
         inertial: What the file says.
-        moves: Whether a joint moves this link, which then needs a rotational inertia too.
+        body: Whether it is one: a joint moves it, or it has a shape. It then has a mass and an inertia.
     """
     mass, inertia = inertial.mass, inertial.inertia
     if mass <= NOTHING:
-        if not moves and not inertia.any():
+        if not body and not inertia.any():
             return None, "", ""
         return None, "warning", f"mass is {mass:g} kg, expected more than 0: mass and inertia unknown"
     moments = np.linalg.eigvalsh(inertia)
     largest = float(np.abs(moments).max())
     shown = ", ".join(f"{m:.4g}" for m in moments)
     if largest == 0.0:
-        if moves:
+        if body:
             return None, "warning", f"mass {mass:g} kg with an inertia of 0: mass and inertia unknown"
         return inertial, "note", f"mass {mass:g} kg with an inertia of 0: a point mass"
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
@@ -173,6 +174,23 @@ def odd_density(density: float) -> str:
     return (
         f"{density:.4g} kg/m³, expected {low:g} to {high:g} kg/m³: check the units of mass, density and size"
     )
+
+
+def too_light(link: Link) -> str:
+    """Why a body of a link's shape weighs more than is said; empty when it may not, or has no volume."""
+    if link.inertial is None or not link.solids:
+        return ""
+    volume = sum(filled(solid) for solid in link.solids)
+    if link.inertial.mass >= DENSITIES[0] * volume * (1 - 1e-9):
+        return ""
+    return f"{link.inertial.mass:.3g} kg in {volume:.3g} m³ is lighter than any foam: give it in masses"
+
+
+def filled(solid: Solid) -> float:
+    """What a solid encloses [m³]; 0 where its mesh is open."""
+    if solid.mesh is None:
+        return moments.of_solid(solid).volume if solid.radius > 0 else 0.0
+    return max(moments.signed_volume(solid.mesh), 0.0) if is_closed(solid.mesh) else 0.0
 
 
 def misplaced_com(com: Array, low: Array, high: Array) -> str:

@@ -113,12 +113,14 @@ def _link(reader: Reader, spec: Any, model: Any, body: int, names: list[str]) ->
     joints = [_joint(reader, model, joint) for joint in range(adr, adr + count)]
     made = tuple(joint for joint in joints if joint)
     visual, solids = shapes_of_body(reader, model, body, name)
+    inertial, refused = _inertial(reader, spec, model, body, name, shown=bool(made or visual or solids))
     return Link(
         name=name,
         parent=names[int(model.body_parentid[body])] if body else None,
         parent_from_link=_at_zero(reader, model, adr, made, parent_from_link),
         joints=made,
-        inertial=_inertial(reader, spec, model, body, name, moves=bool(made)),
+        inertial=inertial,
+        refused_mass=refused,
         visual=visual,
         solids=solids,
     )
@@ -197,10 +199,13 @@ def _at_zero(
     return parent_from_link @ displacement(joints[0], -references[0])
 
 
-def _inertial(reader: Reader, spec: Any, model: Any, body: int, name: str, *, moves: bool) -> Inertial | None:
+def _inertial(
+    reader: Reader, spec: Any, model: Any, body: int, name: str, *, shown: bool
+) -> tuple[Inertial | None, str]:
+    """Mass properties that can be used, and why they cannot."""
     mass = float(model.body_mass[body])
     if mass == 0.0:
-        return None
+        return None, ""
     rotation = rotation_from_wxyz(model.body_iquat[body])
     inertia = rotation @ np.diag(model.body_inertia[body].astype(float)) @ rotation.T
     origin, source = Origin.STATED, f"{reader.file}: body {name}"
@@ -221,10 +226,10 @@ def _inertial(reader: Reader, spec: Any, model: Any, body: int, name: str, *, mo
         origin=origin,
         source=source,
     )
-    kept, level, text = lint.plausible_inertial(made, moves=moves)
+    kept, level, text = lint.plausible_inertial(made, body=shown)
     if text:
         reader.finding(level, name, text)
-    return kept
+    return kept, "" if kept is not None else text
 
 
 def _without_empty_world(links: list[Link]) -> list[Link]:
@@ -240,15 +245,7 @@ def _without_empty_world(links: list[Link]) -> list[Link]:
     ):
         return links
     root = first[0]
-    kept = Link(
-        name=root.name,
-        parent=None,
-        parent_from_link=root.parent_from_link,
-        inertial=root.inertial,
-        visual=root.visual,
-        solids=root.solids,
-    )
-    return [kept, *(link for link in links[1:] if link is not root)]
+    return [replace(root, parent=None), *(link for link in links[1:] if link is not root)]
 
 
 def _sites(model: Any, names: list[str], taken: set[str]) -> list[Link]:

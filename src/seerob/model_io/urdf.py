@@ -142,16 +142,20 @@ def _link(
         reader.finding(
             "note", name, "no collision shape in the file: distances and contacts use the visual one"
         )
-    inertial, impossible = _inertial(reader, name, element, moves=bool(joint))
+    solids = geometry.solids(element, name, tag)
+    inertial, refused, impossible = _inertial(
+        reader, name, element, moves=bool(joint), body=bool(joint or visual or solids)
+    )
     return Link(
         name=name,
         parent=parent[0] if parent else None,
         parent_from_link=parent_from_link,
         joints=joint,
         inertial=inertial,
+        refused_mass=refused,
         impossible_mass=impossible,
         visual=visual,
-        solids=geometry.solids(element, name, tag),
+        solids=solids,
     )
 
 
@@ -239,25 +243,25 @@ def _mimic(reader: Reader, element: Element, key: str) -> Mimic | None:
 
 
 def _inertial(
-    reader: Reader, name: str, link: Element, *, moves: bool
-) -> tuple[Inertial | None, Problem | None]:
-    """Mass properties that can be used, and what is wrong with a mass that cannot."""
+    reader: Reader, name: str, link: Element, *, moves: bool, body: bool
+) -> tuple[Inertial | None, str, Problem | None]:
+    """Mass properties that can be used, why they cannot, and what is wrong with a mass that no body has."""
     element, key = link.find("inertial"), f"link[{name}].inertial"
     if element is None:
-        return None, None
+        return None, "", None
     before = len(reader.problems)
     link_from_inertial = reader.origin(element, key)
     mass, inertia = element.find("mass"), element.find("inertia")
     if mass is None or mass.get("value") is None:
         reader.finding("warning", name, "inertial without a mass: unknown")
-        return None, None
+        return None, "inertial without a mass", None
     kilograms = float(reader.numbers(mass, "value", f"{key}.mass", (0.0,))[0])
     names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     xx, yy, zz, xy, xz, yz = (float(reader.numbers(inertia, n, f"{key}.inertia", (0.0,))[0]) for n in names)
     if kilograms < 0:
         reader.problem(f"{key}.mass.value", f"is {kilograms:g} kg", "a mass is greater than 0")
     if len(reader.problems) > before:
-        return None, None
+        return None, "", None
     rotation = link_from_inertial[:3, :3]
     matrix = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
     made = Inertial(
@@ -267,7 +271,9 @@ def _inertial(
         origin=Origin.STATED,
         source=f"{reader.file}: link {name}",
     )
-    kept, level, text = lint.plausible_inertial(made, moves=moves)
+    kept, level, text = lint.plausible_inertial(made, body=body)
     if text:
         reader.finding(level, name, text)
-    return kept, lint.no_mass(kilograms, file=reader.file, key=f"{key}.mass.value", moves=moves)
+    # Of 0 kg without an inertia the file says no more than of one without <inertial>.
+    refused = "" if kept is not None or (kilograms <= lint.NOTHING and not matrix.any()) else text
+    return kept, refused, lint.no_mass(kilograms, file=reader.file, key=f"{key}.mass.value", moves=moves)

@@ -375,8 +375,7 @@ class _Compiler:
         )
 
     def _riders(self) -> Riders:
-        mounted = [self._body(thing.on) for thing in (*self.station.tools, *self.station.workpieces)]
-        return Riders(self.chains, self.carriers, self.mounting.entries, mounted)
+        return Riders(self.chains, self.carriers, self.mounting.entries)
 
     def _about(self, robot: Robot, mechanism: Mechanism) -> list[Finding]:
         given = self.chains[robot.name].tip is not None or robot.model.startswith("library:")

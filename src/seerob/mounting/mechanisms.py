@@ -9,14 +9,16 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from seerob.chains import couple, unknown_masses, unweighed_links
+from seerob.chains import couple, unknown_masses, weighed
 from seerob.model import Body, Frame, Mechanism
-from seerob.model_io.description import Description, Link
+from seerob.model_io.description import Description
 from seerob.model_io.lint import LIGHT
 from seerob.mounting.specification import Entry
+from seerob.snapshot import LinkMass, Origin
 from seerob.transforms import Array
 
 THINGS = ("tool", "workpiece")
+NOT_WEIGHED = "nobody gave its mass or its density"
 
 
 @dataclass
@@ -39,7 +41,6 @@ class Riders:
         chains: By name.
         carriers: Who carries each body, by the body's full name.
         entries: Bodies with a shape.
-        mounted: Full names of bodies that a tool or a workpiece is mounted on.
     """
 
     def __init__(
@@ -47,10 +48,8 @@ class Riders:
         chains: Mapping[str, Chain],
         carriers: Mapping[str, str],
         entries: Sequence[Entry],
-        mounted: Sequence[str],
     ) -> None:
         self._chains, self._carriers, self._entries = chains, carriers, entries
-        self._on = {*mounted, *(chain.on for chain in chains.values())}
 
     def above(self, name: str) -> str:
         """Who carries a robot or machine; empty for the world."""
@@ -82,10 +81,18 @@ class Riders:
                     things[entry.owner] = mass
         return things
 
-    def unweighed(self, name: str) -> list[Link]:
-        """Links of a robot or machine that joints move and whose mass nobody gave."""
-        loaded = {full.partition("/")[2] for full in self._on if full.startswith(f"{name}/")}
-        return unweighed_links(self._chains[name].description, loaded=loaded)
+    def weighed(self, name: str) -> tuple[LinkMass, ...]:
+        """What each link of a robot or machine weighs, and each thing on it."""
+        chain = self._chains[name]
+        rows = [*weighed(chain.description, carried=bool(chain.on))]
+        given = {e.owner: e.mass for e in self._entries if e.mass is not None}
+        for thing, mass in self.things(name).items():
+            stated = given.get(thing)
+            note = "" if mass is not None else NOT_WEIGHED
+            known = Origin.MISSING if stated is None or mass is None else stated.origin
+            source = "" if stated is None else stated.source
+            rows.append(LinkMass(name=thing, mass=mass, origin=known, source=source, note=note))
+        return tuple(rows)
 
 
 def mechanism(
@@ -111,8 +118,7 @@ def mechanism(
     moving_ids = set(mj_bodies.tolist())
     own_bodies = [b for b in bodies if b.carrier in aboard and b.role != "area"]
     tip = chain.tip if chain.tip is not None else Frame(f"{name}/{chain.description.tip}", -1, np.eye(4))
-    unweighed = riders.unweighed(name)
-    weighed = {thing: mass is not None for thing, mass in riders.things(name).items()}
+    masses = riders.weighed(name)
     return Mechanism(
         name=name,
         role=chain.role,
@@ -130,8 +136,13 @@ def mechanism(
         carried=tuple(b.index for b in own_bodies if b.owner != name),
         moving=tuple(b.index for b in own_bodies if b.mj in moving_ids),
         mj_bodies=mj_bodies,
-        unknown_masses=unknown_masses(name, unweighed, weighed),
-        impossible_masses=tuple(link.impossible_mass for link in unweighed if link.impossible_mass),
+        masses=masses,
+        unknown_masses=unknown_masses(masses),
+        impossible_masses=tuple(
+            link.impossible_mass
+            for link, row in zip(chain.description.links, masses, strict=False)
+            if link.impossible_mass and row.mass is None
+        ),
         velocity_limits=tuple(joint.velocity for joint in commanded),
         effort_limits=tuple(joint.effort for joint in commanded),
         rotor_inertia_known=all(joint.armature is not None for joint in commanded),

@@ -308,7 +308,7 @@ def _possible(
         if what:
             problems.append(Problem(file, f"{key}inertia", what, _proposed(spread)))
         else:
-            mended, level, text = lint.plausible_inertial(inertial, moves=True)
+            mended, level, text = lint.plausible_inertial(inertial, body=True)
             if mended is not None and text:
                 inertial = mended
                 findings.append(Finding(level=level, subject=subject, text=text))

@@ -1,0 +1,181 @@
+"""No mass is dropped: each link's is known, or what moves it is undecided."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob.errors import Undecided
+
+BOX = '<collision><geometry><box size="{0} {0} {0}"/></geometry></collision>'
+SIX = '<inertia ixx="{0}" iyy="{0}" izz="{0}" ixy="0" ixz="0" iyz="0"/>'
+INERTIAL = f'<inertial><mass value="3"/>{SIX.format(0.01)}</inertial>'
+CRITERIA = """
+[[safety]]
+kind = "kinetic_energy"
+name = "kinetic_energy"
+robot = "arm"
+limit = 100
+[[safety]]
+kind = "effective_mass"
+name = "effective_mass"
+at = "arm"
+limit = 100
+[[safety]]
+kind = "power_and_force"
+name = "power_and_force"
+robot = "arm"
+"""
+ENERGY, EFFECTIVE, CONTACT = "kinetic_energy", "effective_mass", "power_and_force"
+FAST = ((0.0, 0.0), (1.0, 0.0))
+
+
+def gripper(inside: str) -> str:
+    """The arm with something behind a fixed joint at its end."""
+    return two_r().replace('<link name="tip"/>', f'<link name="tip">{inside}</link>')
+
+
+def station(folder, urdf, more=""):
+    return made(folder, FLOATING + TWO_R + more + CRITERIA, {"arm.urdf": urdf})
+
+
+def rows(cell):
+    return {row.name: row for row in cell.model.robot("arm").masses}
+
+
+@pytest.mark.parametrize(
+    ("inside", "said"),
+    [
+        (BOX.format(0.1), "nobody gave the mass of arm/tip"),
+        (BOX.format(0.1).replace("collision", "visual"), "nobody gave the mass of arm/tip"),
+        (f'<inertial><mass value="0"/>{SIX.format(0)}</inertial>{BOX.format(0.1)}', "nobody gave"),
+        (f"<inertial>{SIX.format(0.01)}</inertial>", "inertial without a mass"),
+        (f'<inertial><mass value="3"/>{SIX.format(0)}</inertial>{BOX.format(0.1)}', "inertia of 0"),
+        (INERTIAL.replace('izz="0.01"', 'izz="1"') + BOX.format(0.1), "break A \\+ B"),
+        (INERTIAL.replace('izz="0.01"', 'izz="1"'), "break A \\+ B"),
+        (INERTIAL.replace('"3"', '"0.001"') + BOX.format(0.2), "lighter than any foam"),
+    ],
+    ids=["none", "shown only", "zero", "no mass", "no inertia", "refused", "refused, no shape", "foam"],
+)
+def test_what_nobody_weighed_behind_a_fixed_joint_leaves_it_undecided(tmp_path, inside, said):
+    cell = station(tmp_path, gripper(inside))
+    found = results_at(cell, arm=FAST)
+    assert re.search(said, rows(cell)["arm/tip"].note or cell.model.robot("arm").unknown_masses[0])
+    for name in (ENERGY, EFFECTIVE, CONTACT):
+        assert (name, found[name].verdict) == (name, "undecided")
+        assert re.search(said, found[name].reason)
+    assert any("arm/tip" in f.text and "UNDECIDED" in f.text for f in cell.model.findings)
+
+
+def test_a_heavy_gripper_behind_a_fixed_joint_counts(tmp_path):
+    """3 kg at 2 m besides 1 kg at 1 m and at 2 m: ½·(1 + 4 + 12)·1² J, and its own inertia."""
+    cell = station(tmp_path, gripper(INERTIAL))
+    assert results_at(cell, arm=FAST)[ENERGY].value == pytest.approx(8.5 + 0.005, abs=1e-6)
+    given = station(tmp_path / "by hand", gripper(BOX.format(0.1)), "masses.tip = { mass = 3 }\n")
+    assert rows(given)["arm/tip"].mass == 3
+    assert results_at(given, arm=FAST)[ENERGY].value == pytest.approx(8.5 + 0.0025, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "inside", ["", BOX.format(0.01), f'<inertial><mass value="0"/>{SIX.format(0)}</inertial>']
+)
+def test_a_frame_weighs_nothing(tmp_path, inside):
+    """Neither a bare link nor a marker that weighs 25 g at most, made of the heaviest metal."""
+    cell = station(tmp_path, gripper(inside))
+    assert (rows(cell)["arm/tip"].mass, rows(cell)["arm/tip"].merged) == (0, "arm/l2")
+    assert results_at(cell, arm=FAST)[ENERGY].value == pytest.approx(2.5)
+
+
+def test_many_markers_are_no_frames(tmp_path):
+    """Each 25 g at most: the third of them is one too many."""
+    some = "".join(
+        f'<link name="m{i}">{BOX.format(0.01)}</link><joint name="f{i}" type="fixed"><parent link="tip"/>'
+        f'<child link="m{i}"/></joint>'
+        for i in range(3)
+    )
+    cell = station(tmp_path, two_r().replace("</robot>", some + "</robot>"))
+    assert [rows(cell)[f"arm/m{i}"].mass for i in range(3)].count(None) == 2
+
+
+def virtual(offset: float, inside: str = "") -> str:
+    """A link without anything between the two of the arm, ``offset`` [m] ahead of the second joint."""
+    bare = two_r().replace(
+        '<joint name="j2"',
+        f'<link name="mid">{inside}</link><joint name="jm" type="continuous"><parent link="l1"/>'
+        f'<child link="mid"/><origin xyz="{1 - offset} 0 0"/><axis xyz="1 0 0"/>'
+        '<limit effort="9" velocity="9"/></joint><joint name="j2"',
+    )
+    return bare.replace(
+        '<parent link="l1"/><child link="l2"/><origin xyz="1 0 0"/>',
+        f'<parent link="mid"/><child link="l2"/><origin xyz="{offset} 0 0"/>',
+    )
+
+
+@pytest.mark.parametrize(
+    ("offset", "inside", "known"),
+    [
+        (0.0, "", True),
+        (0.0005, "", True),
+        (0.3, "", False),
+        (0.0, BOX.format(0.1), False),
+        (0.0, f'<inertial><mass value="0"/>{SIX.format(0)}</inertial>', True),
+        (0.0, f'<inertial><mass value="3"/>{SIX.format(0)}</inertial>', False),
+    ],
+)
+def test_a_link_between_joints_weighs_nothing_only_where_they_are_in_one_place(
+    tmp_path, offset, inside, known
+):
+    cell = station(tmp_path, virtual(offset, inside))
+    state = state_at(cell, arm=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
+    if known:
+        state.mass_matrix(cell.model.robot("arm"))
+    else:
+        with pytest.raises(Undecided, match="the mass of arm/mid"):
+            state.mass_matrix(cell.model.robot("arm"))
+
+
+def test_a_joint_that_moves_nothing_is_a_body_that_nobody_weighed(tmp_path):
+    last = '<link name="flange"/><joint name="j3" type="continuous"><parent link="tip"/>'
+    last += '<child link="flange"/></joint>'
+    cell = station(tmp_path, two_r().replace("</robot>", last + "</robot>"))
+    assert cell.model.robot("arm").unknown_masses == ("nobody gave the mass of arm/flange",)
+
+
+def test_placeholder_inertias_are_guesses(tmp_path):
+    same = re.sub(r"1e-12", "0.1", two_r(masses=(1.0, 2.0))).replace(
+        '<link name="tip"/>', f'<link name="tip">{INERTIAL.replace("0.01", "0.1")}</link>'
+    )
+    cell = station(tmp_path, same)
+    assert len(cell.model.robot("arm").unknown_masses) == 3
+    assert results_at(cell, arm=FAST)[ENERGY].verdict == "undecided"
+
+
+def test_what_stands_still_weighs_on_nobody(tmp_path):
+    cell = station(
+        tmp_path, two_r().replace('<link name="base"/>', f'<link name="base">{BOX.format(0.1)}</link>')
+    )
+    assert (rows(cell)["arm/base"].mass, rows(cell)["arm/base"].moves) == (None, False)
+    assert results_at(cell, arm=FAST)[ENERGY].verdict == "within"
+
+
+def test_the_table_has_every_link_and_everything_on_it(tmp_path):
+    tool = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ box = [0.1, 0.1, 0.1] }}\n{}\n'
+    for given, mass in (("mass = 2", 2), ("density = 1000", 1), ("", None)):
+        cell = station(tmp_path / (given or "none"), two_r(), tool.format(given))
+        table = rows(cell)
+        assert [table[f"arm/{name}"].mass for name in ("base", "l1", "l2", "tip")] == [0, 1, 1, 0]
+        assert table["grip"].mass == (mass and pytest.approx(mass))
+        (info,) = (m for m in cell.scene().mechanisms if m.name == "arm")
+        assert info.masses == cell.model.robot("arm").masses
+
+
+def test_library_robots_weigh_what_their_links_do(tmp_path):
+    cell = made(tmp_path, '[[robots]]\nname = "arm"\nmodel = "library:ur10e"\n')
+    robot = cell.model.robot("arm")
+    total = sum(link.inertial.mass for link in robot.description.links if link.inertial)
+    assert sum(row.mass for row in robot.masses) == pytest.approx(total)
+    moving = sum(row.mass for row in robot.masses if row.moves)
+    assert moving == pytest.approx(np.sum(cell.model.mj.body_mass[robot.mj_bodies]))

@@ -14,6 +14,7 @@ from seerob.snapshot import Basis, Result, Verdict
 if TYPE_CHECKING:
     from seerob.answers import Answers
     from seerob.model import Model
+    from seerob.spans import Falls, Margin, Points
     from seerob.state import State
     from seerob.states import States
 
@@ -41,6 +42,9 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     by_shape: ClassVar[bool] = False
     """Whether it is about the shapes of its subjects: what no shape shows of a robot is nowhere near."""
 
+    remembers: ClassVar[bool] = False
+    """Whether what it says depends on earlier instants: then it is asked in the order of time only."""
+
     name: str = ""
     """What results are called; made from the kind and the subject when not given."""
     every: Seconds | None = None
@@ -67,6 +71,30 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         It depends on no instant but the one it speaks of, and says of it what that of `bind` says.
         """
         return None
+
+    def falls(self, model: Model, points: Points) -> Falls | None:
+        """What bounds its margin between two instants at which it is asked; None where nothing does.
+
+        Then the verdict of a run stays undecided, unless the file accepts that (`between_samples`).
+
+        Args:
+            model: The compiled workstation.
+            points: Of which the motion is bounded: those of the bodies, and what it adds.
+        """
+        return None
+
+    def margin(self, result: Result) -> Margin:
+        """How far a result that is within is from its limit, and how much of that its tolerances take.
+
+        In its unit; in the order of what `falls` says, when that speaks of several figures.
+        """
+        assert result.value is not None
+        assert result.limit is not None
+        far = result.limit - result.value if result.at_most else result.value - result.limit
+        if result.interval is None:
+            return far, 0.0
+        low, high = result.interval
+        return far, (high - result.value if result.at_most else result.value - low)
 
     def basis(self, model: Model) -> Basis:
         """Formula, source and inputs of what `bind` computes."""

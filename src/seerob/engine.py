@@ -32,6 +32,7 @@ from seerob.moving_base import moved_by_poses
 from seerob.reference import Course, Reference
 from seerob.sample_values import beyond_limits, is_possible, largest_speed, torques_of
 from seerob.samples import BodySample, JointSample, PoseSample, Sample, SignalSample
+from seerob.spans import Path
 from seerob.state import Hearing, State
 from seerob.task_space import TaskPull
 from seerob.transforms import Array, rotation_from_wxyz
@@ -137,6 +138,10 @@ class Engine:
         self._course = Course(
             np.tile(self._mj.qpos0, (rows, 1)), np.zeros((rows, self._mj.nv)), np.zeros((rows, self._mj.nv))
         )
+        self._way = np.empty((rows, self._mj.nq)), np.empty((rows, self._mj.nv))
+        """Positions and velocities at each step of a tick."""
+        self._broken: set[str] = set()
+        """Who was put elsewhere during a tick."""
         self._force = np.zeros(self._mj.nv)
         self._almost = 0.999 * self._limits
         self._followings: dict[str, Following] = {}
@@ -278,7 +283,10 @@ class Engine:
             hearing.forget(start)
         self.signals.forget(start)
         self._aim(start)
-        qvel = self._data.qvel
+        self._broken.clear()
+        qpos, qvel = self._data.qpos, self._data.qvel
+        q_way, v_way = self._way
+        q_way[0], v_way[0] = self._shown.qpos, self._shown.qvel
         for step in range(self._steps if self.physics else 0):
             if self.controllers:
                 self._pull(step, start + step * self._dt)
@@ -286,6 +294,9 @@ class Engine:
             mujoco.mj_step(self._mj, self._data)
             if self.controllers and not kernel.tame(qvel, WILD):
                 self._put_back(step + 1, start + (step + 1) * self._dt)
+            q_way[step + 1], v_way[step + 1] = qpos, qvel
+            if self._centred:
+                v_way[step + 1] += 0.5 * (qvel - self._before)
         self._tick += 1
         t = self._tick * self._period
         if self.physics:
@@ -294,13 +305,45 @@ class Engine:
             self._follow(t)
         self._check_finite()
         self._show(t)
+        self.state.path = self._path(start, t)
         self._note_errors()
         return self.state
+
+    @property
+    def _centred(self) -> bool:
+        """Whether the velocities of mj_step belong half a step earlier than its positions (see _pull)."""
+        return self.controllers and self.physics and not self._data.ncon
+
+    def _path(self, start: float, t: float) -> Path:
+        """How everybody came from the last tick to this one."""
+        broken = tuple(sorted(self._broken))
+        q, v = self._way
+        if self.physics:
+            instants: Array = np.asarray(start + self._dt * np.arange(self._steps + 1), float)
+            instants[-1] = t
+            q[-1], v[-1] = self._shown.qpos, self._shown.qvel
+            return Path(instants, q, v, broken)
+        inside = {
+            instant
+            for mechanism in self._mechanisms
+            for instant in self._references[mechanism.name].instants
+            if start + kernel.SLACK < instant < t - kernel.SLACK
+        }
+        instants = np.array([start, *sorted(inside), t], float)
+        many_q, many_v = np.tile(self._shown.qpos, (len(instants), 1)), np.zeros((len(instants), len(v[0])))
+        for mechanism in self._mechanisms:
+            found, speed, _ = self._references[mechanism.name].course(instants)
+            many_q[:, mechanism.q_address] = found @ mechanism.coupling.T + mechanism.offset
+            many_v[:, mechanism.v_address] = speed @ mechanism.coupling.T
+        many_q[0], many_v[0] = q[0], v[0]
+        many_q[-1], many_v[-1] = self._shown.qpos, self._shown.qvel
+        return Path(instants, many_q, many_v, broken)
 
     def _follow(self, t: float) -> None:
         """Put the twin on what was heard, with the velocities of that motion."""
         for mechanism in self._mechanisms:
-            self._references[mechanism.name].lands(t)
+            if self._references[mechanism.name].lands(t):
+                self._broken.add(mechanism.name)
             self._put(mechanism, *self._references[mechanism.name].at(t))
 
     def _aim(self, start: float) -> None:
@@ -343,6 +386,7 @@ class Engine:
         """Put there who jumped there by ``t`` [s], also where that is the instant of the tick itself."""
         for mechanism in self._mechanisms if self.controllers else ():
             if self._references[mechanism.name].lands(t):
+                self._broken.add(mechanism.name)
                 self._put(mechanism, *(part[step] for part in self._courses[mechanism.name]))
 
     def _place(self, t: float) -> None:
@@ -364,13 +408,13 @@ class Engine:
                 self._put(mechanism, *(part[step] for part in self._courses[mechanism.name]))
                 self._data.qacc_warmstart[mechanism.v_address] = 0.0
                 self._hearings[mechanism.name].lost = t
+                self._broken.add(mechanism.name)
 
     def _show(self, t: float) -> None:
         shown, data = self._shown, self._data
         shown.qpos[:] = data.qpos
         shown.qvel[:] = data.qvel
-        if self.controllers and self.physics and not data.ncon:
-            # The velocities of mj_step belong half a step earlier than its positions (see _pull).
+        if self._centred:
             shown.qvel += 0.5 * (data.qvel - self._before)
         self.state.refresh(t)
         if self._grips.follow(self.state):

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
+from seerob.between_ticks import BetweenTicks, Watch
 from seerob.criterion import Criterion, Evaluate
 from seerob.errors import Undecided, UnknownName
 from seerob.model import Model
@@ -25,6 +26,8 @@ class Bound:
     group: str
     evaluate: Evaluate
     basis: Basis
+    watch: Watch | None = None
+    """How it is judged between two ticks; None where nothing bounds it."""
 
 
 def undecided(result: Result, reason: str) -> Result:
@@ -121,6 +124,7 @@ class Judge:
         self._held: tuple[str, ...] | None = None
         self._held_names: dict[str, str] = {}
         self._kept: dict[int, _Kept] = {}
+        self._between = BetweenTicks([one.watch for one in bound])
 
     def __call__(self, state: State) -> tuple[Result, ...]:
         """Results at this state, in the order of the file."""
@@ -129,7 +133,13 @@ class Judge:
             findings = tuple(dict.fromkeys((*model.findings, *self._findings)))
             self._held = tuple(held(bound.criterion, model, findings) for bound in self._bound)
             self._held_names = held_names(findings)
-        return tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
+        results = tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
+
+        def ask(i: int) -> Result:
+            self._kept.pop(i, None)
+            return self._one(i, self._bound[i], state)
+
+        return self._between(state, results, ask, undecided)
 
     def _one(self, i: int, bound: Bound, state: State) -> Result:
         kept = self._kept.get(i)

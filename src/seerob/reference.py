@@ -74,6 +74,15 @@ class Reference:
         return float(np.abs(self._velocities[-1]).max(initial=0.0))
 
     @property
+    def instants(self) -> tuple[float, ...]:
+        """Of the samples that are kept, and of its rest after the newest [s], increasing.
+
+        Between two of them the motion is one cubic.
+        """
+        ends = (self.until + self._coast,) if self._coast and self._times else ()
+        return (*self._times, *ends)
+
+    @property
     def until(self) -> float:
         """Instant of the newest sample [s]; -inf before the first."""
         return self._times[-1] if self._times else -np.inf

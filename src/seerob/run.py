@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
+from seerob.between_ticks import watched
 from seerob.engine import Engine
 from seerob.errors import InputError, Problem, SeerobError
 from seerob.judging import Bound as Bound  # noqa: PLC0414
@@ -25,6 +26,7 @@ from seerob.samples import Sample
 from seerob.sink import KeepsResults, Writer
 from seerob.snapshot import Result, Scene, Snapshot, Verdict
 from seerob.source import Opened, Pump, Source
+from seerob.spans import Points
 from seerob.state import State
 from seerob.whereabouts.in_doubt import in_doubt
 
@@ -42,6 +44,7 @@ def bind(model: Model) -> tuple[Bound, ...]:
         InputError: With every name that does not exist and every option that cannot be.
     """
     bound: list[Bound] = []
+    points = Points(model)
     problems: list[Problem] = []
     file = next(iter(model.workstation.files), "workstation")
     for i, display in enumerate(model.workstation.displays):
@@ -52,7 +55,8 @@ def bind(model: Model) -> tuple[Bound, ...]:
     for group in ("safety", "ergonomics"):
         for i, criterion in enumerate(getattr(model.workstation, group)):
             try:
-                bound.append(Bound(criterion, group, criterion.bind(model), criterion.basis(model)))
+                judge, basis = criterion.bind(model), criterion.basis(model)
+                bound.append(Bound(criterion, group, judge, basis, watched(criterion, model, points)))
             except SeerobError as error:
                 # Many messages begin with the name of the criterion, which the key already says.
                 text = str(error).removeprefix(f"{criterion.name}: ")

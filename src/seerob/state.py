@@ -22,6 +22,7 @@ from seerob.joint_columns import Columns
 from seerob.kernels.chain import along
 from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
 from seerob.model import Frame, Gap, Mechanism, Model
+from seerob.spans import Path
 from seerob.transforms import Array
 from seerob.variables.dictionary import Value
 from seerob.variables.signals import Signals
@@ -48,6 +49,8 @@ class State:
         self.hearings = hearings
         self.signals = signals or Signals(model.dictionary, {})
         """What machines say; `signal` raises when it may not be relied on."""
+        self.path: Path | None = None
+        """How everybody came here from the last tick; None where there was none."""
         self.asked: set[str] = set()
         """Robots and humans that answers have depended on since the set was last cleared."""
         self.bearers = Bearers(model)
@@ -395,6 +398,10 @@ class State:
         rows = self._rows[bodies]
         speed, point, velocity = self._fastest()
         return speed[rows], point[rows], velocity[rows]
+
+    def largest_speeds(self) -> Array:
+        """The same of every body, whoever was heard, shape (n,): for bounds, never for a verdict."""
+        return self._fastest()[0]
 
     def _fastest(self) -> tuple[Array, Array, Array]:
         if "fastest" not in self._cache:

@@ -24,6 +24,7 @@ from seerob.sensors.sensing import (
 )
 from seerob.sensors.tables import Sensor
 from seerob.snapshot import Basis, Marker, Result, Segment, Verdict
+from seerob.spans import Falls, Points
 from seerob.state import State
 from seerob.transforms import Array
 
@@ -55,6 +56,10 @@ class LightCurtain(Criterion, frozen=True, kw_only=True):
         """See `Criterion.bind`."""
         curtain = self._curtain(model)
         return seen_in_field(self.name, curtain.presence, lambda state: curtain.judge(self.name, state))
+
+    def falls(self, model: Model, points: Points) -> Falls:
+        """See `Criterion.falls`."""
+        return self._curtain(model).presence.falls()
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

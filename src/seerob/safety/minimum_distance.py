@@ -15,6 +15,7 @@ from seerob.distances.least import Reach
 from seerob.errors import InputError
 from seerob.model import Gap, Model
 from seerob.snapshot import Basis, Result, Segment, Verdict
+from seerob.spans import Falls, Points, approaching
 from seerob.state import State
 from seerob.states import States
 from seerob.tolerances import Tolerance, deciding
@@ -106,6 +107,11 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
             return found if self.limit is None else found.exceeded(crossing)
 
         return evaluate
+
+    def falls(self, model: Model, points: Points) -> Falls:
+        """See `Criterion.falls`."""
+        gap = self._gap(model)
+        return approaching(gap.a, gap.b)
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

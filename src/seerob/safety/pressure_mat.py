@@ -8,6 +8,7 @@ from seerob.criterion import Criterion, Evaluate
 from seerob.model import Model
 from seerob.sensors.sensing import Names, Presence, Seen, Sight, bodies_of, names_of, seen_in_field, sensor_of
 from seerob.snapshot import Basis, Result
+from seerob.spans import Falls, Points
 from seerob.state import State
 
 
@@ -42,6 +43,10 @@ class PressureMat(Criterion, frozen=True, kw_only=True):
             return presence.result(self.name, state, sights)
 
         return seen_in_field(self.name, presence, evaluate)
+
+    def falls(self, model: Model, points: Points) -> Falls:
+        """See `Criterion.falls`."""
+        return self._presence(model).falls()
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

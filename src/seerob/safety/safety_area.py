@@ -17,6 +17,7 @@ from seerob.distances.least import Closests
 from seerob.errors import InputError, UnknownName
 from seerob.model import Gap, Model
 from seerob.snapshot import Basis, Highlight, Marker, Result, Segment, Verdict
+from seerob.spans import Falls, Points, approaching
 from seerob.state import State
 from seerob.transforms import Array
 from seerob.whereabouts.partly_seen import seen_first
@@ -115,6 +116,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
         lit: list[Marker],
     ) -> Result:
         room, who = nearest
+        interval: tuple[float, float] | None
         if parts:
             deepest = max(deeps, key=lambda deep: deep.at_least)
             verdict, reason = Verdict.EXCEEDED, ", ".join(part.name for part in parts)
@@ -129,7 +131,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
                 if doubtful
                 else who
             )
-            interval = None
+            interval = (least, room) if least < room else None
         areas = [Highlight(body=name, verdict=verdict) for name in _names(self.area)]
         return Result(
             name=self.name,
@@ -159,6 +161,11 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
                 )
             watched.append(_Watched(name, model.gap(bodies, inside)))
         return tuple(watched)
+
+    def falls(self, model: Model, points: Points) -> Falls:
+        """See `Criterion.falls`."""
+        gaps = [each.gap for each in self._watched(model)]
+        return approaching((i for gap in gaps for i in gap.a), (i for gap in gaps for i in gap.b))
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

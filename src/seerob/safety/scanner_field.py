@@ -30,6 +30,7 @@ from seerob.sensors.sensing import (
 from seerob.sensors.tables import MonitoredField as Field
 from seerob.sensors.tables import Sensor
 from seerob.snapshot import Basis, Result
+from seerob.spans import Falls, Points
 from seerob.state import State
 from seerob.transforms import Array
 from seerob.volumes.floor_polygon import contains
@@ -70,6 +71,10 @@ class ScannerField(Criterion, frozen=True, kw_only=True):
         """See `Criterion.bind`."""
         scan = self._scan(model)
         return seen_in_field(self.name, scan.presence, lambda state: scan.judge(self.name, state))
+
+    def falls(self, model: Model, points: Points) -> Falls:
+        """See `Criterion.falls`."""
+        return self._scan(model).presence.falls()
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

@@ -101,6 +101,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
             nearest = room.argmin(axis=0)
             least = room[nearest, np.arange(len(outside))]
             may = off.at(state) + gap.deviation
+            surely = float((least - may).min())
             k, perhaps = int(least.argmin()), int((least - may).argmin())
             doubt = self._doubt(model, outside[perhaps], float(least[perhaps]), float(may[perhaps]), unknown)
             verdict = Verdict.EXCEEDED if least[k] <= 0 else Verdict.UNDECIDED if doubt else Verdict.WITHIN
@@ -138,6 +139,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
                 at_most=False,
                 verdict=verdict,
                 reason=doubt if verdict is Verdict.UNDECIDED else model.bodies[outside[k]].name,
+                interval=(surely, float(least[k])) if surely < least[k] else None,
                 parts=(*parts, Result(name="largest S_p", value=float(S_p.max()), unit="m")),
                 markers=(*drawn[0][1], *lit),
             )

@@ -16,6 +16,7 @@ from seerob.model import Model
 from seerob.moving_base import velocity_of
 from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Input, Result
+from seerob.spans import Falls, Points, speeding
 from seerob.state import State
 from seerob.states import States
 from seerob.transforms import Array
@@ -113,6 +114,14 @@ class Velocity(Criterion, frozen=True, kw_only=True):
             reason=where,
             markers=(arrow,),
         )
+
+    def falls(self, model: Model, points: Points) -> Falls:
+        """See `Criterion.falls`."""
+        if self.at is None:
+            return speeding(self._bodies(model))
+        frame = model.frame(self.at)
+        local = frame.body_from_frame[:3, :3] @ np.array(self.offset) + frame.body_from_frame[:3, 3]
+        return speeding([points.add(frame.mj, local)])
 
     def batch(self, model: Model) -> EvaluateMany | None:
         """See `Criterion.batch`; of a point, where nothing moves that carries its robot."""

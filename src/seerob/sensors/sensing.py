@@ -16,6 +16,7 @@ from seerob.errors import InputError, UnknownName
 from seerob.model import Gap, Model
 from seerob.sensors.tables import Sensor
 from seerob.snapshot import Highlight, Input, Label, Marker, Origin, Result, Verdict
+from seerob.spans import Falls, approaching
 from seerob.state import State
 from seerob.transforms import Array
 from seerob.whereabouts.partly_seen import seen_first
@@ -177,6 +178,7 @@ class Presence:
         else:
             verdict, reason = Verdict.WITHIN, self._name(nearest)
         lit = [Highlight(body=self.model.bodies[i].name, verdict=Verdict.EXCEEDED) for i in sights]
+        near, least = float(found.distance[nearest]), float(found.distance[perhaps] - may[perhaps])
         marks: list[Marker] = [Highlight(body=self.model.bodies[self.gap.a[0]].name, verdict=verdict), *lit]
         for i, sight in sights.items():
             if sight.seen is Seen.MISSED:
@@ -184,12 +186,13 @@ class Presence:
                 marks.append(Label(position=at, text=f"not detected: {sight.why}", verdict=Verdict.EXCEEDED))
         return Result(
             name=name,
-            value=float(found.distance[nearest]),
+            value=near,
             unit="m",
             limit=0.0,
             at_most=False,
             verdict=verdict,
             reason=reason,
+            interval=(least, near) if least < near else None,
             parts=(*each, *self._ways(bool(sights), triggered), *parts),
             markers=(*marks, *markers),
         )
@@ -225,6 +228,10 @@ class Presence:
                 )
             )
         return tuple(ways)
+
+    def falls(self) -> Falls:
+        """How far its distance can fall between two instants, see `seerob.criterion.Criterion.falls`."""
+        return approaching(self.gap.a, self.gap.b)
 
     def inputs(self) -> tuple[Input, ...]:
         """Of the basis: motion, shapes, and the figures of the device with their source."""

@@ -1,0 +1,233 @@
+"""What criteria say of the time between two ticks: what may have been exceeded there is not within.
+
+At every tick the way since the last one is bounded (`seerob.spans`). Where the margin that a criterion has at
+both ends is more than what it can lose on the way, all of it is within, and no instant of it is looked at.
+Else spans are halved, the one with the worst bound first, and the criterion is asked of the twin in the
+middle, until every span is cleared, an instant is met that exceeds, or the instants are used up.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from msgspec.structs import replace
+
+from seerob.criterion import Criterion, Evaluate
+from seerob.errors import Undecided
+from seerob.model import Model
+from seerob.snapshot import Result, Verdict
+from seerob.spans import Fall, Falls, Indices, Margin, Path, Points
+from seerob.state import State
+from seerob.transforms import Array
+
+MOST = 32
+"""Instants that are looked at between two ticks, of one criterion: spans of 10 ms are halved to less than
+1 ms everywhere; more would hold up a live run."""
+
+_WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+
+
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """How a criterion is judged between two ticks."""
+
+    criterion: Criterion
+    points: Points
+    """Shared by all criteria of a workstation."""
+    falls: Falls
+    again: Callable[[], Evaluate]
+    """Makes another one of it, which is asked of instants in any order."""
+
+
+def watched(criterion: Criterion, model: Model, points: Points) -> Watch | None:
+    """How a criterion is judged between two ticks; None when nothing bounds it."""
+    falls = criterion.falls(model, points)
+    return None if falls is None else Watch(criterion, points, falls, lambda: criterion.bind(model))
+
+
+class End(NamedTuple):
+    """What is known of one end of a span."""
+
+    t: float
+    verdict: Verdict | None
+    margin: Margin | None
+    """None unless it is within."""
+    speeds: Array
+    """Of every body [m/s]."""
+
+
+class Told(NamedTuple):
+    """What a way between two instants came to."""
+
+    exceeded: Result | None = None
+    """At an instant between."""
+    open: str = ""
+    """Why it is not known; empty when all of it is within or something is exceeded."""
+
+
+class BetweenTicks:
+    """Judges the way from tick to tick.
+
+    Args:
+        watches: Of every criterion, None where nothing bounds it.
+    """
+
+    def __init__(self, watches: Sequence[Watch | None]) -> None:
+        self._watches = watches
+        self._before: list[End | None] = [None] * len(watches)
+        self._ids: Indices | None = None
+        self._speeds: Array | None = None
+        self._shadow: State | None = None
+        self._again: dict[int, Evaluate] = {}
+
+    def __call__(
+        self,
+        state: State,
+        results: Sequence[Result],
+        ask: Callable[[int], Result],
+        take_back: Callable[[Result, str], Result],
+    ) -> tuple[Result, ...]:
+        """The results of a tick, each with what happened since the last one.
+
+        Args:
+            state: The twin at this tick.
+            results: Of every criterion at it; one with a period may speak of an earlier instant.
+            ask: Asks a criterion now, before its period is over.
+            take_back: Makes what is within undecided, with a reason.
+        """
+        found = list(results)
+        if not any(self._watches):
+            return tuple(found)
+        speeds, ids, path = state.largest_speeds(), state.bearers.ids, state.path
+        if path is None or self._ids is None or self._speeds is None:
+            path, self._before = None, [None] * len(found)
+        self._way = path
+        for i, watch in enumerate(self._watches):
+            if watch is None:
+                continue
+            before = self._before[i]
+            if found[i].t is not None and found[i].t != state.t and before is not None:
+                self._before[i] = self._falling(watch, before, state, speeds)
+                if self._before[i] is not None:
+                    continue
+                found[i] = ask(i)
+            now = _end(watch.criterion, found[i], state.t, speeds)
+            if path is not None and before is not None:
+                told = self._judge(i, watch, (before, now), state)
+                if told.exceeded is not None:
+                    found[i] = replace(told.exceeded, basis=found[i].basis)
+                elif told.open and now.verdict is _WITHIN:
+                    found[i] = take_back(found[i], told.open)
+            self._before[i] = now
+        self._ids, self._speeds = ids.copy(), speeds
+        return tuple(found)
+
+    def _falling(self, watch: Watch, before: End, state: State, speeds: Array) -> End | None:
+        """What is left at this tick of a margin that was not asked for; None when that is not enough."""
+        path = self._way
+        if path is None:
+            return None
+        if before.margin is None:
+            return End(state.t, before.verdict, None, speeds)
+        fall = self._fall(watch, path, (before, before._replace(t=state.t, speeds=speeds)), state)
+        margin, off = before.margin
+        left = margin - fall.fall
+        return End(state.t, _WITHIN, (left, off), speeds) if np.all(left - off >= 0) else None
+
+    def _judge(self, i: int, watch: Watch, ends: tuple[End, End], state: State) -> Told:
+        """The way between two instants at which a criterion was asked."""
+        before, now = ends
+        if _EXCEEDED in (before.verdict, now.verdict) or not (before.margin or now.margin):
+            return Told()
+        assert self._way is not None
+        low = self._low(watch, self._way, ends, state)
+        if low >= 0:
+            return Told()
+        if self._way.broken and not np.isfinite(low):
+            # Before a source is heard again nobody knew anything anyway.
+            who = ", ".join(self._way.broken)
+            known = before.margin is not None
+            return Told(open=f"{who} jumped: its way between two ticks is not known" if known else "")
+        return self._search(i, watch, ends, low, state)
+
+    def _fall(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Fall:
+        a, b = ends
+        assert self._ids is not None
+        span = watch.points.span(path, a.t, b.t, self._ids, state.model.mj)
+        span.between_speeds(a.speeds, b.speeds)
+        least = [end.margin[0] - end.margin[1] for end in ends if end.margin is not None]
+        return watch.falls(span, least[0] if len(least) == 1 else np.minimum(least[0], least[1]))
+
+    def _low(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> float:
+        """Bound on the margin everywhere between two ends, of which one is within at least."""
+        fall, bend = self._fall(watch, path, ends, state)
+        (m, off), *rest = [end.margin for end in ends if end.margin is not None]
+        if not rest:
+            return float(np.min(m - fall - off))
+        ((other, also),) = rest
+        low = np.maximum((m + other - fall) / 2, np.minimum(m, other) - bend)
+        return float(np.min(low - np.maximum(off, also)))
+
+    def _search(self, i: int, watch: Watch, ends: tuple[End, End], low: float, state: State) -> Told:
+        path = self._way
+        assert path is not None
+        begin, end = (f"{each.t:.4g} s" for each in ends)
+        assert self._ids is not None
+        if watch.criterion.remembers or not np.array_equal(self._ids, state.bearers.ids):
+            what = "it remembers" if watch.criterion.remembers else "something was picked up or let go"
+            return Told(open=f"not known to be within from {begin} to {end}: {what}")
+        spans = [(low, ends[0].t, *ends)]
+        doubt = ""
+        for _ in range(MOST):
+            if not spans:
+                break
+            _, _, a, b = heapq.heappop(spans)
+            t = path.middle(a.t, b.t)
+            result, middle = self._look(i, watch, path, t, state)
+            if middle.verdict is _EXCEEDED:
+                reason = f"between two ticks, at {t:.4f} s: {result.reason}".removesuffix(": ")
+                return Told(exceeded=replace(result, t=t, reason=reason))
+            for pair in ((a, middle), (middle, b)):
+                if pair[0].margin or pair[1].margin:
+                    low = self._low(watch, path, pair, state)
+                    if not low >= 0:
+                        heapq.heappush(spans, (low, pair[0].t, *pair))
+                elif _UNDECIDED in (pair[0].verdict, pair[1].verdict):
+                    doubt = doubt or result.reason
+        if not spans and not doubt:
+            return Told()
+        if not spans:
+            return Told(open=f"between two ticks: {doubt}")
+        _, _, a, b = spans[0]
+        return Told(open=f"not known to be within from {a.t:.4f} s to {b.t:.4f} s, between two ticks")
+
+    def _look(self, i: int, watch: Watch, path: Path, t: float, state: State) -> tuple[Result, End]:
+        """A criterion at an instant between two ticks; what is in doubt at the tick is in doubt there."""
+        criterion = watch.criterion
+        if i not in self._again:
+            self._again[i] = watch.again()
+        if self._shadow is None:
+            data = mujoco.MjData(state.model.mj)
+            self._shadow = State(state.model, data, state.hearings, state.signals)
+            self._shadow.bearers = state.bearers
+        shadow = self._shadow
+        shadow.columns = state.columns
+        shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)
+        shadow.refresh(t)
+        muted = False
+        try:
+            muted = criterion.active is not None and not shadow.signal(criterion.active)
+            result = Result(name=criterion.name) if muted else self._again[i](shadow)
+        except Undecided as reason:
+            result = Result(name=criterion.name, verdict=_UNDECIDED, reason=str(reason))
+        return result, _end(criterion, result, t, shadow.largest_speeds())
+
+
+def _end(criterion: Criterion, result: Result, t: float, speeds: Array) -> End:
+    margin = criterion.margin(result) if result.verdict is _WITHIN else None
+    return End(t, result.verdict, margin, speeds)

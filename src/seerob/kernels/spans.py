@@ -1,0 +1,177 @@
+r"""How fast joints and points get within a span of time, and how quickly that changes, compiled.
+
+Joints move along cubics from knot to knot, with the positions and velocities there. A point is moved by a
+chain of joints, from base to tip: segment k, of length :math:`l_k`, is fixed behind joint k, whatever the
+joints do. With bounds :math:`v, a, c` of a joint's speed, of its acceleration and of the total variation of
+that over the span of length T, the frame behind joint k turns with at most
+
+.. math::
+    \Omega_k &= \Omega_{k-1} + v_k, \qquad \Omega'_k = \Omega'_{k-1} + a_k + v_k \Omega_{k-1}, \\
+    \Omega''_k &= \Omega''_{k-1} + c_k + T (2 a_k \Omega_{k-1} + v_k (\Omega'_{k-1} + \Omega_{k-1}^2)),
+
+and a vector of length l fixed to it changes by at most :math:`\Omega l`, :math:`(\Omega' + \Omega^2) l`, the
+latter of which varies over the span by at most :math:`(\Omega'' + T (3 \Omega \Omega' + \Omega^3)) l`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from seerob.transforms import Array
+
+Indices = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+_ROW, _ROWS = "f8[::1]", "f8[:,::1]"
+
+
+@njit(
+    f"void({_ROW}, {_ROWS}, {_ROWS}, f8, f8, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def joint_bounds(
+    t: Array,
+    q: Array,
+    v: Array,
+    begin: float,
+    end: float,
+    home: Array,
+    speed: Array,
+    change: Array,
+    varies: Array,
+    away: Array,
+) -> None:
+    """Bounds on the motion of joints within a span; writes into the last four arguments.
+
+    Args:
+        t: Knots, increasing [s], shape (k,), k >= 2.
+        q: Positions there [rad or m], shape (k, n).
+        v: Velocities there, shape (k, n).
+        begin: Of the span [s].
+        end: Likewise.
+        home: Positions in the model as compiled, shape (n,).
+        speed: Largest absolute speed, shape (n,).
+        change: Largest absolute acceleration, shape (n,).
+        varies: Total variation of the acceleration, shape (n,).
+        away: Farthest from ``home``, shape (n,).
+    """
+    n = q.shape[1]
+    speed[:] = 0.0
+    change[:] = 0.0
+    varies[:] = 0.0
+    away[:] = 0.0
+    before = np.zeros(n)
+    some = False
+    for k in range(len(t) - 1):
+        T = t[k + 1] - t[k]
+        low, high = max(begin, t[k]), min(end, t[k + 1])
+        if T <= 0.0 or high <= low:
+            continue
+        a, b = (low - t[k]) / T, (high - t[k]) / T
+        for i in range(n):
+            chord = q[k + 1, i] - q[k, i]
+            c1, last = T * v[k, i], T * v[k + 1, i]
+            c2, c3 = 3 * chord - 2 * c1 - last, c1 + last - 2 * chord
+            fast = max(abs(c1 + a * (2 * c2 + a * 3 * c3)), abs(c1 + b * (2 * c2 + b * 3 * c3)))
+            if c3 != 0.0:
+                x = -c2 / (3 * c3)
+                if a < x < b:
+                    fast = max(fast, abs(c1 + x * (2 * c2 + x * 3 * c3)))
+            fast /= T
+            first, then = (2 * c2 + 6 * c3 * a) / (T * T), (2 * c2 + 6 * c3 * b) / (T * T)
+            varies[i] += abs(then - first)
+            if some:
+                varies[i] += abs(first - before[i])
+            before[i] = then
+            speed[i] = max(speed[i], fast)
+            change[i] = max(change[i], abs(first), abs(then))
+            start = q[k, i] + a * (c1 + a * (c2 + a * c3)) - home[i]
+            away[i] = max(away[i], abs(start) + fast * (high - low))
+        some = True
+
+
+@njit(
+    f"void({_ROW}, {_ROW}, {_ROW}, {_ROW}, f8, i8[::1], i8[::1], b1[::1], {_ROW}, {_ROW}, {_ROW}, {_ROW})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def point_bounds(
+    speed: Array,
+    change: Array,
+    varies: Array,
+    away: Array,
+    T: float,
+    start: Indices,
+    joints: Indices,
+    turns: Flags,
+    lengths: Array,
+    fast: Array,
+    quick: Array,
+    bend: Array,
+) -> None:
+    """The same of points at the ends of chains; writes into the last three arguments.
+
+    Args:
+        speed: From `joint_bounds`, as the next three, shape (nv,).
+        change: See there.
+        varies: See there.
+        away: See there; only that of joints that slide counts.
+        T: Length of the span [s].
+        start: Where the joints of each point begin, shape (p + 1,).
+        joints: All chains one after the other, each from base to tip, shape (k,).
+        turns: Whether each turns; otherwise it slides.
+        lengths: Of the segment behind each [m].
+        fast: Largest speed [m/s], shape (p,).
+        quick: Largest acceleration [m/s²], shape (p,).
+        bend: How far the velocity gets from the straight line between those at both ends [m/s], shape (p,).
+    """
+    for p in range(len(fast)):
+        W, W1, W2 = 0.0, 0.0, 0.0
+        V, A, J = 0.0, 0.0, 0.0
+        for k in range(start[p], start[p + 1]):
+            j = joints[k]
+            v, a, c = speed[j], change[j], varies[j]
+            if turns[k]:
+                W2 += c + T * (2 * a * W + v * (W1 + W * W))
+                W1 += a + v * W
+                W += v
+            else:
+                s = away[j]
+                V += v + s * W
+                A += a + 2 * v * W + s * (W1 + W * W)
+                J += c + T * (3 * a * W + 3 * v * (W1 + W * W))
+                J += s * (W2 + T * (3 * W * W1 + W * W * W))
+            V += W * lengths[k]
+            A += (W1 + W * W) * lengths[k]
+            J += (W2 + T * (3 * W * W1 + W * W * W)) * lengths[k]
+        fast[p], quick[p], bend[p] = V, A, 0.25 * T * J
+
+
+@njit(f"void({_ROW}, {_ROWS}, {_ROWS}, f8, {_ROW}, {_ROW})", cache=True, nogil=True, error_model="numpy")
+def joints_at(t: Array, q: Array, v: Array, when: float, position: Array, velocity: Array) -> None:
+    """Where joints are on their cubics at an instant; writes into the last two arguments.
+
+    Args:
+        t: Knots, increasing [s], shape (k,), k >= 2.
+        q: Positions there [rad or m], shape (k, n).
+        v: Velocities there, shape (k, n).
+        when: [s], from the first knot to the last.
+        position: Shape (n,).
+        velocity: Shape (n,).
+    """
+    k = 0
+    while k < len(t) - 2 and t[k + 1] <= when:
+        k += 1
+    T = t[k + 1] - t[k]
+    x = (when - t[k]) / T
+    for i in range(q.shape[1]):
+        chord = q[k + 1, i] - q[k, i]
+        c1, last = T * v[k, i], T * v[k + 1, i]
+        c2, c3 = 3 * chord - 2 * c1 - last, c1 + last - 2 * chord
+        position[i] = q[k, i] + x * (c1 + x * (c2 + x * c3))
+        velocity[i] = (c1 + x * (2 * c2 + x * 3 * c3)) / T

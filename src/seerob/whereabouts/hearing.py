@@ -98,7 +98,7 @@ class Hearing:
     def doubt(self, t: float) -> str:
         """Why what was heard does not tell where it is at ``t`` [s]; empty when it does.
 
-        A sample ahead of the tick does not make up for silence before it: what happened between two
+        A sample ahead of the tick does not make up for silence before it: all that happened between two
         samples that are further apart than the time-out is a guess.
         """
         if not self.driven:
@@ -110,6 +110,9 @@ class Hearing:
         age = t - last
         if age > self.timeout + SLACK:
             return f"not heard for {age:.2f} s (time-out {self.timeout:.3g} s)"
+        silence = self.heard[k][0] - last if k < len(self.heard) else 0.0
+        if silence > self.timeout + SLACK and age > SLACK:
+            return f"not heard for {silence:.2f} s from {last:.3f} s on (time-out {self.timeout:.3g} s)"
         if k == len(self.heard) and age > SLACK and self.leaves_at > STANDS:
             speed = f"{self.leaves_at:.3g} rad/s or m/s"
             return f"what drives it ends in motion, with {speed} at {last:.3f} s: nobody says that it stopped"

@@ -1,0 +1,349 @@
+"""Random workstations, and what can be done to them: tests import it as ``from random_cells import …``.
+
+A cell is plain data; `files` writes it as a user would. What is done to a cell is a function from one cell to
+another, so that any relation between their verdicts can be asked of any cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from seerob.results.result_log import ResultLog
+from seerob.results.series import Series
+from seerob.station import Station, load
+
+LIBRARY = {
+    "ur3e": (6, "tool0"),
+    "ur5": (6, "tool0"),
+    "ur10": (6, "tool0"),
+    "ur16e": (6, "tool0"),
+    "iiwa7": (7, "lbr_link_ee"),
+    "iiwa14": (7, "lbr_link_ee"),
+    "niryo_one": (6, "tool_link"),
+    "doosan_m1013": (6, "link6"),
+}
+"""Robot of the library → number of joints, and the link that carries tools."""
+PIECE = 3
+"""Into how many a link is split by fixed joints."""
+
+
+@dataclass(frozen=True)
+class Inertial:
+    mass: float
+    com: np.ndarray
+    inertia: np.ndarray
+    """About the centre of mass, in the axes of the link, shape (3, 3) [kg·m²]."""
+
+    def urdf(self) -> str:
+        (a, b, c), (_, d, e), (_, _, f) = self.inertia.tolist()
+        return (
+            f'<inertial><origin xyz="{_xyz(self.com)}"/><mass value="{self.mass!r}"/><inertia ixx="{a!r}" '
+            f'ixy="{b!r}" ixz="{c!r}" iyy="{d!r}" iyz="{e!r}" izz="{f!r}"/></inertial>'
+        )
+
+
+@dataclass(frozen=True)
+class Link:
+    origin: np.ndarray
+    """Of its joint in the link before [m]."""
+    axis: np.ndarray
+    kind: str
+    box: np.ndarray
+    """Edges [m]."""
+    middle: np.ndarray
+    """Of the box, in the link [m]."""
+    inertial: Inertial | None
+    shaped: bool = True
+
+
+@dataclass(frozen=True)
+class Cell:
+    links: tuple[Link, ...]
+    """Of a random arm; empty for one of the library."""
+    library: str
+    tool: float | None
+    """Mass of a tool [kg]; None without."""
+    amplitude: np.ndarray
+    frequency: np.ndarray
+    phase: np.ndarray
+    rate: float
+    """Samples per second."""
+    duration: float
+    speeds: bool
+    """Whether the log has velocities."""
+    stature: float
+    person: np.ndarray
+    """x, y, yaw of the person."""
+    walks: bool
+    limits: dict[str, float]
+    tick: float = 0.01
+    physics: bool = False
+    world: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """x, y, yaw of everything."""
+    names: tuple[str, str] = ("arm", "op")
+    turned_tables: bool = False
+    units: bool = False
+    """Whether figures are written in mm and degrees."""
+    split: bool = False
+    start: float = 0.0
+    """Of the log's clock [s]."""
+    gap: tuple[float, float] | None = None
+    """Stretch of the log that is not there [s]."""
+    heard: bool = True
+    uncertainty: float = 0.0
+    mass_tolerance: float = 0.0
+    obstacle: bool = False
+    more: str = ""
+    """More tables."""
+    left_out: frozenset[str] = field(default=frozenset())
+    """Criteria that are not asked."""
+
+
+def random_cell(seed: int, *, published: bool = True) -> Cell:
+    """An arm of two to seven joints that swings beside a person who stands or reaches.
+
+    Args:
+        seed: Equal seeds are equal cells.
+        published: Whether one of four arms is one of the library.
+    """
+    rng = np.random.default_rng(seed)
+    links = []
+    for i in range(int(rng.integers(2, 6))):
+        box = rng.uniform(0.05, 0.12, 3)
+        along = rng.integers(3)
+        box[along] = rng.uniform(0.2, 0.45)
+        middle = np.zeros(3)
+        middle[along] = box[along] / 2
+        mass = float(rng.uniform(0.5, 8))
+        about = Rotation.random(random_state=rng).as_matrix()
+        inertia = about @ np.diag(mass / 12 * (box**2).sum() / 3 * rng.uniform(0.8, 1.2, 3)) @ about.T
+        origin = np.zeros(3) if i == 0 else links[-1].middle * 2
+        axis = rng.standard_normal(3)
+        kind = "prismatic" if rng.random() < 0.15 else "revolute"
+        links.append(
+            Link(origin, axis / np.linalg.norm(axis), kind, box, middle, Inertial(mass, middle, inertia))
+        )
+    library = "" if rng.random() < 0.75 or not published else str(rng.choice(list(LIBRARY)))
+    if library:
+        links = []
+    n = LIBRARY[library][0] if library else len(links)
+    size = np.array([0.15 if link.kind == "prismatic" else 1.0 for link in links] or [0.6] * n)
+    heading = rng.uniform(-np.pi, np.pi)
+    far = rng.uniform(0.6, 2.2)
+    return Cell(
+        links=tuple(links),
+        library=library,
+        tool=float(rng.uniform(0.3, 4)) if rng.random() < 0.6 else None,
+        amplitude=size * rng.uniform(0.1, 0.8, n),
+        frequency=rng.uniform(1.0, 5.0, n),
+        phase=rng.uniform(-np.pi, np.pi, n),
+        rate=float(rng.choice([50, 100, 125, 200])),
+        duration=0.3,
+        speeds=bool(rng.random() < 0.5),
+        stature=float(rng.uniform(1.55, 1.9)),
+        person=np.array([far * np.cos(heading), far * np.sin(heading), rng.uniform(-np.pi, np.pi)]),
+        walks=bool(rng.random() < 0.4),
+        limits={
+            "speed": float(rng.uniform(0.2, 4)),
+            "energy": float(10 ** rng.uniform(-1, 2)),
+            "distance": float(rng.uniform(0.05, 1.0)),
+            "mass": float(rng.uniform(1, 15)),
+        },
+    )
+
+
+# -- as a user writes it ------------------------------------------------------------------------
+
+
+def _xyz(values) -> str:
+    return " ".join(repr(float(v)) for v in values)
+
+
+def _place(cell: Cell, x: float, y: float, z: float, yaw: float) -> str:
+    wx, wy, turn = cell.world
+    c, s = np.cos(turn), np.sin(turn)
+    position, yaw = [wx + c * x - s * y, wy + s * x + c * y, z], yaw + turn
+    if cell.units:
+        mm = [1000 * v for v in position]
+        return f"{{ position_mm = {[float(v) for v in mm]}, rpy_deg = [0, 0, {float(np.degrees(yaw))!r}] }}"
+    return f"{{ position = {[float(v) for v in position]}, rpy = [0, 0, {float(yaw)!r}] }}"
+
+
+def _length(cell: Cell, key: str, value: float) -> str:
+    return f"{key}_mm = {1000 * value!r}\n" if cell.units else f"{key} = {value!r}\n"
+
+
+def _halves(inertial: Inertial) -> list[Inertial]:
+    """Pieces that have the mass, the centre and the inertia of the whole: all alike, at the same place."""
+    return [Inertial(inertial.mass / PIECE, inertial.com, inertial.inertia / PIECE)] * PIECE
+
+
+def urdf(cell: Cell) -> str:
+    """The arm."""
+    text = ['<link name="base"/>']
+    before = "base"
+    for i, link in enumerate(cell.links):
+        box = (
+            f'<collision><origin xyz="{_xyz(link.middle)}"/><geometry><box size="{_xyz(link.box)}"/>'
+            "</geometry></collision>"
+        )
+        pieces = [None] if link.inertial is None else [link.inertial]
+        if cell.split and link.inertial is not None:
+            pieces = _halves(link.inertial)
+        text.append(
+            f'<link name="l{i}">{box if link.shaped else ""}{pieces[0].urdf() if pieces[0] else ""}</link>'
+            f'<joint name="j{i}" type="{link.kind}"><parent link="{before}"/><child link="l{i}"/>'
+            f'<origin xyz="{_xyz(link.origin)}"/><axis xyz="{_xyz(link.axis)}"/>'
+            '<limit lower="-6" upper="6" effort="10000" velocity="50"/></joint>'
+        )
+        for k, piece in enumerate(pieces[1:]):
+            text.append(
+                f'<link name="l{i}_{k}">{piece.urdf()}</link><joint name="f{i}_{k}" type="fixed">'
+                f'<parent link="l{i}"/><child link="l{i}_{k}"/></joint>'
+            )
+        before = f"l{i}"
+    text.append(
+        f'<link name="tip"/><joint name="end" type="fixed"><parent link="{before}"/><child link="tip"/>'
+        f'<origin xyz="{_xyz(cell.links[-1].middle * 2)}"/></joint>'
+    )
+    return f'<robot name="chain">{"".join(text)}</robot>'
+
+
+def motion(cell: Cell) -> str:
+    """The log of the arm."""
+    n = len(cell.amplitude)
+    turning = [link.kind == "revolute" for link in cell.links] or [True] * n
+    unit = [("deg" if cell.units else "rad") if turn else ("mm" if cell.units else "m") for turn in turning]
+    factor = np.array([{"deg": 180 / np.pi, "mm": 1000.0}.get(u, 1.0) for u in unit])
+    header = ["t [s]", *(f"j{i} [{unit[i]}]" for i in range(n))]
+    if cell.speeds:
+        header += [f"dj{i} [{unit[i]}/s]" for i in range(n)]
+    rows = [",".join(header)]
+    for k in range(round(cell.duration * cell.rate) + 1):
+        t = k / cell.rate
+        if cell.gap and cell.gap[0] < t < cell.gap[1]:
+            continue
+        q = cell.amplitude * np.sin(cell.frequency * t + cell.phase) * factor
+        qd = cell.amplitude * cell.frequency * np.cos(cell.frequency * t + cell.phase) * factor
+        row = [t + cell.start, *q.tolist(), *(qd.tolist() if cell.speeds else ())]
+        rows.append(",".join(repr(v) for v in row))
+    return "\n".join(rows) + "\n"
+
+
+def files(cell: Cell) -> dict[str, str]:
+    """The folder of the workstation."""
+    arm, op = cell.names
+    x, y, yaw = cell.person.tolist()
+    tolerance = f"mass_tolerance = {cell.mass_tolerance!r}\n" if cell.mass_tolerance else ""
+    tip = "" if cell.tool is not None or cell.library else 'tool = "tip"\n'
+    model = f"library:{cell.library}" if cell.library else "arm.urdf"
+    end = LIBRARY[cell.library][1] if cell.library else "tip"
+    tables = [
+        f'[[robots]]\nname = "{arm}"\nmodel = "{model}"\n{tip}{tolerance}'
+        f"base = {_place(cell, 0, 0, 0.8, 0)}\n",
+        f'[[humans]]\nname = "{op}"\nstature = {cell.stature!r}\nmass = 75\nsex = "male"\n'
+        f"at = {_place(cell, x, y, 0.0, yaw)}\n",
+        f'[[areas]]\nname = "side"\nshape = {{ box = [1.0, 1.0, 2.0] }}\n'
+        f"at = {_place(cell, 0.9, 0, 1.0, 0)}\n",
+    ]
+    if cell.tool is not None:
+        tables.append(
+            f'[[tools]]\nname = "tool"\non = "{arm}/{end}"\nshape = {{ box = [0.06, 0.06, 0.06] }}\n'
+            f"mass = {cell.tool!r}\ntcp = {{ position = [0, 0, 0.05] }}\n"
+        )
+    if cell.obstacle:
+        tables.append(
+            '[[parts]]\nname = "post"\nshape = { box = [0.1, 0.1, 2.0] }\n'
+            f"at = {_place(cell, 0.6, 0.6, 1.0, 0)}\n"
+        )
+    if cell.heard:
+        tables.append(f'[[sources]]\nkind = "csv"\nrobot = "{arm}"\nfile = "motion.csv"\n')
+    found = {"motion.csv": motion(cell)}
+    if cell.links:
+        found["arm.urdf"] = urdf(cell)
+    if cell.walks:
+        tables.append(f'[[sources]]\nkind = "keyframes"\nhuman = "{op}"\nfile = "person.toml"\n')
+        found["person.toml"] = (
+            'title = "reach"\n[[keyframes]]\nt = 0.0\nposture = "standing"\n'
+            f'[[keyframes]]\nt = {cell.duration!r}\nposture = "reach_forward"\n'
+        )
+    limits = cell.limits
+    criteria = {
+        "speed": f'kind = "velocity"\nat = "{arm}"\nlimit = {limits["speed"]!r}\n',
+        "fastest": f'kind = "velocity"\nof = "{arm}"\nlimit = {limits["speed"]!r}\n',
+        "energy": f'kind = "kinetic_energy"\nrobot = "{arm}"\nlimit = {limits["energy"]!r}\n',
+        "distance": f'kind = "minimum_distance"\nbetween = ["{arm}", "{op}"]\n'
+        + _length(cell, "limit", limits["distance"])
+        + _length(cell, "uncertainty", cell.uncertainty),
+        "separation": f'kind = "separation"\nbetween = ["{arm}", "{op}"]\n'
+        "stop = { reaction = 0.1, stopping = 0.2 }\n"
+        + _length(cell, "intrusion", 0.1)
+        + _length(cell, "human_uncertainty", 0.02 + cell.uncertainty)
+        + _length(cell, "robot_uncertainty", 0.01),
+        "area": f'kind = "safety_area"\narea = "side"\nof = "{arm}"\n'
+        + _length(cell, "tolerance", 0.001 + cell.uncertainty),
+        "felt": f'kind = "effective_mass"\nat = "{arm}"\ntoward = "{op}"\nlimit = {limits["mass"]!r}\n',
+        "contact": f'kind = "power_and_force"\nrobot = "{arm}"\nhuman = "{op}"\n'
+        f"contact_area = {{ {arm} = 1e-4 }}\nlargest_area = 1e-4\n",
+        "posture": f'kind = "owas"\nhuman = "{op}"\n',
+    }
+    asked = [(name, text) for name, text in criteria.items() if name not in cell.left_out]
+    if cell.turned_tables:
+        tables, asked = tables[::-1], asked[::-1]
+    for name, text in asked:
+        group = "ergonomics" if name == "posture" else "safety"
+        tables.append(f'[[{group}]]\nname = "{name}"\n{text}')
+    phase = '[[phases]]\ntitle = "all"\nstart = 0.0\nload = 1.0\nlegs = "posture"\n'
+    head = f"[engine]\ntimestep = 0.001\ntick = {cell.tick!r}\nphysics = {str(cell.physics).lower()}\n"
+    found["workstation.toml"] = "\n".join([head, *tables, phase, cell.more])
+    return found
+
+
+# -- what they say ------------------------------------------------------------------------------
+
+
+def station(cell: Cell, folder: Path) -> Station:
+    """The cell, read and compiled."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in files(cell).items():
+        (folder / name).write_text(text)
+    return load(folder)
+
+
+def said(cell: Cell, folder: Path) -> ResultLog:
+    """What every criterion says over the run."""
+    return station(cell, folder).run().results
+
+
+def least_margin(series: Series) -> float:
+    """Least distance to the limit over the run, negative beyond it; nan without figures."""
+    limits, values = np.nan_to_num(series.limits), series.values
+    margins = limits - values if series.at_most else values - limits
+    return float(np.nanmin(margins)) if np.isfinite(margins).any() else np.nan
+
+
+# -- what is done to them -----------------------------------------------------------------------
+
+
+def heavier(cell: Cell) -> Cell:
+    """Links and tool half as heavy again."""
+    links = tuple(
+        replace(k, inertial=Inertial(1.5 * k.inertial.mass, k.inertial.com, 1.5 * k.inertial.inertia))
+        for k in cell.links
+    )
+    return replace(cell, links=links, tool=None if cell.tool is None else 1.5 * cell.tool)
+
+
+def thicker(cell: Cell) -> Cell:
+    return replace(cell, links=tuple(replace(k, box=k.box + 0.04) for k in cell.links))
+
+
+def faster(cell: Cell) -> Cell:
+    """Twice as fast on the same way, asked at the same places."""
+    return replace(
+        cell, frequency=2 * cell.frequency, rate=2 * cell.rate, duration=cell.duration / 2, tick=cell.tick / 2
+    )

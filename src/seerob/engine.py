@@ -167,7 +167,7 @@ class Engine:
                 self._following(sample.target).hear(sample)
                 continue
             mechanism = self._target(sample)
-            reason = sample.quality.doubt("its source")
+            reason = sample.doubt("its source")
             reference = self._references[mechanism.name]
             if not is_possible(sample):
                 # Nothing to be pulled to; not knowing where it is must show all the same.

@@ -49,6 +49,18 @@ class SampleBase(Struct, frozen=True, kw_only=True, tag=True):
     t_device: float | None = None
     """The same instant on the device's own clock [s], if it has one."""
     quality: Quality = Quality.GOOD
+    reason: str = ""
+    """Why it may not be relied on, as whoever heard it found; empty when nobody found anything."""
+    late: float = 0.0
+    """How much later it arrived than what came fastest from that device [s]; 0 where it sends no time."""
+
+    def doubt(self, who: str) -> str:
+        """Why it may not be relied on; empty when it may.
+
+        Args:
+            who: Whoever says so, for the words.
+        """
+        return self.reason or self.quality.doubt(who)
 
 
 class JointSample(SampleBase, frozen=True, kw_only=True, tag="joint"):

@@ -71,6 +71,54 @@ def test_after_a_slip_nothing_is_sure_until_the_twin_has_settled(said):
     assert after[4].t - before[-1].t == pytest.approx(0.6)
 
 
+@pytest.mark.parametrize("when", ["asleep", "while it computes", "after it has waited"])
+def test_a_pause_of_the_run_itself_is_a_slip_before_anything_is_made_of_it(monkeypatch, when):
+    """Held still for half a second by the system, wherever: no sample may lie half a second ahead as sure."""
+    now = [100.0]
+    pauses = {"asleep": 0.0, "after it has waited": 0.0}
+
+    def sleep(seconds):
+        now[0] += seconds + pauses.pop("asleep", 0.0)
+
+    monkeypatch.setattr("seerob.live.real_time.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("seerob.live.real_time.time.sleep", sleep)
+
+    class Real(Said):
+        def take(self):
+            now[0] += pauses.pop("after it has waited", 0.0)
+            return (joint(now[0] - 0.001),)
+
+    clock = Clock()
+    feed = hear(iter(lambda: (), None), Real(), clock)
+    heard = []
+    for k in range(100):
+        if k == 50:
+            if when == "while it computes":
+                now[0] += 0.5
+            else:
+                pauses[when] = 0.5
+        heard.append((0.01 * k, next(feed)))
+        clock.wait(0.01 * (k + 1))
+    for t, samples in heard:
+        for sample in samples:
+            assert sample.t <= t + Said.delay + 0.01 or sample.quality == "late"
+    assert clock.slipped == pytest.approx(0.5, abs=0.02)
+    late = [t for t, samples in heard if any(s.quality == "late" for s in samples)]
+    assert late[0] == pytest.approx(0.5, abs=0.011)
+    assert len(late) > 45
+
+
+def test_a_computer_that_was_suspended_has_slipped(monkeypatch):
+    """Its monotonic clock stood still; the robot's did not."""
+    clock, slept = Clock(), [0.0]
+    monkeypatch.setattr("seerob.live.real_time._asleep", lambda: clock._asleep + slept[0])
+    clock.look()
+    assert clock.slipped == 0.0
+    slept[0] = 3600.0
+    clock.look()
+    assert clock.slipped == 3600.0
+
+
 def test_several_pictures_of_one_instant_are_all_heard():
     """Of a machine; a robot is in one place."""
     start = time.monotonic()

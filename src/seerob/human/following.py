@@ -272,7 +272,7 @@ class Following:
             share = age / (device.times[k + 1] - device.times[k])
             instant = t
             points = between(points, device.samples[k + 1].points, share)
-        reason = sample.quality.doubt(name)
+        reason = sample.doubt(name)
         if sample.quality is Quality.INVALID:
             return _Told([], reason)
         return self._believed(device, points, instant, reason)

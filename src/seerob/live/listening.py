@@ -29,8 +29,9 @@ from msgspec.structs import replace
 from seerob.errors import InputError, SeerobError
 from seerob.host_name import check_host, check_url
 from seerob.live.arrivals import Arrivals, Statistics
-from seerob.live.device_clock import DeviceClock
-from seerob.samples import Sample, SignalSample
+from seerob.live.contradictions import Contradictions
+from seerob.live.device_clock import AFTER, HOLD, DeviceClock, Instant
+from seerob.samples import BodySample, JointSample, Quality, Sample, SignalSample, key
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
 
@@ -200,6 +201,11 @@ class Listener:
         """Whether it drives a robot or a person, or only has signals."""
         self._source, self._target, self._post = source, target, post
         self._clock, self._arrivals = DeviceClock(), Arrivals(source.period())
+        self._bound = source.timeout
+        self._contradictions: dict[tuple[str, ...], Contradictions] = {}
+        self._found: dict[tuple[str, ...], tuple[str, float]] = {}
+        """What contradicted itself, and until when that counts [s]."""
+        self._posted: dict[tuple[str, ...], Sample] = {}
         self._lock = Lock()
         self._thread = Thread(target=self._run, name=f"seerob-{self.name}", daemon=True)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -241,7 +247,7 @@ class Listener:
         _said.set(set())
         pause = FIRST_PAUSE
         while True:
-            self._clock.restart()
+            self._clock.reconnect()
             begun = time.monotonic()
             reason = await self._session()
             if self._stopping:
@@ -272,21 +278,66 @@ class Listener:
         return "the other end closed the connection"
 
     def _take(self, sample: Sample) -> None:
-        host = sample.t
-        instant: float | None = host
-        if sample.t_device is not None and not isinstance(sample, SignalSample):
-            instant = self._clock.instant(sample.t_device, host)
-            if instant is None:
-                self._arrivals.repeat()
-                return
-        if not (self.drives and isinstance(sample, SignalSample)):
+        if isinstance(sample, SignalSample):
+            self._news(sample, sample.t, self.drives)
+            return
+        host, what = sample.t, key(sample)
+        heard = Instant(host)
+        if sample.t_device is not None:
+            heard = self._clock.hear(sample.t_device, host, _content(sample))
+        if heard.t is None:
+            self._arrivals.repeat()
+            if heard.doubt and what in self._posted:
+                # No news, and a doubt about what was said before.
+                self._doubt(what, heard.doubt)
+            return
+        late = self._clock.latency if sample.t_device is not None else 0.0
+        reason = heard.doubt or self._contradiction(sample, what, host)
+        quality = sample.quality
+        if late > self._bound:
+            reason = f"heard {late:.2f} s later than at its best (bound {self._bound:g} s)"
+            quality = Quality.LATE if quality is Quality.GOOD else quality
+        if reason and quality is Quality.GOOD:
+            quality = Quality.DEGRADED
+        reason = reason and f"{self.name}: {reason}"
+        self._news(replace(sample, t=heard.t, quality=quality, reason=reason, late=late), host, quiet=False)
+
+    def _news(self, sample: Sample, host: float, quiet: bool) -> None:
+        """Post what is new.
+
+        Args:
+            sample: On the host's clock.
+            host: When it arrived [s].
+            quiet: It is not what this source is listened to for.
+        """
+        if not quiet:
             self._arrivals.add(host, sample.t_device)
-        if not self._up and not (self.drives and isinstance(sample, SignalSample)):
             if self._up is False:
                 _log.warning("%s: heard again", self.name)
             self._up = True
-        self._post(replace(sample, source=self.name, seq=self._seq, t=instant))
+        sample = self._posted[key(sample)] = replace(sample, source=self.name, seq=self._seq)
         self._seq += 1
+        self._post(sample)
+
+    def _doubt(self, what: tuple[str, ...], reason: str) -> None:
+        """Say again what was said last, with a doubt: whoever has taken it would not know."""
+        last = self._posted[what]
+        reason = f"{self.name}: {reason}"
+        if last.reason == reason:
+            return
+        quality = Quality.DEGRADED if last.quality is Quality.GOOD else last.quality
+        self._posted[what] = replace(last, t=last.t + AFTER, quality=quality, reason=reason, seq=self._seq)
+        self._seq += 1
+        self._post(self._posted[what])
+
+    def _contradiction(self, sample: Sample, what: tuple[str, ...], host: float) -> str:
+        """What in it contradicts what was said before, now or a moment ago."""
+        if what not in self._contradictions:
+            self._contradictions[what] = Contradictions(self._target)
+        if found := self._contradictions[what].find(sample):
+            self._found[what] = found, host + HOLD
+        found, until = self._found.get(what, ("", 0.0))
+        return found if host <= until else ""
 
     def _lose(self, reason: str) -> None:
         """One line per loss, however often it is tried again."""
@@ -294,6 +345,15 @@ class Listener:
             _log.warning("%s: not heard: %s", self.name, reason)
             self._arrivals.lose()
             self._up = False
+
+
+def _content(sample: Sample) -> int:
+    """What tells a sample's content from that of others."""
+    if isinstance(sample, JointSample):
+        return hash((sample.q, sample.qd))
+    if isinstance(sample, BodySample):
+        return hash(tuple([(p.position, p.wxyz) for p in sample.points]))
+    return 0 if isinstance(sample, SignalSample) else hash((sample.position, sample.wxyz))
 
 
 def name_of(source: LiveSource) -> str:

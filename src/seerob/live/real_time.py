@@ -31,6 +31,8 @@ class Clock:
         """Host's monotonic time at which the tick of run time 0 is due [s]."""
         self.slipped = 0.0
         """How much later than real time the run is by now [s]."""
+        self._due = 0.0
+        self._asleep = _asleep()
 
     def begin(self, start: float) -> None:
         """Let run time 0 be due at ``start`` [s], host's monotonic time, and wait for it."""
@@ -39,12 +41,32 @@ class Clock:
 
     def wait(self, t: float) -> None:
         """Sleep until run time ``t`` [s] has come."""
+        self._due = t
         ahead = self.start + t - time.monotonic()
         if ahead > 0:
             time.sleep(ahead)
-        elif ahead < -self.SLIP:
-            self.start -= ahead
-            self.slipped -= ahead
+        self.look()
+
+    def look(self) -> None:
+        """Look how late it is: whoever slept may have slept longer, and been held up since.
+
+        A computer that was suspended has a monotonic clock that stood still; another one tells.
+        """
+        lag = time.monotonic() - (self.start + self._due)
+        if lag > self.SLIP:
+            self.start += lag
+            self.slipped += lag
+        asleep = _asleep()
+        if asleep > self._asleep + self.SLIP:
+            self.slipped += asleep - self._asleep
+        self._asleep = asleep
+
+
+def _asleep() -> float:
+    """Time that this computer was suspended since it was switched on [s]; 0 where nobody says."""
+    if not hasattr(time, "CLOCK_BOOTTIME"):
+        return 0.0
+    return time.clock_gettime(time.CLOCK_BOOTTIME) - time.monotonic()
 
 
 def hear(
@@ -71,12 +93,15 @@ def hear(
     slipped = clock.slipped
     for samples in recorded:
         waiting: set[tuple[str, ...]] = set()
+        # First taken, then looked: whatever held the run up until now, these samples lie where it is then.
+        came = (*heard, *listening.take())
+        clock.look()
         if clock.slipped > slipped:
             slipped, doubtful, waiting = clock.slipped, set(newest), set(newest)
             settled = {what: sample.t + SETTLE for what, sample in newest.items()}
         zero = clock.start - listening.delay
         taken: list[Sample] = []
-        for sample in (*heard, *listening.take()):
+        for sample in came:
             t = sample.t - zero
             what = key(sample)
             if what in newest and not _is_newer(sample, t, newest[what].t):

@@ -17,7 +17,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from seerob.errors import InputError
-from seerob.live.device_clock import RESTART
+from seerob.live.device_clock import REORDERED
 from seerob.live.differentiation import SAMPLES, Differentiator
 from seerob.live.listening import LiveSource
 from seerob.protocols import ProtocolError, fri
@@ -232,7 +232,7 @@ class Fri(LiveSource, frozen=True, kw_only=True):
                 t = device(m)
                 instant = datagram.arrived if t is None else t
                 qd = None
-                if not newest - RESTART < instant <= newest:  # neither doubled nor overtaken
+                if not newest - REORDERED < instant <= newest:  # neither doubled nor overtaken
                     newest = instant
                     qd = slope.add(instant, m.q)
                 yield joint_sample(m, target=self.robot, arrived=datagram.arrived, device=t, qd=qd)

@@ -253,7 +253,7 @@ def _compared(trajectory: Trajectory, target: Target) -> dict[int, list[Finding]
         if np.ptp(q) < MOVES[unit] and np.sum(np.abs(v) * h) < 10 * MOVES[unit]:
             continue
         power_s, power_v, cross = (float(np.sum(w * a * b)) for a, b in ((s, s), (v, v), (s, v)))
-        reason = _disagreement(power_s, power_v, cross)
+        reason = disagreement(power_s, power_v, cross)
         if reason:
             remedy = 'correct the unit or the columns, or set velocities = "derive" to use the positions'
             problems.append(Problem(trajectory.file, f"velocity of {joint!r}", reason, remedy))
@@ -271,8 +271,14 @@ def _compared(trajectory: Trajectory, target: Target) -> dict[int, list[Finding]
     return found
 
 
-def _disagreement(power_s: float, power_v: float, cross: float) -> str:
-    """What is wrong between slopes and velocities; empty when they agree."""
+def disagreement(power_s: float, power_v: float, cross: float) -> str:
+    """What is wrong between slopes and velocities; empty when they agree.
+
+    Args:
+        power_s: Sum of the squares of the slopes.
+        power_v: Of the velocities.
+        cross: Of their products.
+    """
     if power_v <= 1e-9 * power_s:
         return "is zero while the joint moves"
     if power_s <= 1e-9 * power_v:

@@ -89,5 +89,5 @@ def doubt_of(picture: SignalSample, name: str) -> str:
     if name in picture.doubts:
         return picture.doubts[name]
     if picture.quality is not Quality.GOOD:
-        return f"{name}: {picture.quality.doubt('its source')}"
+        return f"{name}: {picture.doubt('its source')}"
     return "" if name in picture.values else f"{name}: not heard"

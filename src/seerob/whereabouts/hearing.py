@@ -109,7 +109,8 @@ class Hearing:
         last = self.heard[k - 1][0]
         age = t - last
         if age > self.timeout + SLACK:
-            return f"not heard for {age:.2f} s (time-out {self.timeout:.3g} s)"
+            why = self.heard[k - 1][1]
+            return f"not heard for {age:.2f} s (time-out {self.timeout:.3g} s)" + (why and f": {why}")
         silence = self.heard[k][0] - last if k < len(self.heard) else 0.0
         if silence > self.timeout + SLACK and age > SLACK:
             return f"not heard for {silence:.2f} s from {last:.3f} s on (time-out {self.timeout:.3g} s)"

@@ -161,7 +161,7 @@ def _able(
 ) -> tuple[dict[str, _Able], dict[str, str]]:
     """Criteria that judge many instants at once; why others do not."""
     able: dict[str, _Able] = {}
-    names = held_names(findings)
+    names = held_names(findings, model)
     notes: dict[str, str] = {}
     for one in bound:
         criterion = one.criterion

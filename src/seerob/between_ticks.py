@@ -221,8 +221,9 @@ class BetweenTicks:
         shadow.refresh(t)
         muted = False
         try:
-            muted = criterion.active is not None and not shadow.signal(criterion.active)
-            result = Result(name=criterion.name) if muted else self._again[i](shadow)
+            with shadow.asking():
+                muted = criterion.active is not None and not shadow.signal(criterion.active)
+                result = Result(name=criterion.name) if muted else self._again[i](shadow)
         except Undecided as reason:
             result = Result(name=criterion.name, verdict=_UNDECIDED, reason=str(reason))
         return result, _end(criterion, result, t, shadow.largest_speeds())

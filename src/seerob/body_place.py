@@ -42,7 +42,8 @@ class BodyPlaces:
 
     def _named(self, state: State, index: int, point: Array) -> str:
         person, bone = self._bones[index]
-        local = (point - state.positions[index]) @ state.rotations[index]
+        R, x = state.placed((index,), estimates=True)
+        local = (point - x[index]) @ R[index]
         area = body_area(bone, local, body=self._sizes[person], hand=self._hands[person])
         return words(
             self._names[index],

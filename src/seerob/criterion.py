@@ -41,6 +41,9 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Whether its limit bounds from above."""
     by_shape: ClassVar[bool] = False
     """Whether it is about the shapes of its subjects: what no shape shows of a robot is nowhere near."""
+    whole: ClassVar[bool] = True
+    """Whether all that it depends on must be where the twin shows it before it is asked. One that judges
+    people bone by bone, or for which what is known may suffice, says False: what it asks of must be still."""
 
     remembers: ClassVar[bool] = False
     """Whether what it says depends on earlier instants: then it is asked in the order of time only."""
@@ -107,6 +110,10 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def subjects(self) -> tuple[str, ...]:
         """Names from the workstation file that this criterion speaks of."""
         return ()
+
+    def depends(self, model: Model) -> tuple[str, ...]:
+        """Names of all whose place or motion its results depend on; its subjects when not said."""
+        return self.subjects()
 
     def unseen(self, model: Model) -> str:
         """Why nothing is within: what no shape shows of the robots that it speaks of; empty for nothing."""

@@ -57,6 +57,10 @@ class Undecided(SeerobError):
     """
 
 
+class NotAsked(SeerobError):
+    """A criterion read what does not say whether it may be relied on, instead of asking `State`."""
+
+
 class SimulationDiverged(SeerobError):
     """The physics produced a number that is not finite; the message names body and time."""
 

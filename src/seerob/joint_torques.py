@@ -28,7 +28,7 @@ def gravity(state: State, mechanism: Mechanism) -> Array:
         Undecided: Not heard, or a mass that nobody gave.
     """
     state.weigh(mechanism)
-    data, columns = state.data, state.columns[mechanism.name]
+    data, columns = state.data_of(mechanism.name), state.columns[mechanism.name]
     found = np.empty(len(columns.joints))
     held(
         data.subtree_com, data.xanchor, data.xaxis, columns.bodies, columns.joints, columns.turns,
@@ -48,5 +48,5 @@ def bias(state: State, mechanism: Mechanism) -> Array:
     """
     state.weigh(mechanism)
     every = np.zeros(state.model.mj.nv)
-    mujoco.mj_rne(state.model.mj, state.data, 0, every)
+    mujoco.mj_rne(state.model.mj, state.data_of(mechanism.name), 0, every)
     return np.asarray(mechanism.coupling.T @ every[mechanism.v_address])

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import logging
 import math
+import traceback
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 from msgspec.structs import replace
 
 from seerob.between_ticks import BetweenTicks, Watch
 from seerob.criterion import Criterion, Evaluate
-from seerob.errors import Undecided, UnknownName
+from seerob.errors import SeerobError, Undecided, UnknownName
 from seerob.model import Model
-from seerob.snapshot import Basis, Finding, Result, Verdict
+from seerob.plugin import PluginError
+from seerob.snapshot import Basis, Finding, Result, Row, Verdict
 from seerob.state import State
 from seerob.whereabouts.hearing import SLACK
+
+_log = logging.getLogger(__name__)
+# To ask an enumeration for a member takes longer than all the rest of a judgement.
+_WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 
 
 @dataclass(frozen=True)
@@ -28,6 +36,106 @@ class Bound:
     basis: Basis
     watch: Watch | None = None
     """How it is judged between two ticks; None where nothing bounds it."""
+
+
+def bound_to(model: Model, criterion: Criterion, group: str) -> Bound:
+    """A criterion with its names resolved.
+
+    Raises:
+        SeerobError: It cannot be, and why; whatever a criterion of one's own raises, with the place.
+    """
+    kind = type(criterion)
+    for method, gives in (("bind", "the function that judges a state"), ("basis", "formula, source, inputs")):
+        if getattr(kind, method) is getattr(Criterion, method):
+            raise PluginError(
+                f"{kind.__name__} of {kind.__module__} has no {method}: define {method}(self, model), "
+                f"which returns {gives} (CONTRIBUTING.md, “A criterion”)"
+            )
+    method = "bind"
+    try:
+        evaluate = criterion.bind(model)
+        method = "basis"
+        basis = criterion.basis(model)
+    except SeerobError:
+        raise
+    except Exception as error:
+        raise PluginError(f"{method} of {kind.__module__} fails: {_told(error)}") from error
+    for what, returned, right in (
+        ("bind", evaluate, callable(evaluate)),
+        ("basis", basis, isinstance(basis, Basis)),
+    ):
+        if not right:
+            wanted = "a function of State" if what == "bind" else "a seerob.snapshot.Basis"
+            raise PluginError(f"{what} of {kind.__module__} returns {type(returned).__name__}, not {wanted}")
+    return Bound(criterion, group, evaluate, basis)
+
+
+def needed(criterion: Criterion, model: Model) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    """Robots, people and machines, and bodies, that must be where the twin shows them before it is asked."""
+    names: dict[str, None] = {}
+    bodies: dict[int, None] = {}
+    for name in criterion.depends(model) if criterion.whole else ():
+        meant = () if name in model.mechanisms else _meant(model, name)
+        if name in model.mechanisms:
+            names[name] = None
+        elif meant:
+            bodies |= dict.fromkeys(meant)
+        elif name in model.frames:
+            at = model.frames[name].mj
+            moving = (m for m in model.mechanisms.values() if at in m.mj_bodies)
+            names |= dict.fromkeys(m.name for m in moving)
+    return tuple(names), tuple(bodies)
+
+
+def contradiction(result: Result, criterion: Criterion) -> str:
+    """Why a result cannot be what it says; empty where it can.
+
+    Only what makes it greener than it is: nothing is within without a value and a limit that it keeps, or
+    beside a part that is not.
+    """
+    if result.name != criterion.name:
+        return f"its result is called {result.name!r}, not {criterion.name!r}"
+    verdict = result.verdict
+    if verdict is not _WITHIN:
+        known = verdict is None or type(verdict) is Verdict
+        return "" if known else f"its verdict is {verdict!r}, not a seerob.Verdict"
+    value, limit = result.value, result.limit
+    if value is None or limit is None:
+        return f"it is within, and has no {'value' if value is None else 'limit'}"
+    ends = (value,) if result.interval is None else (value, *result.interval)
+    for end in ends:
+        # A value that is not a number keeps no limit.
+        if not (end <= limit if result.at_most else end >= limit):
+            side = "above" if result.at_most else "below"
+            return f"it is within, and {end:g} {result.unit} lies {side} its limit of {limit:g} {result.unit}"
+    inner: tuple[Result | Row, ...] = (*result.parts, *result.rows)
+    for part in inner:
+        if part.verdict is _EXCEEDED or part.verdict is _UNDECIDED:
+            return f"it is within, and its part {part.name} is {part.verdict}"
+    return ""
+
+
+def _unknown(criterion: Criterion, reason: str) -> Result:
+    """What is said of a criterion that could not be asked."""
+    return Result(
+        name=criterion.name,
+        unit=criterion.unit,
+        limit=getattr(criterion, "limit", None),
+        at_most=criterion.at_most,
+        verdict=_UNDECIDED,
+        reason=reason,
+    )
+
+
+def _where(bound: Bound) -> str:
+    return type(bound.criterion).__module__.removeprefix(f"seerob.{bound.group}.")
+
+
+def _told(error: Exception) -> str:
+    """An error in a sentence, with the place in the code where it came from."""
+    last = traceback.extract_tb(error.__traceback__)[-1:]
+    place = "".join(f" ({Path(frame.filename).name}, line {frame.lineno})" for frame in last)
+    return f"{type(error).__name__}: {error}{place}"
 
 
 def undecided(result: Result, reason: str) -> Result:
@@ -79,13 +187,18 @@ def held(criterion: Criterion, model: Model, findings: Iterable[Finding]) -> str
     return "; ".join(dict.fromkeys(filter(None, reasons)))
 
 
-def held_names(findings: Iterable[Finding]) -> dict[str, str]:
+def held_names(findings: Iterable[Finding], model: Model) -> dict[str, str]:
     """By name that findings hold, why nothing that depends on it is within."""
     found: dict[str, list[str]] = {}
     for finding in findings:
         for name in finding.holds:
             found.setdefault(name, []).append(finding.text)
-    return {name: "; ".join(dict.fromkeys(texts)) for name, texts in found.items()}
+    for mechanism in model.mechanisms.values():
+        above = mechanism.on
+        while above:  # whatever is known of it is known of where its carrier is
+            found.setdefault(mechanism.name, []).extend(found.get(above, ()))
+            above = model.mechanisms[above].on
+    return {name: "; ".join(dict.fromkeys(texts)) for name, texts in found.items() if texts}
 
 
 def _meant(model: Model, name: str) -> tuple[int, ...]:
@@ -123,8 +236,10 @@ class Judge:
         self._findings = tuple(findings)
         self._held: tuple[str, ...] | None = None
         self._held_names: dict[str, str] = {}
+        self._needs: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] | None = None
         self._kept: dict[int, _Kept] = {}
         self._between = BetweenTicks([one.watch for one in bound])
+        self._warned: set[str] = set()
 
     def __call__(self, state: State) -> tuple[Result, ...]:
         """Results at this state, in the order of the file."""
@@ -132,7 +247,8 @@ class Judge:
             model = state.model
             findings = tuple(dict.fromkeys((*model.findings, *self._findings)))
             self._held = tuple(held(bound.criterion, model, findings) for bound in self._bound)
-            self._held_names = held_names(findings)
+            self._held_names = held_names(findings, model)
+            self._needs = tuple(needed(bound.criterion, model) for bound in self._bound)
         results = tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
 
         def ask(i: int) -> Result:
@@ -146,30 +262,60 @@ class Judge:
         criterion = bound.criterion
         if kept and self._lasts(kept, criterion, state):
             return kept.result
-        state.asked.clear()
         muted: Result | None = None
         try:
-            muted = self._muted(criterion, state)
-            result = muted or bound.evaluate(state)
-            if result.value is not None and not math.isfinite(result.value):
-                raise Undecided(f"the value is {result.value}, not a finite number")
-            if muted is None and (reason := self._reason(i, state)):
-                result = undecided(result, reason)
+            with state.asking():
+                muted = self._muted(criterion, state)
+                result = muted or self._asked(i, bound, state)
         except Undecided as reason:
-            result = Result(
-                name=criterion.name,
-                unit=criterion.unit,
-                limit=getattr(criterion, "limit", None),
-                at_most=criterion.at_most,
-                verdict=Verdict.UNDECIDED,
-                reason=str(reason),
-            )
+            result = _unknown(criterion, str(reason))
+        except Exception as error:
+            # One's own criterion that fails must not end a run that others are judged in.
+            result = _unknown(criterion, self._failed(bound, error))
         result = replace(result, basis=bound.basis)
         if criterion.every is not None:
             result = replace(result, t=state.t)
             due, asked = state.t + criterion.every, tuple(sorted(state.asked))
             self._kept[i] = _Kept(result, state.t, due, muted is not None, asked)
         return result
+
+    def _asked(self, i: int, bound: Bound, state: State) -> Result:
+        """What a criterion says, as far as it may be green.
+
+        Raises:
+            Undecided: What it depends on may not be relied on, or what it says is no result.
+        """
+        assert self._needs is not None
+        names, bodies = self._needs[i]
+        state.require(*names)
+        if bodies:
+            state.require_bodies(bodies)
+        result = bound.evaluate(state)
+        if type(result) is not Result:
+            what = f"{_where(bound)} returns {type(result).__name__}, not a Result"
+            self._warn(bound, what)
+            raise Undecided(what)
+        reason = contradiction(result, bound.criterion)
+        if reason:
+            reason = f"{_where(bound)} contradicts itself: {reason}"
+            self._warn(bound, reason)
+            if type(result.verdict) is not Verdict:
+                raise Undecided(reason)
+        elif result.value is not None and not math.isfinite(result.value):
+            raise Undecided(f"the value is {result.value}, not a finite number")
+        if held := self._reason(i, state):
+            reason = f"{reason}; {held}" if reason else held
+        return undecided(result, reason) if reason else result
+
+    def _failed(self, bound: Bound, error: Exception) -> str:
+        what = f"{_where(bound)} failed: {_told(error)}"
+        self._warn(bound, what)
+        return what
+
+    def _warn(self, bound: Bound, what: str) -> None:
+        if bound.criterion.name not in self._warned:
+            self._warned.add(bound.criterion.name)
+            _log.warning("%s: %s", bound.criterion.name, what)
 
     def _reason(self, i: int, state: State) -> str:
         """Why nothing that a criterion has just said is within; empty for nothing."""

@@ -21,9 +21,13 @@ RESTS = 1e-3
 
 
 def first_moving(state: State, mechanisms: Iterable[Mechanism]) -> str | None:
-    """Name of the first that does not stand still; None where all do."""
+    """Name of the first that does not stand still; None where all do.
+
+    Raises:
+        Undecided: One of them was not heard.
+    """
     for mechanism in mechanisms:
-        if np.abs(state.data.qvel[mechanism.v_address]).max(initial=0.0) > RESTS:
+        if np.abs(state.data_of(mechanism.name).qvel[mechanism.v_address]).max(initial=0.0) > RESTS:
             return mechanism.name
     return None
 
@@ -42,9 +46,8 @@ def velocity_of(state: State, frame: Frame, mechanism: Mechanism, offset: Array)
     """
     if mechanism.alone:
         return np.asarray(state.jacobian(frame, mechanism, offset) @ state.qd(mechanism))
-    state.require(*_movers(state, frame, mechanism))
+    data = state.data_of(*_movers(state, frame, mechanism))
     rotation, position = state.pose(frame)
-    data = state.data
     twist = data.cvel[frame.mj]
     arm = position + rotation @ offset - data.subtree_com[state.model.mj.body_rootid[frame.mj]]
     return np.concatenate([twist[3:] + np.cross(twist[:3], arm), twist[:3]])
@@ -76,9 +79,8 @@ def energy_of(state: State, robot: Mechanism) -> float:
     Raises:
         Undecided: Not heard, or a mass that nobody gave.
     """
-    state.require(robot.name, *robot.riders)
+    mj, data = state.model.mj, state.data_of(robot.name, *robot.riders)
     state.mass_matrix(robot)  # raises for the reasons that it has
-    mj, data = state.model.mj, state.data
     found = 0.0
     for body in robot.mj_bodies:
         spin, at_root = data.cvel[body][:3], data.cvel[body][3:]

@@ -133,6 +133,10 @@ def _subjects(names: Sequence[Named], entries: Entries, file: str) -> Iterator[P
     for group in ("safety", "ergonomics"):
         asked += [(group, i, c, c.subjects()) for i, c in entries.get(group, {}).items()]
     for group, i, entry, subjects in asked:
+        if isinstance(subjects, str):
+            what = f"subjects of {type(entry).__module__} is the text {subjects!r}"
+            yield Problem(file, f"{group}[{i}]", what, f"return a tuple of names: ({subjects!r},)")
+            continue
         for subject in dict.fromkeys(subjects):
             if not subject or _begins(subject, known):
                 continue

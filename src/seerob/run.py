@@ -9,13 +9,14 @@ import gc
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from seerob.between_ticks import watched
 from seerob.engine import Engine
 from seerob.errors import InputError, Problem, SeerobError
 from seerob.judging import Bound as Bound  # noqa: PLC0414
 from seerob.judging import Judge as Judge  # noqa: PLC0414
+from seerob.judging import bound_to
 from seerob.live.listening import LiveSource, delay_of
 from seerob.live.real_time import Clock
 from seerob.machines.displays import Looks
@@ -55,8 +56,8 @@ def bind(model: Model) -> tuple[Bound, ...]:
     for group in ("safety", "ergonomics"):
         for i, criterion in enumerate(getattr(model.workstation, group)):
             try:
-                judge, basis = criterion.bind(model), criterion.basis(model)
-                bound.append(Bound(criterion, group, judge, basis, watched(criterion, model, points)))
+                one = bound_to(model, criterion, group)
+                bound.append(replace(one, watch=watched(criterion, model, points)))
             except SeerobError as error:
                 # Many messages begin with the name of the criterion, which the key already says.
                 text = str(error).removeprefix(f"{criterion.name}: ")

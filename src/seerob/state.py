@@ -3,11 +3,16 @@
 What two criteria share has its one home here and is computed once per tick. Accessors raise
 `Undecided` when the robot or human they speak of was not heard lately, does not follow what was
 heard, or has a mass that nobody gave: a stale or guessed number can never be green.
+
+What says nothing of whether it may be relied on (`data`, `rotations`, `hearings` and so on) is for the
+engine, the picture and the recorder. While a criterion is asked (`asking`) it is closed: reading it raises
+`NotAsked`, so that no author of a criterion can forget to ask.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import mujoco
@@ -17,7 +22,7 @@ from numpy.typing import NDArray
 from seerob.bearers import Bearers
 from seerob.distances.least import Closest, Closests, Per, Query
 from seerob.distances.surveying import Surveyor
-from seerob.errors import Undecided
+from seerob.errors import NotAsked, Undecided
 from seerob.joint_columns import Columns
 from seerob.kernels.chain import along
 from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
@@ -32,6 +37,8 @@ from seerob.whereabouts.seen_bones import bones_of, unseen_reason
 
 Indices = NDArray[np.int64]
 
+MOST_PLACES = 512
+"""Sets of bodies of which places are kept from tick to tick."""
 VARIABLE = "variable "
 """Before the name of a variable among the names that answers depend on: robots have no blank in theirs."""
 
@@ -43,24 +50,23 @@ class State:
         self, model: Model, data: Any, hearings: dict[str, Hearing], signals: Signals | None = None
     ) -> None:
         self.model = model
-        self.data = data
         self.t = 0.0
         """Run time [s]."""
-        self.hearings = hearings
-        self.signals = signals or Signals(model.dictionary, {})
-        """What machines say; `signal` raises when it may not be relied on."""
+        self._data, self._hearings = data, hearings
+        self._signals = signals or Signals(model.dictionary, {})
+        self._closed = False
         self.path: Path | None = None
-        """How everybody came here from the last tick; None where there was none."""
+        """How everybody came here from the last tick, whoever was heard: for bounds; None where there was
+        none."""
         self.asked: set[str] = set()
         """Robots and humans that answers have depended on since the set was last cleared."""
         self.bearers = Bearers(model)
         """Which of MuJoCo's bodies moves each body."""
         n = len(model.bodies)
-        self.rotations = np.zeros((n, 3, 3))
-        """World from body, in the order of `Model.bodies`."""
-        self.positions = np.zeros((n, 3))
-        """World position of the bodies' origins [m]."""
-        self.quaternions = np.zeros((n, 4))
+        self._rotations, self._positions = np.zeros((n, 3, 3)), np.zeros((n, 3))
+        self._quaternions = np.zeros((n, 4))
+        self._places: dict[tuple[int, ...], tuple[Array, Array, Array, Array]] = {}
+        self._movers: dict[int, tuple[tuple[str, ...], tuple[int, ...]]] = {}
         self._period = model.workstation.engine.tick
         engine = model.workstation.engine
         self._tracking_limits = {
@@ -85,7 +91,7 @@ class State:
 
     def refresh(self, t: float) -> None:
         """Take the engine's new positions and velocities; called once per tick by the engine."""
-        mj, data = self.model.mj, self.data
+        mj, data = self.model.mj, self._data
         # mj_step leaves what follows from positions one step behind.
         mujoco.mj_kinematics(mj, data)
         mujoco.mj_comPos(mj, data)
@@ -96,17 +102,78 @@ class State:
             self._xpos,
             self._xquat,
             self.bearers.ids,
-            self.rotations,
-            self.positions,
-            self.quaternions,
+            self._rotations,
+            self._positions,
+            self._quaternions,
         )
         self._cache.clear()
         self._relied_on.clear()
         self._surveyor.forget()
 
+    # -- what says nothing of whether it may be relied on: closed while a criterion is asked ---------
+
+    @contextmanager
+    def asking(self) -> Iterator[None]:
+        """While a criterion is asked: what would not raise `Undecided` is closed, and `asked` is noted."""
+        self.asked.clear()
+        self._closed = True
+        try:
+            yield
+        finally:
+            self._closed = False
+
+    def _open(self, what: str, instead: str) -> None:
+        if self._closed:
+            raise NotAsked(
+                f"State.{what} does not say whether it may be relied on, so no criterion may read it; "
+                f"ask State.{instead}, which raises Undecided where it may not"
+            )
+
+    @property
+    def data(self) -> Any:
+        """The `mujoco.MjData`."""
+        self._open("data", "data_of(names), q, qd, pose or another accessor")
+        return self._data
+
+    @property
+    def rotations(self) -> Array:
+        """World from body, in the order of `Model.bodies`, shape (n, 3, 3)."""
+        self._open("rotations", "placed(bodies)")
+        return self._rotations
+
+    @property
+    def positions(self) -> Array:
+        """World position of the bodies' origins [m], shape (n, 3)."""
+        self._open("positions", "placed(bodies)")
+        return self._positions
+
+    @property
+    def quaternions(self) -> Array:
+        """World from body, w first, shape (n, 4)."""
+        self._open("quaternions", "placed(bodies)")
+        return self._quaternions
+
+    @property
+    def hearings(self) -> dict[str, Hearing]:
+        """What is known of where robots and people really are."""
+        self._open("hearings", "hearing(name)")
+        return self._hearings
+
+    @property
+    def signals(self) -> Signals:
+        """What machines say."""
+        self._open("signals", "signal(name)")
+        return self._signals
+
+    def joint_positions(self, mechanism: Mechanism) -> Array:
+        """Joint positions as they are shown [rad or m], shape (n,)."""
+        self._open("joint_positions", "q(mechanism)")
+        return self._q(mechanism)
+
     def poses(self) -> bytes:
         """Little-endian float32, seven per body: position [m], quaternion w first."""
-        return np.hstack([self.positions, self.quaternions])[self.bearers.drawn].astype("<f4").tobytes()
+        self._open("poses", "placed(bodies)")
+        return np.hstack([self._positions, self._quaternions])[self.bearers.drawn].astype("<f4").tobytes()
 
     # -- what may be relied on --------------------------------------------------------------
 
@@ -133,7 +200,7 @@ class State:
             return reason
         if name.startswith(VARIABLE):
             return ""
-        hearing = self.hearings[name]
+        hearing = self._hearings[name]
         if reason := unseen_reason(name, hearing.unseen(self.t)):
             return reason
         reason = nobody_says(hearing.unplaced(self.t))
@@ -142,10 +209,10 @@ class State:
     def interrupted(self, name: str) -> str:
         """The same without what no device ever saw: why an answer of a moment ago may not hold any more."""
         if name.startswith(VARIABLE):
-            return self.signals.at(name.removeprefix(VARIABLE), self.t).doubt
+            return self._signals.at(name.removeprefix(VARIABLE), self.t).doubt
         if reason := self.whole_doubt(name):
             return reason
-        hearing = self.hearings[name]
+        hearing = self._hearings[name]
         parts = hearing.doubted(self.t)
         reason = parts[0][0] if parts else hearing.displaced(self.t)
         return f"{name}: {reason}" if reason else ""
@@ -161,7 +228,7 @@ class State:
         turned = self.bones_turned_in_doubt(name)
         key = ("bones in doubt", name)
         if key not in self._cache:
-            unplaced = self.hearings[name].unplaced(self.t)
+            unplaced = self._hearings[name].unplaced(self.t)
             self._cache[key] = tuple(dict.fromkeys((*turned, *unplaced))) if unplaced else turned
         bones: tuple[str, ...] = self._cache[key]
         return bones
@@ -180,7 +247,7 @@ class State:
             raise Undecided(reason)
         key = ("bones turned in doubt", name)
         if key not in self._cache:
-            hearing = self.hearings[name]
+            hearing = self._hearings[name]
             doubted = (bone for _, bones in hearing.doubted(self.t) for bone in bones)
             self._cache[key] = tuple(dict.fromkeys((*doubted, *hearing.unseen(self.t))))
         bones: tuple[str, ...] = self._cache[key]
@@ -211,7 +278,7 @@ class State:
 
     def whole_doubt(self, name: str) -> str:
         """The same without what is only said of single bones of a person."""
-        hearing = self.hearings[name]
+        hearing = self._hearings[name]
         reason = hearing.doubt(self.t)
         if reason:
             return f"{name}: {reason}"
@@ -243,7 +310,7 @@ class State:
             Undecided: It was not heard lately, its source calls it bad, or it cannot be.
         """
         self.asked.add(VARIABLE + name)
-        return self.signals.value(name, self.t)
+        return self._signals.value(name, self.t)
 
     def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """What several criteria work out from this state: made by whoever asks first at this tick.
@@ -253,24 +320,98 @@ class State:
             make: How to.
         """
         if key not in self._cache:
-            self._cache[key] = make()
-        return self._cache[key]
+            before, self.asked = self.asked, set()
+            try:
+                made = make()
+            finally:
+                asked, self.asked = self.asked, before
+                before |= asked
+            self._cache[key] = made, asked
+        made, asked = self._cache[key]
+        self.asked |= asked
+        return made
+
+    def hearing(self, name: str) -> Hearing:
+        """What is known of where a robot or human really is, bone by bone of a person.
+
+        Raises:
+            Undecided: Nothing of it may be relied on.
+        """
+        self.asked.add(name)
+        if reason := self.whole_doubt(name):
+            raise Undecided(reason)
+        return self._hearings[name]
+
+    def placed(
+        self, bodies: tuple[int, ...], *, estimates: bool = False, doubted: bool = False
+    ) -> tuple[Array, Array]:
+        """Where bodies are: world from body, and the world position of their origins [m].
+
+        Args:
+            bodies: By index.
+            estimates: As in `require_bodies`.
+            doubted: Also bones in doubt of people of whom the others may be relied on, as they are shown: for
+                whoever judges bone by bone (`bones_in_doubt`).
+
+        Returns:
+            Of all bodies, shape (n, 3, 3) and (n, 3), so that indices stay what they are; of others they are
+            NaN. Valid until the next tick.
+
+        Raises:
+            Undecided: One of them may be elsewhere.
+        """
+        if doubted:
+            others, people = self._bones(bodies)
+            self.require(*others)
+            for name in people:
+                self.hearing(name)
+        else:
+            self.require_bodies(bodies, estimates=estimates)
+        if bodies not in self._places:
+            if len(self._places) == MOST_PLACES:
+                self._places.clear()
+                self._cache.clear()
+            n = len(self._positions)
+            R, x, v, w = (np.full((n, *shape), np.nan) for shape in ((3, 3), (3,), (3,), (3,)))
+            self._places[bodies] = R, x, v, w
+        R, x, _, _ = self._places[bodies]
+        key = ("placed", bodies)
+        if key not in self._cache:
+            rows = self._rows_of(bodies)
+            R[rows], x[rows] = self._rotations[rows], self._positions[rows]
+            self._cache[key] = True
+        return R, x
+
+    def _rows_of(self, bodies: tuple[int, ...]) -> Indices:
+        if bodies not in self._rows:
+            self._rows[bodies] = np.array(bodies, np.int64)
+        return self._rows[bodies]
+
+    def data_of(self, *names: str) -> Any:
+        """MuJoCo's data, of which only what these robots, people and machines decide may be used.
+
+        For what has no accessor of its own; `seerob.testing` moves everybody else and compares.
+
+        Raises:
+            Undecided: One of them was not heard.
+        """
+        self.require(*names)
+        return self._data
 
     # -- joints -----------------------------------------------------------------------------
 
     def q(self, mechanism: Mechanism) -> Array:
         """Joint positions of the twin [rad or m], shape (n,)."""
         self.require(mechanism.name)
-        return self.joint_positions(mechanism)
+        return self._q(mechanism)
 
-    def joint_positions(self, mechanism: Mechanism) -> Array:
-        """The same without asking whether it was heard: for the picture, never for a verdict."""
-        return np.asarray(self.data.qpos[self.columns[mechanism.name].own_q])
+    def _q(self, mechanism: Mechanism) -> Array:
+        return np.asarray(self._data.qpos[self.columns[mechanism.name].own_q])
 
     def qd(self, mechanism: Mechanism) -> Array:
         """Joint velocities of the twin [rad/s or m/s], shape (n,)."""
         self.require(mechanism.name)
-        return np.asarray(self.data.qvel[self.columns[mechanism.name].own_v])
+        return np.asarray(self._data.qvel[self.columns[mechanism.name].own_v])
 
     def measured_torques(self, mechanism: Mechanism) -> Array:
         """Joint torques that its source measured, between samples as positions are [N·m or N], shape (n,).
@@ -279,7 +420,7 @@ class State:
             Undecided: Not heard, or heard without torques.
         """
         self.require(mechanism.name)
-        hearing = self.hearings[mechanism.name]
+        hearing = self._hearings[mechanism.name]
         if hearing.coarse:
             raise Undecided(f"{mechanism.name}: {hearing.coarse}")
         k = sum(1 for instant, _ in hearing.heard if instant <= self.t + SLACK)
@@ -307,13 +448,13 @@ class State:
             Undecided: A mass that nobody gave, or what drives it is too coarse for what a mass is asked for.
         """
         self.weigh(mechanism)
-        if why := self.hearings[mechanism.name].coarse:
+        if why := self._hearings[mechanism.name].coarse:
             raise Undecided(f"{mechanism.name}: {why}")
         key = ("M", mechanism.name)
         if key not in self._cache:
             if "M" not in self._cache:
-                mujoco.mj_makeM(self.model.mj, self.data)
-                mujoco.mj_fullM(self.model.mj, self.data, self._full_mass_matrix)
+                mujoco.mj_makeM(self.model.mj, self._data)
+                mujoco.mj_fullM(self.model.mj, self._data, self._full_mass_matrix)
                 self._cache["M"] = self._full_mass_matrix
             self._cache[key] = self.columns[mechanism.name].of_matrix(self._full_mass_matrix)
         return np.asarray(self._cache[key])
@@ -321,7 +462,27 @@ class State:
     # -- kinematics -------------------------------------------------------------------------
 
     def pose(self, frame: Frame) -> tuple[Array, Array]:
-        """World rotation (3, 3) and position (3,) [m] of a frame."""
+        """World rotation (3, 3) and position (3,) [m] of a frame.
+
+        Raises:
+            Undecided: Whoever moves it was not heard; of a person, this bone is in doubt.
+        """
+        names, bodies = self._movers.get(frame.mj) or self._movers_of(frame.mj)
+        self.require(*names)
+        if bodies:
+            self.require_bodies(bodies)
+        return self._pose(frame)
+
+    def _movers_of(self, body: int) -> tuple[tuple[str, ...], tuple[int, ...]]:
+        """Whom the place of a body of MuJoCo depends on: the innermost robot or machine, or a bone."""
+        model = self.model
+        bones = tuple(b.index for b in model.bodies if b.role == "human" and b.mj == body)
+        moving = [m for m in model.mechanisms.values() if body in m.mj_bodies]
+        names = () if bones or not moving else (min(moving, key=lambda m: len(m.mj_bodies)).name,)
+        self._movers[body] = names, bones
+        return names, bones
+
+    def _pose(self, frame: Frame) -> tuple[Array, Array]:
         key = ("pose", id(frame))
         if key not in self._cache:
             # With the frame itself: another one may get the id of one that is forgotten.
@@ -341,11 +502,11 @@ class State:
         # Not its name: a tool's working point is called like the tool.
         key = ("J", id(frame), mechanism.name, None if offset is None else offset.tobytes())
         if key not in self._cache:
-            rotation, position = self.pose(frame)
+            rotation, position = self._pose(frame)
             if offset is not None:
                 position = position + rotation @ offset
             every = self._jacobian
-            mujoco.mj_jac(self.model.mj, self.data, every[:3], every[3:], position, frame.mj)
+            mujoco.mj_jac(self.model.mj, self._data, every[:3], every[3:], position, frame.mj)
             self._cache[key] = self.columns[mechanism.name].of_rows(every)
         return np.asarray(self._cache[key])
 
@@ -365,13 +526,29 @@ class State:
         along(self._cdof, self._com, roots[rows], moves, points, directions, every)
         return self.columns[mechanism.name].of_rows(every)
 
-    def body_velocities(self) -> tuple[Array, Array]:
-        """Linear and angular velocities of all bodies at their origins, shape (n, 3) each."""
+    def body_velocities(self, bodies: tuple[int, ...], *, estimates: bool = False) -> tuple[Array, Array]:
+        """Linear and angular velocities of bodies at their origins [m/s, rad/s].
+
+        Returns:
+            Of all bodies, shape (n, 3) each, so that indices stay what they are; of others they are NaN.
+            Valid until the next tick.
+        """
+        self.placed(bodies, estimates=estimates)
+        key = ("velocities of", bodies)
+        if key not in self._cache:
+            self._cache[key] = True
+            _, _, *buffers = self._places[bodies]
+            for buffer, every in zip(buffers, self._velocities(), strict=True):
+                buffer[self._rows_of(bodies)] = every[self._rows_of(bodies)]
+        _, _, linear, angular = self._places[bodies]
+        return linear, angular
+
+    def _velocities(self) -> tuple[Array, Array]:
         if "v" not in self._cache:
-            data = self.data
-            linear, angular = np.empty((2, *self.positions.shape))
+            data = self._data
+            linear, angular = np.empty((2, *self._positions.shape))
             velocities(
-                data.cvel, data.subtree_com, self.positions, self.bearers.ids, self.bearers.roots,
+                data.cvel, data.subtree_com, self._positions, self.bearers.ids, self.bearers.roots,
                 linear, angular,
             )  # fmt: skip
             self._cache["v"] = linear, angular
@@ -393,23 +570,22 @@ class State:
     def fastest_points(self, bodies: tuple[int, ...]) -> tuple[Array, Array, Array]:
         """The same of several bodies: speeds (b,), corners (b, 3) and their velocities (b, 3)."""
         self.require_bodies(bodies)
-        if bodies not in self._rows:
-            self._rows[bodies] = np.array(bodies, np.int64)
-        rows = self._rows[bodies]
+        rows = self._rows_of(bodies)
         speed, point, velocity = self._fastest()
         return speed[rows], point[rows], velocity[rows]
 
     def largest_speeds(self) -> Array:
         """The same of every body, whoever was heard, shape (n,): for bounds, never for a verdict."""
+        self._open("largest_speeds", "fastest_points(bodies)")
         return self._fastest()[0]
 
     def _fastest(self) -> tuple[Array, Array, Array]:
         if "fastest" not in self._cache:
-            n = len(self.positions)
+            n = len(self._positions)
             speed, point, velocity = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
             corners, start = self._corners
             fastest(
-                self.rotations, self.positions, *self.body_velocities(), corners, start, self._reach,
+                self._rotations, self._positions, *self._velocities(), corners, start, self._reach,
                 speed, point, velocity,
             )  # fmt: skip
             self._cache["fastest"] = speed, point, velocity
@@ -421,13 +597,17 @@ class State:
     def closest(self, gap: Gap, *, estimates: bool = False) -> Closest:
         """Where two sets are nearest; ``estimates`` as in `require_bodies`."""
         self.require_bodies((*gap.a, *gap.b), estimates=estimates)
-        return self.distances(gap.query, Per.SETS).at(0)
+        return self._distances(gap.query, Per.SETS).at(0)
 
     def closest_per_body(self, gap: Gap, *, estimates: bool = False) -> Closests:
         """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``."""
         self.require_bodies((*gap.a, *gap.b), estimates=estimates)
-        return self.distances(gap.query, Per.BODY)
+        return self._distances(gap.query, Per.BODY)
 
-    def distances(self, query: Query, per: Per) -> Closests:
-        """What a query says now; whoever asks requires what it depends on."""
-        return self._surveyor.ask(query, per, self.rotations, self.positions)
+    def distances(self, query: Query, per: Per, *, estimates: bool = False) -> Closests:
+        """What a query says now; ``estimates`` as in `require_bodies`."""
+        self.require_bodies((*query.a, *query.b), estimates=estimates)
+        return self._distances(query, per)
+
+    def _distances(self, query: Query, per: Per) -> Closests:
+        return self._surveyor.ask(query, per, self._rotations, self._positions)

@@ -39,7 +39,7 @@ class FloorGap:
             height: Of the floor, z in the world [m].
         """
         bodies = [model.bodies[i] for i in moving]
-        self._height, self._moving = height, np.array(moving, np.int64)
+        self._height, self._moving, self._bodies = height, np.array(moving, np.int64), tuple(moving)
         self._corners = stacked([body.corners for body in bodies])
         self._radius = np.array([body.radius for body in bodies], float)
         self._period = model.workstation.engine.tick
@@ -49,7 +49,7 @@ class FloorGap:
         """Gap to the floor [m] and largest downward speed [m/s] of each moving body, shape (b, 2)."""
         found = np.empty((len(self._moving), 2))
         lowest_and_falling(
-            self._moving, state.rotations, state.positions, *state.body_velocities(),
+            self._moving, *state.placed(self._bodies), *state.body_velocities(self._bodies),
             *self._corners, self._radius, found,
         )  # fmt: skip
         found[:, 0] -= self._height
@@ -107,6 +107,7 @@ class Clamping:
             model.shapes, robot_pinch_pairs(model, robot, cap=cap), self._thickness, cap=cap
         )
         self._floor = None if floor is None else FloorGap(model, robot.moving, floor)
+        self._surfaces = tuple(b.index for b in others)
         # All that carries a surface: where a machine is not known, nor are the gaps to it.
         self._carriers = [name for name, m in model.mechanisms.items() if m.role != "human"]
 
@@ -121,8 +122,8 @@ class Clamping:
             Undecided: A robot or a machine that was not heard.
         """
         state.require(*self._carriers)
-        twists = state.body_velocities()
-        clamped = self._gaps.clamped(state.t, state.rotations, state.positions, twists, wanted)
+        twists = state.body_velocities(self._surfaces)
+        clamped = self._gaps.clamped(state.t, *state.placed(self._surfaces), twists, wanted)
         if self._floor is None:
             return clamped, np.zeros_like(clamped)
         floor = self._floor.clamped(state, self._thickness, wanted)

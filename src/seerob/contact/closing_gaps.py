@@ -54,7 +54,8 @@ class _Instant:
 
     def at(self, rotations: Array, positions: Array) -> bool:
         """Whether it is of these poses."""
-        return np.array_equal(self.positions, positions) and np.array_equal(self.rotations, rotations)
+        same = np.array_equal(self.positions, positions, equal_nan=True)
+        return same and np.array_equal(self.rotations, rotations, equal_nan=True)
 
 
 class ClosingGaps:

@@ -94,5 +94,6 @@ class ContactMarkers:
 
     def _ball(self, state: State, row: int, point: Array, label: str, verdict: Verdict | None) -> Sphere:
         body = self._bodies[row]
-        center = state.positions[body] + state.rotations[body] @ point
+        R, x = state.placed((body,))
+        center = x[body] + R[body] @ point
         return Sphere(center=tuple(center.tolist()), radius=BALL, label=label, verdict=verdict)

@@ -110,7 +110,7 @@ class Person:
         off = self._off.at(state)
         if off.any():
             caps = np.tile(self._reach + off, self._shape[0])
-            found = self._farther.within(state.rotations, state.positions, caps)
+            found = self._farther.within(*state.placed(self._asked), caps)
         else:
             found = state.distances(self._query, Per.WHETHER)
         close: NDArray[np.bool_] = np.asarray(found.reach == _WITHIN_CAP).reshape(self._shape)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta, Struct, structs
 
@@ -91,6 +91,8 @@ class Lift(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 class Niosh(Criterion, frozen=True, kw_only=True):
     """Lifting index of the revised NIOSH equation, composite when there are several lifts."""
+
+    whole: ClassVar[bool] = False  # lifts are entered, whoever is seen
 
     human: str
     """Who lifts."""

@@ -149,7 +149,7 @@ class _Part:
     @classmethod
     def of(cls, state: State, robot: Mechanism, body: int) -> _Part:
         """Of a body of `mujoco`."""
-        mj, data = state.model.mj, state.data
+        mj, data = state.model.mj, state.data_of(robot.name)
         linear, angular = np.zeros((3, mj.nv)), np.zeros((3, mj.nv))
         mujoco.mj_jacBodyCom(mj, data, linear, angular, body)
         J_c, J_w = (rows[:, robot.v_address] @ robot.coupling for rows in (linear, angular))

@@ -21,7 +21,8 @@ def posture(state: State, human: Mechanism) -> Angles:
     """
     state.require(human.name)
     rows = bone_rows(state.model, human)
-    return angles(state.rotations[rows], state.positions[rows])
+    R, x = state.placed(tuple(rows))
+    return angles(R[rows], x[rows])
 
 
 def bone_rows(model: Model, human: Mechanism) -> list[int]:
@@ -45,13 +46,15 @@ def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> C
     for bone in unmeasured:
         if bone not in BONES:
             raise UnknownName("bone", bone, BONES)
-    rows = np.array(bone_rows(model, human))
+    bones = tuple(bone_rows(model, human))
+    rows = np.array(bones)
 
     def read(state: State) -> Angles:
-        hearing = state.hearings[human.name]
+        hearing = state.hearing(human.name)
         # How a hand is turned of which only the wrist is seen is a guess, too.
         doubted = (*state.bones_turned_in_doubt(human.name), *hearing.unaimed(state.t))
-        found = angles(state.rotations[rows], state.positions[rows])
+        R, x = state.placed(bones, doubted=True)
+        found = angles(R[rows], x[rows])
         # What devices see changes with time: of a leg that nobody sees no score is made.
         lost = (*unmeasured, *doubted) if doubted else unmeasured
         found = found.without(lost) if lost else found

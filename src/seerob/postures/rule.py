@@ -36,6 +36,8 @@ from seerob.state import State
 class PostureRule(Criterion, frozen=True, kw_only=True):
     """Base of the rules about a person's posture."""
 
+    whole: ClassVar[bool] = False  # bones that nobody sees are not assessed
+
     human: str
     """Who is judged."""
     accuracy: Annotated[float, Meta(ge=0, lt=np.pi / 2, extra={"unit": "rad"})] | None = None

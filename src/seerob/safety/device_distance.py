@@ -144,9 +144,10 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
         way = self._way(sensor)
         height = None
         if way is Approach.PARALLEL:
-            if state.rotations[plane, 2, 2] < np.cos(LEVEL):
+            R, x = state.placed((plane,))
+            if R[plane, 2, 2] < np.cos(LEVEL):
                 raise Undecided(f"{sensor.name}: its field is not level, so it has no height above the floor")
-            height = float(state.positions[plane, 2])
+            height = float(x[plane, 2])
         try:
             return iso_13855.minimum_distance(
                 way,
@@ -169,14 +170,16 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
         corners, start = stacked([model.bodies[i].corners for i in hazard])
         radius = np.array([model.bodies[i].radius for i in hazard])
         bodies = np.array(hazard, np.int64)
+        concerned = (plane, *hazard)
         ends = np.empty(5)
 
         def ask(state: State) -> tuple[float, int, tuple[Array, Array]]:
+            rotations, positions = state.placed(concerned)
             value, row = bodies_to_border(
-                bodies, state.rotations, state.positions, corners, start, radius, plane, ring, edges,
+                bodies, rotations, positions, corners, start, radius, plane, ring, edges,
                 self.edges is None, ends,
             )  # fmt: skip
-            R, x = state.rotations[plane], state.positions[plane]
+            R, x = rotations[plane], positions[plane]
             flat = [np.append((R[:, :2] @ p + x)[:2], ends[4]) for p in (ends[0:2], ends[2:4])]
             return value, hazard[row], (flat[0], flat[1])
 

@@ -84,6 +84,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
     """Mass that somebody hit by a point of the robot would feel, along its motion or toward a person."""
 
     unit: ClassVar[str] = "kg"
+    whole: ClassVar[bool] = False
 
     at: str
     """Point: a robot (its tool's working point) or the full name of a link."""

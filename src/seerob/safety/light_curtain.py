@@ -38,6 +38,7 @@ class LightCurtain(Criterion, frozen=True, kw_only=True):
 
     unit: ClassVar[str] = "m"
     by_shape: ClassVar[bool] = True
+    whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 
     sensor: str
@@ -92,15 +93,17 @@ class _Curtain:
         still, moving = others(model, sensor, bodies)
         self.people = Rays(model.shapes, bodies)
         self.rest = Rays(model.shapes, (*still, *moving))
+        self.concerned = (self.plane, *bodies, *still, *moving)
         self.carriers = carriers_of(model, (*bodies, *moving, self.plane))
 
     def cast(self, rays: Rays, state: State, heights: Array) -> NDArray[np.int64]:
         """The body that interrupts each beam at a height above the lowest (-1: none)."""
-        R, x = state.rotations[self.plane], state.positions[self.plane]
+        rotations, positions = state.placed(self.concerned)
+        R, x = rotations[self.plane], positions[self.plane]
         starts = (self.start + np.outer(heights, [0.0, 0.0, 1.0])) @ R.T + x
         along = np.broadcast_to(R @ self.along, starts.shape)
         met = np.full(len(heights), -1, np.int64)
-        rays.cast(state.rotations, state.positions, starts, along, np.full(len(heights), self.length), met)
+        rays.cast(rotations, positions, starts, along, np.full(len(heights), self.length), met)
         return met
 
     def judge(self, name: str, state: State) -> Result:
@@ -140,7 +143,8 @@ class _Curtain:
 
     def _beams(self, state: State, met: NDArray[np.int64]) -> tuple[Marker, ...]:
         """The interrupted beams."""
-        R, x = state.rotations[self.plane], state.positions[self.plane]
+        rotations, positions = state.placed(self.concerned)
+        R, x = rotations[self.plane], positions[self.plane]
         drawn: list[Marker] = []
         for height in self.heights[met >= 0][:MOST_DRAWN]:
             a = R @ (self.start + np.array([0.0, 0.0, height])) + x

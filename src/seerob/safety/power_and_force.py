@@ -57,6 +57,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
 
     unit: ClassVar[str] = "m/s"
     by_shape: ClassVar[bool] = True
+    whole: ClassVar[bool] = False
 
     robot: str
     """The robot, with its tools and workpieces."""

@@ -17,6 +17,7 @@ class PressureMat(Criterion, frozen=True, kw_only=True):
 
     unit: ClassVar[str] = "m"
     by_shape: ClassVar[bool] = True
+    whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 
     sensor: str

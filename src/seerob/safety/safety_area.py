@@ -32,6 +32,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
 
     unit: ClassVar[str] = "m"
     by_shape: ClassVar[bool] = True
+    whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 
     area: str | tuple[str, ...]
@@ -69,6 +70,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
     def _bound(self, model: Model, watched: tuple[_Watched, ...], depths: Depths) -> Evaluate:
         several = len(_names(self.area)) > 1
         offs = [TrackingError(model, (*each.gap.a, *each.gap.b)) for each in watched]
+        concerned = tuple(dict.fromkeys(i for each in watched for i in (*each.gap.a, *each.gap.b)))
 
         def evaluate(state: State) -> Result:
             nearest, perhaps = (np.inf, ""), (np.inf, "", 0.0)
@@ -88,7 +90,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
                 perhaps = min(perhaps, (float(room[i]), _where(model, each, i, several), float(may[i])))
                 entered += [(each, found, i) for i in np.flatnonzero(found.distance <= 0).tolist()]
             pairs = [(int(found.body_a[i]), each.gap.b[i]) for each, found, i in entered]
-            deeps = depths.ask(state.rotations, state.positions, pairs) if pairs else []
+            deeps = depths.ask(*state.placed(concerned), pairs) if pairs else []
             for (each, found, i), deep in zip(entered, deeps, strict=True):
                 parts.append(
                     Result(

@@ -44,6 +44,7 @@ class ScannerField(Criterion, frozen=True, kw_only=True):
 
     unit: ClassVar[str] = "m"
     by_shape: ClassVar[bool] = True
+    whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 
     sensor: str
@@ -104,6 +105,7 @@ class _Scan:
         self.presence = Presence(model, sensor, self.plane, bodies)
         still, moving = others(model, sensor, bodies)
         self.still, self.moving = Rays(model.shapes, still), Rays(model.shapes, (*bodies, *moving))
+        self.concerned = (self.plane, *bodies, *still, *moving)
         self.carriers = carriers_of(model, (*bodies, *moving, self.plane))
         self.angles = beam_angles(self.scanner)
         self.beams = directions(self.angles)
@@ -145,11 +147,12 @@ class _Scan:
         beams: Array,
         before: tuple[Array, NDArray[np.int64]] | None = None,
     ) -> tuple[Array, NDArray[np.int64]]:
-        u = beams @ state.rotations[self.plane].T
+        rotations, positions = state.placed(self.concerned)
+        u = beams @ rotations[self.plane].T
         origins = np.empty_like(u)
-        origins[:] = state.positions[self.plane]
+        origins[:] = positions[self.plane]
         distance, met = before or (np.full(len(u), self.scanner.range), np.full(len(u), -1, np.int64))
-        rays.cast(state.rotations, state.positions, origins, u, distance, met)
+        rays.cast(rotations, positions, origins, u, distance, met)
         return distance, met
 
     def judge(self, name: str, state: State) -> Result:
@@ -218,7 +221,7 @@ class _Scan:
 
     def _hidden(self, state: State, body: int) -> str:
         """Why no beam ends on a body that is in the field."""
-        R, x = state.rotations[self.plane], state.positions[self.plane]
+        R, x = self._plane(state)
         found, _ = self.presence.inside(state)
         at = R.T @ (found.point_b[self.presence.bodies.index(body)] - x)
         angle = float(np.arctan2(at[1], at[0]))
@@ -231,10 +234,14 @@ class _Scan:
             return f"in the shadow of {self.model.bodies[blocker].name}"
         return "between two beams" if far <= self.scanner.range else "beyond the range"
 
+    def _plane(self, state: State) -> tuple[Array, Array]:
+        rotations, positions = state.placed(self.concerned)
+        return rotations[self.plane], positions[self.plane]
+
     def _picture(self, state: State, distance: Array, hit: NDArray[np.bool_], result: Result) -> markers.Rays:
         stale = self.drawn is None or not 0 <= state.t - self.drawn[0] < self.redraw
         if self.drawn is None or stale or not self.fixed or self.drawn[1].verdict is not result.verdict:
-            R, x = state.rotations[self.plane], state.positions[self.plane]
+            R, x = self._plane(state)
             ends, beams = outline(self.spans, distance, self.angles)
             fan = markers.Rays(
                 starts=(_rounded(x),),

@@ -57,6 +57,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
     unit: ClassVar[str] = "m"
     by_shape: ClassVar[bool] = True
+    whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 
     between: tuple[str, str]

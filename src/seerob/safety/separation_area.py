@@ -34,6 +34,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
 
     unit: ClassVar[str] = "m"
     by_shape: ClassVar[bool] = True
+    whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 
     separation: str
@@ -177,11 +178,12 @@ def _shells(
     model: Model, state: State, moving: tuple[int, ...], S_p: Array, verdict: Verdict
 ) -> tuple[Hull, ...]:
     shells = []
+    R, x = state.placed(moving)
     for i, distance in zip(moving, S_p.tolist(), strict=True):
         if i in state.bearers.away:
             continue
         body = model.bodies[i]
-        corners = body.corners @ state.rotations[i].T + state.positions[i]
+        corners = body.corners @ R[i].T + x[i]
         vertices, faces = offset_shell(corners, body.radius + max(distance, 0.0))
         rounded = tuple((x, y, z) for x, y, z in vertices.round(3).tolist())
         shells.append(Hull(vertices=rounded, faces=faces, verdict=verdict))

@@ -49,7 +49,9 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
         except InputError as error:
             raise InputError([p._replace(file=self.name or self.of) for p in error.problems]) from None
         way = _Way(
-            Sweep(model, bodies, voxel=self.voxel), max(model.workstation.engine.tick, self.every or 0.0)
+            carriers,
+            Sweep(model, bodies, voxel=self.voxel),
+            max(model.workstation.engine.tick, self.every or 0.0),
         )
         unseen = self.every is not None and self.every > model.workstation.engine.tick * 1.5
 
@@ -101,8 +103,8 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
 class _Way:
     """What has been swept since the run began, and its last picture."""
 
-    def __init__(self, sweep: Sweep, period: float) -> None:
-        self.sweep, self.period = sweep, period
+    def __init__(self, carriers: tuple[str, ...], sweep: Sweep, period: float) -> None:
+        self.carriers, self.sweep, self.period = carriers, sweep, period
         self.unheard: list[str] = []
         self._t: float | None = None
         self._drawn: tuple[float, Hull] | None = None
@@ -112,15 +114,16 @@ class _Way:
         if self._t is not None and state.t <= self._t:
             self.sweep.clear()
             self.unheard, self._t, self._drawn = [], None, None
+        data = state.data_of(*self.carriers)
         # What a gripper holds is where it was taken, not where the file has it in the hand.
         self.sweep.moving.mj = state.model.mj
         try:
             if self._t is None or state.t - self._t > 1.5 * self.period:
                 if self._t is not None:
                     self.unheard.append(f"not known where it went from {self._t:.2f} s to {state.t:.2f} s")
-                self.sweep.start(state.data.qpos, state.data.qvel)
+                self.sweep.start(data.qpos, data.qvel)
             else:
-                self.sweep.advance(state.data.qpos, state.data.qvel, state.t - self._t)
+                self.sweep.advance(data.qpos, data.qvel, state.t - self._t)
         except InputError as error:
             raise Undecided(str(error)) from error
         self._t = state.t

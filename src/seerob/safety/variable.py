@@ -52,21 +52,32 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
 
         def evaluate(state: State) -> Result:
             value = state.signal(self.variable)
+            if self.expected is not None:
+                return self._compared(value)
             return Result(
                 name=self.name,
                 value=float(value) if isinstance(value, int | float) else None,
                 unit=self.unit,
                 limit=self.limit,
-                verdict=self._verdict(value),
+                verdict=judge(value, self.limit) if isinstance(value, float) else None,
                 reason="" if number else self._said(value),
             )
 
         return evaluate
 
-    def _verdict(self, value: Value) -> Verdict | None:
-        if self.expected is not None:
-            return Verdict.WITHIN if value == self.expected else Verdict.EXCEEDED
-        return judge(float(value), self.limit) if isinstance(value, float) else None
+    def _compared(self, value: Value) -> Result:
+        """Of a bool itself, 0 or 1; of a text or a choice whether it is what is expected."""
+        figure, limit = float(value == self.expected), 1.0
+        if isinstance(self.expected, bool):
+            figure, limit = float(bool(value)), float(self.expected)
+        return Result(
+            name=self.name,
+            value=figure,
+            limit=limit,
+            at_most=limit == 0.0,
+            verdict=Verdict.WITHIN if value == self.expected else Verdict.EXCEEDED,
+            reason=self._said(value),
+        )
 
     def _said(self, value: Value) -> str:
         text = f"{self.variable} is {_word(value)}"

@@ -110,7 +110,7 @@ class Presence:
 
     def follow(self, state: State, inside: NDArray[np.bool_], triggered: bool) -> None:
         """Take the way of what is inside since the last evaluation into account."""
-        now = state.positions[list(self.bodies)].copy()
+        now = state.placed(self.bodies)[1][list(self.bodies)]
         if self._last is None or state.t <= self._last[0]:
             self._last, self._since, self.unseen, self.until_output = None, None, 0.0, 0.0
         way = 0.0
@@ -182,7 +182,7 @@ class Presence:
         marks: list[Marker] = [Highlight(body=self.model.bodies[self.gap.a[0]].name, verdict=verdict), *lit]
         for i, sight in sights.items():
             if sight.seen is Seen.MISSED:
-                at = tuple(state.positions[i].tolist())
+                at = tuple(state.placed((i,))[1][i].tolist())
                 marks.append(Label(position=at, text=f"not detected: {sight.why}", verdict=Verdict.EXCEEDED))
         return Result(
             name=name,

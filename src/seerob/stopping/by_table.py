@@ -203,9 +203,11 @@ def _levers(state: State, robot: Mechanism, chain: Array, index: int) -> Array:
     if index in state.bearers.away:
         return np.zeros(len(chain))
     joints = state.model.mj.dof_jntid[robot.v_address[chain]]
-    corners = state.positions[index] + body.corners @ state.rotations[index].T
-    arms = corners[None] - state.data.xanchor[joints][:, None]
-    along = np.einsum("kci,ki->kc", arms, state.data.xaxis[joints])
+    R, x = state.placed((index,))
+    data = state.data_of(robot.name)
+    corners = x[index] + body.corners @ R[index].T
+    arms = corners[None] - data.xanchor[joints][:, None]
+    along = np.einsum("kci,ki->kc", arms, data.xaxis[joints])
     squares = np.einsum("kci,kci->kc", arms, arms) - along**2
     return np.asarray(np.sqrt(np.maximum(squares, 0.0).max(axis=1)) + body.radius + body.deviation)
 
@@ -214,7 +216,8 @@ def _extension(state: State, robot: Mechanism) -> float:
     """Distance of the flange from the first axis [m]."""
     joint = int(state.model.mj.dof_jntid[robot.v_address[0]])
     flange = state.model.frames[f"{robot.name}/{robot.description.tip}"]
-    arm = state.pose(flange)[1] - state.data.xanchor[joint]
+    data = state.data_of(robot.name)
+    arm = state.pose(flange)[1] - data.xanchor[joint]
     if state.model.mj.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
         return float(np.linalg.norm(arm))
-    return float(np.linalg.norm(np.cross(state.data.xaxis[joint], arm)))
+    return float(np.linalg.norm(np.cross(data.xaxis[joint], arm)))

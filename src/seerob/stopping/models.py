@@ -341,8 +341,9 @@ def approach(stopped: Stopped, state: State, gap: Gap) -> Array:
     """
     K = len(stopped.t)
     picked = np.unique(np.linspace(0, K - 1, min(K, INSTANTS)).round().astype(int))
-    rotations = np.repeat(state.rotations[None], len(picked), axis=0)
-    positions = np.repeat(state.positions[None], len(picked), axis=0)
+    R, x = state.placed(gap.a, estimates=True)
+    rotations = np.repeat(R[None], len(picked), axis=0)
+    positions = np.repeat(x[None], len(picked), axis=0)
     rotations[:, gap.b] = stopped.rotations[picked]
     positions[:, gap.b] = stopped.positions[picked]
     distances = gap.query.batch(rotations, positions, Per.BODY).distance

@@ -107,7 +107,7 @@ class StopSimulation:
         state.weigh(self.robot)
         # What a gripper holds is where it was taken, and weighs while it is held.
         self._mj = state.model.mj
-        self._data.qpos[:] = state.data.qpos
+        self._data.qpos[:] = state.data_of(self.robot.name).qpos
         self._data.qvel[:] = 0.0
         trace = _Trace(self)
         q, v = state.q(self.robot).astype(float), scale * state.qd(self.robot)

@@ -28,6 +28,7 @@ class DistanceEnds:
 
     def __init__(self, model: Model, gap: Gap) -> None:
         self._off = TrackingError(model, (*gap.a, *gap.b))
+        self._concerned = (*gap.a, *gap.b)
         self._shape = len(gap.a), len(gap.b)
         self._pairs = Survey(model.shapes, [(Query(model.shapes, gap.a, gap.b), Per.PAIR)])
 
@@ -65,5 +66,5 @@ class DistanceEnds:
     def _within(self, state: State, caps: Array) -> Array:
         """Distance of every pair [m], or its cap where it is not less, shape (a, b)."""
         beyond = np.nextafter(caps, np.inf).ravel()
-        found = self._pairs.within(state.rotations, state.positions, beyond)
+        found = self._pairs.within(*state.placed(self._concerned, estimates=True), beyond)
         return found.distance.reshape(self._shape)

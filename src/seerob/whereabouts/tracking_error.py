@@ -54,7 +54,7 @@ class TrackingError:
 
     def none(self, state: State) -> bool:
         """Whether no device says where any of these people are: nothing is off then."""
-        return not any(state.hearings[person].bones for person in self._bones)
+        return not any(state.hearing(person).bones for person in self._bones)
 
     def at(self, state: State) -> Array:
         """Of each body [m], shape (b,)."""
@@ -62,8 +62,9 @@ class TrackingError:
         if self.none(state):
             return found
         for person, bones in self._bones.items():
-            errors = state.hearings[person].bones
-            unaimed = state.hearings[person].unaimed(state.t) if errors else {}
+            hearing = state.hearing(person)
+            errors = hearing.bones
+            unaimed = hearing.unaimed(state.t) if errors else {}
             for row, bone, reach in bones if errors else ():
                 position, angle = errors.get(bone, (None, None))
                 chord = 2 * reach * np.sin(unaimed.get(bone, 0.0) / 2)
@@ -71,11 +72,10 @@ class TrackingError:
             told = self._told(state, person, errors) if errors else {}
             for row, bone, _ in bones if told else ():
                 found[row] = max(found[row], told.get(bone, 0.0))
-            slack = state.hearings[person].slack(state.t) if errors else {}
+            slack = hearing.slack(state.t) if errors else {}
             for row, bone, _ in bones if slack else ():
                 found[row] += slack.get(bone, 0.0)
             if person in self._accepted:
-                hearing = state.hearings[person]
                 unseen = (*hearing.unseen(state.t), *hearing.unplaced(state.t))
                 for row, bone, _ in bones if unseen else ():
                     found[row] = max(found[row], self._accepted[person] * (bone in unseen))
@@ -89,7 +89,8 @@ class TrackingError:
         seen = {bone for bone, error in errors.items() if error != (None, None) and bone in where}
         if not told_between(seen):
             return {}
-        return told_errors(seen, errors, {bone: state.positions[i] for bone, i in where.items()})
+        _, x = state.placed(tuple(where.values()), doubted=True)
+        return told_errors(seen, errors, {bone: x[i] for bone, i in where.items()})
 
 
 def tracking(error: float) -> Tolerance:

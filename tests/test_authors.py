@@ -1,0 +1,227 @@
+"""What authors of criteria can forget, and what must not become green for it: the judge sees to it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, person, state_at, two_r
+from seerob.engine import Engine
+from seerob.errors import InputError, NotAsked, Undecided
+from seerob.judging import Judge, contradiction
+from seerob.run import bind
+from seerob.snapshot import Result, Row, Verdict
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+WITHIN, EXCEEDED, UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+HEAD = """
+from dataclasses import dataclass
+import numpy as np
+from seerob.criterion import Criterion, judge
+from seerob.distances.least import Per
+from seerob.snapshot import Basis, Result, Verdict
+
+class Own(Criterion, frozen=True, kw_only=True):
+    '''A rule of one's own.'''
+    of: str = "arm"
+    limit: float = 100.0
+    def subjects(self): return (self.of,)
+    def basis(self, model): return Basis(formula="as below", source="ACME")
+    def result(self, value): return Result(
+        name=self.name, value=float(value), limit=self.limit, verdict=judge(float(value), self.limit))
+"""
+BIND = """
+    def bind(self, model):
+        arm, frame = model.mechanisms["arm"], model.frame("arm")
+        bodies = model.select("arm")
+        def evaluate(state):
+            {}
+        return evaluate
+"""
+READS = {
+    "pose": "return self.result(state.pose(frame)[1][0])",
+    "placed": "return self.result(np.abs(state.placed(bodies)[1][list(bodies)]).max())",
+    "velocities": "return self.result(np.abs(state.body_velocities(bodies)[0][list(bodies)]).max())",
+    "data_of": "return self.result(state.data_of('arm').qpos[0])",
+    "q": "return self.result(state.q(arm)[0])",
+    "nothing": "return self.result(1.0)",
+    "hearing": "return self.result(len(state.hearing('arm').heard))",
+    "data": "return self.result(state.data.qpos[0])",
+    "positions": "return self.result(state.positions[0, 0])",
+    "rotations": "return self.result(state.rotations[0, 0, 0])",
+    "quaternions": "return self.result(state.quaternions[0, 0])",
+    "joint_positions": "return self.result(state.joint_positions(arm)[0])",
+    "poses": "return self.result(len(state.poses()))",
+    "hearings": "return self.result(len(state.hearings['arm'].heard))",
+    "signals": "return self.result(state.signals.value('x', state.t))",
+}
+RAW = ("data", "positions", "rotations", "quaternions", "joint_positions", "poses", "hearings", "signals")
+OWN = '[[safety]]\nkind = "{}"\nname = "own"\n'
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """A workstation with an arm that nobody drives and a criterion of one's own."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    count = iter(range(99))
+
+    def write(text, more="", head=HEAD, q=""):
+        kind = f"own_{next(count)}_{tmp_path.name.replace('-', '_')}"
+        package = tmp_path / kind
+        package.mkdir()
+        (package / "__init__.py").touch()
+        (package / "rule.py").write_text(head + text)
+        cell = FLOATING + TWO_R + q + OWN.format(f"{kind}.rule") + more
+        return made(tmp_path / f"{kind}_cell", cell, {"arm.urdf": two_r()})
+
+    return write
+
+
+def unheard(station):
+    return Judge(bind(station.model))(Engine(station.model).start())[0]
+
+
+def test_the_shipped_example_of_a_robot_that_nobody_ever_heard_is_undecided(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    text = '[[robots]]\nname = "ur5e"\nmodel = "library:ur5e"\n[[safety]]\nkind = "acme.work_height"\n'
+    station = made(tmp_path, f'{text}name = "height"\nat = "ur5e"\nlimit = 9\n')
+    found = station.run().results["height"]
+    assert (found.verdict, found.worst().value) == (UNDECIDED, None)
+    assert "no source drives it" in found.worst().reason
+
+
+@pytest.mark.parametrize("read", READS)
+def test_whatever_is_read_of_a_robot_that_nobody_heard_is_undecided(own, read):
+    """By its own accessor, or because the judge required what the criterion is about, or as closed."""
+    found = unheard(own(BIND.format(READS[read])))
+    assert (found.verdict, found.value) == (UNDECIDED, None)
+    assert "no source drives it" in found.reason
+
+
+@pytest.mark.parametrize("read", READS)
+def test_nothing_is_read_that_does_not_say_whether_it_may_be_relied_on(own, read):
+    """Also by a criterion that forgot to say whom it is about; raw data stay closed whoever is heard."""
+    text = BIND.format(READS[read]) + "    def subjects(self): return ()\n"
+    found = unheard(own(text))
+    if read == "nothing":
+        assert found.verdict is WITHIN  # it depends on nobody
+    elif read in RAW:
+        assert (found.verdict, f"State.{read} does not say whether" in found.reason) == (UNDECIDED, True)
+        assert "rule.py, line" not in found.reason or "NotAsked" in found.reason
+    else:
+        assert (found.verdict, "no source drives it" in found.reason) == (UNDECIDED, True)
+    known = unheard(own(text, q="q = [0, 0]\n"))
+    assert known.verdict is (UNDECIDED if read in RAW else WITHIN)
+
+
+def test_what_was_not_asked_for_is_not_a_number(own):
+    """Of bodies beside those that were named nothing is told."""
+    text = BIND.format("return self.result(state.placed(bodies[:1])[1][list(bodies)].max())")
+    found = unheard(own(text, q="q = [0, 0]\n"))
+    assert (found.verdict, "not a finite number" in found.reason) == (UNDECIDED, True)
+
+
+def test_raw_data_are_open_outside_of_a_judgement_and_closed_in_it(own):
+    state = state_at(own(BIND.format(READS["q"]), q="q = [0, 0]\n"), arm=((0, 0), (0, 0)))
+    assert state.positions.shape == (len(state.model.bodies), 3)
+    with state.asking(), pytest.raises(NotAsked, match=r"ask State\.placed\(bodies\)"):
+        _ = state.positions
+    assert np.isfinite(state.rotations).all()
+
+
+def test_a_person_of_whom_a_bone_is_asked_is_required(tmp_path):
+    station = made(tmp_path, FLOATING + person())
+    state = Engine(station.model).start()
+    state.hearings["op"].given = False
+    frame = station.model.frames["op/right_hand"]
+    with pytest.raises(Undecided, match="op: "):
+        state.pose(frame)
+    assert "op" in state.asked
+
+
+def test_what_is_worked_out_once_is_depended_on_by_everybody_who_takes_it(own):
+    """Whoever comes second rests on the same robot as whoever came first."""
+    state = state_at(own(BIND.format(READS["q"]), q="q = [0, 0]\n"), arm=((0, 0), (0, 0)))
+    arm = state.model.mechanisms["arm"]
+    for _ in range(2):
+        with state.asking():
+            state.once(("mean",), lambda: state.q(arm).mean())
+        assert state.asked == {"arm"}
+
+
+# -- a criterion that is not one ----------------------------------------------------------------
+
+NO_BASIS = HEAD.replace('    def basis(self, model): return Basis(formula="as below", source="ACME")\n', "")
+GOOD = BIND.format(READS["q"])
+
+
+@pytest.mark.parametrize(
+    ("text", "head", "words"),
+    [
+        (GOOD, NO_BASIS, r"Own of own_\w+\.rule has no basis: define basis\(self, model\)"),
+        ("", HEAD, r"has no bind: define bind\(self, model\)"),
+        (
+            "    def bind(self, model): return 1 / 0\n",
+            HEAD,
+            r"ZeroDivisionError: division by zero \(rule\.py",
+        ),
+        ("    def bind(self, model): return None\n", HEAD, "returns NoneType, not a function of State"),
+        (GOOD + "    def basis(self, model): return 'by heart'\n", HEAD, r"returns str, not a seerob\.snap"),
+        (GOOD + "    def basis(self, model): return {}['x']\n", HEAD, "basis of .* fails: KeyError: 'x'"),
+    ],
+)
+def test_a_criterion_that_is_none_is_refused_with_file_and_key(own, text, head, words):
+    station = own(text, head=head)
+    with pytest.raises(InputError, match=words) as error:
+        _ = station.bound
+    (problem,) = error.value.problems
+    assert (problem.file, problem.key) == ("workstation.toml", "safety[0] (own)")
+
+
+def test_subjects_are_a_tuple_of_names(own):
+    with pytest.raises(
+        InputError, match=r"safety\[0\]: subjects of own_\w+.rule is the text 'arm'; return a tup"
+    ):
+        own(GOOD + "    def subjects(self): return 'arm'\n")
+
+
+@pytest.mark.parametrize(
+    ("returned", "words"),
+    [
+        ("return 1 / 0", ".rule failed: ZeroDivisionError: division by zero (rule.py, line"),
+        ("return 3.0", "returns float, not a Result"),
+        ("return None", "returns NoneType, not a Result"),
+        ("return Result(name='other', value=1.0, limit=2.0, verdict=Verdict.WITHIN)", "is called 'other'"),
+        ("return Result(name='own', value=1.0, limit=2.0, verdict='within')", "its verdict is 'within'"),
+        (
+            "return Result(name='own', value=float('nan'), limit=2.0, verdict=Verdict.WITHIN)",
+            "within, and nan",
+        ),
+        ("return Result(name='own', value=3.0, limit=2.0, verdict=Verdict.WITHIN)", "3  lies above"),
+        ("return Result(name='own', value=3.0, verdict=Verdict.WITHIN)", "it is within, and has no limit"),
+        ("return Result(name='own', limit=2.0, verdict=Verdict.WITHIN)", "it is within, and has no value"),
+        ("return self.result(float('inf'))", "is inf, not a finite number"),
+    ],
+)
+def test_what_is_no_result_or_contradicts_itself_is_undecided(own, returned, words):
+    found = unheard(own(BIND.format(returned), q="q = [0, 0]\n"))
+    assert found.verdict is UNDECIDED
+    assert words in found.reason
+
+
+def test_a_whole_is_no_greener_than_its_parts(own):
+    criterion = own(GOOD).bound[0].criterion
+    within = {"value": 1.0, "limit": 2.0, "verdict": WITHIN}
+    for inner in (Result(name="a", verdict=UNDECIDED), Result(name="a", verdict=EXCEEDED)):
+        assert "its part a is" in contradiction(Result(name="own", parts=(inner,), **within), criterion)
+    assert "its part a" in contradiction(
+        Result(name="own", rows=(Row(name="a", verdict=EXCEEDED),), **within), criterion
+    )
+    wide = Result(name="own", interval=(0.5, 2.5), **within)
+    assert "2.5  lies above its limit" in contradiction(wide, criterion)
+    low = Result(name="own", value=3.0, limit=2.0, at_most=False, interval=(1.5, 4.0), verdict=WITHIN)
+    assert "1.5  lies below its limit" in contradiction(low, criterion)
+    assert contradiction(Result(name="own", parts=(Result(name="a"),), **within), criterion) == ""
+    assert contradiction(Result(name="own", value=9.0, limit=2.0, verdict=EXCEEDED), criterion) == ""

@@ -25,7 +25,8 @@ def walked(folder, steps, more="response = 0.25\n"):
     for t, one, two, inside, triggered in steps:
         positions = np.zeros((len(model.bodies), 3))
         positions[bodies, 0] = one, two
-        presence.follow(SimpleNamespace(t=t, positions=positions), np.array(inside), triggered)
+        state = SimpleNamespace(t=t, placed=lambda _, x=positions: (None, x))
+        presence.follow(state, np.array(inside), triggered)
         ways.append((presence.unseen, presence.until_output))
     return np.array(ways)
 

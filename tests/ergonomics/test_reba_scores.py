@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from made_postures import UNSUPPORTED, known, made_angles
 
+from seerob.scoring.edges import ROUNDING
 from seerob.scoring.reba import (
     Coupling,
     coupling,
@@ -148,8 +149,9 @@ UPRIGHT, EXTENSION = Thresholds().trunk_upright, Thresholds().neck_extension
         (knees, 60, 1, 2),
     ],
 )
-def test_the_upper_edge_belongs_to_a_band(score, edge, within, above):
-    assert score(np.radians([edge - 1e-6, edge, edge + 1e-6])).tolist() == [within, within, above]
+def test_an_edge_belongs_to_the_stricter_band(score, edge, within, above):
+    near = np.radians(edge) + np.array([-1e-5, -ROUNDING / 2, 0.0, ROUNDING])
+    assert score(near).tolist() == [within, above, above, above]
 
 
 def test_knees_count_from_30_degrees_on():

@@ -5,6 +5,7 @@ import pytest
 from made_postures import UNSUPPORTED, known, made_angles
 
 from seerob.ergonomics.rula import Rula
+from seerob.scoring.edges import ROUNDING
 from seerob.scoring.rula import (
     LEAST,
     LoadUse,
@@ -164,14 +165,14 @@ NOMINAL = Thresholds()
         (lambda x: wrist(-x, NOMINAL.wrist_neutral), 15, 2, 3),
     ],
 )
-def test_the_lower_edge_belongs_to_a_band(score, below, edge, above):
-    near = np.radians([below - 1e-6, below, below + 1e-6])
-    assert score(near).tolist() == [edge, above, above]
+def test_an_edge_belongs_to_the_stricter_band(score, below, edge, above):
+    near = np.radians(below) + np.array([-1e-5, -ROUNDING / 2, 0.0, ROUNDING])
+    assert score(near).tolist() == [edge, above, above, above]
 
 
-def test_the_elbow_has_both_ends_inside():
-    near = np.radians([59.999, 60, 80, 100, 100.001])
-    assert lower_arm(near).tolist() == [2, 1, 1, 1, 2]
+def test_the_elbow_has_both_ends_outside():
+    near = np.radians([59.999, 60, 60.001, 80, 99.999, 100, 100.001])
+    assert lower_arm(near).tolist() == [2, 2, 1, 1, 1, 2, 2]
 
 
 def test_extension():

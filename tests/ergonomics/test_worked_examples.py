@@ -180,10 +180,11 @@ def test_reba_reaching_overhead():
 
 def test_reba_lifting_more_than_ten_kilograms():
     """`CASES_REBA`, example 1, from postures to the end: neck 1, knees between 30 and 60° 2, trunk at about
-    20° 2, A 3 and 2 for the load; forearm 1, wrist 1, arms at about 20° and abducted 2; final score 4.
+    20° 2, A 3 and 2 for the load; forearm 1, wrist 1, arms at about 20° and abducted 2; final score 4. The
+    example takes both as up to 20°; exactly there the stricter band would count.
     """
     found = reba_scores(
-        neck_flexion=10, knee_flexion=45, trunk_flexion=20, shoulder_flexion=20, shoulder_abduction=30
+        neck_flexion=10, knee_flexion=45, trunk_flexion=19, shoulder_flexion=19, shoulder_abduction=30
     )
     assert tuple(found.values()) == (1, 2, 2, 2, 1, 1)
     assert reba.load(11, False) == exactly(2)

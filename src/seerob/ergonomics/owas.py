@@ -17,6 +17,7 @@ from seerob.postures.ergonomic_posture import bind_posture
 from seerob.postures.rule import PostureRule
 from seerob.scoring import owas as method
 from seerob.scoring.basis import ACCURACY_NOTE, chosen, entered, posture_quality
+from seerob.scoring.edges import ROUNDING
 from seerob.scoring.measured import Accuracy
 from seerob.scoring.phases import Kilograms, Phase, TaskPhase, phase_at, shared_phases
 from seerob.scoring.published import published
@@ -87,7 +88,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         def evaluate(state: State) -> Result:
             angles = read(state)
             phase = phase_at(phases, state.t, unknown)
-            measured = self.codes(angles, phase)
+            measured = method.settled(self.codes(angles, phase), self.codes(angles, phase, ROUNDING))
             spread = None if error is None else self.codes(angles, phase, error)
             return self._result(angles, measured, spread)
 

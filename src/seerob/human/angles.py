@@ -27,6 +27,8 @@ _INDEX = {bone: i for i, bone in enumerate(BONES)}
 _OUTWARD = np.array([1.0, -1.0])
 """Sign of Z that points away from the trunk, right and left."""
 _TINY = 1e-9
+_LEAST = 1e-6
+"""Directions that are shorter are rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +162,7 @@ def angles(rotations: ArrayLike, positions: ArrayLike) -> Angles:
     leg = at["foot"] - at["thigh"]
     rise = at["foot"][..., 2] - at["foot"][..., 2].min(axis=-1, keepdims=True)
     return Angles(
-        trunk_flexion=np.arctan2(trunk[..., 0], trunk[..., 1]),
+        trunk_flexion=_bent(np.arctan2(trunk[..., 0], trunk[..., 1])),
         trunk_side_bend=_arcsin(trunk[..., 2]),
         trunk_twist=_twist(pelvis, thorax),
         neck_flexion=np.arctan2(neck[..., 0], neck[..., 1]),
@@ -214,9 +216,10 @@ def _in_heading(right: Array, direction: Array) -> Array:
     """A direction in the frame of gravity and heading: forward, up, right.
 
     The heading comes from the axis to the right, not from the one forward, which points down when
-    somebody bends over.
+    somebody bends over. Somebody who lies on a side has none: not a number.
     """
-    horizontal = right[..., :2] / np.maximum(np.hypot(right[..., 0], right[..., 1]), _TINY)[..., None]
+    length = np.hypot(right[..., 0], right[..., 1])[..., None]
+    horizontal = right[..., :2] / np.where(length > _LEAST, length, np.nan)
     x, y = horizontal[..., 0], horizontal[..., 1]
     forward = -y * direction[..., 0] + x * direction[..., 1]
     return np.stack([forward, direction[..., 2], x * direction[..., 0] + y * direction[..., 1]], axis=-1)
@@ -229,6 +232,11 @@ def _twist(parent: Array, child: Array) -> Array:
         return _dot(parent[..., i], child[..., j])
 
     return np.arctan2(entry(0, 2) - entry(2, 0), entry(0, 0) + entry(2, 2))
+
+
+def _bent(angle: Array) -> Array:
+    """An angle of the range -π to π of which the end is forward: upside down, whatever the last bit says."""
+    return np.where(angle < -np.pi + _LEAST, angle + 2 * np.pi, angle)
 
 
 def _forward(angle: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from seerob.scoring.edges import fallen, reached
 from seerob.scoring.thresholds import Thresholds
 
 Edges = Mapping[str, tuple[float, ...]]
@@ -67,12 +68,17 @@ def reba_edges(thresholds: Thresholds) -> Edges:
     }
 
 
-def band_of(angle: float, edges: Sequence[float]) -> str:
+NEUTRAL = {"elbow_flexion": math.radians(80)}
+"""Name of an angle → the posture away from which its bands get stricter [rad], where that is not 0."""
+
+
+def band_of(angle: float, edges: Sequence[float], neutral: float = 0.0) -> str:
     """``20° to 45°`` of an angle [rad]; empty for one that is not measured or has no bands."""
     if not edges or math.isnan(angle):
         return ""
     shown = [f"{math.degrees(edge):.4g}°".replace("-", "−") for edge in sorted(edges)]
-    at = sum(edge <= angle for edge in edges)
+    # An edge belongs to the stricter side, which is the one away from the neutral posture.
+    at = sum(bool(reached(angle, edge) if edge >= neutral else not fallen(angle, edge)) for edge in edges)
     if at == 0:
         return f"below {shown[0]}"
     return f"beyond {shown[-1]}" if at == len(shown) else f"{shown[at - 1]} to {shown[at]}"

@@ -16,6 +16,7 @@ from msgspec import Struct
 
 from seerob.human.angles import Angles
 from seerob.postures.task_phase import Stance
+from seerob.scoring.edges import ROUNDING, reached
 from seerob.scoring.measured import Accuracy, Measured
 from seerob.scoring.published import published
 from seerob.scoring.spans import Span
@@ -126,14 +127,14 @@ def possible_lines(
     t, m = thresholds, Measured(angles, accuracy)
     bent = m.graded(
         "trunk_flexion",
-        lambda x: (x >= t.bent - _ROUNDING).astype(np.int64) + (x > t.far_bent + _ROUNDING),
+        lambda x: reached(x, t.bent).astype(np.int64) + reached(x, t.far_bent),
         within=(0, 2),
         neutral=-math.inf,
     )
     arms = _highest(
         m.graded(
             "arm_rise",
-            lambda x: (x >= -_ROUNDING).astype(np.int64) + (x > t.overhead),
+            lambda x: (x >= -ROUNDING).astype(np.int64) + reached(x, t.overhead),
             within=(0, 2),
             neutral=-math.inf,
         )
@@ -159,7 +160,7 @@ def _positions(measured: Measured, legs: Stance | None, t: EawsThresholds) -> tu
     if legs != "posture":
         return (POSITIONS[legs],)
     folded = measured.beyond("knee_flexion", t.crouching)
-    flat = measured.beyond("shank_tilt", t.kneeling, signed=True)
+    flat = measured.beyond("shank_tilt", t.kneeling)
     low = folded.low.min() == 1 or flat.low.max() == 1
     high = folded.high.min() == 1 or flat.high.max() == 1
     return ("kneeling",) if low else ("standing", "kneeling") if high else ("standing",)

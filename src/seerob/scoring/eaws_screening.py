@@ -65,8 +65,7 @@ class Screening:
             ledger.lines.add(t, possible[-end])
             for name, timers in ledger.turns.items():
                 for edge, timer in zip(published("eaws_posture")["asymmetry_from_deg"], timers, strict=True):
-                    # "Up to 10°" scores nothing, "from 30°" scores 5.
-                    turned = measured.beyond(name, math.radians(edge) - (0.0 if edge == 10 else 1e-9))
+                    turned = measured.beyond(name, math.radians(edge))
                     timer.add(t, "turned" if int(turned[end]) else "")
 
     @property

@@ -130,7 +130,7 @@ class Moves:
             self._low = self._high = angle
         self._low, self._high = min(self._low, angle), max(self._high, angle)
         for way, passed in ((1, angle - self._low), (-1, self._high - angle)):
-            if self._going != way and passed > self._amplitude:
+            if self._going != way and passed >= self._amplitude - _ROUNDING:
                 self._going, self._low, self._high = way, angle, angle
                 self._turns[way].append(t)
                 break

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict
 
 from seerob.human.angles import Angles
+from seerob.scoring.edges import ROUNDING
 from seerob.scoring.published import Ints
 from seerob.scoring.spans import Span, beyond, graded
 from seerob.scoring.thresholds import Angle
@@ -73,6 +75,17 @@ def accuracy_of(all_angles: float | None, joints: JointAccuracy | None) -> Accur
     }
 
 
+LEVERS = {
+    "trunk_flexion": ("trunk_side_bend", False),
+    "neck_flexion": ("neck_side_bend", False),
+    "wrist_flexion": ("wrist_deviation", False),
+    "shoulder_rotation": ("shoulder_elevation", True),
+}
+"""Angle → the one that shortens its lever, to its cosine or to one more than that."""
+SHORT = 0.01
+"""A lever that is longer turns rounding by less than a hundredth of a degree."""
+
+
 class Measured:
     """Angles of postures, each known to its accuracy.
 
@@ -96,9 +109,40 @@ class Measured:
     ) -> Span:
         """`spans.graded` of an angle by its name."""
         return graded(
-            getattr(self.angles, name), score, within=within, accuracy=self.error(name), neutral=neutral
+            getattr(self.angles, name),
+            score,
+            within=within,
+            accuracy=self.error(name),
+            neutral=neutral,
+            rounding=self.rounding(name),
         )
+
+    def rounding(self, name: str) -> Array | float:
+        """How far rounding may turn an angle that is seen under a shortened lever [rad].
+
+        Seen from the side, a trunk that is bent sideways by 90° points nowhere, and of an arm that points
+        straight up no rotation about itself can be told.
+        """
+        if name not in LEVERS:
+            return 0.0
+        aside, whole = LEVERS[name]
+        lever = np.cos(getattr(self.angles, aside)) + (1.0 if whole else 0.0)
+        return turned(ROUNDING, lever) if np.any(lever < SHORT) else 0.0
 
     def beyond(self, name: str, threshold: float, *, signed: bool = False) -> Span:
         """`spans.beyond` of an angle by its name."""
-        return beyond(getattr(self.angles, name), threshold, accuracy=self.error(name), signed=signed)
+        return beyond(
+            getattr(self.angles, name),
+            threshold,
+            accuracy=self.error(name),
+            signed=signed,
+            rounding=self.rounding(name),
+        )
+
+
+def turned(accuracy: float, lever: Array) -> Array | float:
+    """How far an error turns a direction that is seen under a shortened lever [rad]."""
+    if not accuracy:
+        return 0.0
+    sine = np.minimum(np.sin(min(accuracy, np.pi / 2)) / np.maximum(np.abs(lever), 1e-12), 1.0)
+    return np.where(np.isnan(sine) | (sine < 1.0), np.arcsin(sine), np.pi)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from enum import StrEnum
 
 import numpy as np
@@ -14,6 +15,7 @@ from msgspec import Struct
 from numpy.typing import ArrayLike, NDArray
 
 from seerob.human.angles import Angles
+from seerob.scoring.edges import ROUNDING
 from seerob.scoring.measured import Accuracy, Measured
 from seerob.scoring.published import Ints, cells
 from seerob.scoring.spans import Span, either
@@ -90,6 +92,21 @@ def category_span(back: Possible, arms: Possible, legs: Possible, load: Possible
     return Span(low, np.where(every, table, table.min()).max(axis=axes))
 
 
+def settled(codes: Mapping[str, Possible], around: Mapping[str, Possible]) -> dict[str, Possible]:
+    """Codes of a posture at a threshold: those of the greatest category, which does not grow with each code.
+
+    Args:
+        codes: Possible codes by component, in the order of `owas`, shape (number of codes) each.
+        around: The same with every angle off by rounding.
+    """
+    sets = {key: own if own.sum() > 1 else around[key] for key, own in codes.items()}
+    every = np.ix_(*(np.flatnonzero(sets[key]) for key in CODES))
+    found = cells("owas", "category")[every]
+    worst = np.unravel_index(found.argmax(), found.shape)
+    picked = {key: int(every[k].ravel()[i]) for (k, key), i in zip(enumerate(CODES), worst, strict=True)}
+    return {key: own if own.sum() > 1 else only(picked[key] + 1, len(own)) for key, own in codes.items()}
+
+
 def only(code: int, of: int) -> Possible:
     """The set of one code."""
     return np.asarray(np.arange(1, of + 1) == code)
@@ -113,7 +130,9 @@ def back_codes(angles: Angles, thresholds: OwasThresholds, accuracy: Accuracy = 
 
 def arm_codes(angles: Angles, accuracy: Accuracy = 0.0) -> Possible:
     """1 both below shoulder level, 2 one at or above it, 3 both; elbow or wrist, whichever is higher."""
-    up = Measured(angles, accuracy).beyond("arm_rise", -1e-9, signed=True)
+    up = Measured(angles, accuracy).graded(
+        "arm_rise", lambda x: (x >= -ROUNDING).astype(np.int64), within=(0, 1), neutral=-math.inf
+    )
     low, high = up.low.sum(axis=-1), up.high.sum(axis=-1)
     return np.stack([(low <= n) & (n <= high) for n in range(3)], axis=-1)
 
@@ -121,9 +140,9 @@ def arm_codes(angles: Angles, accuracy: Accuracy = 0.0) -> Possible:
 def leg_codes(angles: Angles, thresholds: OwasThresholds, accuracy: Accuracy = 0.0) -> Possible:
     """Codes 2 to 6 of somebody who stands or kneels; sitting and walking cannot be seen from one posture."""
     t, m = thresholds, Measured(angles, accuracy)
-    high = m.beyond("foot_rise", t.foot_rise, signed=True)
+    high = m.beyond("foot_rise", t.foot_rise)
     bent = m.beyond("knee_flexion", t.knee_bent)
-    flat = m.beyond("shank_tilt", t.kneeling, signed=True)
+    flat = m.beyond("shank_tilt", t.kneeling)
     found = np.zeros((*angles.trunk_flexion.shape, 7), bool)
     for raised, folded, lying in itertools.product(itertools.product((False, True), repeat=2), repeat=3):
         possible = np.ones(angles.trunk_flexion.shape, bool)

@@ -1,7 +1,7 @@
 """REBA as pure functions: Hignett and McAtamney 2000, Applied Ergonomics 31.
 
-Bands end with their upper edge inside, as the wording ``>60°`` says: the opposite of RULA. Group A is
-trunk, neck and legs here, group B the arms.
+An edge of a band belongs to the stricter side (`seerob.scoring.edges`), although the wording ``>60°`` gives
+it to the other one. Group A is trunk, neck and legs here, group B the arms.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seerob.human.angles import Angles
+from seerob.scoring.edges import fallen, reached
 from seerob.scoring.measured import Accuracy, Measured
 from seerob.scoring.published import Ints, cells
 from seerob.scoring.shoulder import ArmPolicy, arm_score
@@ -21,8 +22,6 @@ from seerob.scoring.thresholds import Thresholds
 from seerob.transforms import Array
 
 _RAD = np.pi / 180
-_ROUNDING = 1e-9
-"""Angles that differ by less [rad] are the same: 60° written as radians."""
 LEAST = {
     "neck": 1,
     "trunk": 1,
@@ -118,39 +117,35 @@ def reba(
 
 def trunk(flexion: Array, upright: float) -> Ints:
     """1 to 4 of the flexion [rad], without modifiers."""
-    x = flexion / _RAD - _ROUNDING
-    lying_back = flexion / _RAD + _ROUNDING < -20
-    bent = (x > 20) | lying_back
-    return 1 + ((np.abs(flexion) > upright) | bent).astype(np.int64) + bent + (x > 60)
+    bent = reached(np.abs(flexion), 20 * _RAD)
+    upset = reached(np.abs(flexion), upright) | bent
+    return 1 + upset.astype(np.int64) + bent + reached(flexion, 60 * _RAD)
 
 
 def neck(flexion: Array, extension_from: float) -> Ints:
     """1 or 2 of the flexion [rad], without modifiers."""
-    return 1 + ((flexion < -extension_from) | (flexion / _RAD - _ROUNDING > 20)).astype(np.int64)
+    return 1 + (fallen(flexion, -extension_from) | reached(flexion, 20 * _RAD)).astype(np.int64)
 
 
 def knees(flexion: Array) -> Ints:
     """What bent knees add to the legs, 0 to 2, of the flexion [rad]."""
-    x = flexion / _RAD
-    return (x >= 30 - _ROUNDING).astype(np.int64) + (x - _ROUNDING > 60)
+    return reached(flexion, 30 * _RAD).astype(np.int64) + reached(flexion, 60 * _RAD)
 
 
 def upper_arm(flexion: Array) -> Ints:
     """1 to 4 of the flexion [rad], without modifiers."""
-    x = flexion / _RAD - _ROUNDING
-    back = flexion / _RAD + _ROUNDING < -20
-    return 1 + ((x > 20) | back).astype(np.int64) + (x > 45) + (x > 90)
+    away = reached(np.abs(flexion), 20 * _RAD)
+    return 1 + away.astype(np.int64) + reached(flexion, 45 * _RAD) + reached(flexion, 90 * _RAD)
 
 
 def lower_arm(flexion: Array) -> Ints:
     """1 or 2 of the elbow's flexion [rad]."""
-    x = flexion / _RAD
-    return 1 + ((x < 60 - _ROUNDING) | (x > 100 + _ROUNDING)).astype(np.int64)
+    return 1 + (fallen(flexion, 60 * _RAD) | reached(flexion, 100 * _RAD)).astype(np.int64)
 
 
 def wrist(flexion: Array) -> Ints:
     """1 or 2 of flexion or extension [rad], without modifiers."""
-    return 1 + (np.abs(flexion) / _RAD - _ROUNDING > 15).astype(np.int64)
+    return 1 + reached(np.abs(flexion), 15 * _RAD).astype(np.int64)
 
 
 def load(kg: float | None, shock: bool | None) -> Span:

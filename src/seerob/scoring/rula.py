@@ -1,7 +1,7 @@
 """RULA as pure functions: McAtamney and Corlett 1993, Applied Ergonomics 24(2).
 
-Bands are half open with the lower edge inside, as the paper's wording fixes for 15° of the wrist, 20° of
-the neck, 60° of the trunk and 90° of the upper arm; the elbow's 60 to 100° includes both ends.
+An edge of a band belongs to the stricter side (`seerob.scoring.edges`), as the paper's wording fixes for 15°
+of the wrist, 20° of the neck, 60° of the trunk and 90° of the upper arm.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seerob.human.angles import Angles
+from seerob.scoring.edges import fallen, reached
 from seerob.scoring.measured import Accuracy, Measured
 from seerob.scoring.published import Ints, cells
 from seerob.scoring.shoulder import ArmPolicy, arm_score
@@ -22,8 +23,6 @@ from seerob.scoring.thresholds import Thresholds
 from seerob.transforms import Array
 
 _RAD = np.pi / 180
-_ROUNDING = 1e-9
-"""Angles that differ by less [rad] are the same: 15° written as radians."""
 LEAST = {
     "upper arm": 1,
     "lower arm": 1,
@@ -142,32 +141,32 @@ def _check(*scores: tuple[Ints, int]) -> None:
 
 def upper_arm(flexion: Array) -> Ints:
     """1 to 4 of the flexion [rad], without modifiers."""
-    x = flexion / _RAD + _ROUNDING
-    return 1 + (x < -20).astype(np.int64) + (x >= 20) + (x >= 45) + (x >= 90)
+    raised = sum(reached(flexion, edge * _RAD).astype(np.int64) for edge in (20, 45, 90))
+    return 1 + fallen(flexion, -20 * _RAD).astype(np.int64) + raised
 
 
 def lower_arm(flexion: Array) -> Ints:
     """1 or 2 of the elbow's flexion [rad], without modifiers."""
-    x = flexion / _RAD
-    return 1 + ((x < 60 - _ROUNDING) | (x > 100 + _ROUNDING)).astype(np.int64)
+    return 1 + (fallen(flexion, 60 * _RAD) | reached(flexion, 100 * _RAD)).astype(np.int64)
 
 
 def neck(flexion: Array, extension_from: float) -> Ints:
     """1 to 4 of the flexion [rad], without modifiers."""
-    x = flexion / _RAD + _ROUNDING
-    return np.where(flexion < -extension_from, 4, 1 + (x >= 10).astype(np.int64) + (x >= 20))
+    bent = 1 + reached(flexion, 10 * _RAD).astype(np.int64) + reached(flexion, 20 * _RAD)
+    return np.where(fallen(flexion, -extension_from), 4, bent)
 
 
 def trunk(flexion: Array, upright: float) -> Ints:
     """1 to 4 of the flexion [rad], without modifiers; extension has no row and counts as 2."""
-    x = flexion / _RAD + _ROUNDING
-    return 1 + (np.abs(flexion) > upright).astype(np.int64) + (x >= 20) + (x >= 60)
+    bent = reached(np.abs(flexion), upright) | reached(flexion, 20 * _RAD)
+    return 1 + bent.astype(np.int64) + reached(flexion, 20 * _RAD) + reached(flexion, 60 * _RAD)
 
 
 def wrist(flexion: Array, neutral: float) -> Ints:
     """1 to 3 of flexion or extension [rad], without modifiers."""
-    x = np.abs(flexion) / _RAD + _ROUNDING
-    return 1 + ((np.abs(flexion) > neutral) | (x >= 15)).astype(np.int64) + (x >= 15)
+    size = np.abs(flexion)
+    far = reached(size, 15 * _RAD)
+    return 1 + (reached(size, neutral) | far).astype(np.int64) + far
 
 
 def force(load: float | None, use: LoadUse | None, profile: Profile) -> Span:
@@ -260,4 +259,4 @@ def one_foot_up(measured: Measured, thresholds: Thresholds) -> Span:
     """1 where one foot is raised: an estimate of standing on one leg."""
     # Not fmax: what is not assessed on one side is not known of both.
     higher = measured.angles.foot_rise.max(axis=-1)
-    return beyond(higher, thresholds.foot_rise, accuracy=measured.error("foot_rise"), signed=True)
+    return beyond(higher, thresholds.foot_rise, accuracy=measured.error("foot_rise"))

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from seerob.human.angles import SIDED, Angles
 from seerob.human.skeleton import SIDES
-from seerob.scoring.bands import Edges, band_of
+from seerob.scoring.bands import NEUTRAL, Edges, band_of
 from seerob.scoring.spans import Span
 from seerob.snapshot import Aspect, Row, RowState, Verdict
 
@@ -130,7 +130,7 @@ def aspects(angles: Angles, names: Sequence[str], side: int | None, edges: Edges
                     name=text,
                     value=value if measured else None,
                     unit="rad",
-                    band=band_of(value, edges.get(name, ())),
+                    band=band_of(value, edges.get(name, ()), NEUTRAL.get(name, 0.0)),
                 )
             )
     return tuple(found)

@@ -7,7 +7,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from seerob.scoring.measured import Measured
+from seerob.scoring.edges import ROUNDING
+from seerob.scoring.measured import Measured, turned
 from seerob.scoring.published import Ints
 from seerob.scoring.spans import Span, graded
 from seerob.transforms import Array
@@ -44,14 +45,15 @@ def arm_score(measured: Measured, score: Callable[[Array], Ints], policy: ArmPol
     angles = measured.angles
     accuracy = measured.error("shoulder_flexion", "shoulder_elevation")
     flexion, side = angles.shoulder_flexion, angles.shoulder_abduction
-    spread = _turned(accuracy, np.cos(side))
+    spread, rounding = turned(accuracy, np.cos(side)), turned(ROUNDING, np.cos(side))
     if ArmPolicy(policy) is ArmPolicy.PROJECTION:
-        return _projected(flexion, score, spread)
+        return _projected(flexion, score, spread, rounding)
     azimuth = np.abs(np.arctan2(np.sin(side), np.cos(side) * np.sin(flexion)))
-    swing = _turned(accuracy, np.sin(angles.shoulder_elevation))
+    lever = np.sin(angles.shoulder_elevation)
+    swing, off = turned(accuracy, lever), turned(ROUNDING, lever)
     ahead = graded(angles.shoulder_elevation, score, within=BASE, accuracy=accuracy)
     beside = graded(np.zeros_like(flexion), score, within=BASE)
-    behind = _projected(flexion, score, spread)
+    behind = _projected(flexion, score, spread, rounding)
     lowest, highest = np.full(flexion.shape, BASE[1]), np.full(flexion.shape, BASE[0])
     for span, first, last in (
         (ahead, -np.inf, WIDEST),
@@ -60,27 +62,24 @@ def arm_score(measured: Measured, score: Callable[[Array], Ints], policy: ArmPol
     ):
         # An edge belongs to both: what is said of an arm exactly there is the worse of the two.
         possible = ~((azimuth + swing < first) | (azimuth - swing > last))
+        rounded = ~((azimuth + swing + off < first) | (azimuth - swing - off > last))
         lowest = np.where(possible, np.minimum(lowest, span.low), lowest)
-        highest = np.where(possible, np.maximum(highest, span.high), highest)
-    return Span(lowest, highest)
+        highest = np.where(rounded, np.maximum(highest, span.high), highest)
+    missing = np.isnan(flexion)
+    return Span(lowest if np.any(accuracy) else np.where(missing, BASE[0], highest), highest)
 
 
-def _projected(flexion: Array, score: Callable[[Array], Ints], spread: Array | float) -> Span:
+def _projected(
+    flexion: Array, score: Callable[[Array], Ints], spread: Array | float, rounding: Array | float
+) -> Span:
     """Score of the flexion, which goes on at 270° where it ends at -90°."""
-    span = graded(flexion, score, within=BASE, accuracy=spread)
-    if not np.any(spread):
-        return span
-    around = (flexion - spread < -np.pi / 2) | (flexion + spread > 3 * np.pi / 2)
+    span = graded(flexion, score, within=BASE, accuracy=spread, rounding=rounding)
     ends = score(np.array([-np.pi / 2, 3 * np.pi / 2]))
-    return Span(
-        np.where(around, np.minimum(span.low, ends.min()), span.low),
-        np.where(around, np.maximum(span.high, ends.max()), span.high),
-    )
 
+    def around(off: Array | float) -> Array:
+        return np.asarray((flexion - off < -np.pi / 2) | (flexion + off > 3 * np.pi / 2))
 
-def _turned(accuracy: float, lever: Array) -> Array | float:
-    """How far an error turns a direction that is seen under a shortened lever [rad]."""
-    if not accuracy:
-        return 0.0
-    sine = np.minimum(np.sin(min(accuracy, np.pi / 2)) / np.maximum(np.abs(lever), 1e-12), 1.0)
-    return np.where(np.isnan(sine) | (sine < 1.0), np.arcsin(sine), np.pi)
+    high = np.where(around(spread + rounding), np.maximum(span.high, ends.max()), span.high)
+    if not np.any(spread):
+        return Span(np.where(np.isnan(flexion), span.low, high), high)
+    return Span(np.where(around(spread), np.minimum(span.low, ends.min()), span.low), high)

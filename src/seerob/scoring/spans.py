@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from seerob.scoring.edges import reached
 from seerob.scoring.published import Ints
 from seerob.transforms import Array
 
@@ -62,6 +63,7 @@ def graded(
     within: tuple[int, int],
     accuracy: Array | float = 0.0,
     neutral: float = 0.0,
+    rounding: Array | float = 0.0,
 ) -> Span:
     """Score of an angle that is known to ± ``accuracy``.
 
@@ -71,12 +73,17 @@ def graded(
         within: Least and greatest score that there is.
         accuracy: [rad], of a shape that fits ``angle``.
         neutral: [rad]
+        rounding: How far rounding alone may turn it [rad], shaped likewise: the worst of that counts.
     """
     if not np.any(accuracy):
         low = high = score(angle)
+        if np.any(rounding):
+            worst = np.maximum(high, np.maximum(score(angle - rounding), score(angle + rounding)))
+            low = high = np.where(rounding >= np.pi, within[1], worst)
     else:
         first, last = angle - accuracy, angle + accuracy
         high = np.maximum(score(first), score(last))
+        high = np.where(np.asarray(rounding) >= np.pi, within[1], high)
         low = score(np.clip(neutral, first, last))
     missing = np.isnan(angle)
     if missing.any():
@@ -84,17 +91,31 @@ def graded(
     return Span(low, high)
 
 
-def beyond(angle: Array, threshold: float, *, accuracy: Array | float = 0.0, signed: bool = False) -> Span:
-    """1 where an angle, or its size unless ``signed``, is greater than a threshold; else 0."""
+def beyond(
+    angle: Array,
+    threshold: float,
+    *,
+    accuracy: Array | float = 0.0,
+    signed: bool = False,
+    rounding: Array | float = 0.0,
+) -> Span:
+    """1 where an angle, or its size unless ``signed``, is at a threshold or beyond it; else 0."""
     if signed:
         return graded(
             angle,
-            lambda x: (x > threshold).astype(np.int64),
+            lambda x: reached(x, threshold).astype(np.int64),
             within=(0, 1),
             accuracy=accuracy,
             neutral=-np.inf,
+            rounding=rounding,
         )
-    return graded(angle, lambda x: (np.abs(x) > threshold).astype(np.int64), within=(0, 1), accuracy=accuracy)
+    return graded(
+        angle,
+        lambda x: reached(np.abs(x), threshold).astype(np.int64),
+        within=(0, 1),
+        accuracy=accuracy,
+        rounding=rounding,
+    )
 
 
 def either(*spans: Span) -> Span:

@@ -18,6 +18,7 @@ from msgspec import Meta, Struct
 from seerob.errors import UnknownName
 from seerob.human.angles import NEEDS, SIDED, Angles
 from seerob.postures.task_phase import Period, Seconds
+from seerob.scoring.edges import ROUNDING
 from seerob.scoring.measured import Accuracy, Measured
 from seerob.scoring.repetition import GAP, WINDOW
 
@@ -40,9 +41,9 @@ class ZoneRow(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     angle: str
     """Which angle: ``trunk_flexion``, ``shoulder_elevation``, …"""
     low: ZoneAngle | None = None
-    """Begin of the range, which belongs to it [rad]; without end when not given."""
+    """Begin of the range [rad]; without end when not given. Where two rows meet, the higher score counts."""
     high: ZoneAngle | None = None
-    """End of the range, which belongs to the next one [rad]; without end when not given."""
+    """End of the range [rad], which belongs to it but at 0; without end when not given."""
     score: Annotated[float, Meta(ge=0, le=1000)]
     """Points, or the zone: 0 is nothing to be said against."""
     either_way: bool = False
@@ -73,8 +74,11 @@ class ZoneRow(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def within(self, angle: float) -> bool:
         """Whether an angle [rad] lies in the range."""
-        x = (abs(angle) if self.either_way else angle) + _ROUNDING
-        return (self.low is None or x >= self.low) and (self.high is None or x < self.high)
+        x = abs(angle) if self.either_way else angle
+        at_end = -ROUNDING if self.high == 0 else ROUNDING
+        return (self.low is None or x >= self.low - ROUNDING) and (
+            self.high is None or x <= self.high + at_end
+        )
 
     def edges(self) -> list[float]:
         """Where the range begins and ends [rad], on both sides when it is of the size."""

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from made_cell import TWO_R, made, two_r
+from seerob.between_ticks import Told
+from seerob.run import Judge, engine_of, pump, ticks
 from seerob.snapshot import Verdict
 
 STICK = (
@@ -70,3 +72,182 @@ def test_what_is_passed_between_two_ticks_is_exceeded(tmp_path, what, physics):
     summary = station.run()
     assert summary.results["c"].verdict is Verdict.EXCEEDED
     assert summary.verdict is Verdict.EXCEEDED
+
+
+# -- no bound is ever beaten --------------------------------------------------------------------
+
+
+def random_robot(rng, slides):
+    """A chain of joints that turn and slide about any axes, with boxes and masses anywhere."""
+    parts, links = [], ['<link name="base"/>']
+    for k, slides_here in enumerate(slides):
+        mass = rng.uniform(0.5, 4)
+        x, size, axis = rng.normal(size=3) * 0.15, rng.uniform(0.05, 0.3, 3), rng.normal(size=3)
+        kind = "prismatic" if slides_here else "revolute"
+        links.append(
+            f'<link name="l{k}"><inertial><origin xyz="{x[0]} {x[1]} {x[2]}"/><mass value="{mass}"/>'
+            '<inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial><collision>'
+            f'<origin xyz="{x[0]} {x[1]} {x[2]}"/><geometry>'
+            f'<box size="{size[0]} {size[1]} {size[2]}"/></geometry>'
+            "</collision></link>"
+        )
+        at = rng.normal(size=3) * 0.25
+        parts.append(
+            f'<joint name="j{k}" type="{kind}"><parent link="{f"l{k - 1}" if k else "base"}"/><child link="l{k}"/>'
+            f'<origin xyz="{at[0]} {at[1]} {at[2]}" rpy="{rng.normal()} {rng.normal()} {rng.normal()}"/>'
+            f'<axis xyz="{axis[0]} {axis[1]} {axis[2]}"/>'
+            '<limit lower="-9" upper="9" effort="1e5" velocity="60"/></joint>'
+        )
+    return f'<robot name="chain">{"".join(links + parts)}</robot>'
+
+
+def random_wave(rng, joints):
+    amplitude, pace, phase = (
+        rng.normal(size=joints) * 0.3,
+        rng.uniform(1, 9, joints),
+        rng.uniform(0, 6, joints),
+    )
+
+    def wave(t):
+        return amplitude * np.sin(pace * t + phase), amplitude * pace * np.cos(pace * t + phase)
+
+    return wave
+
+
+RANDOM = """
+[engine]
+gravity = [0, 0, 0]
+tick = {tick}
+timestep = 0.001
+physics = {physics}
+[[robots]]
+name = "a"
+model = "a.urdf"
+[[robots]]
+name = "b"
+model = "b.urdf"
+base = {{ position = [2.5, 0, 0] }}
+[[humans]]
+name = "op"
+stature = 1.75
+mass = 75
+sex = "male"
+at = {{ position = [0, 3, 0] }}
+[[areas]]
+name = "zone"
+shape = {{ box = [1, 1, 1] }}
+at = {{ position = [0, -3, 0] }}
+[[sources]]
+kind = "csv"
+robot = "a"
+file = "a.csv"
+[[sources]]
+kind = "csv"
+robot = "b"
+file = "b.csv"
+[[safety]]
+kind = "minimum_distance"
+name = "distance"
+between = ["a", "b"]
+limit = 0
+[[safety]]
+kind = "safety_area"
+name = "area"
+area = "zone"
+of = ["a", "b"]
+[[safety]]
+kind = "velocity"
+name = "fastest"
+of = "a"
+limit = 99
+[[safety]]
+kind = "velocity"
+name = "point"
+at = "a"
+offset = [0.1, 0.2, 0.3]
+limit = 99
+[[safety]]
+kind = "kinetic_energy"
+name = "energy"
+robot = "a"
+limit = 9999
+[[safety]]
+kind = "manipulability"
+name = "singularity"
+at = "a"
+limit = 0
+[[safety]]
+kind = "separation"
+name = "bound"
+between = ["a", "op"]
+stop = {{ reaction = 0.1, stopping = 0.2 }}
+intrusion = 0
+human_uncertainty = 0
+robot_uncertainty = 0
+[[safety]]
+kind = "separation"
+name = "braking"
+between = ["a", "op"]
+stop = {{ model = "constant_deceleration", reaction = 0.1, deceleration = 6 }}
+human_speed = 1.6
+intrusion = 0
+human_uncertainty = 0
+robot_uncertainty = 0
+[[safety]]
+kind = "separation_area"
+name = "around"
+separation = "bound"
+of = "op"
+"""
+
+
+def random_cell(folder, rng, *, tick, physics, rate):
+    files = {}
+    for name in "ab":
+        joints = int(rng.integers(2, 6))
+        wave = random_wave(rng, joints)
+        slides = rng.random(joints) < 0.3
+        units = ("m" if slide else "rad" for slide in slides)
+        lines = [",".join(["t [s]", *(f"j{k} [{unit}]" for k, unit in enumerate(units))])]
+        for t in np.arange(0, 0.2, 1 / rate):
+            lines.append(",".join(f"{x:.12g}" for x in (t, *wave(t)[0])))
+        files |= {f"{name}.urdf": random_robot(rng, slides), f"{name}.csv": "\n".join(lines) + "\n"}
+    return made(folder, RANDOM.format(tick=tick, physics=physics), files)
+
+
+def worst_found(station, looks):
+    """By criterion, how far the bound is from the worst that many looks between each two ticks meet."""
+    engine = engine_of(station.model)
+    judge = Judge(station.bound)
+    between = judge._between
+    room = {}
+
+    def watching(i, watch, ends, state):
+        if ends[0].margin is None or ends[1].margin is None:
+            return Told()
+        low = between._low(watch, between._way, ends, state)
+        path = between._way
+        instants = np.union1d(np.linspace(path.t[0], path.t[-1], looks + 2), path.t)
+        met = []
+        for t in instants.tolist():
+            _, there = between._look(i, watch, path, t, state)
+            met.append(-1.0 if there.margin is None else np.min(there.margin[0] - there.margin[1]))
+        room.setdefault(watch.criterion.name, []).append(min(met) - low)
+        return Told()
+
+    between._judge = watching
+    for _ in ticks(engine, judge, pump(station.sources, station.workstation.engine.tick)):
+        pass
+    return room
+
+
+CASES = [(1, 0.01, "true", 125), (2, 0.01, "false", 250), (3, 0.005, "true", 40), (4, 0.01, "false", 60)]
+
+
+@pytest.mark.parametrize(("seed", "tick", "physics", "rate"), CASES)
+def test_nothing_that_is_met_between_two_ticks_is_worse_than_the_bound(tmp_path, seed, tick, physics, rate):
+    station = random_cell(tmp_path, np.random.default_rng(seed), tick=tick, physics=physics, rate=rate)
+    room = worst_found(station, looks=9)
+    assert set(room) >= {"distance", "area", "fastest", "point", "energy", "singularity", "bound", "braking"}
+    for name, found in room.items():
+        assert min(found) >= -1e-9, name

@@ -40,6 +40,8 @@ class Watch:
     points: Points
     """Shared by all criteria of a workstation."""
     falls: Falls
+    remembers: bool
+    """Whether it is asked in the order of time only."""
     again: Callable[[], Evaluate]
     """Makes another one of it, which is asked of instants in any order."""
 
@@ -47,7 +49,11 @@ class Watch:
 def watched(criterion: Criterion, model: Model, points: Points) -> Watch | None:
     """How a criterion is judged between two ticks; None when nothing bounds it."""
     falls = criterion.falls(model, points)
-    return None if falls is None else Watch(criterion, points, falls, lambda: criterion.bind(model))
+    return (
+        None
+        if falls is None
+        else Watch(criterion, points, falls, criterion.remembers(model), lambda: criterion.bind(model))
+    )
 
 
 class End(NamedTuple):
@@ -178,8 +184,8 @@ class BetweenTicks:
         assert path is not None
         begin, end = (f"{each.t:.4g} s" for each in ends)
         assert self._ids is not None
-        if watch.criterion.remembers or not np.array_equal(self._ids, state.bearers.ids):
-            what = "it remembers" if watch.criterion.remembers else "something was picked up or let go"
+        if watch.remembers or not np.array_equal(self._ids, state.bearers.ids):
+            what = "it remembers" if watch.remembers else "something was picked up or let go"
             return Told(open=f"not known to be within from {begin} to {end}: {what}")
         spans = [(low, ends[0].t, *ends)]
         doubt = ""

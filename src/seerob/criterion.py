@@ -45,9 +45,6 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Whether all that it depends on must be where the twin shows it before it is asked. One that judges
     people bone by bone, or for which what is known may suffice, says False: what it asks of must be still."""
 
-    remembers: ClassVar[bool] = False
-    """Whether what it says depends on earlier instants: then it is asked in the order of time only."""
-
     name: str = ""
     """What results are called; made from the kind and the subject when not given."""
     every: Seconds | None = None
@@ -74,6 +71,10 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         It depends on no instant but the one it speaks of, and says of it what that of `bind` says.
         """
         return None
+
+    def remembers(self, model: Model) -> bool:
+        """Whether what it says depends on earlier instants: then it is asked in the order of time only."""
+        return False
 
     def falls(self, model: Model, points: Points) -> Falls | None:
         """What bounds its margin between two instants at which it is asked; None where nothing does.

@@ -84,7 +84,8 @@ class Points:
         self.model = model
         self._own: list[tuple[int, Array, float]] = []
         self._ids: Indices | None = None
-        self._speed, self._change, self._varies, self._away = np.zeros((4, model.mj.nv))
+        self._bounds = np.zeros((4, model.mj.nv))
+        self._speed, self._change, self._varies, self._away = self._bounds
         self._movers = {name: np.asarray(m.v_address) for name, m in model.mechanisms.items()}
 
     @property
@@ -134,7 +135,13 @@ class Points:
         if path.broken:
             lost = ~np.isfinite(fast)
             fast[lost], quick[lost], bend[lost] = np.inf, np.inf, np.inf
-        return Span(begin, end, fast, quick, bend, self._speed.copy(), self._change.copy())
+        return Span(begin, end, fast, quick, bend, self._bounds.copy())
+
+    def chain(self, point: int) -> tuple[Indices, NDArray[np.bool_], Array]:
+        """Joints that move a point, from base to tip, whether each turns, the segments behind them [m]."""
+        assert self._ids is not None
+        part = slice(int(self._start[point]), int(self._start[point + 1]))
+        return self._joints[part], self._turns[part], self._lengths[part]
 
     def _chains(self, mj: Any, ids: Indices) -> None:
         """Resolve which joints move each point, from base to tip, and how long the segments between are."""
@@ -172,7 +179,7 @@ class Span:
     """Bounds that hold at every instant from one to another; points as in `Points`."""
 
     def __init__(
-        self, begin: float, end: float, fast: Array, quick: Array, bend: Array, qd: Array, qdd: Array
+        self, begin: float, end: float, fast: Array, quick: Array, bend: Array, joints: Array
     ) -> None:
         self.begin, self.end = begin, end
         self.T = end - begin
@@ -183,14 +190,17 @@ class Span:
         """Largest acceleration [m/s²], shape (p,)."""
         self.bend = bend
         """How far a velocity gets from the straight line between those at both ends [m/s], shape (p,)."""
-        self.qd, self.qdd = qd, qdd
-        """Largest absolute speed and acceleration of every joint, shape (nv,) each."""
+        self.slow = np.zeros(len(fast))
+        """Least speed of the fastest point of each body [m/s], shape (n,)."""
+        self.qd, self.qdd, _, self.away = joints
+        """Largest absolute speed and acceleration of every joint, and its way from the model's pose, (nv,)."""
 
     def between_speeds(self, before: Array, after: Array) -> None:
         """Take into account how fast bodies are at both ends [m/s], shape (n,) each."""
         n = len(before)
         most = (before + after + self.quick[:n] * self.T) / 2
         np.minimum(self.fast[:n], most, out=self.fast[:n])
+        self.slow = np.maximum((before + after - self.quick[:n] * self.T) / 2, 0.0)
 
     def way(self, rows: Indices) -> float:
         """Longest way of any of some points within the span [m]."""

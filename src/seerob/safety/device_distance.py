@@ -25,6 +25,7 @@ from seerob.norms.iso_13855 import Approach, Edition
 from seerob.sensors.sensing import Names, bodies_of, carriers_of, names_of
 from seerob.sensors.tables import Sensor
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
+from seerob.spans import Falls, Points, approaching
 from seerob.state import State
 from seerob.transforms import Array
 
@@ -184,6 +185,13 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
             return value, hazard[row], (flat[0], flat[1])
 
         return ask
+
+    def falls(self, model: Model, points: Points) -> Falls | None:
+        """See `Criterion.falls`; none of a field that moves, whose border turns with it."""
+        _, plane, corners = self._device(model)
+        if corners is not None and model.bodies[plane].mover:
+            return None
+        return approaching((plane,), bodies_of(model, self.hazard))
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

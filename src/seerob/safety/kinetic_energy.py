@@ -15,6 +15,7 @@ from seerob.model import Model
 from seerob.mounting.mass_tolerances import MassTolerances
 from seerob.moving_base import energy_of
 from seerob.snapshot import Basis, Result, Sphere, Verdict
+from seerob.spans import Fall, Falls, Points, Span, rows_of
 from seerob.state import State
 from seerob.states import States
 from seerob.tolerances import deciding, spread
@@ -105,6 +106,33 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
             return Answers.against(energy, self.limit, at_most=self.at_most)
 
         return evaluate
+
+    def falls(self, model: Model, points: Points) -> Falls | None:
+        r"""See `Criterion.falls`; none where a mass has a tolerance.
+
+        :math:`\sqrt{2E}` is a norm of the velocities of all that has a mass, so it changes by no more than
+        the norm of how much they change.
+        """
+        robot, mj = model.robot(self.robot), model.mj
+        if self.limit is None or len(MassTolerances(model, robot)):
+            return None
+        limit, bodies = self.limit, [int(b) for b in robot.mj_bodies if mj.body_mass[b] > 0]
+        masses = mj.body_mass[bodies]
+        # The mean square distance from the centre of mass is what its moments of inertia say.
+        radii = np.sqrt(mj.body_inertia[bodies].sum(axis=1) / 2 / masses)
+        rows = rows_of(
+            points.add(body, mj.body_ipos[body], radius) for body, radius in zip(bodies, radii, strict=True)
+        )
+        dofs, rotors = robot.v_address, mj.dof_armature[robot.v_address]
+
+        def falls(span: Span, least: Array | float) -> Fall:
+            turned = rotors @ (span.qdd[dofs] * span.T) ** 2
+            change = np.sqrt(masses @ (span.quick[rows] * span.T) ** 2 + turned)
+            bend = np.sqrt(masses @ span.bend[rows] ** 2 + turned / 4)
+            most = np.sqrt(2 * max(limit - float(least), 0.0))
+            return Fall(float((most + change) * change), float(most * bend + bend**2 / 2))
+
+        return falls
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

@@ -3,6 +3,7 @@ r"""Protective separation distance, ISO/TS 15066:2016 5.5.4.2.3; upper bound: [W
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -17,6 +18,7 @@ from seerob.model import Gap, Model
 from seerob.norms import iso_13855
 from seerob.sensors.detection import Detection, device_of
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
+from seerob.spans import Fall, Falls, Margin, Points, Span, rows_of
 from seerob.state import State
 from seerob.stopping.inputs import approach_speed, intrusion
 from seerob.stopping.largest import LargestSeparation
@@ -288,6 +290,49 @@ class Separation(Criterion, frozen=True, kw_only=True):
             return None
         incomplete = bool(self.unknown(model))
         return separations(own.stop, gap, lambda now: own._distance(now, K), incomplete=incomplete)
+
+    def remembers(self, model: Model) -> bool:
+        """See `Criterion.remembers`."""
+        return self.mode == "fixed"
+
+    def falls(self, model: Model, points: Points) -> Falls | None:
+        """See `Criterion.falls`, of each moving part; where S_p follows from speeds alone."""
+        gap, rises = self._gap(model), self.rises(model)
+        if rises is None:
+            return None
+        people, parts = rows_of(gap.a), rows_of(gap.b)
+
+        def falls(span: Span, _: Array | float) -> Fall:
+            return Fall(span.way(people) + span.fast[parts] * span.T + rises(span))
+
+        return falls
+
+    def rises(self, model: Model) -> Callable[[Span], Array] | None:
+        """How much S_p of each of `Mechanism.moving` can change within a span [m]; None where not known."""
+        parts = rows_of(self._gap(model).b)
+        required: list[Callable[[Array], Array]] = []
+        for each in dict.fromkeys((self, self.at_worst(model))):
+            own = each._by_device(model)[0]
+            by_speed, K = own._stop(model).by_speed, sum(own._terms()[0]) + own._gap(model).deviation
+            if by_speed is None:
+                return None
+            required.append(partial(own._at_speeds, by_speed, K))
+
+        def rises(span: Span) -> Array:
+            ends = ((S_p(span.fast[parts]), S_p(span.slow[parts])) for S_p in required)
+            return np.asarray(np.max([most - least for most, least in ends], axis=0))
+
+        return rises
+
+    def _at_speeds(self, by_speed: Callable[[Array], Course], K: float, v: Array) -> Array:
+        return self._distance(by_speed(v), K)
+
+    def margin(self, result: Result) -> Margin:
+        """See `Criterion.margin`, of each moving part."""
+        parts = [part for part in result.parts if part.verdict is not None]
+        far = [(part.value or 0.0) - (part.limit or 0.0) for part in parts]
+        off = [(part.value or 0.0) - part.interval[0] if part.interval else 0.0 for part in parts]
+        return np.array(far), np.array(off)
 
     def required(self, model: Model) -> Callable[[State], Array]:
         """S_p of each of `Mechanism.moving` of the robot [m], in that order; to be asked at every tick."""

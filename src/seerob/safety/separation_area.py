@@ -22,6 +22,7 @@ from seerob.errors import InputError, UnknownName
 from seerob.model import Model
 from seerob.sensors.sensing import Names, bodies_of, names_of
 from seerob.snapshot import Basis, Highlight, Hull, Marker, Result, Segment, Verdict
+from seerob.spans import Fall, Falls, Points, Span, rows_of
 from seerob.state import State
 from seerob.transforms import Array
 from seerob.volumes.offset_shell import offset_shell
@@ -156,6 +157,23 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
             name = model.bodies[body].name
             return f"{name} is within {deviation * 1e3:.1f} mm, what shapes and places may be off by"
         return ""
+
+    def remembers(self, model: Model) -> bool:
+        """See `Criterion.remembers`."""
+        return bool(self._criterion(model).remembers(model))
+
+    def falls(self, model: Model, points: Points) -> Falls | None:
+        """See `Criterion.falls`; where S_p follows from speeds alone."""
+        rises = self._criterion(model).rises(model)
+        if rises is None:
+            return None
+        moving, outside = map(rows_of, self._sides(model))
+
+        def falls(span: Span, _: Array | float) -> Fall:
+            nearer = span.fast[moving] * span.T + rises(span)
+            return Fall(span.way(outside) + float(nearer.max(initial=0.0)))
+
+        return falls
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

@@ -138,6 +138,8 @@ class StopModel:
     not_modelled: tuple[str, ...] = ()
     inverse: Inverse | None = None
     """In closed form, where there is one."""
+    by_speed: Callable[[Array], Course] | None = None
+    """The course of parts of given speeds [m/s], where nothing else counts; never shorter for higher ones."""
     costly: bool = False
     """Takes milliseconds: searches ask it seldom."""
 
@@ -195,12 +197,10 @@ def _timed(stop: Stop, gap: Gap) -> StopModel:
 
     def courses(state: State) -> At:
         v = fastest(state, gap)
-        top = float(v.max())
+        return lambda scale: by_speed(scale * v)
 
-        def at(scale: float) -> Course:
-            return course(scale * v, stop.reaction, T_s if a is None else scale * top / a, share)
-
-        return at
+    def by_speed(v: Array) -> Course:
+        return course(v, stop.reaction, T_s if a is None else float(v.max()) / a, share)
 
     def inverse(v: Array, d: Array, v_h: Array, K: float) -> tuple[float, float | None]:
         T_r, top = stop.reaction, float(v.max())
@@ -222,6 +222,7 @@ def _timed(stop: Stop, gap: Gap) -> StopModel:
             "S_s = v_r T_s",
             (known,),
             inverse=inverse,
+            by_speed=by_speed,
             not_modelled=("deceleration during the stop: full speed is assumed until standstill",),
         )
     return StopModel(
@@ -229,6 +230,7 @@ def _timed(stop: Stop, gap: Gap) -> StopModel:
         "S_s = v_r T_s / 2" + ("" if a is None else ", T_s = v / a of the fastest point"),
         (known,),
         inverse=inverse,
+        by_speed=by_speed,
         not_modelled=(
             "a deceleration that sets in late or is uneven: published tables have joints that travel more "
             "than half of speed times time (up to 0.51)",

@@ -91,9 +91,9 @@ def random_robot(rng, slides):
             f'<box size="{size[0]} {size[1]} {size[2]}"/></geometry>'
             "</collision></link>"
         )
-        at = rng.normal(size=3) * 0.25
+        at, parent = rng.normal(size=3) * 0.25, f"l{k - 1}" if k else "base"
         parts.append(
-            f'<joint name="j{k}" type="{kind}"><parent link="{f"l{k - 1}" if k else "base"}"/><child link="l{k}"/>'
+            f'<joint name="j{k}" type="{kind}"><parent link="{parent}"/><child link="l{k}"/>'
             f'<origin xyz="{at[0]} {at[1]} {at[2]}" rpy="{rng.normal()} {rng.normal()} {rng.normal()}"/>'
             f'<axis xyz="{axis[0]} {axis[1]} {axis[2]}"/>'
             '<limit lower="-9" upper="9" effort="1e5" velocity="60"/></joint>'

@@ -18,7 +18,6 @@ import numpy as np
 from msgspec.structs import replace
 
 from seerob.criterion import Criterion, Evaluate
-from seerob.errors import Undecided
 from seerob.model import Model
 from seerob.snapshot import Result, Verdict
 from seerob.spans import Fall, Falls, Indices, Margin, Path, Points
@@ -67,6 +66,17 @@ class End(NamedTuple):
     """Of every body [m/s]."""
 
 
+class Asking(NamedTuple):
+    """What only who asks the criteria can do."""
+
+    now: Callable[[int], Result]
+    """Asks a criterion now, before its period is over."""
+    at: Callable[[int, Evaluate, State], Result]
+    """What another one of it says of a state, by the same rules."""
+    take_back: Callable[[Result, str], Result]
+    """Makes what is within undecided, with a reason."""
+
+
 class Told(NamedTuple):
     """What a way between two instants came to."""
 
@@ -95,16 +105,14 @@ class BetweenTicks:
         self,
         state: State,
         results: Sequence[Result],
-        ask: Callable[[int], Result],
-        take_back: Callable[[Result, str], Result],
+        asking: Asking,
     ) -> tuple[Result, ...]:
         """The results of a tick, each with what happened since the last one.
 
         Args:
             state: The twin at this tick.
             results: Of every criterion at it; one with a period may speak of an earlier instant.
-            ask: Asks a criterion now, before its period is over.
-            take_back: Makes what is within undecided, with a reason.
+            asking: See there.
         """
         found = list(results)
         if not any(self._watches):
@@ -112,7 +120,7 @@ class BetweenTicks:
         speeds, ids, path = state.largest_speeds(), state.bearers.ids, state.path
         if path is None or self._ids is None or self._speeds is None:
             path, self._before = None, [None] * len(found)
-        self._way = path
+        self._way, self._asking = path, asking
         for i, watch in enumerate(self._watches):
             if watch is None:
                 continue
@@ -121,14 +129,14 @@ class BetweenTicks:
                 self._before[i] = self._falling(watch, before, state, speeds)
                 if self._before[i] is not None:
                     continue
-                found[i] = ask(i)
+                found[i] = asking.now(i)
             now = _end(watch.criterion, found[i], state.t, speeds)
             if path is not None and before is not None:
                 told = self._judge(i, watch, (before, now), state)
                 if told.exceeded is not None:
-                    found[i] = replace(told.exceeded, basis=found[i].basis)
+                    found[i] = told.exceeded
                 elif told.open and now.verdict is _WITHIN:
-                    found[i] = take_back(found[i], told.open)
+                    found[i] = asking.take_back(found[i], told.open)
             self._before[i] = now
         self._ids, self._speeds = ids.copy(), speeds
         return tuple(found)
@@ -214,7 +222,6 @@ class BetweenTicks:
 
     def _look(self, i: int, watch: Watch, path: Path, t: float, state: State) -> tuple[Result, End]:
         """A criterion at an instant between two ticks; what is in doubt at the tick is in doubt there."""
-        criterion = watch.criterion
         if i not in self._again:
             self._again[i] = watch.again()
         if self._shadow is None:
@@ -225,14 +232,8 @@ class BetweenTicks:
         shadow.columns = state.columns
         shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)
         shadow.refresh(t)
-        muted = False
-        try:
-            with shadow.asking():
-                muted = criterion.active is not None and not shadow.signal(criterion.active)
-                result = Result(name=criterion.name) if muted else self._again[i](shadow)
-        except Undecided as reason:
-            result = Result(name=criterion.name, verdict=_UNDECIDED, reason=str(reason))
-        return result, _end(criterion, result, t, shadow.largest_speeds())
+        result = self._asking.at(i, self._again[i], shadow)
+        return result, _end(watch.criterion, result, t, shadow.largest_speeds())
 
 
 def _end(criterion: Criterion, result: Result, t: float, speeds: Array) -> End:

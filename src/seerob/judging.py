@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from seerob.between_ticks import BetweenTicks, Watch
+from seerob.between_ticks import Asking, BetweenTicks, Watch
 from seerob.criterion import Criterion, Evaluate
 from seerob.errors import SeerobError, Undecided, UnknownName
 from seerob.model import Model
@@ -255,42 +255,51 @@ class Judge:
             self._kept.pop(i, None)
             return self._one(i, self._bound[i], state)
 
-        return self._between(state, results, ask, undecided)
+        def look(i: int, evaluate: Evaluate, shadow: State) -> Result:
+            return self._now(i, evaluate, shadow)[0]
+
+        return self._between(state, results, Asking(ask, look, undecided))
 
     def _one(self, i: int, bound: Bound, state: State) -> Result:
         kept = self._kept.get(i)
         criterion = bound.criterion
         if kept and self._lasts(kept, criterion, state):
             return kept.result
-        muted: Result | None = None
-        try:
-            with state.asking():
-                muted = self._muted(criterion, state)
-                result = muted or self._asked(i, bound, state)
-        except Undecided as reason:
-            result = _unknown(criterion, str(reason))
-        except Exception as error:
-            # One's own criterion that fails must not end a run that others are judged in.
-            result = _unknown(criterion, self._failed(bound, error))
-        result = replace(result, basis=bound.basis)
+        result, muted = self._now(i, bound.evaluate, state)
         if criterion.every is not None:
             result = replace(result, t=state.t)
             due, asked = state.t + criterion.every, tuple(sorted(state.asked))
-            self._kept[i] = _Kept(result, state.t, due, muted is not None, asked)
+            self._kept[i] = _Kept(result, state.t, due, muted, asked)
         return result
 
-    def _asked(self, i: int, bound: Bound, state: State) -> Result:
+    def _now(self, i: int, evaluate: Evaluate, state: State) -> tuple[Result, bool]:
+        """What a criterion says of a state, and whether it did not apply there."""
+        bound = self._bound[i]
+        muted: Result | None = None
+        try:
+            with state.asking():
+                muted = self._muted(bound.criterion, state)
+                result = muted or self._asked(i, evaluate, state)
+        except Undecided as reason:
+            result = _unknown(bound.criterion, str(reason))
+        except Exception as error:
+            # One's own criterion that fails must not end a run that others are judged in.
+            result = _unknown(bound.criterion, self._failed(bound, error))
+        return replace(result, basis=bound.basis), muted is not None
+
+    def _asked(self, i: int, evaluate: Evaluate, state: State) -> Result:
         """What a criterion says, as far as it may be green.
 
         Raises:
             Undecided: What it depends on may not be relied on, or what it says is no result.
         """
         assert self._needs is not None
+        bound = self._bound[i]
         names, bodies = self._needs[i]
         state.require(*names)
         if bodies:
             state.require_bodies(bodies)
-        result = bound.evaluate(state)
+        result = evaluate(state)
         if type(result) is not Result:
             what = f"{_where(bound)} returns {type(result).__name__}, not a Result"
             self._warn(bound, what)

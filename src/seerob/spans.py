@@ -193,7 +193,7 @@ class Span:
         self.slow = np.zeros(len(fast))
         """Least speed of the fastest point of each body [m/s], shape (n,)."""
         self.qd, self.qdd, _, self.away = joints
-        """Largest absolute speed and acceleration of every joint, and its way from the model's pose, (nv,)."""
+        """Largest absolute speed and acceleration of every joint, and way from the model's pose, (nv,)."""
 
     def between_speeds(self, before: Array, after: Array) -> None:
         """Take into account how fast bodies are at both ends [m/s], shape (n,) each."""

@@ -37,6 +37,7 @@ from seerob.state import Hearing, State
 from seerob.task_space import TaskPull
 from seerob.transforms import Array, rotation_from_wxyz
 from seerob.variables.signals import Signals
+from seerob.whereabouts.hearing import NOWHERE
 
 DEFAULT_TIMEOUT = 0.2
 """Of what is heard without a source that states one [s]."""
@@ -184,6 +185,8 @@ class Engine:
                 taken, missed = self._take_pose(mechanism, sample)
                 reason = reason or missed
             self._note(mechanism.name, sample.t, reason, torques_of(sample), taken=taken)
+            if isinstance(sample, JointSample) and not sample.placed:
+                self._hearings[mechanism.name].places.append((sample.t, NOWHERE))
 
         for name, following in self._followings.items():
             hearing = self._hearings[name]

@@ -74,6 +74,8 @@ class JointSample(SampleBase, frozen=True, kw_only=True, tag="joint"):
     """Joint velocities [rad/s or m/s]."""
     tau: tuple[float, ...] | None = None
     """Measured joint torques [N·m or N]."""
+    placed: bool = True
+    """Whether it says where a person stands; if not, it is of the posture alone."""
 
 
 class PoseSample(SampleBase, frozen=True, kw_only=True, tag="pose"):
@@ -123,6 +125,8 @@ class BodySample(SampleBase, frozen=True, kw_only=True, tag="body"):
     """What was seen. What the device has but did not see this time has neither position nor orientation."""
     subject: str = ""
     """The person, as the device calls it."""
+    placed: bool = True
+    """Whether positions say where the person stands; if not, they are of the posture alone."""
     latency: float = 0.0
     """By how much ``t`` was put earlier than the device's time of arrival or stamp [s]."""
     hold: float = 0.5

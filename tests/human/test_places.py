@@ -13,6 +13,7 @@ from seerob.human.estimated import located
 from seerob.human.following import HELD_SPEED
 from seerob.human.skeleton import BONES
 from seerob.postures.ergonomic_posture import bind_posture
+from seerob.reading import read
 from seerob.run import Judge
 from seerob.safety.minimum_distance import MinimumDistance
 from seerob.snapshot import Verdict
@@ -123,3 +124,86 @@ def test_dropping_any_bones_from_any_frames_never_makes_anything_within(seed):
             near = a.interval or (a.value, a.value)
             assert b.verdict is not Verdict.WITHIN or near[0] >= a.limit - 0.01, (t, a, b)
             assert b.verdict is not Verdict.WITHIN or a.verdict is not Verdict.EXCEEDED, (t, a, b)
+
+
+@pytest.mark.parametrize(
+    ("columns", "stays", "verdict"),
+    [
+        (("pelvis_x [m]", "pelvis_y [m]"), "", Verdict.WITHIN),
+        (("pelvis_x [m]",), "", Verdict.UNDECIDED),
+        ((), "", Verdict.UNDECIDED),
+        ((), "stays = true", Verdict.WITHIN),
+    ],
+)
+def test_a_table_of_joints_that_says_no_place_decides_no_distance_unless_the_person_stays(
+    tmp_path, columns, stays, verdict
+):
+    head = ",".join(("time [s]", *columns, "right_elbow_flexion [deg]"))
+    rows = "\n".join(",".join([f"{0.1 * k:.1f}", *("0.0" for _ in columns), f"{10 * k}"]) for k in range(6))
+    (tmp_path / "joints.csv").write_text(f"{head}\n{rows}\n")
+    results = assessed(tmp_path, f'kind = "joint_angles"\nfile = "joints.csv"\n{stays}')
+    assert {r.verdict for r in results if r.name == "d"} == {verdict}
+    assert {r.verdict for r in results if r.name == "owas"} == {Verdict.WITHIN}
+
+
+def test_a_bvh_without_places_of_its_root_decides_no_distance(tmp_path):
+    channels = "CHANNELS 3 Zrotation Xrotation Yrotation"
+    legs = "".join(
+        f"JOINT {side}UpLeg {{ OFFSET {x} 0 0 {channels} JOINT {side}Leg {{ OFFSET 0 -42 0 {channels} JOINT "
+        f"{side}Foot {{ OFFSET 0 -41 0 {channels} End Site {{ OFFSET 0 -5 12 }} }} }} }}\n"
+        for side, x in (("Left", 10), ("Right", -10))
+    )
+    spine = (
+        f"JOINT Spine {{ OFFSET 0 10 0 {channels} JOINT Neck {{ OFFSET 0 40 0 {channels} JOINT Head {{ "
+        f"OFFSET 0 10 0 {channels} End Site {{ OFFSET 0 20 0 }} }} }} }}\n"
+    )
+    for place, verdict in (("", {Verdict.UNDECIDED}), ("Xposition Yposition Zposition ", {Verdict.WITHIN})):
+        count = 6 if place else 3
+        text = f"HIERARCHY\nROOT Hips {{ OFFSET 0 0 0 CHANNELS {count} {place}Zrotation Xrotation Yrotation\n"
+        frame = " ".join((["0 90 0"] if place else []) + ["0"] * 3 * 10)
+        motion = "\n".join([frame] * 8)
+        whole = f"{text}{legs}{spine}}}\nMOTION\nFrames: 8\nFrame Time: 0.05\n{motion}\n"
+        whole = whole.replace("{ ", "{\n").replace(" }", "\n}").replace(" JOINT", "\nJOINT")
+        whole = whole.replace(" CHANNELS", "\nCHANNELS").replace(" End Site", "\nEnd Site")
+        (tmp_path / "motion.bvh").write_text(whole)
+        results = assessed(tmp_path, 'kind = "bvh"\nfile = "motion.bvh"\nunit = "cm"\nup = "y"', part="head")
+        assert {r.verdict for r in results if r.name == "d"} == verdict
+
+
+def assessed(folder, table, part=""):
+    """Results of all ticks of a person whom a file moves, 3 m from a post."""
+    body = f"op/{part}" if part else "op"
+    (folder / "cell.toml").write_text(
+        f"""
+[[humans]]
+name = "op"
+stature = 1.75
+mass = 75
+sex = "male"
+[[parts]]
+name = "post"
+at = {{ position = [3.0, 0.0, 1.0] }}
+shape = {{ box = [0.1, 0.1, 0.1] }}
+[[sources]]
+human = "op"
+{table}
+[[safety]]
+kind = "minimum_distance"
+name = "d"
+between = ["post", "{body}"]
+limit = 0.5
+[[ergonomics]]
+kind = "owas"
+name = "owas"
+human = "op"
+action_category = 4
+phases = [{{ load = 0, legs = "standing" }}]
+"""
+    )
+    stage = Station(read(folder / "cell.toml"))
+    engine, judge = Engine(stage.model, driven={"op": TIMEOUT}), Judge(stage.bound)
+    told = []
+    for seq, samples in enumerate(road.pump(stage.sources, 0.01)):
+        engine.take(samples)
+        told += judge(engine.tick() if seq else engine.start())
+    return told

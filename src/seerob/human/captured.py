@@ -72,6 +72,8 @@ class Captured:
     """Number of frames in ``frames``."""
     calibration: tuple[CaptureFrame, ...] = ()
     """Calibration poses that the file contains."""
+    placed: bool = True
+    """Whether its positions say where the person stands, and not only how its points lie to each other."""
     lengths: dict[str, float] = field(default_factory=dict)
     """Bone lengths that the file states [m], in the device's names."""
     findings: tuple[Finding, ...] = ()

@@ -122,6 +122,8 @@ class _Device:
     """Bone → when it was last seen indeed."""
     placed: dict[str, float] = field(default_factory=dict)
     """Bone → when a place of it was last seen."""
+    anchored: dict[str, float] = field(default_factory=dict)
+    """Likewise a place that says where the person stands."""
     turned: dict[Turn, float] = field(default_factory=dict)
     """Bone and axis → when it was last seen how it is turned about it."""
     smoother: Smoother = field(default_factory=Smoother)
@@ -234,10 +236,11 @@ class Following:
         unaimed = {bone: swing(bone, q, self._fitter.lower, self._fitter.upper) for bone in open_ends}
         reason = "; ".join(reasons[:4])
         bones = bare(observed, placed, turns)
-        ages = _told_ages(observed, placed, turns)
+        anchored = self._seen(t, lambda device: device.anchored)
+        ages = _told_ages(observed, placed, anchored, turns)
         unplaced = frozenset(BONES).difference(ages, estimated(observed, bones))
         displaced = unplaced & self._placed_before if ages else unplaced
-        self._placed_before |= placed.keys()
+        self._placed_before |= anchored.keys()
         apart = self._apart(told, t, q)
         parts += [(f"devices see it {far:.2f} m apart: {bone}", (bone,)) for bone, far in apart if far > FAR]
         slack = {bone: held_speed(bone) * age for bone, age in ages.items() if age > SLACK}
@@ -275,9 +278,11 @@ class Following:
         reason = sample.doubt(name)
         if sample.quality is Quality.INVALID:
             return _Told([], reason)
-        return self._believed(device, points, instant, reason)
+        return self._believed(device, points, instant, reason, placed=sample.placed)
 
-    def _believed(self, device: _Device, points: Sequence[BodyPoint], t: float, reason: str) -> _Told:
+    def _believed(
+        self, device: _Device, points: Sequence[BodyPoint], t: float, reason: str, *, placed: bool
+    ) -> _Told:
         """Without what cannot have moved so far; what is believed is remembered."""
         out: list[BodyPoint] = []
         jumped: dict[str, str] = {}
@@ -301,6 +306,8 @@ class Following:
                     device.observed[point.bone] = t
                 if point.position is not None and point.position_weight > 0:
                     device.placed[point.bone] = t
+                    if placed:
+                        device.anchored[point.bone] = t
                 out.append(point)
         device.turned |= dict.fromkeys(turned(out), t)
         if not jumped:
@@ -381,7 +388,10 @@ def held_speed(bone: str) -> float:
 
 
 def _told_ages(
-    observed: Mapping[str, float], placed: Mapping[str, float], turns: Mapping[Turn, float]
+    observed: Mapping[str, float],
+    placed: Mapping[str, float],
+    anchored: Mapping[str, float],
+    turns: Mapping[Turn, float],
 ) -> dict[str, float]:
     """Bones of which it is told where they are, each with the age of the oldest that it takes [s]."""
     found: dict[str, float] = {}
@@ -390,7 +400,7 @@ def _told_ages(
         seen, places = ({bone for bone, own in each.items() if own <= age} for each in (observed, placed))
         ways = {turn for turn, own in turns.items() if own <= age}
         directed = frozenset(BONES).difference(estimated(seen, bare(seen, places, ways)))
-        for bone in located(directed, places):
+        for bone in located(directed, {bone for bone, own in anchored.items() if own <= age}):
             found.setdefault(bone, age)
         for bone in aimed(ways):
             ends.setdefault(bone, age)

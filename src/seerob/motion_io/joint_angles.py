@@ -37,6 +37,8 @@ class JointAngles:
     findings: tuple[Finding, ...]
     high: bool = False
     """The joint values themselves say how high the pelvis is."""
+    placed: bool = True
+    """It says where the person stands."""
 
 
 def from_storage(path: Path, *, file: str) -> JointAngles:
@@ -85,7 +87,7 @@ def _of_opensim(found: Storage, file: str) -> JointAngles:
     rest = [name for name in found.labels if name not in used]
     if rest:
         said.append(Finding(level="note", subject="", text=f"{file}: not used: {', '.join(rest)[:200]}"))
-    return JointAngles(found.t, q, pelvis, tuple(said))
+    return JointAngles(found.t, q, pelvis, tuple(said), placed=bool(np.isfinite(pelvis).any()))
 
 
 def from_table(path: Path, *, file: str) -> JointAngles:
@@ -154,4 +156,6 @@ def _of_names(
         f"{file}: {len(taken)} joints given; at 0: {', '.join(unseen[:12])}{' …' if len(unseen) > 12 else ''}"
     )
     findings = said if not unseen else (*said, Finding(level="assumed", subject="", text=text))
-    return JointAngles(t, q, np.full((len(t), 3), np.nan), findings, JOINTS.index("pelvis_z") in taken)
+    placed = {JOINTS.index(name) for name in LENGTHS[:2]} <= taken.keys()
+    nowhere = np.full((len(t), 3), np.nan)
+    return JointAngles(t, q, nowhere, findings, JOINTS.index("pelvis_z") in taken, placed)

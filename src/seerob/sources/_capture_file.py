@@ -164,6 +164,7 @@ class BodySamples:
                 latency=late,
                 hold=source.hold,
                 smoothing=source.smoothing or 0.0,
+                placed=self.captured.placed,
                 quality=Quality.GOOD,
             )
             seq += 1

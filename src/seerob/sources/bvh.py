@@ -170,6 +170,9 @@ def read(path: Path, *, unit: Unit = Unit.GUESS, up: Up = Up.GUESS, file: str = 
         said.append(say("note", f"joints that also shift: {shown}; their channels replace the OFFSET"))
     if np.any(found.joints[0].offset):
         said.append(say("assumed", "the root's position is that of its channels, its OFFSET is not added"))
+    placed = len(found.joints[0].translations) == 3
+    if not placed:
+        said.append(say("warning", "its root has no position channels: nobody says where the person stands"))
     names = tuple(joint.name for joint in found.joints)
     parents = tuple(joint.parent for joint in found.joints)
     return Captured(
@@ -177,6 +180,7 @@ def read(path: Path, *, unit: Unit = Unit.GUESS, up: Up = Up.GUESS, file: str = 
         frames=_Frames(found, METRES[unit], up),
         rate=1 / found.period,
         count=int(found.whole().sum()),
+        placed=placed,
         lengths=_lengths(found, METRES[unit]),
         findings=tuple(said),
     )

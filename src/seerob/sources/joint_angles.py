@@ -43,6 +43,7 @@ class _Samples:
     degraded: NDArray[np.bool_]
     source: str
     target: str
+    placed: bool
 
     def __iter__(self) -> Iterator[JointSample]:
         rows = zip(self.t.tolist(), self.q.tolist(), self.qd.tolist(), self.degraded.tolist(), strict=True)
@@ -55,6 +56,7 @@ class _Samples:
                 q=tuple(q),
                 qd=tuple(qd),
                 quality=Quality.DEGRADED if degraded else Quality.GOOD,
+                placed=self.placed,
             )
 
 
@@ -69,6 +71,8 @@ class JointAngleFile(Source, frozen=True, kw_only=True):
     """Path, from the folder of the workstation file."""
     floor: bool = True
     """Keep the lowest sole on the floor; else the pelvis is as high as the file says."""
+    stays: bool = False
+    """The person stays at its place ``at``; without it distances are undecided where it says no place."""
 
     def target(self) -> str:
         """The person."""
@@ -89,10 +93,19 @@ class JointAngleFile(Source, frozen=True, kw_only=True):
         q, degraded, limits = _within(found.q, target, self.file)
         q = self._placed(q, found, target.description)
         largest = np.array([LARGEST_SPEED[unit] for unit in target.units])
+        placed = found.placed or self.stays
+        if not placed:
+            text = (
+                f"{self.file}: it does not say where the person stands (pelvis_x, pelvis_y; pelvis_tx … in "
+                "OpenSim): no distance is decided; write stays = true if the person stays at its at"
+            )
+            left_out = (*left_out, Finding(level="warning", subject="", text=text))
         qd = derive_velocities(found.t, q, largest=largest).qd
         t = found.t - found.t[0]
         return Opened(
-            samples=_Samples(t, q, qd, degraded, self.name or f"joint_angles {self.human}", target.name),
+            samples=_Samples(
+                t, q, qd, degraded, self.name or f"joint_angles {self.human}", target.name, placed
+            ),
             duration=float(t[-1]),
             findings=about((*found.findings, *left_out, *limits), target.name),
         )

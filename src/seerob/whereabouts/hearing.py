@@ -31,6 +31,10 @@ class Places(NamedTuple):
     """Bone → how much farther a point of it may be, as it is held or seen elsewhere, too [m]."""
 
 
+NOWHERE = Places(frozenset(BONES), frozenset(BONES), {})
+"""Of whoever's posture is told, and of no bone the place."""
+
+
 @dataclass
 class Hearing:
     """What is known of where a robot or human really is."""

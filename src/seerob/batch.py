@@ -20,7 +20,7 @@ from msgspec.structs import replace as changed
 from seerob.answers import UNDECIDED, WITHIN, Answers
 from seerob.criterion import Criterion, EvaluateMany
 from seerob.errors import Undecided, UnknownName
-from seerob.judging import Judge, held, held_names
+from seerob.judging import Judge, held, held_names, unmentioned
 from seerob.model import Model
 from seerob.results.series import CODES
 from seerob.run import Bound, Feed, engine_of, settled
@@ -168,7 +168,7 @@ def _able(
         many = criterion.batch(model)
         if many is None:
             notes[criterion.name] = "asked instant by instant: with these options it is not made for batches"
-        elif held(criterion, model, findings):
+        elif held(criterion, model, findings) or unmentioned(criterion, model):
             notes[criterion.name] = "asked instant by instant: a finding holds what it is about"
         elif criterion.variables():
             notes[criterion.name] = "asked instant by instant: it follows variables"

@@ -39,8 +39,9 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Unit of its results."""
     at_most: ClassVar[bool] = True
     """Whether its limit bounds from above."""
-    by_shape: ClassVar[bool] = False
-    """Whether it is about the shapes of its subjects: what no shape shows of a robot is nowhere near."""
+    by_shape: ClassVar[bool] = True
+    """Whether it is about the shapes of its subjects, so that what no shape shows of a robot could make it
+    worse; False only where no distance, area, volume or point of a surface is in it."""
     whole: ClassVar[bool] = True
     """Whether all that it depends on must be where the twin shows it before it is asked. One that judges
     people bone by bone, or for which what is known may suffice, says False: what it asks of must be still."""
@@ -118,7 +119,7 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def unseen(self, model: Model) -> str:
         """Why nothing is within: what no shape shows of the robots that it speaks of; empty for nothing."""
-        return model.unseen(self.subjects()) if self.by_shape else ""
+        return model.unseen(self.depends(model)) if self.by_shape else ""
 
 
 def judge(value: float, limit: float | None, *, at_most: bool = True) -> Verdict | None:

@@ -187,6 +187,17 @@ def held(criterion: Criterion, model: Model, findings: Iterable[Finding]) -> str
     return "; ".join(dict.fromkeys(filter(None, reasons)))
 
 
+def unmentioned(criterion: Criterion, model: Model) -> dict[str, str]:
+    """By robot that no subject means, what no shape shows of it: should it be asked all the same."""
+    if not criterion.by_shape:
+        return {}
+    subjects = criterion.depends(model)
+    meant = {model.bodies[i].carrier for name in subjects for i in _meant(model, name)}
+    meant |= {name.partition("/")[0] for name in subjects}
+    every = {name: model.unseen((name,)) for name in model.mechanisms if name not in meant}
+    return {name: text for name, text in every.items() if text}
+
+
 def held_names(findings: Iterable[Finding], model: Model) -> dict[str, str]:
     """By name that findings hold, why nothing that depends on it is within."""
     found: dict[str, list[str]] = {}
@@ -237,6 +248,7 @@ class Judge:
         self._held: tuple[str, ...] | None = None
         self._held_names: dict[str, str] = {}
         self._needs: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] | None = None
+        self._unmentioned: tuple[dict[str, str], ...] = ()
         self._kept: dict[int, _Kept] = {}
         self._between = BetweenTicks([one.watch for one in bound])
         self._warned: set[str] = set()
@@ -249,6 +261,7 @@ class Judge:
             self._held = tuple(held(bound.criterion, model, findings) for bound in self._bound)
             self._held_names = held_names(findings, model)
             self._needs = tuple(needed(bound.criterion, model) for bound in self._bound)
+            self._unmentioned = tuple(unmentioned(bound.criterion, model) for bound in self._bound)
         results = tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
 
         def ask(i: int) -> Result:
@@ -330,9 +343,10 @@ class Judge:
         """Why nothing that a criterion has just said is within; empty for nothing."""
         assert self._held is not None
         reason = self._held[i]
-        if not self._held_names:
+        if not self._held_names and not self._unmentioned[i]:
             return reason
-        texts = (text for name, text in self._held_names.items() if name in state.asked)
+        every = (*self._held_names.items(), *self._unmentioned[i].items())
+        texts = (text for name, text in every if name in state.asked)
         return "; ".join(dict.fromkeys(filter(None, (reason, *(t for t in texts if t not in reason)))))
 
     @staticmethod

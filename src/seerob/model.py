@@ -128,7 +128,7 @@ class Mechanism:
     holders: tuple[str, ...] = ()
     """Those of them that pick things up: what it weighs depends on them."""
     unseen: tuple[str, ...] = ()
-    """Full names of moving links that have a mass, and that no shape shows."""
+    """Full names of what has a mass, some of which lies where nothing of it has a shape."""
 
     @property
     def links(self) -> frozenset[str]:
@@ -286,9 +286,19 @@ class Model:
         return found
 
     def unseen(self, names: Iterable[str]) -> str:
-        """What no shape shows of whole robots that names mean, in a sentence; empty for nothing."""
-        found = (self.mechanisms[name].unseen for name in names if name in self.mechanisms)
-        links = ", ".join(dict.fromkeys(link for each in found for link in each))
+        """What no shape shows of robots and links that names mean, in a sentence; empty for nothing.
+
+        Names are those of `select`.
+        """
+        found: dict[str, None] = {}
+        for name in names:
+            found |= dict.fromkeys(
+                link
+                for m in self.mechanisms.values()
+                for link in m.unseen
+                if name in (m.name, link) or link.startswith(name + "/") or fnmatchcase(link, name)
+            )
+        links = ", ".join(found)
         return f"no shape shows {links}, which has a mass: give it one, or mount one on it" if links else ""
 
     def names(self) -> tuple[str, ...]:

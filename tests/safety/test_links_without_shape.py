@@ -6,12 +6,19 @@ import re
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from made_cell import FLOATING, TWO_R, made, person, results_at, state_at, two_r
-from seerob.errors import Undecided
+from seerob.criterion import Criterion
+from seerob.errors import InputError, Undecided
+from seerob.mounting.mechanisms import stands_out
 from seerob.permissible.between_samples import BetweenSamples
 from seerob.permissible.ceilings import ceilings_of
 from seerob.permissible.given_motion import GivenMotion
+from seerob.planning.clearance import Clearance
+from seerob.run import Bound, Judge
+from seerob.snapshot import Basis, Result, Verdict
 
 LAST = re.compile(r'(<link name="l2">.*?)<collision>.*?</collision>')
 BARE = LAST.sub(r"\1", two_r())
@@ -19,8 +26,14 @@ FIXED = (
     '<link name="tip"><inertial><mass value="0.1"/><inertia ixx="4e-4" iyy="4e-4" izz="4e-4" ixy="0" ixz="0" '
     'iyz="0"/></inertial><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
 )
+COVER = (
+    '[[tools]]\nname = "cover"\non = "arm/l2"\nshape = {{ box = [1, 0.1, 0.1] }}\nmass = 0.1\n'
+    "at = {{ position = [{}, 0, 0] }}\n"
+)
 TERMS = "intrusion = 0\nhuman_uncertainty = 0\nrobot_uncertainty = 0\n"
 STOP = "stop = { reaction = 0.01, stopping = 0.01 }\n"
+STUB = '<collision><geometry><box size="{0} {0} {0}"/></geometry></collision>'
+SIX = ("xx", "yy", "zz", "xy", "xz", "yz")
 ABOUT = {
     "minimum_distance": 'between = ["arm", "op"]\nlimit = 0.01\n',
     "separation": f'between = ["arm", "op"]\n{STOP}{TERMS}',
@@ -65,7 +78,7 @@ def test_nothing_about_shapes_is_within(tmp_path):
     "shown",
     [
         (two_r(), ""),
-        (BARE, '[[tools]]\nname = "cover"\non = "arm/l2"\nshape = { box = [1, 0.1, 0.1] }\nmass = 0.1\n'),
+        (BARE, COVER.format(0.5)),
         (LAST.sub(r"\1", two_r(masses=(1.0, 0.05))), ""),
         (BARE.replace('<link name="tip"/>', FIXED), ""),
     ],
@@ -77,6 +90,117 @@ def test_what_is_shown_is_enough(tmp_path, shown):
     assert found.pop("power_and_force") is None  # nobody is near
     assert found.pop("figure") is None
     assert set(found.values()) == {"within"}
+
+
+def lump(mass=5.0, x=1.0, inertia=1e-3, shape=""):
+    """The arm with a mass at a place ahead of its end [m], which is at 2 m."""
+    six = " ".join(f'i{axes}="{inertia if axes[0] == axes[1] else 0}"' for axes in SIX)
+    inertial = f'<inertial><origin xyz="{x} 0 0"/><mass value="{mass}"/><inertia {six}/></inertial>'
+    return two_r().replace('<link name="tip"/>', f'<link name="tip">{inertial}{shape}</link>')
+
+
+@pytest.mark.parametrize(
+    ("urdf", "shown"),
+    [
+        (lump(), False),
+        (lump(x=0.0), True),  # at the end of the last link's box
+        (lump(x=-0.5, inertia=0.01), True),  # spread by 0.03 m in a box of half 0.05 m
+        (lump(x=-0.5, inertia=5 * 0.6**2), False),  # and one that is too large for it
+        (lump(mass=0.04), True),
+        (lump(x=0.0, shape=STUB.format(0.2)), True),
+        (lump(x=0.25, shape=STUB.format(0.2)), False),
+        (lump(x=0.0, shape=STUB.format(0.005)), True),
+        (BARE.replace('<link name="tip"/>', f'<link name="tip">{STUB.format(0.005)}</link>'), False),
+        (two_r().replace('size="1 0.1 0.1"', 'size="0.005 0.005 0.005"'), False),
+    ],
+    ids=[
+        "1 m out",
+        "inside",
+        "thin",
+        "wide",
+        "light",
+        "own",
+        "beside its own",
+        "stub on a box",
+        "a stub",
+        "stubs",
+    ],
+)
+def test_what_is_fixed_to_a_shape_is_in_it_or_not_shown(tmp_path, urdf, shown):
+    """5 kg whose centre lies 1 m ahead of everything that has a shape are somewhere."""
+    result = results_at(cell(tmp_path, urdf), arm=((0.0, 0.0), (1.0, 0.0)))["minimum_distance"]
+    assert (result.verdict, "no shape shows" in result.reason) == (
+        ("within", False) if shown else ("undecided", True)
+    )
+
+
+@given(
+    st.lists(st.tuples(st.floats(-1, 1), st.floats(0.1, 9)), min_size=1, max_size=9),
+    st.floats(-2, 2),
+    st.floats(0, 3),
+)
+def test_no_body_that_lies_in_a_span_reaches_out_of_it(points, low, length):
+    """Of points with masses: the bound is never more than what they do, and is reached by two at the ends."""
+    x, m = np.array(points).T
+    mean = float(m @ x / m.sum())
+    variance = float(m @ (x - mean) ** 2 / m.sum())
+    high = low + length
+    out = max(low - x.min(), x.max() - high)
+    assert stands_out(mean - low, high - mean, variance) <= out + 1e-9
+    if len(points) == 2:
+        assert stands_out(mean - x.min(), x.max() - mean, variance) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_names_of_links_and_patterns_mean_what_is_not_shown_too(tmp_path):
+    kinds = "".join(
+        f'[[safety]]\nkind = "velocity"\nname = "{of}"\nof = "{of}"\nlimit = 9\n'
+        for of in ("arm/*", "*", "arm/l1", "arm/l?", "op")
+    )
+    text = FLOATING + TWO_R + person("op", 9.0, 0, -1) + kinds
+    results = results_at(made(tmp_path, text, {"arm.urdf": BARE}), arm=((0.0, 0.0), (1.0, 0.0)))
+    undecided = {name for name, result in results.items() if "no shape shows arm/l2" in result.reason}
+    assert undecided == {"arm/*", "*", "arm/l?"}
+    assert results["arm/l1"].verdict == "within"
+
+
+class Forgetful(Criterion, frozen=True, kw_only=True):
+    """An own criterion that says nothing of shapes, and not of whom it speaks."""
+
+    def bind(self, model):
+        """See `Criterion.bind`."""
+        gap = model.gap(model.select("arm"), model.select("op"))
+        return lambda state: Result(
+            name="own", value=state.closest(gap).distance, limit=0.0, at_most=False, verdict=Verdict.WITHIN
+        )
+
+
+def test_nobody_has_to_think_of_it(tmp_path):
+    for urdf, verdict in ((BARE, "undecided"), (two_r(), "within")):
+        station = cell(tmp_path / verdict, urdf)
+        state = state_at(station, arm=((0.0, 0.0), (1.0, 0.0)))
+        own = Bound(
+            Forgetful(name="own"), "safety", Forgetful().bind(station.model), Basis(formula="", source="")
+        )
+        assert [result.verdict for result in Judge([own])(state)] == [verdict]
+
+
+def test_an_area_that_a_robot_sweeps_of_which_a_part_is_not_shown_is_not_safe_outside(tmp_path):
+    area = '[[areas]]\nname = "reach"\nswept = { of = "arm", reach = true, voxel = 0.2 }\n'
+    area += '[[safety]]\nkind = "safety_area"\narea = "reach"\nof = "op"\n'
+    for urdf, verdict in ((BARE, "undecided"), (two_r(), "within")):
+        urdf = re.sub('type="continuous"', 'type="revolute"', urdf)
+        urdf = urdf.replace("<limit ", '<limit lower="-0.1" upper="0.1" ')
+        station = made(
+            tmp_path / verdict, FLOATING + TWO_R + person("op", 9.0, 0, -1) + area, {"arm.urdf": urdf}
+        )
+        (result,) = results_at(station, arm=((0.0, 0.0), (0.0, 0.0))).values()
+        assert result.verdict == verdict
+
+
+def test_no_way_is_proven_clear_of_what_is_not_shown(tmp_path):
+    model = cell(tmp_path, BARE).model
+    with pytest.raises(InputError, match="no shape shows arm/l2"):
+        Clearance(model, model.robot("arm"), np.zeros(2))
 
 
 def test_a_robot_that_must_stay_outside_counts_whole(tmp_path):

@@ -86,7 +86,11 @@ def run(options: argparse.Namespace) -> int:
             )
     mesh = swept.mesh(most=options.triangles)
     write_mesh(options.output, mesh)
-    line("volume", f"{swept.volume:.4g} m³ in voxels of {options.voxel:g} m: not less than the truth")
+    unseen = model.unseen((_subject(station, options.of),))
+    sure = "less than the truth" if unseen else "not less than the truth"
+    line("volume", f"{swept.volume:.4g} m³ in voxels of {options.voxel:g} m: {sure}")
+    if unseen:
+        line("undecided", unseen, "yellow")
     line("contains", swept.guarantee)
     if swept.excess is None:
         line("dilated", f"by up to {swept.dilation * 1e3:.1f} mm for motion between two stamps")
@@ -95,7 +99,7 @@ def run(options: argparse.Namespace) -> int:
     line(
         "wrote", f"{options.output}: {len(mesh.faces)} triangles, metres; holds {signed_volume(mesh):.4g} m³"
     )
-    return Exit.WITHIN
+    return Exit.UNDECIDED if unseen else Exit.WITHIN
 
 
 def _subject(station: Station, name: str | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -358,7 +358,7 @@ class _Compiler:
             name: mechanism(mj, name, chain, riders, self.carriers, numbered)
             for name, chain in self.chains.items()
         }
-        return Model(
+        model = Model(
             workstation=self.station,
             mj=mj,
             bodies=numbered,
@@ -373,6 +373,14 @@ class _Compiler:
             files={**self.station.files, **self.mounting.files},
             dictionary=self.bound.variables,
         )
+        return replace(model, findings=(*model.findings, *self._too_small(model)))
+
+    def _too_small(self, model: Model) -> Iterator[Finding]:
+        """What is said of areas that something sweeps of which no shape shows a part."""
+        for area in self.station.areas:
+            if area.swept is not None and (unseen := model.unseen((area.swept.of,))):
+                text = f"{area.name} is swept by what is not all shown: {unseen}"
+                yield Finding(level="warning", subject=area.name, text=text, holds=(area.name,))
 
     def _riders(self) -> Riders:
         return Riders(self.chains, self.carriers, self.mounting.entries)

@@ -91,6 +91,11 @@ class Clearance:
         places = places or {}
         there = [m for m in model.mechanisms.values() if m.name != robot.name and m.name not in swept]
         problems = [
+            Problem("workstation", other.name, why, "a way is clear only of what has a shape")
+            for other in (robot, *there)
+            if (why := model.unseen((other.name,)))
+        ]
+        problems += [
             Problem("workstation", other.name, "nobody says where it stands", "give its q in the file")
             for other in there
             if other.name not in places and not other.home_given

@@ -39,7 +39,6 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
     """Distance of a hazard from the border of a protective device, against ISO 13855."""
 
     unit: ClassVar[str] = "m"
-    by_shape: ClassVar[bool] = True
     at_most: ClassVar[bool] = False
 
     sensor: str

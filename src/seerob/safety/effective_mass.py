@@ -101,6 +101,10 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         """The point, and whom it faces."""
         return (self.at,) if self.toward is None else (self.at, self.toward)
 
+    def unseen(self, model: Model) -> str:
+        """See `Criterion.unseen`; a direction that is not toward somebody needs no shape."""
+        return "" if self.toward is None else super().unseen(model)
+
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         frame = model.frame(self.at)

@@ -50,6 +50,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
     """Largest force that the robot's torque limits allow at a point, in any direction."""
 
     unit: ClassVar[str] = "N"
+    by_shape: ClassVar[bool] = False
 
     at: str
     """Point: a robot (its tool's working point) or the full name of a link."""

@@ -42,6 +42,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
     """Kinetic energy of a whole robot with everything mounted on it."""
 
     unit: ClassVar[str] = "J"
+    by_shape: ClassVar[bool] = False
 
     robot: str
     limit: Annotated[float, Meta(gt=0, extra={"unit": "J"})] | None = None

@@ -37,7 +37,6 @@ class LightCurtain(Criterion, frozen=True, kw_only=True):
     """Whether a light curtain is interrupted, by which body, and whether one reaches through unseen."""
 
     unit: ClassVar[str] = "m"
-    by_shape: ClassVar[bool] = True
     whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 

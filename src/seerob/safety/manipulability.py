@@ -82,6 +82,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
     """How well a point can move in its worst direction; near zero the robot is near a singularity."""
 
     unit: ClassVar[str] = "m/rad"
+    by_shape: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 
     at: str

@@ -28,7 +28,6 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
     """Least distance between two sets of bodies, exact on their non-convex shapes."""
 
     unit: ClassVar[str] = "m"
-    by_shape: ClassVar[bool] = True
     whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 

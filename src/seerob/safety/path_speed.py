@@ -60,6 +60,7 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
     """Speed of a robot along a known path against the permissible-speed map of that path."""
 
     unit: ClassVar[str] = ""
+    by_shape: ClassVar[bool] = False
 
     robot: str
     """The robot."""

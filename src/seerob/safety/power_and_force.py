@@ -56,7 +56,6 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     """Power and force limiting: speed of every moving part against what each body region may be hit with."""
 
     unit: ClassVar[str] = "m/s"
-    by_shape: ClassVar[bool] = True
     whole: ClassVar[bool] = False
 
     robot: str

@@ -16,7 +16,6 @@ class PressureMat(Criterion, frozen=True, kw_only=True):
     """Whether somebody stands on a pressure-sensitive mat, and how far they walked on it."""
 
     unit: ClassVar[str] = "m"
-    by_shape: ClassVar[bool] = True
     whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 

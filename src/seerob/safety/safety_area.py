@@ -31,7 +31,6 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
     """Whether anything of a set is inside a safety area, which bodies, and how deep."""
 
     unit: ClassVar[str] = "m"
-    by_shape: ClassVar[bool] = True
     whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 

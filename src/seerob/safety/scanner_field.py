@@ -43,7 +43,6 @@ class ScannerField(Criterion, frozen=True, kw_only=True):
     """Whether a laser scanner's field is entered, by which body, and whether the scanner sees it."""
 
     unit: ClassVar[str] = "m"
-    by_shape: ClassVar[bool] = True
     whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 

@@ -58,7 +58,6 @@ class Separation(Criterion, frozen=True, kw_only=True):
     """Speed and separation monitoring: every moving part of the robot against every part of the person."""
 
     unit: ClassVar[str] = "m"
-    by_shape: ClassVar[bool] = True
     whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 

@@ -34,7 +34,6 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
     """Whether anything is nearer to a robot than the protective separation distance of this moment."""
 
     unit: ClassVar[str] = "m"
-    by_shape: ClassVar[bool] = True
     whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 
@@ -48,10 +47,6 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
     def subjects(self) -> tuple[str, ...]:
         """What must stay outside."""
         return names_of(self.of)
-
-    def unseen(self, model: Model) -> str:
-        """See `Criterion.unseen`; of the robot that the separation is of."""
-        return super().unseen(model) or str(self._criterion(model).unseen(model))
 
     def _criterion(self, model: Model) -> Any:
         known = {c.name: c for c in model.workstation.safety if hasattr(c, "required")}

@@ -92,6 +92,7 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
     """Force that the robot exerts at its tool, from the joint torques that its source measures."""
 
     unit: ClassVar[str] = "N"
+    by_shape: ClassVar[bool] = False
 
     at: str
     """Point of contact: a robot (its tool's working point) or the full name of a link."""

@@ -42,7 +42,6 @@ class Velocity(Criterion, frozen=True, kw_only=True):
     """Speed of a point of a robot or person, or of the fastest point of a set of bodies."""
 
     unit: ClassVar[str] = "m/s"
-    by_shape: ClassVar[bool] = True
 
     at: str | None = None
     """Point: a robot (its tool's working point) or the full name of a link."""

@@ -39,6 +39,7 @@ class Waypoints(Criterion, frozen=True, kw_only=True):
     """Where the waypoints of a robot's program are, and how far its tool point is from the nearest."""
 
     unit: ClassVar[str] = "m"
+    by_shape: ClassVar[bool] = False
 
     robot: str
     """A robot with a source of kind ``waypoints``."""

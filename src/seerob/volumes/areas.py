@@ -223,7 +223,9 @@ class _Maker:
             for name, error in record.off.items():
                 if error > limit:
                     text = f"the twin of {name} was off by up to {error:.3g} rad or m: it is the twin's way"
-                    findings.append(Finding(level="warning", subject=area.name, text=text))
+                    findings.append(
+                        Finding(level="warning", subject=area.name, text=text, holds=(area.name,))
+                    )
         text = f"{what}, in voxels of {swept.voxel:g} m: {found.volume:.3g} m³, not less than the truth"
         if found.excess is not None:
             text += f"; larger by at most {found.excess * 1e3:.0f} mm before any margin"

@@ -6,18 +6,17 @@ import numpy as np
 import trimesh
 
 from made_cell import UR10, made
-from seerob.contact.clamping import STILL, clamps, pinch_pairs, robot_pinch_pairs
+from seerob.contact.clamping import STILL, clamps, pinch_pairs, robot_pinch_pairs, thickest
 from seerob.distances.least import Shapes
 from seerob.geometry import Mesh, Solid, capsule
 
 HAND, BODY = 0.1, 0.5
-THICKNESS = np.array([HAND, BODY])
+THICKNESS = np.array([[HAND, BODY]])
 
 
-def one(gaps: np.ndarray, *, moved: float = 0.0, speed: float = 0.1, opened: bool = True) -> np.ndarray:
+def one(gaps: np.ndarray, *, speed: float = 0.1, period: float = 0.0) -> np.ndarray:
     column = gaps[:, None]
-    every = np.full_like(column, moved), np.full_like(column, speed)
-    return clamps(column, *every, THICKNESS, opened=np.array([opened]))[:, 0]
+    return clamps(column, np.full_like(column, speed), period, THICKNESS)[:, 0]
 
 
 def test_gap_no_wider_than_the_body_part_clamps_it_whether_it_closes_or_opens() -> None:
@@ -32,27 +31,23 @@ def test_what_stands_still_clamps_nobody() -> None:
         assert one(np.full(3, 0.05), speed=speed).any() == found
 
 
-def test_parts_of_one_robot_clamp_only_what_once_had_room() -> None:
-    gaps = np.array([0.08, 0.06, 0.04, 0.12, 0.08, 0.04])
-    found = one(gaps, opened=False)
-    assert not found[:3].any()
-    assert found[4:, 0].all()
-    assert not found[:, 1].any()
-    # As wide as the body part is enough.
-    assert one(np.array([0.5, 0.4]), opened=False)[:, 1].tolist() == [True, True]
-
-
 def test_the_rest_of_the_way_is_looked_at_before_it_is_gone() -> None:
-    """What moved by 0.05 m may do so again; never more than `AHEAD` is looked ahead."""
+    """What moves at 5 m/s goes 0.05 m in a tick; never more than `AHEAD` is looked ahead."""
     gaps = np.array([0.16, 0.15, 0.14])
-    assert one(gaps, moved=0.05)[:, 0].tolist() == [False, True, True]
-    assert one(np.array([0.1905, 0.1895]), moved=7.0)[:, 0].tolist() == [False, True]
+    assert one(gaps, speed=5.0, period=0.01)[:, 0].tolist() == [False, True, True]
+    assert one(np.array([0.1905, 0.1895]), speed=700.0, period=0.01)[:, 0].tolist() == [False, True]
 
 
-def test_room_is_told_for_each_body_part() -> None:
-    opened = np.array([[True, False]])
-    found = clamps(np.full((1, 1), 0.05), np.zeros((1, 1)), np.ones((1, 1)), THICKNESS, opened=opened)
-    assert found[0, 0].tolist() == [True, False]
+def test_between_own_parts_a_body_part_counts_as_thick_as_what_fits() -> None:
+    """Of a hand, 4 to 100 mm, and a body, 180 to 500 mm; nothing is clamped before it could close."""
+    fits, thickness, sizes = np.array([0.004, 0.18]), THICKNESS[0], (0.025, 0.05, 0.1, 0.18, 0.3, 0.5)
+    widest = np.array([0.0, 0.02, 0.03, 0.085, 0.3, 0.9, np.inf])
+    found = thickest(widest, fits, thickness, sizes, least=0.004)
+    np.testing.assert_allclose(found[:, 0], [-np.inf, -np.inf, 0.025, 0.05, 0.1, 0.1, 0.1])
+    np.testing.assert_allclose(found[:, 1], [-np.inf, -np.inf, -np.inf, -np.inf, 0.296, 0.5, 0.5])
+    # Wider open never lets less in.
+    rising = thickest(np.linspace(0, 1, 200), fits, thickness, sizes, least=0.004)
+    assert (np.diff(np.nan_to_num(rising, neginf=-1), axis=0) >= 0).all()
 
 
 def slotted() -> Mesh:
@@ -79,20 +74,18 @@ def test_gap_in_a_slot_is_found_where_a_hull_has_none() -> None:
     live = [pairs.gaps(r, p)[0] for r, p in zip(rotations, positions, strict=True)]
     np.testing.assert_array_equal(live, gaps)
     assert pairs.gaps(rotations[0], positions[0])[1].tolist() == [0]
-    found = clamps(
-        gaps, np.full_like(gaps, 0.01), np.full_like(gaps, 0.1), np.array([0.05]), opened=pairs.opened
-    )
+    found = clamps(gaps, np.full_like(gaps, 1.0), 0.01, np.array([[0.05]]))
     np.testing.assert_array_equal(found[:, 0, 0], gaps[:, 0] - 0.01 <= 0.05)
 
 
-def test_own_links_are_paired_except_neighbours_and_both_sides_clamp() -> None:
+def test_own_links_are_paired_except_those_left_out_and_both_sides_clamp() -> None:
     bodies = [(n, [capsule(np.zeros(3), np.array([0.0, 0, 0.1]), 0.02)]) for n in "abcd"]
     neighbours = frozenset({(0, 1), (1, 2)})
     pairs = pinch_pairs(Shapes.build(bodies), [0, 1, 2], [], neighbours, still=[3], cap=1.0)
     assert sorted(zip(pairs.first.tolist(), pairs.second.tolist(), strict=True)) == [
         (0, -1), (0, 2), (1, -1), (2, -1),
     ]  # fmt: skip
-    assert not pairs.opened.any()
+    assert pairs.across.tolist() == [3, 2, 3, 3] or (pairs.across >= 0).all()
     clamped = ((pairs.first == 0) & (pairs.second == 2))[:, None]
     assert pairs.per_body(clamped)[:, 0].tolist() == [True, False, True]
 
@@ -102,7 +95,7 @@ def test_other_things_are_on_the_far_side_of_a_gap_and_flags_are_those_of_each_m
     pairs = pinch_pairs(Shapes.build(bodies), [1, 2, 3], [0], frozenset(), cap=1.0)
     assert pairs.first.tolist() == [0, 1, 2, 0, 0, 1]
     assert pairs.second.tolist() == [-1, -1, -1, 1, 2, 2]
-    assert pairs.opened.tolist() == [True] * 3 + [False] * 3
+    assert pairs.across.tolist() == [-1, -1, -1, 2, 3, 3]
     flags = np.random.default_rng(0).random((5, 6, 2)) < 0.3
     expected = np.zeros((5, 3, 2), bool)
     for n, gap, part in np.argwhere(flags):
@@ -111,13 +104,13 @@ def test_other_things_are_on_the_far_side_of_a_gap_and_flags_are_those_of_each_m
     np.testing.assert_array_equal(pairs.per_body(flags), expected)
 
 
-def test_own_links_of_a_robot_that_no_joint_connects_are_paired(tmp_path) -> None:
+def test_own_links_of_a_robot_are_paired_by_the_joints_between_them(tmp_path) -> None:
     """A tool is one with the last link; the parts around count as surfaces, areas and people do not."""
     text = UR10 + '[[parts]]\nname = "wall"\nshape = { box = [0.1, 1, 1] }\nat = { position = [2, 0, 0] }\n'
     text += '[[areas]]\nname = "zone"\nshape = { sphere = 0.5 }\n'
     model = made(tmp_path, text).model
     robot = model.robot("arm")
-    pairs = robot_pinch_pairs(model, robot, cap=0.6)
+    pairs, widest, by_one = robot_pinch_pairs(model, robot, cap=0.6)
     own = [
         {model.bodies[query.a[i]].name, model.bodies[query.b[0]].name}
         for query, _ in pairs.queries[1:]
@@ -134,5 +127,11 @@ def test_own_links_of_a_robot_that_no_joint_connects_are_paired(tmp_path) -> Non
     expected = [{a, b} for a in solid for b in solid if a < b and abs(place[a] - place[b]) > 1]
     moving = {model.bodies[i].name for i in pairs.moving}
     assert sorted(map(sorted, own)) == sorted(sorted(p) for p in expected if p & moving)
+    one = [{a, b} for a in solid for b in solid if a < b and abs(place[a] - place[b]) == 1]
+    found = [sorted((model.bodies[i].name, model.bodies[j].name)) for i, j, _ in by_one]
+    assert sorted(found) == sorted(sorted(p) for p in one)
+    assert len(widest) == len(pairs.first)
+    assert np.isinf(widest[pairs.across < 0]).all()
+    assert (widest[pairs.across >= 0] <= 0.6).all()
     (surfaces, _), *_ = pairs.queries
     assert [model.bodies[i].name for i in surfaces.a] == ["wall"]

@@ -81,15 +81,15 @@ def test_what_surfaces_may_stick_out_and_bones_are_off_by_is_within_the_horizon(
     assert horizon_of(out, region) == pytest.approx(plain - off, abs=2e-7)
 
 
-def test_own_links_clamp_the_thickest_region_once_they_had_room(tmp_path: Path) -> None:
-    """The tool of a UR10 folds onto its upper arm, which it was more than half a metre away from before."""
+def test_own_links_that_fold_clamp_a_hand_whatever_was_before(tmp_path: Path) -> None:
+    """The forearm of a UR10 folds onto its upper arm; stretched out, it does not."""
     station = made(tmp_path, FLOATING + '[[robots]]\nname = "arm"\nmodel = "library:ur10"\n')
     robot = station.model.robot("arm")
-    clamping = Clamping(station.model, robot, {}, ("Chest",), None)
+    clamping = Clamping(station.model, robot, {}, ("Hands and fingers",), None)
     wanted = np.ones((len(robot.moving), 1), bool)
     found = []
-    for t, elbow in ((0.0, 2.6), (0.1, 0.0), (0.2, 2.6)):
+    for t, elbow in ((0.0, 2.6), (0.1, 0.0), (0.2, 2.6), (0.1, 2.6)):
         state = state_at(station, arm=((0, -1.5, elbow, 0, 0, 0), (0, 0, 0.5, 0, 0, 0)))
         state.t = t
         found.append(bool(clamping.at(state, wanted)[0].any()))
-    assert found == [False, False, True]
+    assert found == [True, False, True, True]

@@ -67,6 +67,7 @@ def test_gaps_are_those_of_the_file_in_metres_or_those_that_are_given():
     gaps, source = crushing_gaps()
     assert gaps["Chest"] == pytest.approx(0.5)
     assert gaps["Lower legs"] == pytest.approx(0.18)
-    table, own = gap_inputs({"Face": 0.2}, ("Chest", "Face"))
+    table, own, chest, face = gap_inputs({"Face": 0.2}, ("Chest", "Face"))
+    assert (chest.value, face.value, chest.origin, chest.unit) == (0.18, 0.1, "estimated", "m")
     assert (table.value, table.unit, table.origin, table.source) == (0.5, "m", "estimated", source)
     assert (own.value, own.unit, own.origin) == (0.2, "m", "given")

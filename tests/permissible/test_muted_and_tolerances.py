@@ -86,7 +86,7 @@ def test_what_clamps_on_the_floor_says_so(tmp_path, floor):
     """An arm that comes down onto the floor from 5 cm above it, and the same one without a floor."""
     turned = two_r().replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"')
     text = FLOATING + TWO_R + LIMITS + "base = { position = [0, 0, 0.5] }\n" + SOURCE + PFL + KEPT_OUT
-    text += f"floor = {str(floor).lower()}\n"
+    text = text.replace("floor = false", f"floor = {str(floor).lower()}")
     station = made(tmp_path, text, {"arm.urdf": turned, "motion.csv": turn(angle=0.2)})
     (found,) = maps(station, By.ALL).values()
     contacts = {c.contact for each in found.ceilings for c in each}

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace as dataclass_replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from msgspec.structs import replace
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.contact.clamped_regions import FloorGap
@@ -28,7 +30,9 @@ TABLE = part("table", (3, 1, 0.1), (1, -0.3, -0.12))
 
 
 def cell(folder: Path, more: str, options: str = "", *, base: str = "", axis: str = "0 0 1") -> Station:
+    """Without a base the arm lies in the plane of the floor, which then is left out."""
     robot = TWO_R + base
+    options = options if base or "floor" in options else f"{options}floor = false\n"
     text = (
         f'{FLOATING}{robot}{more}[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\n'
         f'mass = "simplified"\ncontact_area = {{ arm = 1e-4 }}\n{options}'
@@ -109,13 +113,13 @@ def over_floor(folder: Path, z: float, options: str = "", more: str = "") -> Sta
         (0.14, 0.2, "", True, True),  # the lowest point of the arm 0.05 m under its axis
         (0.16, 0.2, "", False, True),
         (0.56, 0.2, "", False, False),
-        (0.14, -0.2, "", False, False),  # it only rises
+        (0.14, -0.2, "", True, True),  # it rises, as it may from a wall
         (0.14, 0.2, "floor = false\n", False, False),
         (0.14, 0.2, "floor_height = -0.1\n", False, True),
         (0.56, 0.2, "floor_height = 0.42\n", True, True),
     ],
 )
-def test_arm_that_comes_down_clamps_against_the_floor(
+def test_arm_that_moves_near_the_floor_clamps_against_it(
     tmp_path: Path, z: float, v: float, options: str, hand: bool, chest: bool
 ) -> None:
     """Nothing is drawn there: who stands, stands on z = 0."""
@@ -133,13 +137,21 @@ def test_floor_clamps_as_a_part_in_its_place_does(tmp_path: Path) -> None:
     assert clamped(plane[HAND])
 
 
-def test_floor_counts_where_the_arm_may_be_by_the_next_instant(tmp_path: Path) -> None:
-    """0.11 m above the floor and falling at up to 0.4 m/s: in 10 ms above 0.1 m, in 100 ms below."""
+@pytest.mark.parametrize(("tick", "expected"), [(0.01, False), (0.1, True)])
+def test_floor_counts_where_the_arm_may_be_by_the_next_tick(
+    tmp_path: Path, tick: float, expected: bool
+) -> None:
+    """0.11 m above the floor and falling at up to 0.4 m/s: in 10 ms above 0.1 m, in 100 ms below.
+
+    When it was asked before does not matter.
+    """
     station = over_floor(tmp_path, 0.16)
+    engine = replace(station.model.workstation.engine, tick=tick)
+    model = dataclass_replace(station.model, workstation=replace(station.model.workstation, engine=engine))
     state = state_at(station, arm=((0.0, 0.0), (0.2, 0.0)))
-    floor = FloorGap(station.model, station.model.robot("arm").moving, 0.0)
+    floor = FloorGap(model, model.robot("arm").moving, 0.0)
     thickness, wanted = np.array([0.1]), np.ones((2, 1), bool)
-    for t, expected in ((0.0, False), (0.1, True), (0.1, True), (0.11, False), (0.05, False)):
+    for t in (0.0, 0.1, 0.11, 0.05):
         state.t = t
         assert floor.clamped(state, thickness, wanted)[1, 0] == expected, t
 
@@ -172,8 +184,19 @@ def test_twice_what_surfaces_may_stick_out_is_added_to_body_parts(
     assert clamped(regions(station)[HAND]) == expected
 
 
-def test_what_moves_along_the_floor_does_not_come_down_on_it(tmp_path: Path) -> None:
-    assert not clamped(regions(cell(tmp_path, ""))["Chest"])
+@pytest.mark.parametrize("z", [0.06, 0.14, 0.2])
+def test_what_moves_along_the_floor_clamps_as_what_moves_along_a_wall(tmp_path: Path, z: float) -> None:
+    """The same arm, turning about z, beside a floor, a slab in its place, and a table top above it."""
+    base = f"base = {{ position = [0, 0, {z}] }}\n"
+    floor = regions(cell(tmp_path / "a", "", "", base=base))
+    slab = part("slab", (6, 6, 0.2), (0, 0, -0.1))
+    drawn = regions(cell(tmp_path / "b", slab, "floor = false\n", base=base))
+    above = part("above", (6, 6, 0.2), (0, 0, 2 * z + 0.1))
+    ceiling = regions(cell(tmp_path / "c", above, "floor = false\n", base=base))
+    for other in (drawn, ceiling):
+        assert {n: p.limit for n, p in floor.items()} == {n: p.limit for n, p in other.items()}
+    assert clamped(floor["Chest"])
+    assert clamped(floor[HAND]) == (z < 0.15)
 
 
 @pytest.mark.parametrize(
@@ -185,7 +208,8 @@ def test_what_moves_along_the_floor_does_not_come_down_on_it(tmp_path: Path) -> 
     ],
 )
 def test_basis_says_what_the_floor_is(tmp_path: Path, options: str, value: object, origin: Origin) -> None:
-    inputs = {i.name: i for i in cell(tmp_path, "", options).bound[0].basis.inputs}
+    station = cell(tmp_path, "", options, base="base = { position = [0, 0, 1] }\n")
+    inputs = {i.name: i for i in station.bound[0].basis.inputs}
     found = inputs["floor as a surface that clamps"]
     assert (found.value, found.origin) == (value, origin)
     assert found.unit == ("" if value == "left out" else "m")

@@ -15,7 +15,7 @@ def contact(folder, options="", *, robot="", speed=1.0, links=(4.0, 4.0)):
     text = FLOATING + TWO_R + robot
     text += criterion(
         "power_and_force",
-        f'robot = "arm"\nexcluded = [{EXCLUDED}]\ncontact_area = {{ arm = 1e-4 }}\n{options}',
+        f'robot = "arm"\nexcluded = [{EXCLUDED}]\ncontact_area = {{ arm = 1e-4 }}\nfloor = false\n{options}',
     )
     station = made(folder, text, {"arm.urdf": two_r(masses=links)})
     return results_at(station, arm=((0.0, 0.0), (speed, 0.0)))["it"]

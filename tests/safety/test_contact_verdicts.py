@@ -35,6 +35,8 @@ def person(x: float, z: float = -1.0, more: str = "") -> str:
 
 
 def cell(folder: Path, options: str = FLAT, *, more: str = "", base: str = "", axis: str = "") -> Station:
+    """The arm lies in the plane of the floor, which is left out unless there is a base."""
+    options = options if base or "floor" in options else f"{options}floor = false\n"
     text = (
         FLOATING + TWO_R + base + more + '[[safety]]\nkind = "power_and_force"\nname = "F"\nrobot = "arm"\n'
     )

@@ -24,6 +24,8 @@ M_TIP = 1.0  # the outer point mass, at the end of a straight arm across its dir
 
 
 def cell(folder: Path, options: str = "", *, head: str = "", more: str = "", **arm: object) -> Station:
+    """The arm lies in the plane of the floor, which is left out unless it is asked for."""
+    options = options if "floor" in options else f"floor = false\n{options}"
     text = (
         f"{head}{FLOATING}{TWO_R}{more}"
         f'[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\n{options}'
@@ -241,6 +243,9 @@ def test_what_rests_on_a_gap_that_is_not_verified_says_so(tmp_path: Path) -> Non
     assert gaps["Chest: clamped in gaps up to"] == (0.5, Origin.ESTIMATED)
     assert gaps["Neck: clamped in gaps up to"] == (0.1, Origin.GIVEN)
     assert len(gaps) == 10
+    opened = [i for i in station.bound[0].basis.inputs if "gets between parts of one robot" in i.name]
+    assert {i.name.split(":")[0]: i.value for i in opened}["Chest"] == 0.18
+    assert all("(M)" in i.source for i in opened)
 
 
 def test_gap_wider_than_the_body_part_does_not_clamp_it(tmp_path: Path) -> None:

@@ -1,9 +1,9 @@
 """Which body regions each moving body of a robot clamps: against surfaces, itself and the floor.
 
 People stand on z = 0 by definition, whether or not a part of the workstation is drawn there: unless told
-otherwise it is a surface, endless and horizontal. A body clamps against it where its lowest point is no
-higher than the body part is thick, or may be by the next instant at its present speed, while any of its
-points comes down; see `seerob.contact.clamping`.
+otherwise it is a surface like any other, endless and horizontal. A body that moves clamps against it where
+its lowest point is no higher than the body part is thick, or may be by the next tick at its present speed;
+see `seerob.contact.clamping`.
 """
 
 from __future__ import annotations
@@ -12,12 +12,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from seerob.contact.clamping import AHEAD, STILL, Flags, robot_pinch_pairs
+from seerob.contact.clamping import AHEAD, Flags, robot_pinch_pairs, thickest
 from seerob.contact.closing_gaps import ClosingGaps
+from seerob.contact.joint_gaps import JointGaps
 from seerob.kernels.approach import lowest_and_falling
 from seerob.kernels.speed import stacked
 from seerob.model import Mechanism, Model
-from seerob.norms.crushing_gaps import crushing_gaps
+from seerob.norms.crushing_gaps import crushing_gaps, openings, sizes
 from seerob.provenance import given
 from seerob.snapshot import Input, Origin
 from seerob.state import State
@@ -43,7 +44,6 @@ class FloorGap:
         self._corners = stacked([body.corners for body in bodies])
         self._radius = np.array([body.radius for body in bodies], float)
         self._period = model.workstation.engine.tick
-        self._asked: tuple[float, float] | None = None
 
     def lowest_and_falling(self, state: State) -> Array:
         """Gap to the floor [m] and largest downward speed [m/s] of each moving body, shape (b, 2)."""
@@ -64,17 +64,9 @@ class FloorGap:
             wanted: Of which bodies and body parts that matters, shape (b, r).
         """
         gap, fall = self.lowest_and_falling(state).T
-        # As for other surfaces: it counts where it may be no wider by the next instant.
-        ahead = gap - np.clip(fall * self._until_next(state.t), 0.0, AHEAD)
-        return np.asarray((fall > STILL)[:, None] & (ahead[:, None] <= thickness) & wanted)
-
-    def _until_next(self, t: float) -> float:
-        """As long as it was since the instant before [s]; a tick at the first, or set back."""
-        if self._asked is None or t < self._asked[0]:
-            self._asked = t, self._period
-        elif t > self._asked[0]:
-            self._asked = t, t - self._asked[0]
-        return self._asked[1]
+        # As for other surfaces: where it may be no wider by the next tick, whatever way it goes.
+        ahead = gap - np.clip(fall * self._period, 0.0, AHEAD)
+        return np.asarray((ahead[:, None] <= thickness) & wanted)
 
 
 class Clamping:
@@ -99,15 +91,23 @@ class Clamping:
         """
         known = {**crushing_gaps()[0], **gaps}
         others = [b for b in model.bodies if b.role not in ("human", "area")]
-        # The real surfaces may be nearer than the shapes.
+        # The real surfaces may be nearer than the shapes, or farther apart.
         deviation = 2 * max((body.deviation for body in others), default=0.0)
-        self._thickness = np.array([known[name] + deviation for name in regions])
+        plain = np.array([known[name] for name in regions])
+        fits = np.minimum([openings()[0][name] for name in regions], plain)
+        self._thickness = plain + deviation
         cap = float(self._thickness.max(initial=0.0)) + ROOM
-        self._gaps = ClosingGaps(
-            model.shapes, robot_pinch_pairs(model, robot, cap=cap), self._thickness, cap=cap
+        pairs, widest, by_one = robot_pinch_pairs(model, robot, cap=cap)
+        period = model.workstation.engine.tick
+        least = min(openings()[0].values())
+        between = thickest(widest + deviation, fits, plain, sizes(), least=least) + deviation
+        self._gaps = ClosingGaps(model.shapes, pairs, between, period=period)
+        self._joints = JointGaps(
+            model, robot, by_one, self._thickness, np.maximum(fits - deviation, 0.0), least=least
         )
+        self._moving, self._surfaces = robot.moving, pairs.surfaces
         self._floor = None if floor is None else FloorGap(model, robot.moving, floor)
-        self._surfaces = tuple(b.index for b in others)
+        self._asked = tuple(b.index for b in others)
         # All that carries a surface: where a machine is not known, nor are the gaps to it.
         self._carriers = [name for name, m in model.mechanisms.items() if m.role != "human"]
 
@@ -122,12 +122,20 @@ class Clamping:
             Undecided: A robot or a machine that was not heard.
         """
         state.require(*self._carriers)
-        twists = state.body_velocities(self._surfaces)
-        clamped = self._gaps.clamped(state.t, *state.placed(self._surfaces), twists, wanted)
+        if not wanted.any():
+            return np.zeros_like(wanted), np.zeros_like(wanted)
+        speeds = state.fastest_points(self._moving)[0], self._fastest_surface(state)
+        twists = state.body_velocities(self._asked)
+        clamped = self._gaps.clamped(*state.placed(self._asked), twists, speeds, wanted)
+        clamped |= self._joints.clamped(state, wanted)
         if self._floor is None:
             return clamped, np.zeros_like(clamped)
         floor = self._floor.clamped(state, self._thickness, wanted)
         return clamped | floor, floor
+
+    def _fastest_surface(self, state: State) -> float:
+        """Speed of the fastest point of any surface [m/s]."""
+        return float(state.fastest_points(self._surfaces)[0].max()) if self._surfaces else 0.0
 
 
 def floor_input(height: float | None) -> Input:

@@ -1,24 +1,31 @@
 r"""Where a part of a person could be clamped: in a gap no wider than the body part, of parts that move.
 
 A gap :math:`g` between a moving part of a robot and another surface clamps a body part of the
-thickness :math:`D` where it is no wider than it, or may be by the next instant, while its sides move:
+thickness :math:`D` where it is no wider than it, or may be by the next tick, while its sides move against
+each other:
 
-.. math:: |v| > 0, \qquad g - \delta \le D
+.. math:: |v| > 0, \qquad g - |v| T \le D
 
-with :math:`\delta` how far the sides have moved since the instant before. Whether the *least* distance
-closes does not count: a nearer surface at a constant distance, or a part that tilts, hides another place
-where the gap closes. A part that moves past a surface or away from it counts as well: the rule errs on the
-side of clamping, and one more surface never permits more.
+with T the period of a tick. Whether the *least* distance closes does not count: a nearer surface at a
+constant distance, or a part that tilts, hides another place where the gap closes. A part that moves past a
+surface or away from it counts as well: the rule errs on the side of clamping, and one more surface never
+permits more. Nothing is remembered: the answer at an instant follows from the poses and speeds then.
 
-Gaps of one robot's own parts are counted only after they were once as wide as the body part, since nothing
-gets between links that are always near, and only while these two move against each other.
+Between the robot's own parts nothing gets where they are always near. Which body parts do is settled once,
+from the shapes and the ranges of the joints:
+
+- of two parts that several joints move against each other (a tool and the upper arm), a body part counts as
+  thick as the widest of the sizes that fit between them in some position of these joints;
+- of two parts that one joint moves against each other (an elbow, two fingers), which touch at the joint
+  wherever it stands, every place is looked at by itself; see `seerob.contact.joint_gaps`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,41 +35,54 @@ from seerob.model import Mechanism, Model
 from seerob.transforms import Array
 
 Flags = NDArray[np.bool_]
+Coordinate = tuple[str, int]
+"""A commanded joint: mechanism and column."""
 
 STILL = 1e-3
 """Parts of a robot that move more slowly against each other stay as they are [m/s]."""
 AHEAD = 0.09
 """Largest way that is looked ahead to the next instant [m]."""
+SAMPLED = 64
+"""Positions of several joints in which it is looked how far two parts can be apart."""
+MISSED = 0.1
+"""By which share they may be farther apart in a position in between."""
+ENDLESS = 1.0
+"""How far to either side a slide without ends is looked at [m]."""
 
 
-def clamps(
-    gaps: Array,
-    moved: Array,
-    speed: Array,
-    thickness: Array,
-    *,
-    opened: Flags,
-) -> Flags:
-    """Which gaps clamp which body parts, and when.
+def clamps(gaps: Array, speed: Array, period: float, thickness: Array) -> Flags:
+    """Which gaps clamp which body parts.
 
     Args:
-        gaps: Distances of pairs of surfaces [m], shape (N, g); not above a cap that exceeds every thickness
-            by more than `AHEAD`.
-        moved: How far their sides have moved since the instant before [m], 0 at the first, shape (N, g).
-        speed: Of one side seen from the other [m/s], infinity where it counts in any case, shape (N, g).
-        thickness: Of body parts [m], shape (r,).
-        opened: Whether a pair counts from the start on (True) or only after it was as wide as the body
-            part (False), shape (g,) or, of each body part, (g, r).
+        gaps: Distances of pairs of surfaces [m], shape (..., g).
+        speed: Of one side seen from the other [m/s], shape (..., g).
+        period: Until it is asked again [s].
+        thickness: Of body parts in each gap [m], -infinity of one that does not get in, shape (g, r).
 
     Returns:
-        Shape (N, g, r).
+        Shape (..., g, r).
     """
-    gaps = np.asarray(gaps, float)
-    seen = np.maximum.accumulate(gaps, axis=0)
-    opened = opened[:, None] if opened.ndim == 1 else opened
-    wide = opened | (seen[..., None] >= thickness)
-    ahead = gaps - np.minimum(moved, AHEAD)
-    return np.asarray((speed > STILL)[..., None] & (ahead[..., None] <= thickness) & wide)
+    ahead = np.asarray(gaps, float) - np.minimum(speed * period, AHEAD)
+    return np.asarray((speed > STILL)[..., None] & (ahead[..., None] <= thickness))
+
+
+def thickest(widest: Array, fits: Array, thickness: Array, sizes: Sequence[float], *, least: float) -> Array:
+    """Thickest of the sizes that fit between two parts, and that are of the body part [m], shape (g, r).
+
+    Never as wide as the parts can be apart: what is there when they are is not yet clamped.
+
+    Args:
+        widest: How far the parts can be apart [m], shape (g,).
+        fits: Thinnest that a body part is [m], shape (r,).
+        thickness: Thickest likewise [m], shape (r,).
+        sizes: Between them, thinnest first [m].
+        least: By how much a gap changes that closes at all [m].
+    """
+    found = np.full((len(widest), len(thickness)), -np.inf)
+    for size in (*sizes, *thickness.tolist()):
+        counts = (fits <= size) & (size <= thickness) & (widest[:, None] >= size * (1 - MISSED))
+        found = np.where(counts, np.maximum(found, size), found)
+    return np.asarray(np.minimum(found, widest[:, None] - least))
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +95,11 @@ class PinchPairs:
     first: NDArray[np.int64]
     """Row in ``moving`` of each gap, shape (g,)."""
     second: NDArray[np.int64]
-    """Row in ``moving`` of the other side, -1 when it is a surface, shape (g,)."""
-    opened: Flags
-    """See `clamps`."""
+    """Row in ``moving`` of the other side, -1 when it does not move or is a surface, shape (g,)."""
+    across: NDArray[np.int64]
+    """Body of the other side, -1 of the gaps to any of the surfaces, shape (g,)."""
+    surfaces: tuple[int, ...]
+    """Bodies of the environment and of other robots."""
 
     def gaps(self, rotations: Array, positions: Array) -> tuple[Array, NDArray[np.int64]]:
         """Gaps [m] and the body on the other side (-1 beyond the cap), shape (g,).
@@ -113,7 +135,7 @@ def pinch_pairs(
     shapes: Shapes,
     moving: Sequence[int],
     surfaces: Sequence[int],
-    neighbours: frozenset[tuple[int, int]],
+    apart: frozenset[tuple[int, int]],
     *,
     still: Sequence[int] = (),
     cap: float,
@@ -124,53 +146,129 @@ def pinch_pairs(
         shapes: Of the model.
         moving: Bodies that the robot's joints move.
         surfaces: Bodies of the environment and of other robots.
-        neighbours: Pairs of the robot's own bodies that a joint or a weld connects.
+        apart: Pairs of the robot's own bodies that are one, or that are judged place by place.
         still: The robot's own bodies that its joints do not move.
         cap: Largest gap that matters [m].
     """
     queries: list[tuple[Query, Per]] = []
     first: list[int] = []
     second: list[int] = []
+    across: list[int] = []
     if moving and surfaces:
         queries.append((Query(shapes, surfaces, moving, cap=cap), Per.BODY))
         first += range(len(moving))
         second += [-1] * len(moving)
-    outside = len(first)
+        across += [-1] * len(moving)
     own = [*moving, *still]
     for row, body in enumerate(moving):
         others = [
-            k
-            for k in range(row + 1, len(own))
-            if (body, own[k]) not in neighbours and (own[k], body) not in neighbours
+            k for k in range(row + 1, len(own)) if (body, own[k]) not in apart and (own[k], body) not in apart
         ]
         if others:
             queries.append((Query(shapes, [own[k] for k in others], [body], cap=cap), Per.PAIR))
             first += [row] * len(others)
             second += [k if k < len(moving) else -1 for k in others]
-    opened = np.arange(len(first)) < outside
+            across += [own[k] for k in others]
     return PinchPairs(
-        tuple(moving), tuple(queries), np.array(first, np.int64), np.array(second, np.int64), opened
-    )
+        tuple(moving), tuple(queries), np.array(first, np.int64), np.array(second, np.int64),
+        np.array(across, np.int64), tuple(surfaces) if moving else (),
+    )  # fmt: skip
 
 
-def robot_pinch_pairs(model: Model, robot: Mechanism, *, cap: float) -> PinchPairs:
-    """The gaps of a robot to parts, other robots and its own links that no joint connects.
+class OwnJoints:
+    """Which commanded joints move two bodies of a robot against each other, and poses by where they stand.
+
+    Args:
+        model: The compiled workstation.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._model, self._data = model, mujoco.MjData(model.mj)
+        self._bodies = [body.mj for body in model.bodies]
+        self._of_joint: dict[int, set[Coordinate]] = {}
+        for name, m in model.mechanisms.items():
+            for row, dof in enumerate(m.v_address.tolist()):
+                columns = np.flatnonzero(m.coupling[row]).tolist()
+                self._of_joint.setdefault(dof, set()).update((name, column) for column in columns)
+
+    def between(self, a: int, b: int) -> frozenset[Coordinate]:
+        """Commanded joints between two bodies; empty when they are one."""
+        mj = self._model.mj
+        ways = []
+        for body in (a, b):
+            at, dofs = int(self._bodies[body]), set()
+            while at:
+                start, count = int(mj.body_dofadr[at]), int(mj.body_dofnum[at])
+                dofs |= set(range(start, start + count)) if count else set()
+                at = int(mj.body_parentid[at])
+            ways.append(dofs)
+        found = (self._of_joint.get(dof, set()) for dof in ways[0] ^ ways[1])
+        return frozenset(coordinate for each in found for coordinate in each)
+
+    def range(self, coordinate: Coordinate) -> tuple[float, float]:
+        """Ends of a joint [rad or m]; a turn that has none goes round once, a slide some way."""
+        name, column = coordinate
+        m = self._model.mechanisms[name]
+        low, high, home = float(m.lower[column]), float(m.upper[column]), float(m.home[column])
+        some = np.pi if m.joints[column].kind == "revolute" else ENDLESS
+        low = home - some if not np.isfinite(low) else low
+        return low, max(home + some, low) if not np.isfinite(high) else high
+
+    def poses(self, positions: Mapping[Coordinate, Array]) -> tuple[Array, Array]:
+        """Poses of all bodies with some joints there and all others at home.
+
+        Args:
+            positions: Of each joint [rad or m], shape (N,) each.
+
+        Returns:
+            world_from_body, shapes (N, n, 3, 3) and (N, n, 3) [m].
+        """
+        count = len(next(iter(positions.values())))
+        rotations, places = [], []
+        for k in range(count):
+            for name, m in self._model.mechanisms.items():
+                q = m.home.copy()
+                for (who, column), values in positions.items():
+                    if who == name:
+                        q[column] = values[k]
+                self._data.qpos[m.q_address] = m.coupling @ q + m.offset
+            mujoco.mj_kinematics(self._model.mj, self._data)
+            rotations.append(self._data.xmat[self._bodies].reshape(-1, 3, 3).copy())
+            places.append(self._data.xpos[self._bodies].copy())
+        return np.array(rotations), np.array(places)
+
+
+def robot_pinch_pairs(
+    model: Model, robot: Mechanism, *, cap: float
+) -> tuple[PinchPairs, Array, list[tuple[int, int, Coordinate]]]:
+    """The gaps of a robot to parts and other robots, and between its own parts.
 
     Args:
         model: The compiled workstation.
         robot: The robot.
         cap: Largest gap that matters [m].
+
+    Returns:
+        Its gaps; how far their sides can be apart [m], infinity of surfaces, shape (g,); and pairs of its own
+        bodies, one of them moving, that one joint alone moves against each other.
     """
     own = (*robot.bodies, *robot.carried)
     still = [i for i in own if i not in robot.moving]
     surfaces = [b.index for b in model.bodies if b.role not in ("human", "area") and b.index not in own]
-    weld, parent = model.mj.body_weldid, model.mj.body_parentid
-    group = {i: int(weld[model.bodies[i].mj]) for i in own}
-    above = {i: int(weld[parent[group[i]]]) for i in own}
-    neighbours = frozenset(
-        (i, j)
-        for i in own
-        for j in own
-        if group[i] == group[j] or above[i] == group[j] or above[j] == group[i]
-    )
-    return pinch_pairs(model.shapes, robot.moving, surfaces, neighbours, still=still, cap=cap)
+    joints = OwnJoints(model)
+    between = {(i, j): joints.between(i, j) for i in own for j in own if i < j}
+    one = [(i, j, next(iter(of))) for (i, j), of in between.items() if len(of) == 1]
+    apart = frozenset(pair for pair, of in between.items() if len(of) < 2)
+    pairs = pinch_pairs(model.shapes, robot.moving, surfaces, apart, still=still, cap=cap)
+    inner = pairs.across >= 0
+    widest = np.full(len(pairs.first), np.inf)
+    if inner.any():
+        every = sorted(set().union(*between.values()))
+        draws = np.random.default_rng(0).random((SAMPLED, len(every)))
+        ends = [joints.range(coordinate) for coordinate in every]
+        poses = joints.poses(
+            {c: lo + draws[:, k] * (hi - lo) for k, (c, (lo, hi)) in enumerate(zip(every, ends, strict=True))}
+        )
+        own_pairs = [query for query, per in pairs.queries if per is Per.PAIR]
+        widest[inner] = np.concatenate([q.batch(*poses, Per.PAIR).distance.max(axis=0) for q in own_pairs])
+    return pairs, widest, one

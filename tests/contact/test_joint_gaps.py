@@ -1,0 +1,214 @@
+"""Gaps between parts that one joint moves against each other: elbows, fingers, bearings."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from made_cell import FLOATING, made, results_at, state_at, two_r
+from seerob.contact.clamped_regions import Clamping
+from seerob.contact.joint_gaps import closing, places
+from seerob.geometry import Mesh, Solid, capsule
+from seerob.snapshot import Verdict
+from seerob.station import Station
+
+HAND, CHEST = "Hands and fingers", "Chest"
+ARM = '[[robots]]\nname = "arm"\nmodel = "arm.urdf"\n'
+
+
+def clamped(station: Station, regions: tuple[str, ...] = (HAND, CHEST), **motion) -> dict[str, set[str]]:
+    """Which bodies clamp each region."""
+    robot = station.model.robot("arm")
+    state = state_at(station, **motion)
+    flags, _ = Clamping(station.model, robot, {}, regions, None).at(
+        state, np.ones((len(robot.moving), len(regions)), bool)
+    )
+    names = [station.model.bodies[i].name for i in robot.moving]
+    return {
+        region: {name for name, flag in zip(names, flags[:, k], strict=True) if flag}
+        for k, region in enumerate(regions)
+    }
+
+
+def elbow(folder: Path, base: str = "") -> Station:
+    """Two links of 1 m × 0.1 m × 0.1 m, joined at the end of the first."""
+    return made(folder, FLOATING + ARM + base, {"arm.urdf": two_r()})
+
+
+BOTH = {"arm/l1", "arm/l2"}
+
+
+@pytest.mark.parametrize(
+    ("q", "qd", "hand"),
+    [
+        (2.7, 0.3, BOTH),  # folds
+        (2.7, -0.3, set()),  # opens
+        (-2.7, -0.3, BOTH),  # folds to the other side
+        (0.0, 0.3, set()),  # stretched out
+        (1.0, 0.3, set()),
+        (2.7, 0.0, set()),  # stands still
+        (2.7 + 2 * math.pi, 0.3, BOTH),  # a turn farther
+    ],
+)
+def test_an_elbow_that_folds_clamps_a_hand(tmp_path: Path, q: float, qd: float, hand: set[str]) -> None:
+    assert clamped(elbow(tmp_path), arm=((0.3, q), (0.0, qd)))[HAND] == hand
+
+
+def test_an_elbow_that_folds_on_a_hand_is_not_within_where_a_free_hand_would_be(tmp_path: Path) -> None:
+    text = (
+        f'{FLOATING}{ARM}[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\nfloor = false\n'
+        'mass = "simplified"\ncontact_area = { arm = 1e-4 }\n'
+    )
+    station = made(tmp_path, text, {"arm.urdf": two_r(masses=(8.0, 8.0))})
+
+    def hand(q, speed):
+        found = results_at(station, arm=((0.0, q), (0.0, speed)))["pfl"]
+        return next(part for part in found.parts if part.name == HAND)
+
+    folding, stretched = hand(2.8, 0.6), hand(0.0, 0.6)
+    assert stretched.verdict is Verdict.WITHIN
+    assert ", free, " in stretched.reason
+    assert folding.verdict is Verdict.EXCEEDED
+    assert ", clamped, " in folding.reason
+    # 140 N against M/2 = 8 kg alone.
+    assert folding.limit <= 140 / math.sqrt(8 * 75e3) + 1e-12
+
+
+def test_once_folded_enough_it_stays_so_until_it_is_shut(tmp_path: Path) -> None:
+    """A narrower gap never relieves: as the angle grows, free turns into clamped once."""
+    station = elbow(tmp_path)
+    for region in (HAND, CHEST):
+        found = [
+            bool(clamped(station, (region,), arm=((0, q), (0, 0.3)))[region]) for q in np.linspace(1, 3, 25)
+        ]
+        assert found == sorted(found), region
+        assert found[-1]
+
+
+def test_turned_and_shifted_it_says_the_same(tmp_path: Path) -> None:
+    base = "base = { position = [3, -2, 1.5], rpy = [0.4, -1.1, 2.0] }\n"
+    here, there = elbow(tmp_path / "a"), elbow(tmp_path / "b", base)
+    for q in np.linspace(-3.1, 3.1, 12):
+        for qd in (0.3, -0.3):
+            motion = ((0.2, q), (0.5, qd))
+            assert clamped(here, arm=motion) == clamped(there, arm=motion), (q, qd)
+
+
+def rolls(radius: float) -> str:
+    """A forearm that turns about its own axis in a sleeve."""
+    cylinder = '<geometry><cylinder radius="{}" length="0.3"/></geometry>'
+    inertial = (
+        '<inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+    links = "".join(
+        f'<link name="{name}">{inertial}<collision><origin xyz="0 0 {z}"/>{cylinder.format(r)}</collision>'
+        "</link>"
+        for name, z, r in (("a", 0.15, 0.06), ("b", 0.17, radius))
+    )
+    return (
+        f'<robot name="r"><link name="base"/>{links}'
+        '<joint name="j1" type="continuous"><parent link="base"/><child link="a"/><axis xyz="1 0 0"/></joint>'
+        '<joint name="j2" type="continuous"><parent link="a"/><child link="b"/><origin xyz="0 0 0.3"/>'
+        '<axis xyz="0 0 1"/></joint></robot>'
+    )
+
+
+@pytest.mark.parametrize("radius", [0.04, 0.06, 0.09])
+def test_what_turns_in_its_bearing_clamps_nobody(tmp_path: Path, radius: float) -> None:
+    station = made(tmp_path, FLOATING + ARM, {"arm.urdf": rolls(radius)})
+    for q in (0.0, 0.7, 2.9):
+        assert clamped(station, arm=((0.0, q), (0.0, 1.0))) == {HAND: set(), CHEST: set()}
+
+
+MIMIC = '<mimic joint="left"/>'
+
+
+def gripper(opening: float) -> str:
+    finger = (
+        '<link name="{n}"><inertial><mass value="0.2"/>'
+        '<inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial>'
+        '<collision><origin xyz="0 {y} 0.16"/><geometry><box size="0.02 0.01 0.12"/></geometry>'
+        "</collision></link>"
+    )
+    links = finger.format(n="left", y=0.005) + finger.format(n="right", y=-0.005)
+    joint = (
+        '<joint name="{n}" type="prismatic"><parent link="palm"/><child link="{n}"/><axis xyz="0 {s} 0"/>'
+        f'<limit lower="0" upper="{opening / 2}" effort="50" velocity="1"/>{{m}}</joint>'
+    )
+    return (
+        '<robot name="g"><link name="base"/><link name="palm"><inertial><mass value="1"/>'
+        '<inertia ixx="1e-2" iyy="1e-2" izz="1e-2" ixy="0" ixz="0" iyz="0"/></inertial>'
+        "</link>"
+        f'{links}<joint name="turn" type="continuous"><parent link="base"/><child link="palm"/>'
+        f'<axis xyz="0 0 1"/></joint>{joint.format(n="left", s=1, m="")}'
+        f"{joint.format(n='right', s=-1, m=MIMIC)}</robot>"
+    )
+
+
+@pytest.mark.parametrize("opening", [0.02, 0.085, 0.3])
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.95])
+def test_fingers_that_close_clamp_a_hand_however_the_recording_begins(
+    tmp_path: Path, opening: float, share: float
+) -> None:
+    """An 85 mm gripper never was as wide as a hand; a finger it takes."""
+    station = made(tmp_path, FLOATING + ARM, {"arm.urdf": gripper(opening)})
+    fingers = {"arm/left", "arm/right"}
+    closes = clamped(station, (HAND,), arm=((0.0, share * opening / 2), (0.0, -0.05)))[HAND]
+    assert (closes >= fingers) == (share * opening <= 0.1)
+    if opening < 0.18:
+        assert not clamped(station, (CHEST,), arm=((0.0, share * opening / 2), (0.0, -0.05)))[CHEST]
+    opens = clamped(station, (HAND,), arm=((0.0, share * opening / 2), (0.0, 0.05)))[HAND]
+    assert not opens & fingers
+
+
+def test_wider_fingers_never_relieve(tmp_path: Path) -> None:
+    stations = [made(tmp_path / str(k), FLOATING + ARM, {"arm.urdf": gripper(k)}) for k in (0.03, 0.06, 0.12)]
+    for gap in (0.005, 0.015, 0.028):
+        found = [bool(clamped(s, (HAND,), arm=((0, gap / 2), (0, -0.1)))[HAND]) for s in stations]
+        assert found == sorted(found)
+        assert found[-1]
+
+
+# -- the mathematics ----------------------------------------------------------------------------
+
+
+def test_a_place_closes_where_it_faces_is_narrow_and_opens_wide_enough() -> None:
+    q = np.linspace(0.0, 1.0, 11)
+    gaps = np.stack([0.3 * (1 - q), 0.3 * (1 - q), 0.003 * (1 - q), np.full(11, 0.05), 0.02 * q], axis=1)
+    faces = np.ones(gaps.shape, bool)
+    faces[:, 1] = False
+    thickness, fits = np.array([0.1, 0.5]), np.array([0.004, 0.18])
+    for columns, growing, falling in (
+        ([0], [4, 10], 0),
+        ([1], [0, 0], 0),
+        ([2], [0, 0], 0),
+        ([3], [0, 0], 0),
+    ):
+        rates = closing(gaps[:, columns], faces[:, columns], np.diff(q), thickness, fits, least=0.004)
+        np.testing.assert_array_equal((rates[0] > 0).sum(axis=0), growing)
+        assert (rates[1] > 0).sum() == falling
+    # 2 cm in a metre: it slides.
+    assert not closing(gaps[:, [4]], faces[:, [4]], np.diff(q), thickness, fits, least=0.004).any()
+    rates = closing(gaps[:, [0]], faces[:, [0]], np.diff(q), thickness, fits, least=0.004)
+    assert rates[0].max() == pytest.approx(0.3)
+
+
+def test_places_lie_on_the_surface_and_their_normals_point_outward() -> None:
+    box = trimesh.creation.box([0.4, 0.1, 0.2])
+    mesh = Mesh(np.array(box.vertices), np.array(box.faces, np.int32))
+    on = places([Solid(mesh=mesh)])
+    half = np.array([0.2, 0.05, 0.1])
+    np.testing.assert_allclose(np.max(np.abs(on.points) - half, axis=1), 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.max(np.abs(on.points + 1e-3 * on.normals) - half, axis=1), 1e-3)
+    rod = capsule(np.zeros(3), np.array([0.0, 0, 0.5]), 0.05)
+    on = places([rod])
+    axis = np.clip(on.points[:, 2], 0, 0.5)[:, None] * [0, 0, 1]
+    np.testing.assert_allclose(np.linalg.norm(on.points - axis, axis=1), 0.05)
+    np.testing.assert_allclose(on.points - axis, 0.05 * on.normals, atol=1e-12)
+    # None of the rod's lie inside the box.
+    on = places([Solid(mesh=mesh), rod])
+    assert (np.max(np.abs(on.points) - half, axis=1) > -1e-9).all()

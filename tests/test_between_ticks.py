@@ -74,6 +74,38 @@ def test_what_is_passed_between_two_ticks_is_exceeded(tmp_path, what, physics):
     assert summary.verdict is Verdict.EXCEEDED
 
 
+UNBOUNDED = '[[safety]]\nkind = "effective_mass"\nname = "c"\nat = "arm"\nalong = "motion"\nlimit = 1e6\n'
+
+
+@pytest.mark.parametrize("accepted", ["", 'between_samples = "accepted: it changes slowly"\n'])
+def test_a_run_of_which_nothing_is_known_between_ticks_is_within_only_where_the_file_accepts_that(
+    tmp_path, accepted
+):
+    station = passing(tmp_path, UNBOUNDED + accepted, POST)
+    summary = station.run()
+    assert set(summary.results["c"].verdicts.tolist()) == {0}  # every tick is within
+    assert summary.verdict is (Verdict.WITHIN if accepted else Verdict.UNDECIDED)
+    (info,) = summary.scene.criteria
+    assert info.between.startswith("accepted: it" if accepted else "nothing bounds it between")
+    assert ("between_samples" in summary.results["c"].worst().reason) is not bool(accepted)
+
+
+@pytest.mark.parametrize("every", [0.05, 4.0])
+@pytest.mark.parametrize("what", THROUGH)
+def test_what_is_passed_between_two_periods_is_exceeded(tmp_path, what, every):
+    thing, criterion = THROUGH[what]
+    station = passing(tmp_path, f"{criterion}every = {every}\n", thing)
+    assert station.run().results["c"].verdict is Verdict.EXCEEDED
+
+
+def test_a_period_is_covered_without_being_asked_while_nothing_comes_near(tmp_path):
+    criterion = THROUGH["post"][1].replace("0.005", "0.01") + "every = 0.2\n"
+    station = passing(tmp_path, criterion, POST.replace("{x}", "5"), speed=0.5)
+    summary = station.run()
+    assert summary.verdict is Verdict.WITHIN
+    assert len(summary.results["c"]) == 3
+
+
 # -- no bound is ever beaten --------------------------------------------------------------------
 
 

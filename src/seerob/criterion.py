@@ -46,6 +46,9 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Whether all that it depends on must be where the twin shows it before it is asked. One that judges
     people bone by bone, or for which what is known may suffice, says False: what it asks of must be still."""
 
+    instants: ClassVar[str] = ""
+    """``accepted: why`` of a method that speaks of instants by its nature: nothing need bound it between."""
+
     name: str = ""
     """What results are called; made from the kind and the subject when not given."""
     every: Seconds | None = None

@@ -26,6 +26,9 @@ _log = logging.getLogger(__name__)
 _WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 
 
+UNBOUNDED = "nothing bounds it between the instants at which it was asked; between_samples can accept that"
+
+
 @dataclass(frozen=True)
 class Bound:
     """A criterion whose names are resolved."""
@@ -36,6 +39,13 @@ class Bound:
     basis: Basis
     watch: Watch | None = None
     """How it is judged between two ticks; None where nothing bounds it."""
+
+    @property
+    def between(self) -> str:
+        """See `seerob.snapshot.CriterionInfo.between`."""
+        if self.watch is not None:
+            return ""
+        return self.criterion.between_samples or self.criterion.instants or UNBOUNDED
 
 
 def bound_to(model: Model, criterion: Criterion, group: str) -> Bound:

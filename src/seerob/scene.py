@@ -63,6 +63,7 @@ def scene_of(
                 limit=getattr(b.criterion, "limit", None),
                 at_most=b.criterion.at_most,
                 basis=b.basis,
+                between=b.between,
                 levels=getattr(b.criterion, "levels", ()),
             )
             for b in bound

@@ -293,6 +293,9 @@ class CriterionInfo(Struct, frozen=True, kw_only=True):
     limit: float | None = None
     at_most: bool = True
     basis: Basis | None = None
+    between: str = ""
+    """What is known of the time between the instants at which it is asked: empty where it is bounded there,
+    ``accepted: …`` with the reason, or why nothing is known; then the verdict of a run stays undecided."""
     levels: tuple[Level, ...] = ()
     """Classes of the scores, the lowest first; empty when the method has none."""
 

@@ -312,6 +312,15 @@ class State:
         self.asked.add(VARIABLE + name)
         return self._signals.value(name, self.t)
 
+    def signals_meanwhile(self, name: str) -> tuple[Value, ...]:
+        """What a variable was between the last tick and this one, where its source tells more often.
+
+        Raises:
+            Undecided: It may not be relied on.
+        """
+        self.asked.add(VARIABLE + name)
+        return () if self.path is None else self._signals.meanwhile(name, float(self.path.t[0]), self.t)
+
     def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """What several criteria work out from this state: made by whoever asks first at this tick.
 

@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "c2c6b6fb1dc45254";
+export const SCHEMA = "4e67ae40627bda0b";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -352,6 +352,11 @@ export interface CriterionInfo {
   limit: number | null;
   at_most: boolean;
   basis: Basis | null;
+  /**
+   * What is known of the time between the instants at which it is asked: empty where it is bounded there,
+   * `accepted: …` with the reason, or why nothing is known; then the verdict of a run stays undecided.
+   */
+  between: string;
   /** Classes of the scores, the lowest first; empty when the method has none. */
   levels: Level[];
 }

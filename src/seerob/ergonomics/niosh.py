@@ -92,6 +92,7 @@ class Lift(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Niosh(Criterion, frozen=True, kw_only=True):
     """Lifting index of the revised NIOSH equation, composite when there are several lifts."""
 
+    instants: ClassVar[str] = "accepted: lifts are entered, and what is entered does not change during a run"
     whole: ClassVar[bool] = False  # lifts are entered, whoever is seen
 
     human: str

@@ -36,6 +36,9 @@ from seerob.state import State
 class PostureRule(Criterion, frozen=True, kw_only=True):
     """Base of the rules about a person's posture."""
 
+    instants: ClassVar[str] = (
+        "accepted: the method scores postures that are looked at, not the way between them"
+    )
     whole: ClassVar[bool] = False  # bones that nobody sees are not assessed
 
     human: str

@@ -40,6 +40,7 @@ class ResultLog(Mapping[str, Series]):
     def __init__(self, criteria: Iterable[CriterionInfo] = ()) -> None:
         self._series: dict[str, Series] = {}
         self._worst: dict[str, WorstTracker] = {}
+        self._between: dict[str, str] = {}
         self._tracking: dict[str, JointLog] = {}
         self._bones: dict[str, BoneErrors] = {}
         self._spill = Spill()
@@ -52,6 +53,7 @@ class ResultLog(Mapping[str, Series]):
         self.end: float | None = None
         """Run time of the last snapshot [s]."""
         for criterion in criteria:
+            self._between[criterion.name] = criterion.between
             self._begin(criterion.name, criterion.unit, criterion.at_most)
 
     def add(self, snapshot: Snapshot) -> tuple[str, ...]:
@@ -93,7 +95,14 @@ class ResultLog(Mapping[str, Series]):
 
     def _begin(self, name: str, unit: str, at_most: bool) -> Series:
         tracker = WorstTracker()
-        series = Series(name=name, unit=unit, at_most=at_most, tracker=tracker, spill=self._spill)
+        series = Series(
+            name=name,
+            unit=unit,
+            at_most=at_most,
+            tracker=tracker,
+            spill=self._spill,
+            between=self._between.get(name, ""),
+        )
         self._series[name], self._worst[name] = series, tracker
         return series
 

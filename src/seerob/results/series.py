@@ -121,8 +121,11 @@ class Series:
         at_most: bool,
         tracker: WorstTracker | None = None,
         spill: Spill | None = None,
+        between: str = "",
     ) -> None:
         self.name = name
+        self.open = "" if between.startswith("accepted: ") else between
+        """Why the run is not within although every instant of it is; empty when nothing is open."""
         self.unit = unit
         self.at_most = at_most
         """Whether limits bound from above."""
@@ -209,6 +212,8 @@ class Series:
             return Verdict.UNDECIDED
         present = set(np.unique(self.verdicts).tolist())
         found = worst_verdict(v for v, code in CODES.items() if code in present)
+        if found is Verdict.WITHIN and self.open:
+            return Verdict.UNDECIDED
         return Verdict.UNDECIDED if found is None and self._never_judged() else found
 
     def _never_judged(self) -> bool:
@@ -251,6 +256,9 @@ class Series:
         """
         if self._tracker is not None and self._tracker.worst is not None:
             worst = self._tracker.worst
+            if worst.verdict is Verdict.WITHIN and self.open:
+                reason = f"{self.open}; {worst.reason}".removesuffix("; ")
+                return worst._replace(verdict=self.verdict, reason=reason)
             return worst if worst.verdict is not None else worst._replace(verdict=self.verdict)
         if not self.known:
             raise Undecided(f"{self.name} was never heard in this run")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar
 
 from msgspec import Meta
@@ -12,6 +13,7 @@ from seerob.errors import InputError, UnknownName
 from seerob.model import Model
 from seerob.sensors.sensing import Names, bodies_of, names_of
 from seerob.snapshot import Basis, Input, Origin, Result
+from seerob.spans import Fall, Falls, Points
 from seerob.state import State
 
 
@@ -78,6 +80,14 @@ class SensorAgreement(Criterion, frozen=True, kw_only=True):
             )
 
         return evaluate
+
+    def remembers(self, model: Model) -> bool:
+        """See `Criterion.remembers`."""
+        return True
+
+    def falls(self, model: Model, points: Points) -> Falls:
+        """See `Criterion.falls`: a disagreement begins and ends within a span, and lasts as long at most."""
+        return lambda span, least: Fall(math.inf, span.T)
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

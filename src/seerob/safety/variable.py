@@ -12,6 +12,7 @@ from seerob.criterion import Criterion, Evaluate, judge
 from seerob.errors import InputError
 from seerob.model import Model
 from seerob.snapshot import Basis, Input, Origin, Result, Verdict
+from seerob.spans import Fall, Falls, Points
 from seerob.state import State
 from seerob.variables.dictionary import Kind, Value
 
@@ -51,7 +52,12 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
             raise InputError.at(self.name, "expected", what, "give a value of that type")
 
         def evaluate(state: State) -> Result:
-            value = state.signal(self.variable)
+            now = judged(state.signal(self.variable))
+            # What was told since the last tick counts too: the first of it that exceeds.
+            told = (judged(value) for value in state.signals_meanwhile(self.variable))
+            return next((result for result in told if result.verdict is Verdict.EXCEEDED), now)
+
+        def judged(value: Value) -> Result:
             if self.expected is not None:
                 return self._compared(value)
             return Result(
@@ -64,6 +70,11 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
             )
 
         return evaluate
+
+    def falls(self, model: Model, points: Points) -> Falls:
+        """See `Criterion.falls`: a variable stands until it is told anew, and all that is told is judged."""
+        fall = Fall(0.0 if self.every is None else math.inf)
+        return lambda span, least: fall
 
     def _compared(self, value: Value) -> Result:
         """Of a bool itself, 0 or 1; of a text or a choice whether it is what is expected."""

@@ -77,6 +77,21 @@ class Signals:
             raise Undecided(known.doubt or f"{name}: not heard")
         return known.value
 
+    def meanwhile(self, name: str, begin: float, t: float) -> tuple[Value, ...]:
+        """Every value of a variable that was told after one instant and before another [s], in their order.
+
+        Raises:
+            Undecided: One of them may not be relied on.
+        """
+        source = self.dictionary[name].source
+        found = []
+        for picture in self._heard.get(source, ()):
+            if begin + SLACK < picture.t < t - SLACK:
+                if doubt := doubt_of(picture, name):
+                    raise Undecided(f"{doubt}, at {picture.t:.3f} s")
+                found.append(picture.values[name])
+        return tuple(found)
+
     def picture(self, t: float) -> tuple[dict[str, Value], dict[str, str]]:
         """Every variable that was heard, and every doubt, at an instant [s]."""
         known = {name: self.at(name, t) for name, v in self.dictionary.items() if not v.write}

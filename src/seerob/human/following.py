@@ -24,6 +24,7 @@ from seerob.human.chosen_points import between
 from seerob.human.ends import ENDS, Turn, aimed, bare, swing, turned, untold
 from seerob.human.estimated import estimated, in_doubt_with, located
 from seerob.human.fitting import Fitter, Pulls, pulls
+from seerob.human.frozen import Frozen
 from seerob.human.handover import Handover
 from seerob.human.skeleton import AXES, BONES, without_side
 from seerob.human.smoothing import HIGHEST, LOWEST, POINT_SLACK, POINT_SPEED, Smoother
@@ -127,6 +128,7 @@ class _Device:
     turned: dict[Turn, float] = field(default_factory=dict)
     """Bone and axis → when it was last seen how it is turned about it."""
     smoother: Smoother = field(default_factory=Smoother)
+    frozen: Frozen = field(default_factory=Frozen)
 
     def forget(self, t: float) -> None:
         """Drop what is older than the last sample at or before ``t``."""
@@ -169,6 +171,7 @@ class Following:
             return False
         if len(sample.points) > MOST_POINTS or not 0 < sample.hold < LARGEST:
             return False
+        sample = structs.replace(sample, points=device.frozen(sample.points))
         if sample.smoothing:
             if not LOWEST <= sample.smoothing <= HIGHEST:
                 return False
@@ -354,7 +357,15 @@ class Following:
                 newest[bone] = max(seen, before[0]), max(hold, before[1])
         gone = [bone for bone, (seen, hold) in newest.items() if t - seen > hold]
         gone.sort(key=BONES.index)
-        return [(f"not seen any more: {', '.join(gone[:6])}", tuple(gone))] if gone else []
+        still = {bone for device in self._devices.values() for bone in device.frozen.bones}
+        found = []
+        for why, own in (
+            ("not seen any more", [bone for bone in gone if bone not in still]),
+            ("frozen, the same value again and again", [bone for bone in gone if bone in still]),
+        ):
+            if own:
+                found.append((f"{why}: {', '.join(own[:6])}", tuple(own)))
+        return found
 
     def errors(self, t: float, q: Array) -> dict[str, tuple[float | None, float | None]]:
         """How far the twin is from what devices saw at ``t``: bone → position [m] and angle [rad].

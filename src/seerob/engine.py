@@ -62,6 +62,7 @@ class Engine:
         driven: dict[str, float] | None = None,
         live: Collection[str] = (),
         signals: dict[str, float] | None = None,
+        untimed: dict[str, str] | None = None,
         controllers: bool = True,
         contacts: bool = True,
     ) -> None:
@@ -72,7 +73,8 @@ class Engine:
             driven: Time-out [s] of the source of each robot and human that a source drives.
             live: Those of them whose source is live; when a sample is late they coast, until the time-out;
                 machines do not.
-            signals: Time-out [s] of each source of variables.
+            signals: Time-out [s] of each variable, or source of variables.
+            untimed: Why nobody knows how late a variable is heard, by name.
             controllers: Whether the twin is pulled at all; off, it moves freely from where the first
                 samples put it, and nothing that is heard later is compared with it.
             contacts: Whether the contacts that the file asks for act.
@@ -147,7 +149,7 @@ class Engine:
         self._almost = 0.999 * self._limits
         self._followings: dict[str, Following] = {}
         """By person that devices see."""
-        self.signals = Signals(model.dictionary, signals or {})
+        self.signals = Signals(model.dictionary, signals or {}, untimed)
         self._machines = Machines(model.workstation.machines, self.signals)
         self.state = State(model, self._shown, self._hearings, self.signals)
         self._grips = Grips(self.state, self._mj)
@@ -206,6 +208,7 @@ class Engine:
         anew = self._tick > 0 and moved.anew
         reference = self._references[moved.machine]
         taken = reference.take(moved.t, moved.q, moved.qd, anew=anew or self._silent(moved.machine))
+        self._hearings[moved.machine].older = moved.age
         self._note(moved.machine, moved.t, moved.doubt, None, taken=taken)
 
     def _note(self, name: str, t: float, reason: str, torques: Array | None, *, taken: bool) -> None:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from msgspec.structs import replace
 
 from seerob.errors import InputError, Problem
 from seerob.live.listening import LiveSource, delay_of
 from seerob.model import Model
 from seerob.mounting.compilation import pose_matrix
+from seerob.snapshot import Finding
 from seerob.source import Matrix4, Opened, Source, Target
+from seerob.sources._variables import VariablesSource
+
+MOST_NAMED = 5
+"""Variables in one finding."""
 
 
 def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
@@ -27,13 +34,49 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
                 f"{source.timeout:g} s is not longer than the delay of {delay:g} s of the slowest live source"
             )
             problems.append(Problem(file, f"sources[{i}].timeout", what, "give a longer one"))
+        problems += _too_short(model, source, delay)
         try:
-            opened.append((source, source.open(model.folder, source_target(model, source))))
+            found = source.open(model.folder, source_target(model, source))
+            opened.append((source, replace(found, findings=(*found.findings, *_lateness(model, source)))))
         except InputError as error:
             problems += (_placed(problem, source, f"sources[{i}].file", file) for problem in error.problems)
     if problems:
         raise InputError(problems)
     return tuple(opened)
+
+
+def _too_short(model: Model, source: Source, delay: float) -> Iterator[Problem]:
+    """Variables that would be too old whenever they are shown."""
+    for variable in model.dictionary.values() if isinstance(source, LiveSource) else ():
+        if variable.source == source.name and variable.timeout <= delay and not variable.write:
+            what = f"{variable.timeout:g} s is not longer than the delay of {delay:g} s of the slowest source"
+            key = f"variables ({variable.name}).timeout"
+            yield Problem(model.workstation.variables or "", key, what, "give a longer one")
+
+
+def _lateness(model: Model, source: Source) -> Iterator[Finding]:
+    """What nobody would see of how late variables are heard."""
+    if not isinstance(source, VariablesSource):
+        return
+    blind = [
+        v.name
+        for v in model.dictionary.values()
+        if v.source == source.name and not (v.write or source.times(v))
+    ]
+    if not blind:
+        return
+    shown = ", ".join(blind[:MOST_NAMED]) + (" …" if len(blind) > MOST_NAMED else "")
+    text = f"no time is sent with {shown}: a delay on the way is not seen"
+    if source.delay is None:
+        yield Finding(
+            level="warning",
+            subject=source.name,
+            text=f"{text}, and what moves by it is undecided: give the time of the value, or delay",
+        )
+    else:
+        yield Finding(
+            level="assumed", subject=source.name, text=f"{text}; the file says {source.delay:g} s at most"
+        )
 
 
 def _placed(problem: Problem, source: Source, key: str, file: str) -> Problem:
@@ -74,19 +117,36 @@ def source_target(model: Model, source: Source) -> Target | None:
 
 
 def signal_timeouts(model: Model) -> tuple[dict[str, float], dict[str, float]]:
-    """Time-outs [s] of the sources of variables, and of the machines that follow those, by name."""
+    """Time-outs [s] of the variables, and of the machines that follow those, by name.
+
+    Of a variable its own counts, or that of its source when that is shorter, whether or not the source still
+    has a connection; of one that is read from a file only that of the file, which is not asked.
+    """
     delay = delay_of(model.workstation.sources)
-    sources = {
-        s.name: s.timeout - (delay if isinstance(s, LiveSource) else 0.0)
-        for s in model.workstation.sources
-        if s.reads_variables
+    sources = {s.name: s for s in model.workstation.sources}
+    timeouts = {
+        name: min(variable.timeout, source.timeout) - delay
+        if isinstance(source, LiveSource)
+        else source.timeout
+        for name, variable in model.dictionary.items()
+        if (source := sources[variable.source]).reads_variables
     }
-    followed = {
-        machine.name: {model.dictionary[name].source for name in names}
-        for machine in model.workstation.machines
-        if (names := machine.motion.variables())
+    followed = {m.name: m.motion.variables() for m in model.workstation.machines}
+    return timeouts, {name: min(timeouts[v] for v in by) for name, by in followed.items() if by}
+
+
+def untimed(model: Model) -> dict[str, str]:
+    """Why nobody knows how late a variable is heard, by name: its device sends no time, the file no bound."""
+    sources = {s.name: s for s in model.workstation.sources}
+    return {
+        name: f"{name}: {source.name} sends no time and cannot be asked for it: nobody knows how late "
+        "it is; give the time of the value, or a bound on its lateness as delay of the source"
+        for name, variable in model.dictionary.items()
+        if isinstance(source := sources[variable.source], VariablesSource)
+        and source.delay is None
+        and not variable.write
+        and not source.times(variable)
     }
-    return sources, {name: min(sources[s] for s in by) for name, by in followed.items()}
 
 
 def _world_from_base(model: Model, name: str) -> Matrix4 | None:

@@ -21,7 +21,7 @@ from seerob.live.listening import LiveSource, delay_of
 from seerob.live.real_time import Clock
 from seerob.machines.displays import Looks
 from seerob.model import Model
-from seerob.opening import coarse, signal_timeouts
+from seerob.opening import coarse, signal_timeouts, untimed
 from seerob.results.result_log import ResultLog
 from seerob.samples import Sample
 from seerob.sink import KeepsResults, Writer
@@ -129,7 +129,13 @@ def engine_of(model: Model) -> Engine:
             driven[source.target()] = max(timeout, driven.get(source.target(), timeout))
     live = {s.target() for s in model.workstation.sources if isinstance(s, LiveSource)}
     signals, following = signal_timeouts(model)
-    engine = Engine(model, driven={**following, **driven}, live={*live, *following}, signals=signals)
+    engine = Engine(
+        model,
+        driven={**following, **driven},
+        live={*live, *following},
+        signals=signals,
+        untimed=untimed(model),
+    )
     for name, why in coarse(model).items():
         engine.state.hearings[name].coarse = why
     return engine

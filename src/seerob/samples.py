@@ -142,6 +142,9 @@ class SignalSample(SampleBase, frozen=True, kw_only=True, tag="signal"):
     values: dict[str, float | bool | str]
     doubts: dict[str, str] = field(default_factory=dict)
     """Why what is known of a name may not be relied on: too old, called bad by its source, out of range."""
+    ages: dict[str, float] = field(default_factory=dict)
+    """How much older than ``t`` what is known of a name may be [s]: since it was asked for, was last known to
+    stand, or the delay that the file allows; no older where nothing is said."""
 
 
 Sample = JointSample | PoseSample | BodySample | SignalSample

@@ -91,7 +91,7 @@ def test_what_depends_on_a_doubted_machine_is_undecided(tmp_path):
 def test_silence_of_its_source_shows_within_the_time_out(tmp_path):
     station = made(tmp_path, PERSON + GATE, POSITION, table("t,x", [(0, 0), (1, 0)]))
     sources, machines = signal_timeouts(station.model)
-    assert (sources, machines) == ({"plc": 0.5}, {"gate": 0.5})
+    assert (sources, machines) == ({"gate/position": 0.5}, {"gate": 0.5})
     engine = Engine(station.model, driven=machines, signals=sources)
     engine.take([SignalSample(source="plc", seq=0, t=0.0, values={"gate/position": 0.25})])
     state = engine.start()

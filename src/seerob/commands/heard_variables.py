@@ -12,7 +12,7 @@ from typing import Any
 
 from seerob.commands import line
 from seerob.live.arrivals import Arrivals
-from seerob.sources._variables import Node, VariablesSource
+from seerob.sources._variables import Change, Node, VariablesSource
 from seerob.variables.dictionary import Kind, Variable
 
 
@@ -53,9 +53,10 @@ async def _heard(
             asyncio.timeout_at(clock.time() + wait),
         ):
             async for changes in said:
-                if changes:
+                told = [change for change in changes if isinstance(change, Change)]
+                if told:
                     arrivals.add(time.monotonic(), None)
-                doubts |= {addresses[change.name]: change.doubt for change in changes}
+                doubts |= {addresses[change.name]: change.doubt for change in told}
     except TimeoutError:
         pass  # of the listening, or of a device that has nothing to say
     return arrivals, doubts

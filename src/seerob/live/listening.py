@@ -69,7 +69,8 @@ class LiveSource(Source, frozen=True, kw_only=True):
     """Base of the sources whose future nobody knows: controllers, machines, trackers."""
 
     delay: Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})] | None = None
-    """How far the twin is behind the world [s]; one period of the source and 5 ms when not given."""
+    """How far the twin is behind the world [s]; one period of the source and 5 ms when not given. Of
+    variables that are sent without a time also how late they are at most."""
 
     apart: ClassVar[bool] = True
     """Whether it may listen in another process: not who takes what this one has."""

@@ -40,6 +40,8 @@ class Moved(NamedTuple):
     """Why it may be elsewhere; empty when it is known."""
     anew: bool = False
     """It was put there, and did not move there."""
+    age: float = 0.0
+    """How much older than ``t`` what is known of it may be [s]."""
 
 
 class Place(NamedTuple):
@@ -76,7 +78,7 @@ class Machines:
     def hear(self, sample: SignalSample) -> Iterator[Moved]:
         """Where the machines are that follow the variables of a picture, which `Signals` has taken."""
         for follower in self._followers.get(sample.source, ()):
-            moved = follower.at(sample.t, self._signals)
+            moved = follower.at(sample.t, self._signals, sample.ages)
             if moved is not None:
                 yield moved
 
@@ -89,7 +91,7 @@ class _Follower:
         self._last: Array | None = None
         self._t = -math.inf
 
-    def at(self, t: float, signals: Signals) -> Moved | None:
+    def at(self, t: float, signals: Signals, ages: Mapping[str, float]) -> Moved | None:
         """Where it is at an instant; None when that is not newer, or when nothing was heard yet."""
         if t <= self._t:
             return None
@@ -104,7 +106,9 @@ class _Follower:
             return Moved(self._name, t, self._last, np.zeros_like(self._last), doubt)
         place = self._follow(t, values)
         self._last, self._t = place.q, t
-        return Moved(self._name, t, place.q, place.qd, place.doubt, place.anew)
+        doubt = next((signals.untimed[name] for name in self._names if name in signals.untimed), "")
+        age = max((ages.get(name, 0.0) for name in self._names), default=0.0)
+        return Moved(self._name, t, place.q, place.qd, place.doubt or doubt, place.anew, age)
 
 
 def follow(motion: Motion) -> Follow:

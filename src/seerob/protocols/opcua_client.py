@@ -284,6 +284,8 @@ class Changes:
         self._arrived = asyncio.Event()
         self.revised: float | None = None
         """Publishing interval that the server grants [s]."""
+        self._watched = time.monotonic()
+        """When it was asked to be told."""
 
     async def watch(self, client: Client, nodes: Mapping[str, Node], interval: float) -> dict[str, str]:
         """Subscribe to nodes by name; returns why some cannot be watched.
@@ -293,7 +295,7 @@ class Changes:
         """
         from asyncua.ua.uaerrors import UaError
 
-        self._names = {}
+        self._names, self._watched = {}, time.monotonic()
         for name, node in nodes.items():
             self._names.setdefault(node.nodeid, []).append(name)
         subscription = await client.create_subscription(1e3 * interval, self)
@@ -314,37 +316,56 @@ class Changes:
             self._waiting[name] = said(data.monitored_item.Value)
             self._arrived.set()
 
-    async def heard(self, client: Client, pulse: float = BEAT) -> AsyncGenerator[dict[str, Said], None]:
-        """What has changed; nothing, when nothing does and the server has just shown that it is there.
+    async def heard(
+        self, client: Client, pulse: float = BEAT
+    ) -> AsyncGenerator[tuple[dict[str, Said], float], None]:
+        """What has changed, if anything, and until when the server has said everything that it had to say.
+
+        The server is asked again and again whether it is there. Its answer comes after what it said before
+        it was asked: who is told of changes alone would not see that they come late.
 
         Args:
-            client: Connected.
-            pulse: After so long without a change the server is asked whether it is there [s].
+            client: Connected, and watching.
+            pulse: Between two questions, at least [s].
+
+        Yields:
+            Changes by name; when the newest question was asked that was answered, host's monotonic time [s].
 
         Raises:
             OSError: The connection is gone, or the server does not answer.
         """
-        while True:
-            changed, self._waiting = self._waiting, {}
-            self._arrived.clear()
-            yield changed
-            try:
-                async with asyncio.timeout(pulse):
-                    await self._arrived.wait()
-            except TimeoutError:
-                await self._answered(client, pulse)
+        shown, asked = self._watched, 0.0
+        asking: asyncio.Task[None] | None = None
+        try:
+            while True:
+                changed, self._waiting = self._waiting, {}
+                self._arrived.clear()
+                yield changed, shown
+                while not self._arrived.is_set():
+                    left = asked + pulse - time.monotonic()
+                    if asking is None and left <= 0:
+                        asked = time.monotonic()
+                        asking = asyncio.create_task(self._ask(client))
+                    with suppress(TimeoutError):
+                        async with asyncio.timeout(left if asking is None else None):
+                            await self._arrived.wait()
+                if asking is not None and asking.done():
+                    asking.result()
+                    asking, shown = None, asked
+        finally:
+            if asking is not None:
+                asking.cancel()
+                await asyncio.gather(asking, return_exceptions=True)
 
-    async def _answered(self, client: Client, within: float) -> None:
-        """Ask until there is an answer in time: a late one says nothing of now."""
+    async def _ask(self, client: Client) -> None:
+        """Whether the server is there."""
         from asyncua import ua
 
-        state = client.get_node(ua.NodeId(ua.Int32(STATE)))
-        while not self._waiting:
+        try:
             await client.check_connection()
-            asked = time.monotonic()
-            await state.read_value()
-            if time.monotonic() - asked <= within:
-                return
+            await client.get_node(ua.NodeId(ua.Int32(STATE))).read_value()
+        finally:
+            self._arrived.set()
 
 
 def said(value: Any) -> Said:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncGenerator, AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator, Mapping
 from contextlib import aclosing
 from pathlib import Path
 from typing import ClassVar, NamedTuple, Self
@@ -49,7 +49,14 @@ class Change(NamedTuple):
     doubt: str = ""
     """Why the device itself does not stand by it."""
     age: float = 0.0
-    """How old it was when it arrived, by the device's own stamps [s]."""
+    """How old it may have been when it arrived [s]: since it was asked for, or by the device's own stamps."""
+
+
+class Shown(NamedTuple):
+    """That a device was there, and that what it had to say until then has arrived."""
+
+    asked: float
+    """When it was asked, of what has answered since: host's monotonic time [s]."""
 
 
 class Node(NamedTuple):
@@ -103,7 +110,7 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
             async with aclosing(self.changes(variables, folder)) as said, asyncio.timeout_at(end):
                 async for changes in said:
                     picture.take(changes, time.monotonic())
-                    waiting -= {change.name for change in changes}
+                    waiting -= {change.name for change in changes if isinstance(change, Change)}
                     if not waiting:
                         break
         except TimeoutError:
@@ -122,13 +129,17 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
             ),
         )
 
+    def times(self, variable: Variable) -> bool:
+        """Whether it shows how late a variable is heard: it is asked for it, or told when it was so."""
+        return False
+
     def changes(
         self, variables: tuple[Variable, ...], folder: Path
-    ) -> AsyncGenerator[tuple[Change, ...], None]:
+    ) -> AsyncGenerator[tuple[Change | Shown, ...], None]:
         """Connect, and yield what the device says of the variables until the connection ends.
 
-        Each time it yields, the device was there at that moment: what stands is as new as that. A device
-        that only speaks of changes has to be asked now and then, and nothing is a fine thing to yield.
+        Each time it yields, the device was there at that moment. A device that only speaks of changes has to
+        be asked now and then: what stands is as old as the newest question that it has answered.
 
         Args:
             variables: Those to read.
@@ -153,7 +164,7 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
     async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Everything that is known, whenever something changes and at least every `BEAT`."""
         variables = () if target is None else target.variables
-        picture = Picture(variables, by_exception=self.by_exception)
+        picture = Picture(variables, by_exception=self.by_exception, bounds=self._bounds(variables))
         folder = Path("" if target is None else target.folder)
         read = tuple(v for v in variables if not v.write)
         alive = time.monotonic()
@@ -165,7 +176,12 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
                     picture.take(changes, now)
                 if picture.begun:
                     # Silence is no news: what stood when the device was last heard is as old as that.
-                    yield replace(picture.sample(now), t=alive)
+                    yield picture.sample(now, alive)
+
+    def _bounds(self, variables: tuple[Variable, ...]) -> dict[str, float]:
+        """How late what nobody shows to be late may be, as the file says [s]."""
+        late = {v.name for v in variables if not v.write and not self.times(v)}
+        return dict.fromkeys(late, self.delay or 0.0)
 
 
 class Picture:
@@ -174,10 +190,20 @@ class Picture:
     Args:
         variables: Of the dictionary.
         by_exception: Whether a value stands until the device says another.
+        bounds: How much older than it seems a variable may be [s], by name.
     """
 
-    def __init__(self, variables: tuple[Variable, ...], *, by_exception: bool) -> None:
+    def __init__(
+        self,
+        variables: tuple[Variable, ...],
+        *,
+        by_exception: bool,
+        bounds: Mapping[str, float] | None = None,
+    ) -> None:
         self._variables = {v.name: v for v in variables}
+        self._bounds = bounds or {}
+        self._shown: float | None = None
+        """Until when everything was said that is known [s]; None where that was not asked."""
         self._by_exception = by_exception
         self._said: dict[str, float] = {}
         self._values: dict[str, Value] = {}
@@ -185,7 +211,7 @@ class Picture:
         self.begun = False
         """Whether the device has said anything yet."""
 
-    def take(self, changes: tuple[Change, ...], now: float) -> None:
+    def take(self, changes: tuple[Change | Shown, ...], now: float) -> None:
         """Hear what the device says.
 
         Args:
@@ -193,6 +219,9 @@ class Picture:
             now: Host's monotonic time [s].
         """
         for change in changes:
+            if isinstance(change, Shown):
+                self._shown = max(change.asked, self._shown or change.asked)
+                continue
             variable = self._variables.get(change.name)
             if variable is None:
                 continue
@@ -207,8 +236,14 @@ class Picture:
             except BadValue as error:
                 self._bad[change.name] = str(error)
 
-    def sample(self, now: float) -> SignalSample:
-        """What is known at a time on the host's monotonic clock [s]."""
+    def sample(self, now: float, heard: float | None = None) -> SignalSample:
+        """What is known.
+
+        Args:
+            now: Host's monotonic time [s].
+            heard: When the device was heard last [s]; now when not given.
+        """
+        t = now if heard is None else heard
         doubts = dict(self._bad)
         for name, variable in self._variables.items():
             if variable.write or name in doubts:
@@ -218,14 +253,20 @@ class Picture:
                 doubts[name] = f"{name}: nothing heard yet"
             elif not self._by_exception and now - said > variable.timeout:
                 doubts[name] = f"{name}: not heard for {now - said:.2f} s (time-out {variable.timeout:g} s)"
-        return SignalSample(source="", seq=0, t=now, values=dict(self._values), doubts=doubts)
+        ages = {name: age for name in self._values if (age := self._age(name, t)) > 0}
+        return SignalSample(source="", seq=0, t=t, values=dict(self._values), doubts=doubts, ages=ages)
+
+    def _age(self, name: str, t: float) -> float:
+        """How much older than ``t`` what is known of a variable may be [s]."""
+        said = self._shown if self._by_exception else self._said[name]
+        return max(0.0, t - (t if said is None else said)) + self._bounds.get(name, 0.0)
 
 
 async def _beating(
-    said: AsyncIterator[tuple[Change, ...]],
-) -> AsyncGenerator[tuple[Change, ...] | None, None]:
+    said: AsyncIterator[tuple[Change | Shown, ...]],
+) -> AsyncGenerator[tuple[Change | Shown, ...] | None, None]:
     """What is said, and None every `BEAT` in which nothing is."""
-    waiting: asyncio.Task[tuple[Change, ...]] | None = None
+    waiting: asyncio.Task[tuple[Change | Shown, ...]] | None = None
     try:
         while True:
             if waiting is None:

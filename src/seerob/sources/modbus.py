@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import AsyncGenerator
 from pathlib import Path
 from typing import Annotated, ClassVar
@@ -61,6 +62,10 @@ class Modbus(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self, folder, target)
 
+    def times(self, variable: Variable) -> bool:
+        """It is asked."""
+        return True
+
     async def ask(self) -> tuple[Finding, ...]:
         """Connect once: the protocol has no question for what a device is."""
         async with connect(self.host, self.port, self.device):
@@ -76,11 +81,13 @@ class Modbus(VariablesSource, frozen=True, kw_only=True):
         async with connect(self.host, self.port, self.device) as device:
             due = clock.time()
             while True:
+                asked = time.monotonic()
                 found = await device.read(wanted)
+                age = time.monotonic() - asked
                 yield tuple(
                     Change(name, None, doubt=str(value))
                     if isinstance(value, Refused)
-                    else Change(name, value)
+                    else Change(name, value, age=age)
                     for name, value in found.items()
                 )
                 # What was asked late is not made up for.

@@ -119,13 +119,14 @@ class ModbusRobot(LiveSource, frozen=True, kw_only=True):
             questions = tuple(block for block, said in answers if not isinstance(said, Refused))
             due = clock.time()
             while True:
+                asked = time.monotonic()
                 values: dict[str, int | float | bool] = {}
                 for block in questions:
                     values |= await _read(device, found, block)
-                now = time.monotonic()
                 states, doubts = signals(found, values)
-                sample = joint_sample(found, values, states, target=self.robot, arrived=now)
-                yield SignalSample(source="", seq=0, t=now, values=states, doubts=doubts)
+                # As old as the question: when in between it was so, nobody says.
+                sample = joint_sample(found, values, states, target=self.robot, arrived=asked)
+                yield SignalSample(source="", seq=0, t=asked, values=states, doubts=doubts)
                 yield sample
                 # What was asked late is not made up for.
                 due = max(due + self.every, clock.time())

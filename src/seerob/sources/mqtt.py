@@ -155,6 +155,11 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
 
+    def times(self, variable: Variable) -> bool:
+        """Its payload says when it was so; the broker only knows when it came."""
+        where = address(variable)
+        return isinstance(where, Plain) and where.time is not None
+
     async def ask(self) -> tuple[Finding, ...]:
         """Connect once."""
         async with self._client():

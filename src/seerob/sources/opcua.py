@@ -27,7 +27,7 @@ from seerob.quantities import Seconds
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
 from seerob.sources._opcua_files import missing
-from seerob.sources._variables import LONGEST_PULSE, PULSES, Change, Node, VariablesSource
+from seerob.sources._variables import LONGEST_PULSE, PULSES, Change, Node, Shown, VariablesSource
 from seerob.variables.dictionary import Kind, Variable
 from seerob.variables.units import unit
 
@@ -85,6 +85,10 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
 
+    def times(self, variable: Variable) -> bool:
+        """The server is asked whether it has said everything."""
+        return True
+
     async def ask(self) -> tuple[Finding, ...]:
         """Connect once."""
         async with connect(self.way(), Path()) as client:
@@ -95,7 +99,7 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
 
     async def changes(
         self, variables: tuple[Variable, ...], folder: Path
-    ) -> AsyncGenerator[tuple[Change, ...], None]:
+    ) -> AsyncGenerator[tuple[Change | Shown, ...], None]:
         """What the server says, as it changes; first why some cannot be had."""
         async with connect(self.way(), folder) as client:
             nodes: dict[str, Found] = {}
@@ -112,11 +116,12 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
             changes = Changes()
             lost |= await changes.watch(client, nodes, self.interval)
             yield tuple(Change(name, None, doubt=why) for name, why in lost.items())
-            async for changed in changes.heard(client, min(self.timeout / PULSES, LONGEST_PULSE)):
-                yield tuple(
-                    # A value that stands is as new as the connection, however long ago it changed.
-                    Change(name, found.value, doubt=found.doubt)
-                    for name, found in changed.items()
+            within = min([self.timeout / PULSES, *(v.timeout / PULSES for v in variables), LONGEST_PULSE])
+            async for changed, shown in changes.heard(client, within):
+                yield (
+                    Shown(shown),
+                    # A value that stands is as new as the newest answer, however long ago it changed.
+                    *(Change(name, found.value, doubt=found.doubt) for name, found in changed.items()),
                 )
 
     async def write(self, variable: Variable, raw: bool, folder: Path) -> None:

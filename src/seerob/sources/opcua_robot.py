@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import time
 from collections.abc import AsyncGenerator
 from pathlib import Path
@@ -138,7 +139,8 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
             newest: dict[str, Said] = {}
             signals: dict[str, float | bool | str] = {}
             due = 0.0
-            async for changed in changes.heard(client, min(self.timeout / PULSES, SIGNAL_PERIOD)):
+            within, last = min(self.timeout / PULSES, SIGNAL_PERIOD), -math.inf
+            async for changed, shown in changes.heard(client, within):
                 newest |= changed
                 now = time.monotonic()
                 states = _states(newest)
@@ -146,11 +148,13 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
                     signals, due = states, now + SIGNAL_PERIOD
                     yield SignalSample(source="", seq=0, t=now, values=states | _load(found))
                 moved = any(name[0] in "qv" and name[1:].isdecimal() for name in changed)
-                if moved or not changed:
+                last = now if moved else last
+                if moved or (not changed and shown >= last + within):
                     sample = joint_sample(newest, positions, speeds, target=self.robot, arrived=now)
                     if sample is not None:
                         # Of a robot that stands still a server says nothing but that it is there.
-                        yield sample if moved else msgspec.structs.replace(sample, t_device=None)
+                        # It stood when it was asked.
+                        yield sample if moved else msgspec.structs.replace(sample, t=shown, t_device=None)
 
     def _chosen(self, found: tuple[Robot, ...]) -> Robot:
         where = f"opcua_robot {self.url}"

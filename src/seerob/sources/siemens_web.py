@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import time
 from collections import defaultdict, deque
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
@@ -83,6 +84,10 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
 
+    def times(self, variable: Variable) -> bool:
+        """It is asked."""
+        return True
+
     async def ask(self) -> tuple[Finding, ...]:
         """Log in and out."""
         async with self._session(Path()):
@@ -98,11 +103,13 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
         async with self._session(folder) as session:
             due = clock.time()
             while True:
+                asked = time.monotonic()
                 said: list[tuple[Any, str]] = []
                 for k in range(0, len(addresses), s7_web.MOST):
                     some = addresses[k : k + s7_web.MOST]
                     said += s7_web.results(await session.post(s7_web.reading(some)), len(some))
-                yield tuple(Change(n, raw, doubt) for n, (raw, doubt) in zip(names, said, strict=True))
+                age = time.monotonic() - asked
+                yield tuple(Change(n, raw, doubt, age) for n, (raw, doubt) in zip(names, said, strict=True))
                 # What was asked late is not made up for.
                 due = max(due + self.every, clock.time())
                 await asyncio.sleep(due - clock.time())

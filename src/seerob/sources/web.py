@@ -150,6 +150,10 @@ class Web(VariablesSource, frozen=True, kw_only=True):
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
 
+    def times(self, variable: Variable) -> bool:
+        """It is asked, or the document says when it was so."""
+        return not self._pushed or spot(variable.address).time is not None
+
     async def ask(self) -> tuple[Finding, ...]:
         """Hear one document."""
         async with aclosing(self._documents(("",), Path())) as documents:
@@ -164,11 +168,11 @@ class Web(VariablesSource, frozen=True, kw_only=True):
         spots = {v.name: spot(v.address) for v in variables}
         paths = tuple(dict.fromkeys(s.path for s in spots.values())) or ("",)
         async with aclosing(self._documents(paths, folder)) as documents:
-            async for path, said in documents:
+            async for path, said, took in documents:
                 wanted = {name: s for name, s in spots.items() if s.path == path}
-                yield tuple(self._changes(wanted, said))
+                yield tuple(self._changes(wanted, said, took))
 
-    def _changes(self, wanted: Mapping[str, Spot], said: Any) -> Iterator[Change]:
+    def _changes(self, wanted: Mapping[str, Spot], said: Any, took: float) -> Iterator[Change]:
         now = time.time()
         for name, where in wanted.items():
             if isinstance(said, ProtocolError):
@@ -176,7 +180,7 @@ class Web(VariablesSource, frozen=True, kw_only=True):
                 continue
             try:
                 value, age = told(said, where.pointer, where.time, now=now)
-                yield Change(name, value, age=age)
+                yield Change(name, value, age=max(age, took))
             except KeyError as error:
                 # Of what is pushed, a document may tell a part; what stays out grows old.
                 if not self._pushed:
@@ -195,20 +199,25 @@ class Web(VariablesSource, frozen=True, kw_only=True):
             raise ValueError(f"path = {path!r} leads to another server: give it a source of its own")
         return found
 
-    async def _documents(self, paths: tuple[str, ...], folder: Path) -> AsyncGenerator[tuple[str, Any], None]:
-        """Documents by path as they come; what is wrong with one instead of it."""
-        found: AsyncGenerator[tuple[str, bytes | str | ProtocolError], None]
+    async def _documents(
+        self, paths: tuple[str, ...], folder: Path
+    ) -> AsyncGenerator[tuple[str, Any, float], None]:
+        """Documents by path as they come, and how long ago they were asked for [s].
+
+        In place of one with which something is wrong, what that is.
+        """
+        found: AsyncGenerator[tuple[str, bytes | str | ProtocolError, float], None]
         found = self._heard(folder) if self._pushed else self._asked(paths, folder)
         async with aclosing(found):
-            async for path, data in found:
+            async for path, data, took in found:
                 try:
-                    yield path, data if isinstance(data, ProtocolError) else document(data)
+                    yield path, data if isinstance(data, ProtocolError) else document(data), took
                 except ProtocolError as error:
-                    yield path, error
+                    yield path, error, took
 
     async def _asked(
         self, paths: tuple[str, ...], folder: Path
-    ) -> AsyncGenerator[tuple[str, bytes | str | ProtocolError], None]:
+    ) -> AsyncGenerator[tuple[str, bytes | str | ProtocolError, float], None]:
         import httpx
 
         clock = asyncio.get_running_loop()
@@ -219,19 +228,20 @@ class Web(VariablesSource, frozen=True, kw_only=True):
                 for path in paths:
                     try:
                         headers = {"Accept": "application/json"} | self._headers()
-                        yield (
-                            path,
-                            await answer(client, "GET", self._place(path), who="the server", headers=headers),
-                        )
+                        where, asked = self._place(path), time.monotonic()
+                        said = await answer(client, "GET", where, who="the server", headers=headers)
+                        yield path, said, time.monotonic() - asked
                     except ProtocolError as error:
                         if len(paths) == 1:
                             raise
-                        yield path, error
+                        yield path, error, 0.0
                 # What was asked late is not made up for.
                 due = max(due + self.every, clock.time())
                 await asyncio.sleep(due - clock.time())
 
-    async def _heard(self, folder: Path) -> AsyncGenerator[tuple[str, bytes | str | ProtocolError], None]:
+    async def _heard(
+        self, folder: Path
+    ) -> AsyncGenerator[tuple[str, bytes | str | ProtocolError, float], None]:
         tls = self._context(folder) if self._encrypted else None
         async with linked_to(
             self.url, largest=LARGEST, what="WebSocket", headers=self._headers(), tls=tls
@@ -245,7 +255,7 @@ class Web(VariablesSource, frozen=True, kw_only=True):
                     raise TimeoutError(f"nothing said for {SILENCE:g} s") from error
                 if heard is None:
                     raise ConnectionError("the server closed the connection")
-                yield "", heard[1]
+                yield "", heard[1], 0.0
 
     def _headers(self) -> dict[str, str]:
         if self.token_env is None:
@@ -258,7 +268,7 @@ class Web(VariablesSource, frozen=True, kw_only=True):
     async def browse(self) -> AsyncGenerator[Node, None]:
         """The values of the first document, by their pointers."""
         async with aclosing(self._documents(("",), Path())) as documents:
-            _, said = await anext(documents)
+            _, said, _ = await anext(documents)
         if isinstance(said, ProtocolError):
             raise said
         for node in leaves(said):

@@ -31,12 +31,23 @@ class Signals:
 
     Args:
         dictionary: Variables by name.
-        timeouts: Of their sources [s], by name.
+        timeouts: Of variables, or of their sources [s], by name.
+        untimed: Why nobody knows how late something is, by variable; it shows, and nothing that moves by it
+            is known.
     """
 
-    def __init__(self, dictionary: Mapping[str, Variable], timeouts: Mapping[str, float]) -> None:
+    def __init__(
+        self,
+        dictionary: Mapping[str, Variable],
+        timeouts: Mapping[str, float],
+        untimed: Mapping[str, str] | None = None,
+    ) -> None:
         self.dictionary = dictionary
-        self._timeouts = timeouts
+        self.untimed = untimed or {}
+        self._timeouts = {
+            name: timeouts.get(name, timeouts.get(variable.source, DEFAULT_TIMEOUT))
+            for name, variable in dictionary.items()
+        }
         self._heard: dict[str, list[SignalSample]] = {}
 
     def take(self, sample: SignalSample) -> None:
@@ -60,8 +71,8 @@ class Signals:
         if picture is None:
             return Known(None, f"{name}: nothing heard yet")
         value = picture.values.get(name)
-        age = t - picture.t
-        timeout = self._timeouts.get(source, DEFAULT_TIMEOUT)
+        age = t - picture.t + picture.ages.get(name, 0.0)
+        timeout = self._timeouts[name]
         if age > timeout + SLACK:
             return Known(value, f"{name}: {source} not heard for {age:.2f} s (time-out {timeout:g} s)")
         return Known(value, doubt_of(picture, name))

@@ -74,6 +74,8 @@ class Hearing:
     """When the physics last lost it, so that it was put back [s]."""
     saturated: bool = False
     """A joint's torque limit was reached: the twin cannot do what was heard."""
+    older: float = 0.0
+    """How much older than its instant what was heard last may be [s]."""
     leaves_at: float = 0.0
     """Of a source that is known ahead: largest speed of a joint at its newest sample [rad/s or m/s]."""
     coarse: str = ""
@@ -111,14 +113,14 @@ class Hearing:
         if k == 0:
             return "nothing heard yet"
         last = self.heard[k - 1][0]
-        age = t - last
+        age = t - last + self.older
         if age > self.timeout + SLACK:
             why = self.heard[k - 1][1]
             return f"not heard for {age:.2f} s (time-out {self.timeout:.3g} s)" + (why and f": {why}")
         silence = self.heard[k][0] - last if k < len(self.heard) else 0.0
-        if silence > self.timeout + SLACK and age > SLACK:
+        if silence > self.timeout + SLACK and t - last > SLACK:
             return f"not heard for {silence:.2f} s from {last:.3f} s on (time-out {self.timeout:.3g} s)"
-        if k == len(self.heard) and age > SLACK and self.leaves_at > STANDS:
+        if k == len(self.heard) and t - last > SLACK and self.leaves_at > STANDS:
             speed = f"{self.leaves_at:.3g} rad/s or m/s"
             return f"what drives it ends in motion, with {speed} at {last:.3f} s: nobody says that it stopped"
         return next((reason for _, reason in self.heard[k - 1 : k + 1] if reason), "")

@@ -1,0 +1,119 @@
+"""How old what is known of a variable is: since it was asked for, whether or not anybody is connected."""
+
+from __future__ import annotations
+
+import threading
+import time
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+from live_story import listening, wait_for
+from made_cell import person
+from seerob import load
+from seerob.run import engine_of
+from seerob.samples import SignalSample
+from seerob.source import Target
+from seerob.sources.web import Web
+from seerob.variables.dictionary import Variable
+from seerob.variables.signals import Signals
+
+SPEED = Variable(name="belt/speed", source="plc", address=1, unit="m/s", timeout=0.5)
+
+
+def picture(t=0.0, **ages):
+    return SignalSample(
+        source="plc", seq=0, t=t, values={"belt/speed": 0.25}, ages={"belt/speed": ages.get("age", 0)}
+    )
+
+
+def known(t, age=0.0, source=1.0):
+    signals = Signals({"belt/speed": SPEED}, {"belt/speed": min(SPEED.timeout, source)})
+    signals.take(picture(age=age))
+    return signals.at("belt/speed", t)
+
+
+def test_its_own_time_out_counts_after_the_session_has_ended():
+    """The last picture is all there is; a second of the source's time-out is not half a second of its own."""
+    assert known(0.49).doubt == ""
+    for t in (0.51, 0.7, 0.98):
+        assert f"not heard for {t:.2f} s (time-out 0.5 s)" in known(t).doubt
+    assert "time-out 0.2 s" in known(0.3, source=0.2).doubt
+
+
+@pytest.mark.parametrize("age", [0.1, 0.4])
+def test_it_is_as_old_as_the_question(age):
+    assert known(0.49 - age, age=age).doubt == ""
+    assert "not heard for 0.51 s" in known(0.51 - age, age=age).doubt
+
+
+def test_an_answer_that_takes_its_time_is_as_old_as_its_question():
+    """Over a real socket: the value was so at some instant in between."""
+
+    class Slow(BaseHTTPRequestHandler):
+        def do_GET(self):
+            time.sleep(0.2)
+            self.send_response(200)
+            self.end_headers()
+            self.wfile.write(b'{"speed": 0.25}')
+
+        def log_message(self, *_):
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Slow) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        source = Web(name="plc", url=f"http://127.0.0.1:{server.server_port}/", every=0.05)
+        variable = Variable(name="belt/speed", source="plc", address="/speed", unit="m/s")
+        with listening(source, Target(variables=(variable,))) as heard:
+            wait_for(lambda: len(heard) > 4)
+        server.shutdown()
+    assert all(0.2 <= s.ages["belt/speed"] < 30 for s in heard)
+
+
+STATION = f"""
+variables = "variables.toml"
+{person("op", 2, 0, 0)}
+[[sources]]
+kind = "mqtt"
+name = "plc"
+host = "127.0.0.1"
+MORE
+[[machines]]
+name = "gate"
+shape = {{ box = [0.2, 1.0, 1.0] }}
+at = {{ position = [0, 0, 1] }}
+slide = {{ along = [1, 0, 0], position = "gate/position", lower = 0, upper = 1.5 }}
+"""
+POSITION = """
+[[variables]]
+name = "gate/position"
+source = "plc"
+address = ADDRESS
+unit = "m"
+"""
+
+
+def gate(folder, more="", address='"gate"', age=0.0, ticks=20):
+    """Why nobody knows where a gate is, tick by tick, that stands where its last picture says."""
+    (folder / "workstation.toml").write_text(STATION.replace("MORE", more))
+    (folder / "variables.toml").write_text(POSITION.replace("ADDRESS", address))
+    engine = engine_of(load(folder).model)
+    ages = {"gate/position": age} if age else {}
+    engine.take([SignalSample(source="plc", seq=0, t=0.0, values={"gate/position": 0.25}, ages=ages)])
+    states = [engine.start()]
+    return [state.doubt("gate") for state in states] + [engine.tick().doubt("gate") for _ in range(ticks)]
+
+
+def test_what_moves_by_who_sends_no_time_is_known_where_the_file_bounds_how_late_it_is(tmp_path):
+    assert "sends no time and cannot be asked" in gate(tmp_path)[0]
+    assert "delay of the source" in gate(tmp_path)[0]
+    assert gate(tmp_path, "delay = 0.1")[0] == ""
+    assert gate(tmp_path, address='{ topic = "gate", pointer = "/x", time = "/t" }')[0] == ""
+
+
+def test_a_machine_is_as_old_as_the_question_too(tmp_path):
+    timed = '{ topic = "gate", pointer = "/x", time = "/t" }'
+    fresh, old = gate(tmp_path, address=timed, ticks=60), gate(tmp_path, address=timed, age=0.3, ticks=60)
+    late = [next(k for k, why in enumerate(doubts) if "not heard for" in why) for doubts in (fresh, old)]
+    assert late[0] - late[1] == pytest.approx(30, abs=1)
+    assert late[0] < 51

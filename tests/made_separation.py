@@ -11,15 +11,15 @@ PERSON = (
 )
 KNOWN = "intrusion = 0.2\nhuman_uncertainty = 0.1\nrobot_uncertainty = 0.05\n"
 K = 0.35
-BOUND = "reaction = 0.1, stopping = 0.3"
+BOUND = "acceleration = 0, reaction = 0.1, stopping = 0.3"
 HALF = f'{BOUND}, model = "constant_deceleration"'
-BRAKING = 'reaction = 0.1, deceleration = 2.0, model = "constant_deceleration"'
-SIMULATED = 'reaction = 0.1, model = "simulated", brakes = [40.0, 20.0]'
+BRAKING = 'acceleration = 0, reaction = 0.1, deceleration = 2.0, model = "constant_deceleration"'
+SIMULATED = 'acceleration = 0, reaction = 0.1, model = "simulated", brakes = [40.0, 20.0]'
 ROTOR = "rotor_inertia = [0.0, 0.0]\n"
 JOINT = "{{ joint = {j}, full_speed = 3.0, way = [[[{way}]]], time = [[[{time}]]] }}"
 HEAD = 'robot = "arm", category = 0, source = "s", confidence = "1S"'
 TABLE = (
-    f'reaction = 0.1, model = "table", table = {{ {HEAD}, rated_payload = 5.0, joints = ['
+    f'acceleration = 0, reaction = 0.1, model = "table", table = {{ {HEAD}, rated_payload = 5.0, joints = ['
     + JOINT.format(j=0, way=0.4, time=0.3)
     + ", "
     + JOINT.format(j=1, way=0.2, time=0.1)

@@ -77,7 +77,7 @@ limit = 0.3
 kind = "separation"
 name = "separation"
 between = ["arm", "worker"]
-stop = { reaction = 0.1, stopping = 0.2 }
+stop = { acceleration = 0, reaction = 0.1, stopping = 0.2 }
 human_speed = 0.2
 intrusion = 0.0
 human_uncertainty = 0.0
@@ -86,14 +86,14 @@ robot_uncertainty = 0.0
 kind = "separation"
 name = "open separation"
 between = ["arm", "worker"]
-stop = { reaction = 0.1, stopping = 0.2, model = "constant_deceleration" }
+stop = { acceleration = 0, reaction = 0.1, stopping = 0.2, model = "constant_deceleration" }
 """
 SLOW = """
 [[safety]]
 kind = "separation"
 name = "fixed"
 between = ["arm", "worker"]
-stop = { reaction = 0.1, stopping = 0.2 }
+stop = { acceleration = 0, reaction = 0.1, stopping = 0.2 }
 mode = "fixed"
 [[safety]]
 kind = "power_and_force"

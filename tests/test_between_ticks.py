@@ -7,7 +7,7 @@ import pytest
 
 from made_cell import TWO_R, made, two_r
 from seerob.between_ticks import Told
-from seerob.run import Judge, engine_of, pump, ticks
+from seerob.run import Judge, engine_of, looks_ahead, pump, ticks
 from seerob.snapshot import Verdict
 
 STICK = (
@@ -220,7 +220,7 @@ robot_uncertainty = 0
 kind = "separation"
 name = "braking"
 between = ["a", "op"]
-stop = {{ model = "constant_deceleration", reaction = 0.1, deceleration = 6 }}
+stop = {{ model = "constant_deceleration", reaction = 0.1, deceleration = 12 }}
 human_speed = 1.6
 intrusion = 0
 human_uncertainty = 0
@@ -268,7 +268,8 @@ def worst_found(station, looks):
         return Told()
 
     between._judge = watching
-    for _ in ticks(engine, judge, pump(station.sources, station.workstation.engine.tick)):
+    ahead = looks_ahead(station.model)
+    for _ in ticks(engine, judge, pump(station.sources, station.workstation.engine.tick, ahead=ahead)):
         pass
     return room
 

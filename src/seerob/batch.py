@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import mujoco
@@ -28,6 +29,7 @@ from seerob.snapshot import Finding, Result, Verdict
 from seerob.state import Hearing, State
 from seerob.states import Bench, Motion, Questions, Reasons
 from seerob.transforms import Array
+from seerob.whereabouts.hearing import SLACK, STANDS
 
 STRETCH = 256
 """Instants that are placed together: enough for the arrays to pay, few enough for the processor's cache."""
@@ -110,7 +112,7 @@ def recorded(model: Model, feed: Feed) -> Motion:
         for name, found in doubts.items():
             found.append(state.doubt(name))
     reasons = {name: np.array(found, object) for name, found in doubts.items()}
-    return Motion(np.array(t), np.array(q), np.array(v), reasons)
+    return Motion(np.array(t), np.array(q), np.array(v), reasons, foreseen=True)
 
 
 def judged(
@@ -273,6 +275,8 @@ def _walked(model: Model, bound: Sequence[Bound], motion: Motion, findings: Sequ
         for one in bound
     ]
     judge = Judge(fresh, findings)
+    if motion.foreseen:
+        state.foresee = partial(_foresee, model, motion, state)
     rows: list[tuple[Result, ...]] = []
     with settled():
         for k, t in enumerate(motion.t.tolist()):
@@ -283,6 +287,20 @@ def _walked(model: Model, bound: Sequence[Bound], motion: Motion, findings: Sequ
             state.refresh(t)
             rows.append(judge(state))
     return {one.criterion.name: _of_results([row[i] for row in rows]) for i, one in enumerate(bound)}
+
+
+def _foresee(
+    model: Model, motion: Motion, state: State, name: str, t: Array
+) -> tuple[Array, Array, str] | None:
+    """See `seerob.state.Foresee`: the motion itself, at its own instants."""
+    rows = np.searchsorted(motion.t, t - SLACK)
+    beyond, rows = bool(len(rows)) and rows[-1] >= len(motion.t), np.minimum(rows, len(motion.t) - 1)
+    columns = state.columns[name]
+    q, qd = motion.q[rows][:, columns.own_q], motion.v[rows][:, columns.own_v]
+    why = next(filter(None, motion.doubts[name][rows].tolist()), "")
+    if beyond and np.abs(motion.v[-1][columns.own_v]).max(initial=0.0) > STANDS:
+        why = why or "the motion ends, and what it does after is not known"
+    return q, qd, why
 
 
 def _of_results(results: Sequence[Result]) -> tuple[Answers, Reasons]:

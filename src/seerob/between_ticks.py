@@ -229,7 +229,7 @@ class BetweenTicks:
             self._shadow = State(state.model, data, state.hearings, state.signals)
             self._shadow.bearers = state.bearers
         shadow = self._shadow
-        shadow.columns = state.columns
+        shadow.columns, shadow.foresee = state.columns, state.foresee
         shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)
         shadow.refresh(t)
         result = self._asking.at(i, self._again[i], shadow)

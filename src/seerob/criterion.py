@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from msgspec import Meta, Struct
@@ -107,6 +107,10 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def basis(self, model: Model) -> Basis:
         """Formula, source and inputs of what `bind` computes."""
         raise NotImplementedError
+
+    def looks_ahead(self, model: Model) -> Mapping[str, float]:
+        """Of robots, how far ahead it asks what their recorded motions do [s], `State.foresee`."""
+        return {}
 
     def variables(self) -> dict[str, str]:
         """Variables of the dictionary that it asks, and the SI unit that each must have, or ``bool``."""

@@ -152,6 +152,7 @@ class Engine:
         self.signals = Signals(model.dictionary, signals or {}, untimed)
         self._machines = Machines(model.workstation.machines, self.signals)
         self.state = State(model, self._shown, self._hearings, self.signals)
+        self.state.foresee = self._foresee
         self._grips = Grips(self.state, self._mj)
         self._tick = 0
         self._place(0.0)
@@ -267,6 +268,18 @@ class Engine:
         )
         missed = f"{sample.target} cannot reach the pose that was heard: the nearest that was found is {miss}"
         return reference.take(sample.t, q, None), "" if miss.larger <= POSE_TOLERANCE else missed
+
+    def _foresee(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
+        """See `seerob.state.Foresee`: of what a file drives, and of what stands."""
+        hearing, mechanism = self._hearings[name], self.model.mechanisms[name]
+        if not hearing.driven:
+            if not (self.controllers and hearing.given):
+                return None
+            return np.tile(mechanism.home, (len(t), 1)), np.zeros((len(t), len(mechanism.home))), ""
+        if name not in self._ahead:
+            return None
+        q, qd, _ = self._references[name].course(t)
+        return q, qd, hearing.doubt_ahead(self.state.t, float(t[-1]) if len(t) else self.state.t)
 
     # -- time -------------------------------------------------------------------------------
 

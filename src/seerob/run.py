@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 
@@ -70,20 +70,38 @@ def bind(model: Model) -> tuple[Bound, ...]:
 # -- feeds: what is heard for each tick ---------------------------------------------------------
 
 
-def pump(opened: Sequence[tuple[Source, Opened]], period: float, *, endless: bool = False) -> Feed:
-    """Samples of recorded sources as run time passes.
+def looks_ahead(model: Model) -> Mapping[str, float]:
+    """Of robots, how far ahead the criteria of a workstation ask what their recorded motions do [s]."""
+    found: dict[str, float] = {}
+    for criterion in model.workstation.safety:
+        for name, span in criterion.looks_ahead(model).items():
+            found[name] = max(span, found.get(name, 0.0))
+    return found
+
+
+def pump(
+    opened: Sequence[tuple[Source, Opened]],
+    period: float,
+    *,
+    endless: bool = False,
+    ahead: Mapping[str, float] | None = None,
+) -> Feed:
+    """Samples of recorded sources as run time passes; of some targets so much ahead [s].
 
     Ends with the last sample of the last source; a source that loops does not keep a run going
     on its own unless ``endless``. Without sources there is one tick.
     """
-    pumps = [Pump(o, loop=source.loop, pause=source.loop_pause) for source, o in opened]
+    pumps = [
+        (Pump(o, loop=source.loop, pause=source.loop_pause), (ahead or {}).get(source.target(), 0.0))
+        for source, o in opened
+    ]
     duration = max((o.duration for _, o in opened), default=0.0)
     last = round(duration / period - 0.5 + 1e-9)
     k = 0
     while endless or k <= last:
         # Every sample, not only the newest: the run starts on the first one, and a source that is
         # faster than the ticks is followed exactly. One ahead, so that references reach to the tick's end.
-        yield tuple(sample for each in pumps for sample in each.until(k * period))
+        yield tuple(sample for each, more in pumps for sample in each.until(k * period + more))
         k += 1
 
 

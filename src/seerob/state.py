@@ -36,6 +36,9 @@ from seerob.whereabouts.hearing import Hearing as Hearing  # noqa: PLC0414
 from seerob.whereabouts.seen_bones import bones_of, unseen_reason
 
 Indices = NDArray[np.int64]
+Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]
+"""Of a robot or human and instants ahead [s] (m,): joint positions and velocities there, shape (m, n) each,
+and why they may be others; None where nobody knows what it will do."""
 
 MOST_PLACES = 512
 """Sets of bodies of which places are kept from tick to tick."""
@@ -58,6 +61,8 @@ class State:
         self.path: Path | None = None
         """How everybody came here from the last tick, whoever was heard: for bounds; None where there was
         none."""
+        self.foresee: Foresee = lambda name, t: None
+        """What a motion that is known ahead will do."""
         self.asked: set[str] = set()
         """Robots and humans that answers have depended on since the set was last cleared."""
         self.bearers = Bearers(model)

@@ -41,6 +41,8 @@ class Motion:
     """MuJoCo's velocities, shape (N, nv)."""
     doubts: Mapping[str, Reasons]
     """Why a robot or human may not be there, by name."""
+    foreseen: bool = False
+    """Whether one instant leads to the next: a motion, and not a collection of places."""
 
     def part(self, begin: int, end: int) -> Motion:
         """Some instants that follow one another."""

@@ -180,7 +180,12 @@ class Station:
         clock = Clock() if live else None
         scene = scene or self.scene(with_sources=feed is None)
         if feed is None:
-            feed = road.pump(self.sources, self.workstation.engine.tick, endless=live)
+            feed = road.pump(
+                self.sources,
+                self.workstation.engine.tick,
+                endless=live,
+                ahead=road.looks_ahead(self.model),
+            )
         with ExitStack() as until_the_end:
             if clock and heard:
                 targets = [(source, source_target(self.model, source)) for source in heard]

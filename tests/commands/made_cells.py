@@ -14,7 +14,7 @@ HUMAN = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = 
 SPEED = '[[safety]]\nkind = "velocity"\nname = "speed"\nat = "ur5e"\nlimit = {limit}\n'
 SEPARATION = (
     '[[safety]]\nkind = "separation"\nname = "gap"\nbetween = ["ur5e", "op"]\n'
-    "stop = { reaction = 0.1, stopping = 0.2 }\n"
+    "stop = { acceleration = 0, reaction = 0.1, stopping = 0.2 }\n"
 )
 
 

@@ -64,7 +64,7 @@ human_speed = 1.6
 intrusion = 0.1
 human_uncertainty = 0.05
 robot_uncertainty = 0.02
-stop = { model = "bound", reaction = 0.1, stopping = 0.4 }
+stop = { model = "bound", acceleration = 0, reaction = 0.1, stopping = 0.4 }
 """
 )
 Q = np.array([0.3, -1.2, 1.4, -1.5, -1.5, 0.2])

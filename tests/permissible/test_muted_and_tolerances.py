@@ -61,7 +61,10 @@ def test_what_a_stop_may_be_off_by_counts_in_full(tmp_path):
     off = KNOWN.replace(
         "stopping = 0.3 ", "stopping = 0.3, tolerance = { reaction = 0.02, stopping = 0.05 } "
     )
-    longest = KNOWN.replace("reaction = 0.1, stopping = 0.3", "reaction = 0.12, stopping = 0.35")
+    longest = KNOWN.replace(
+        "acceleration = 0, reaction = 0.1, stopping = 0.3",
+        "acceleration = 0, reaction = 0.12, stopping = 0.35",
+    )
     tolerant, worst, nominal = (
         maps(cell(tmp_path / str(i), text), By.ALL)[By.ALL].permissible
         for i, text in enumerate((off, longest, KNOWN))

@@ -21,7 +21,8 @@ PERSON = (
 )
 SSM = (
     '[[safety]]\nkind = "separation"\nname = "S"\nbetween = ["arm", "op"]\nhuman_speed = 1.6\n'
-    "stop = {{ reaction = 0.1, stopping = 0.3 }}\nintrusion = 0.05\nhuman_uncertainty = 0.02\n{Z_r}"
+    "stop = {{ acceleration = 0, reaction = 0.1, stopping = 0.3 }}\n"
+    "intrusion = 0.05\nhuman_uncertainty = 0.02\n{Z_r}"
 )
 KNOWN = SSM.format(Z_r="robot_uncertainty = 0.01\n")
 KEPT_OUT = 'excluded = ["Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"]\n'

@@ -170,7 +170,7 @@ name = "gap"
 between = ["arm", "p"]
 human_speed = 1.6
 intrusion = 0.1
-stop = { reaction = 0.1, stopping = 0.1 }
+stop = { acceleration = 0, reaction = 0.1, stopping = 0.1 }
 human_uncertainty = 0.05
 """
 

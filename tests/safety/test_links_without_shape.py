@@ -31,7 +31,7 @@ COVER = (
     "at = {{ position = [{}, 0, 0] }}\n"
 )
 TERMS = "intrusion = 0\nhuman_uncertainty = 0\nrobot_uncertainty = 0\n"
-STOP = "stop = { reaction = 0.01, stopping = 0.01 }\n"
+STOP = "stop = { acceleration = 0, reaction = 0.01, stopping = 0.01 }\n"
 STUB = '<collision><geometry><box size="{0} {0} {0}"/></geometry></collision>'
 SIX = ("xx", "yy", "zz", "xy", "xz", "yz")
 ABOUT = {

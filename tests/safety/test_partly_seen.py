@@ -41,7 +41,8 @@ SAFETY = {
 }
 S = (
     '[[safety]]\nkind = "separation"\nname = "S"\nbetween = ["arm", "op"]\nhuman_speed = 1.6\nintrusion = 0\n'
-    "human_uncertainty = 0\nrobot_uncertainty = 0\nstop = { reaction = 0.1, stopping = 0.3 }\n"
+    "human_uncertainty = 0\nrobot_uncertainty = 0\n"
+    "stop = { acceleration = 0, reaction = 0.1, stopping = 0.3 }\n"
 )
 
 

@@ -52,7 +52,7 @@ def separation(folder, *, x=6.0, options=FULL, qd=(1.0, 0.0), between='["arm", "
         + TWO_R
         + PERSON.format(x=x)
         + f'[[safety]]\nkind = "separation"\nname = "S"\nbetween = {between}\n'
-        + f"stop = {{ reaction = 0.1, stopping = 0.3 }}\n{options}"
+        + f"stop = {{ acceleration = 0, reaction = 0.1, stopping = 0.3 }}\n{options}"
         + '[[safety]]\nkind = "minimum_distance"\nname = "d"\nbetween = ["arm", "op"]\n'
         + '[[safety]]\nkind = "velocity"\nname = "v"\nof = "arm"\n'
     )

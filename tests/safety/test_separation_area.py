@@ -26,7 +26,7 @@ at = { position = [0, 2.5, 0] }
 kind = "separation"
 name = "ssm"
 between = ["arm", "operator"]
-stop = { reaction = 0.1, stopping = 0.3 }
+stop = { acceleration = 0, reaction = 0.1, stopping = 0.3 }
 human_speed = 1.6
 intrusion = 0.1
 human_uncertainty = 0.05

@@ -81,10 +81,18 @@ def test_robot_at_rest_has_a_permissible_speed_but_no_share(tmp_path, stop):
 @pytest.mark.parametrize(
     ("stop", "K", "S_p"),
     [
-        ("reaction = 0.1, stopping = 0.05", 0.0, 2.0 * 0.15),
-        ("reaction = 0.1, stopping = 0.05", 0.35, 0.5),  # 0.65 m at 2 m/s, 0.59 m at 1.6 m/s
-        ("reaction = 0.1, stopping = 0.16", 0.0, 0.5),  # 0.52 m at 2 m/s, 0.416 m at 1.6 m/s
-        ("reaction = 0.1, stopping = 0.3", 0.0, 0.64),
+        ("acceleration = 0, reaction = 0.1, stopping = 0.05", 0.0, 2.0 * 0.15),
+        (
+            "acceleration = 0, reaction = 0.1, stopping = 0.05",
+            0.35,
+            0.5,
+        ),  # 0.65 m at 2 m/s, 0.59 m at 1.6 m/s
+        (
+            "acceleration = 0, reaction = 0.1, stopping = 0.16",
+            0.0,
+            0.5,
+        ),  # 0.52 m at 2 m/s, 0.416 m at 1.6 m/s
+        ("acceleration = 0, reaction = 0.1, stopping = 0.3", 0.0, 0.64),
     ],
 )
 def test_approach_speed_is_switched_at_half_a_metre(tmp_path, stop, K, S_p):
@@ -187,22 +195,31 @@ def test_fixed_mode_keeps_the_largest_of_a_run_and_starts_anew_with_the_next(tmp
 @pytest.mark.parametrize(
     ("stop", "match"),
     [
-        ("reaction = 0.1", "needs stopping"),
-        ('reaction = 0.1, model = "constant_deceleration"', "needs either stopping or deceleration"),
+        ("acceleration = 0, reaction = 0.1", "needs stopping"),
+        (
+            'acceleration = 0, reaction = 0.1, model = "constant_deceleration"',
+            "needs either stopping or deceleration",
+        ),
         (f"{HALF}, deceleration = 2.0", "needs either stopping or deceleration"),
-        ('reaction = 0.1, model = "table"', "needs table"),
+        ('acceleration = 0, reaction = 0.1, model = "table"', "needs table"),
         (f"{BOUND}, deceleration = 2.0", "does nothing"),
         (f'{BOUND}, table = "ur5_cb3"', "does nothing"),
         (f'{BOUND}, model = "simulated"', "does nothing"),
         (f'{BOUND}, direction = "toward"', "does nothing"),
         (f"{BOUND}, brakes = [1.0, 1.0]", "does nothing"),
-        ('reaction = 0.1, model = "simulated", brakes = [1.0]', "1 torques for the 2 joints"),
-        ('reaction = 0.1, model = "simulated", brakes = [1.0, -1.0]', "> 0"),
-        ('reaction = 0.1, model = "table", table = "ur5"', "ur5_cb3"),
-        ('reaction = 0.1, model = "table", table = "ur5_cb3"', "has joint 2, arm has 2 joints"),
+        (
+            'acceleration = 0, reaction = 0.1, model = "simulated", brakes = [1.0]',
+            "1 torques for the 2 joints",
+        ),
+        ('acceleration = 0, reaction = 0.1, model = "simulated", brakes = [1.0, -1.0]', "> 0"),
+        ('acceleration = 0, reaction = 0.1, model = "table", table = "ur5"', "ur5_cb3"),
+        (
+            'acceleration = 0, reaction = 0.1, model = "table", table = "ur5_cb3"',
+            "has joint 2, arm has 2 joints",
+        ),
         (f'{BOUND}, table_for = "arm"', "does nothing"),
         (f'{TABLE}, table_for = "other"', "other does not stop here"),
-        ("reaction = 0.0, stopping = 0.3", "> 0"),
+        ("acceleration = 0, reaction = 0.0, stopping = 0.3", "> 0"),
     ],
 )
 def test_options_that_cannot_be(tmp_path, stop, match):

@@ -7,7 +7,7 @@ import pytest
 from seerob.safety.separation import Detection, Separation, Stop
 from seerob.stopping.models import StopTolerance
 
-STOP = Stop(reaction=0.1, stopping=0.3)
+STOP = Stop(acceleration=0.0, reaction=0.1, stopping=0.3)
 
 
 def separation(**options):
@@ -46,7 +46,9 @@ def test_options_that_do_not(options, said):
 
 def test_the_worst_of_every_tolerance_is_put_in():
     """Long times, fast people, deep intrusion; without tolerances it is itself."""
-    stop = Stop(reaction=0.1, stopping=0.3, tolerance=StopTolerance(reaction=0.02, stopping=0.05))
+    stop = Stop(
+        acceleration=0.0, reaction=0.1, stopping=0.3, tolerance=StopTolerance(reaction=0.02, stopping=0.05)
+    )
     given = {"human_speed": 1.6, "intrusion": 0.1}
     off = separation(
         stop=stop, human_speed_tolerance=0.2, intrusion_tolerance=0.03, human_uncertainty=0.1, **given

@@ -32,7 +32,7 @@ ASKED = """
 kind = "separation"
 name = "{name}"
 between = ["arm", "operator"]
-stop = {{ reaction = {reaction}, stopping = 0.3 }}
+stop = {{ acceleration = 0, reaction = {reaction}, stopping = 0.3 }}
 human_speed = 1.6
 human_uncertainty = 0.05
 robot_uncertainty = 0.01

@@ -30,7 +30,7 @@ def test_rotors_lengthen_the_simulated_stop(tmp_path):
 def test_simulated_stop_is_never_more_than_the_bound_with_its_stopping_time(tmp_path):
     simulated = separation(tmp_path / "s", SIMULATED)
     T_s = terms(simulated)[0] / 1.6 - 0.1
-    bound = separation(tmp_path / "b", f"reaction = 0.1, stopping = {T_s}")
+    bound = separation(tmp_path / "b", f"acceleration = 0, reaction = 0.1, stopping = {T_s}")
     assert simulated.limit < bound.limit
 
 
@@ -117,7 +117,9 @@ def test_what_a_simulated_stop_says_of_itself(tmp_path):
         ("a", two_r(effort=50.0), "estimated", "0.8 of the torque limits"),
         ("b", one, "missing", "0.8 of the torque limits"),
     ):
-        S = separation(tmp_path / folder, 'reaction = 0.1, model = "simulated"', urdf=urdf, x=9.0)
+        S = separation(
+            tmp_path / folder, 'acceleration = 0, reaction = 0.1, model = "simulated"', urdf=urdf, x=9.0
+        )
         (brakes,) = (i for i in S.basis.inputs if i.name == "brake torques")
         assert (brakes.origin, said in brakes.source) == (origin, True)
         assert "not given" not in brakes.source
@@ -131,7 +133,7 @@ def test_simulated_stop_without_rotor_inertia_is_undecided_above_and_exceeded_be
 
 
 def test_simulated_stop_without_torque_limits_is_undecided(tmp_path):
-    stop = 'reaction = 0.1, model = "simulated"'
+    stop = 'acceleration = 0, reaction = 0.1, model = "simulated"'
     S = separation(tmp_path / "u", stop, urdf=two_r().replace('effort="1000.0" ', ""), x=9.0)
     assert S.verdict == "undecided"
     limited = separation(tmp_path / "l", stop, arm=ROTOR + "torque_limits = [50.0, 25.0]\n")

@@ -56,7 +56,7 @@ def test_joint_without_a_table_needs_a_stopping_time(tmp_path):
     assert terms(given)[:3] == pytest.approx([1.6 * 0.6, 0.1 * arm, 0.5 * arm])
 
 
-UR10_TABLE = 'reaction = 0.1, model = "table", table = "ur10_cb3"'
+UR10_TABLE = 'acceleration = 0, reaction = 0.1, model = "table", table = "ur10_cb3"'
 
 
 def test_table_by_tool_speed_is_undecided_above_its_payload_and_without_a_mass(tmp_path):
@@ -98,7 +98,8 @@ def test_table_without_a_payload_gives_its_printed_figures_once_the_file_says_wh
     q = ([0.0, -1.2, 1.4, -1.5, -1.5, 0.0], [full, 0, 0, 0, 0, 0])
     found = {}
     for key in ("", ", rated_payload = 20.0"):
-        stop = f'reaction = 0.1, model = "table", table = "kuka_kr20_r3100", table_for = "arm"{key}'
+        stop = 'acceleration = 0, reaction = 0.1, model = "table", table = "kuka_kr20_r3100"'
+        stop += f', table_for = "arm"{key}'
         text = UR10 + PERSON.format(x=15.0)
         text += f'[[safety]]\nkind = "separation"\nname = "S"\nbetween = ["arm", "op"]\n{KNOWN}'
         found[key] = results_at(made(tmp_path / str(len(key)), text + f"stop = {{ {stop} }}\n"), arm=q)["S"]

@@ -18,7 +18,7 @@ from seerob.verdict import Verdict
 
 KNOWN = TERMS + "human_speed = 1.6\n"
 V_H, T = 1.6, 0.4
-STIFF = 'reaction = 0.1, model = "simulated", brakes = [4e3, 2e3]'
+STIFF = 'acceleration = 0, reaction = 0.1, model = "simulated", brakes = [4e3, 2e3]'
 """Brakes so strong that a simulated stop takes a few milliseconds."""
 AT_HOME = ((0.0, 0.0), (1.0, 0.0))
 OUT = '<visual><origin xyz="0.5 0 0"/><geometry><box size="1.04 0.14 0.14"/></geometry></visual>'
@@ -154,7 +154,7 @@ def test_the_fixed_distance_remembers_what_each_input_made_of_it(tmp_path):
     assert (second.limit, second.verdict) == (pytest.approx((3 * V + V_H) * T + K), Verdict.UNDECIDED)
     assert second.reason.endswith("decided by stop.reaction ± 20 ms")
     required = open_.bound[0].criterion.required(open_.model)
-    assert required(state)[1] == pytest.approx(V_H * T + K)
+    assert required(state).S_p[1] == pytest.approx(V_H * T + K)
 
 
 def test_the_distance_asked_for_is_that_of_the_present_speeds_and_in_the_fixed_mode_the_largest(tmp_path):
@@ -163,12 +163,12 @@ def test_the_distance_asked_for_is_that_of_the_present_speeds_and_in_the_fixed_m
         S = twin.bound[0].criterion
         assert (S.batch(twin.model) is None) == (mode == "fixed")
         required, state = S.required(twin.model), state_at(twin, arm=AT_HOME)
-        first = required(state)
+        first = required(state).S_p
         assert first == pytest.approx([(v + V_H) * T + K for v in (np.hypot(1, 0.05), V)])
         state.data.qvel[0] = 0.5
         state.refresh(0.0)
         halved = [(v / 2 + V_H) * T + K for v in (np.hypot(1, 0.05), V)]
-        assert required(state) == pytest.approx(first if mode == "fixed" else halved)
+        assert required(state).S_p == pytest.approx(first if mode == "fixed" else halved)
     off = cell(tmp_path / "off", BOUND, KNOWN + "intrusion_tolerance = 0.1\n")
     assert off.bound[0].criterion.batch(off.model) is None
 
@@ -185,7 +185,7 @@ def test_what_a_surface_may_stick_out_is_in_every_separation_distance(larger):
     of_S_p = terms(result)
     assert of_S_p[:3] == pytest.approx([V_H * T, (V + out) * 0.1, (V + out) * 0.3])
     assert sum(of_S_p) == pytest.approx(wanted)
-    assert S.required(larger.model)(state)[1] == pytest.approx(wanted)
+    assert S.required(larger.model)(state).S_p[1] == pytest.approx(wanted)
     distance = np.array([part(result, name).value for name in ("arm/l1", "arm/l2")])
     S_p, (speed, share) = S.inverse(larger.model)(state, distance)
     assert S_p[1] == pytest.approx(wanted)

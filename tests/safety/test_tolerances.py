@@ -136,7 +136,7 @@ def separation(folder, stop, *, x=6.0, more="", qd=(1.0, 0.0)):
     return results_at(station, arm=((0.0, 0.0), qd))["it"]
 
 
-TIMES = "reaction = {0}, stopping = {1}"
+TIMES = "acceleration = 0, reaction = {0}, stopping = {1}"
 KNOWN = "intrusion = 0.2\nhuman_uncertainty = 0.1\nrobot_uncertainty = 0.05\nhuman_speed = 1.6\n"
 
 
@@ -144,21 +144,21 @@ KNOWN = "intrusion = 0.2\nhuman_uncertainty = 0.1\nrobot_uncertainty = 0.05\nhum
     ("stop", "halves", "low", "high", "decides"),
     [
         (
-            "reaction = {0}, stopping = {1}",
+            "acceleration = 0, reaction = {0}, stopping = {1}",
             "reaction = 0.02, stopping = 0.1",
             (0.08, 0.2),
             (0.12, 0.4),
             "stop.stopping ± 100 ms",
         ),
         (
-            'model = "constant_deceleration", reaction = {0}, deceleration = {1}',
+            'model = "constant_deceleration", acceleration = 0, reaction = {0}, deceleration = {1}',
             "reaction = 0.02, deceleration = 2.0",
             (0.08, 6.0),
             (0.12, 2.0),
             "stop.deceleration ± 2 m/s²",
         ),
         (
-            "reaction = {0}, stopping = {1}",
+            "acceleration = 0, reaction = {0}, stopping = {1}",
             "reaction = 0.02",
             (0.08, 0.3),
             (0.12, 0.3),
@@ -198,9 +198,15 @@ def test_separation_lies_between_those_of_the_ends(tmp_path, stop, halves, low, 
 @pytest.mark.parametrize(
     ("stop", "word"),
     [
-        ("reaction = 0.1, stopping = 0.3, tolerance = { reaction = 0.1 }", "reaction = 0.1 is not more"),
-        ("reaction = 0.1, stopping = 0.3, tolerance = { deceleration = 1 }", "deceleration is not given"),
-        ("reaction = 0.1, stopping = 0.3, tolerance = { reaction = -0.1 }", ">= 0"),
+        (
+            "acceleration = 0, reaction = 0.1, stopping = 0.3, tolerance = { reaction = 0.1 }",
+            "reaction = 0.1 is not more",
+        ),
+        (
+            "acceleration = 0, reaction = 0.1, stopping = 0.3, tolerance = { deceleration = 1 }",
+            "deceleration is not given",
+        ),
+        ("acceleration = 0, reaction = 0.1, stopping = 0.3, tolerance = { reaction = -0.1 }", ">= 0"),
     ],
 )
 def test_a_tolerance_that_cannot_be_is_named_before_the_run(tmp_path, stop, word):
@@ -231,7 +237,8 @@ def test_what_a_person_is_off_by_is_in_every_distance(tmp_path):
     text = FLOATING + TWO_R + PERSON.format(x=3.0)
     text += criterion("minimum_distance", 'between = ["arm", "op"]\nlimit = 0.3')
     text += criterion(
-        "separation", f'between = ["arm", "op"]\nstop = {{ reaction = 0.1, stopping = 0.3 }}\n{KNOWN}'
+        "separation",
+        f'between = ["arm", "op"]\nstop = {{ acceleration = 0, reaction = 0.1, stopping = 0.3 }}\n{KNOWN}',
     ).replace('"it"', '"S"')
     station = made(tmp_path, text, {"arm.urdf": two_r()})
     state = state_at(station, arm=((0.0, 0.0), (1.0, 0.0)))
@@ -335,7 +342,8 @@ def test_approach_speed_and_intrusion_that_are_off(tmp_path, more, low, high, de
         text = FLOATING + TWO_R + PERSON.format(x=x)
         text += criterion(
             "separation",
-            'between = ["arm", "op"]\nstop = { reaction = 0.1, stopping = 0.3 }\nhuman_uncertainty = 0\n'
+            'between = ["arm", "op"]\nstop = { acceleration = 0, reaction = 0.1, stopping = 0.3 }\n'
+            "human_uncertainty = 0\n"
             f'robot_uncertainty = 0\nmode = "{mode}"\n' + "\n".join(f"{k} = {v}" for k, v in keys.items()),
         )
         return results_at(made(tmp_path / name, text, {"arm.urdf": two_r()}), arm=((0, 0), (0.3, 0)))["it"]
@@ -355,7 +363,9 @@ def test_approach_speed_and_intrusion_that_are_off(tmp_path, more, low, high, de
 def test_tolerances_of_what_is_not_given_are_refused(tmp_path):
     for key in ("human_speed_tolerance", "intrusion_tolerance"):
         text = PERSON.format(x=3) + criterion(
-            "separation", f'between = ["arm", "op"]\nstop = {{ reaction = 1, stopping = 1 }}\n{key} = 0.1'
+            "separation",
+            f'between = ["arm", "op"]\nstop = {{ acceleration = 0, reaction = 1, stopping = 1 }}\n'
+            f"{key} = 0.1",
         )
         with pytest.raises(InputError, match=key):
             made(tmp_path, FLOATING + TWO_R + text, {"arm.urdf": two_r()})

@@ -33,7 +33,8 @@ ASKED = {
     "device_distance": 'sensor = "mat"\nhazard = "arm"\nstopping = 0.2\nedition = "2010"\nreach_under = 0',
     "swept_volume": 'of = "arm"\nvoxel = 0.1',
     "velocity": 'at = "arm"',
-    "separation": 'between = ["arm", "op"]\nstop = { reaction = 0.1, stopping = 0.3 }\nintrusion = 0.2\n'
+    "separation": 'between = ["arm", "op"]\nstop = { acceleration = 0, reaction = 0.1, stopping = 0.3 }\n'
+    "intrusion = 0.2\n"
     "human_uncertainty = 0\nrobot_uncertainty = 0",
 }
 UNITS = {

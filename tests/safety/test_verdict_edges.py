@@ -320,7 +320,8 @@ def test_terms_shown_sum_to_the_separation_distance_shown(tmp_path, mode, speed)
     """Also of a robot that has become slower since, in the fixed mode."""
     text = FLOATING + TWO_R + '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
     text += 'at = { position = [6, 0, -1] }\n[[safety]]\nkind = "separation"\nname = "S"\n'
-    text += 'between = ["arm", "op"]\nstop = { reaction = 0.1, stopping = 0.3 }\nintrusion = 0.2\n'
+    text += 'between = ["arm", "op"]\nstop = { acceleration = 0, reaction = 0.1, stopping = 0.3 }\n'
+    text += "intrusion = 0.2\n"
     text += f'human_uncertainty = 0.1\nrobot_uncertainty = 0.05\nmode = "{mode}"\n{speed}'
     station = made(tmp_path, text, {"arm.urdf": two_r()})
     state = state_at(station, arm=((0.0, 0.0), (1.0, 0.0)))

@@ -11,7 +11,7 @@ from seerob.results.series import CODES
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [6, 0, -1] }\n'
 ASKED = (
     '[[safety]]\nkind = "separation"\nname = "{name}"\nbetween = ["arm", "op"]\nhuman_uncertainty = 0\n'
-    "robot_uncertainty = 0\nstop = {{ reaction = 0.1, {stop} }}\n{more}\n"
+    "robot_uncertainty = 0\nstop = {{ acceleration = 0, reaction = 0.1, {stop} }}\n{more}\n"
 )
 GIVEN = "intrusion = 0.2\n"
 TIMED = {

@@ -8,13 +8,14 @@ import pytest
 from seerob.snapshot import Origin
 from seerob.stopping.inputs import approach_speed, intrusion
 from seerob.stopping.models import MOVING, SHARE, Stop, StopTolerance, bind_stop
+from seerob.stopping.onset import accelerated
 from seerob.stopping.terms import BOUND, CONSTANT, largest_speed_decelerating, largest_speed_in_time
 from seerob.stopping.tolerances import shifted, tolerances
 from seerob.tolerances import Tolerance
 
-KNOWN = {"reaction": 0.1, "stopping": 0.3}
+KNOWN = {"acceleration": 0.0, "reaction": 0.1, "stopping": 0.3}
 HALF = {**KNOWN, "model": "constant_deceleration"}
-BRAKING = {"reaction": 0.1, "deceleration": 2.0, "model": "constant_deceleration"}
+BRAKING = {"acceleration": 0.0, "reaction": 0.1, "deceleration": 2.0, "model": "constant_deceleration"}
 TABLE = {"reaction": 0.1, "model": "table", "table": "ur10_cb3"}
 SIMULATED = {"reaction": 0.1, "model": "simulated"}
 OFF = StopTolerance
@@ -68,7 +69,8 @@ def test_brakes_have_eight_tenths_of_the_torque_limits_unless_the_file_says_othe
 
 
 def known(options):
-    (found,) = bind_stop(Stop(**options), None, None, None).inputs
+    found, how = bind_stop(Stop(**options), None, None, None).inputs
+    assert (how.name, how.value, how.origin) == ("acceleration during T_r", 0.0, "given")
     return found.name, found.value, found.unit, found.origin
 
 
@@ -76,13 +78,18 @@ def test_what_a_stop_says_of_itself():
     assert known(KNOWN) == known(HALF) == ("T_s", 0.3, "s", "given")
     assert known(BRAKING) == ("deceleration", 2.0, "m/s²", "given")
     formulas = [bind_stop(Stop(**options), None, None, None).formula for options in (KNOWN, HALF, BRAKING)]
-    half = "S_s = v_r T_s / 2"
-    assert formulas == ["S_s = v_r T_s", half, f"{half}, T_s = v / a of the fastest point"]
+    half = "S_s = v_s T_s / 2"
+    assert formulas == ["S_s = v_s T_s", half, f"{half}, T_s = v_s / a of the fastest point"]
 
 
 # -- the largest permissible speed ----------------------------------------------------------------
 
 D, V_H, K, T_R = np.array([2.0, 2.6]), np.array([1.6, 1.7]), 0.35, 0.1
+
+
+def onsets(v, a=0.0):
+    """At rest and at speeds [m/s]."""
+    return [accelerated(scale * v, T_R, a, np.zeros(0)) for scale in (0.0, 1.0)]
 
 
 def lacks(options, v):
@@ -97,7 +104,7 @@ def lacks(options, v):
 @pytest.mark.parametrize("v", [(1.0, 2.5), (0.7, 0.4), (MOVING, 0.0)])
 def test_at_the_largest_factor_the_worst_part_is_as_near_as_it_may_be(options, v):
     v = np.array(v)
-    speed, factor = bind_stop(Stop(**options), None, None, None).inverse(v, D, V_H, K)
+    speed, factor = bind_stop(Stop(**options), None, None, None).inverse(*onsets(v), D, V_H, K)
     assert speed == pytest.approx(factor * v.max(), rel=1e-12)
     assert lacks(options, factor * v) == pytest.approx(0, abs=1e-9)
 
@@ -109,10 +116,10 @@ def test_at_rest_each_part_may_be_the_fastest(v):
     for share in (BOUND, CONSTANT):
         each = largest_speed_in_time(D, V_H, T_R, 0.3, K, share)
         assert each[0] < each[1]
-        assert inverse[share](np.array(v), D, V_H, K) == (each[0], None)
+        assert inverse[share](*onsets(np.array(v)), D, V_H, K) == (each[0], None)
     each = largest_speed_decelerating(D, V_H, T_R, 2.0, K)
     assert each[0] < each[1]
-    assert inverse[None](np.array(v), D, V_H, K) == (each[0], None)
+    assert inverse[None](*onsets(np.array(v)), D, V_H, K) == (each[0], None)
 
 
 # -- tolerances -----------------------------------------------------------------------------------

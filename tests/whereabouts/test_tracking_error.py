@@ -21,7 +21,7 @@ SSM = """
 kind = "separation"
 name = "ssm"
 between = ["arm", "op"]
-stop = { reaction = 0.01, stopping = 0.01 }
+stop = { acceleration = 0, reaction = 0.01, stopping = 0.01 }
 human_speed = 1.6
 intrusion = 0
 human_uncertainty = 0

@@ -22,7 +22,7 @@ from seerob.permissible.verification import Verified, verify
 from seerob.permissible.witness import Clock, Witness
 from seerob.results.result_log import ResultLog
 from seerob.results.series import worst_verdict
-from seerob.run import Bound, Feed, Judge, Summary, engine_of, pump, ticks
+from seerob.run import Bound, Feed, Judge, Summary, engine_of, looks_ahead, pump, ticks
 from seerob.samples import JointSample, PoseSample, Sample
 from seerob.snapshot import CriterionInfo, Finding, Snapshot, Verdict
 from seerob.source import HOLD, Opened, Source
@@ -136,7 +136,9 @@ def witness(
     seen, log = Witness(Judge(bound, findings)), ResultLog(infos)
     duration = max((opened.duration for _, opened in sources), default=0.0)
     first: Snapshot | None = None
-    for out, _ in ticks(engine_of(model), seen, pump(sources, model.workstation.engine.tick)):
+    for out, _ in ticks(
+        engine_of(model), seen, pump(sources, model.workstation.engine.tick, ahead=looks_ahead(model))
+    ):
         first = first or out
         log.add(out)
         say("the given motion", min(1.0, out.t / duration) if duration else 1.0)
@@ -256,7 +258,9 @@ def evaluation(
     if not whole:
         return answer
     duration = max(opened.duration for _, opened in whole)
-    return replace(answer, after=again(pump(whole, model.workstation.engine.tick), duration))
+    return replace(
+        answer, after=again(pump(whole, model.workstation.engine.tick, ahead=looks_ahead(model)), duration)
+    )
 
 
 def played(sources: Sources, rescaled: Rescaled, period: float) -> tuple[Sources, tuple[Finding, ...]]:

@@ -101,6 +101,14 @@ class Posed(State):
         self.doubts: dict[str, str] = {}
         """Why somebody's place may not be relied on, by name; empty when it may."""
         self._said: dict[str, Value | Undecided] = {}
+        self.foresee = self._steady
+
+    def _steady(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
+        """A speed that a place permits is one that is held there; the run of the plan knows better."""
+        if name != self._robot.name:
+            return None
+        q, qd = self.joint_positions(self._robot), self.data.qvel[self.columns[name].own_v]
+        return np.tile(q, (len(t), 1)), np.tile(qd, (len(t), 1)), ""
 
     def place(self, t: float, others_at: float, q: Array, qd: Array, own_doubt: str = "") -> None:
         """Put everybody where they are.

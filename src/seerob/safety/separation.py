@@ -2,9 +2,9 @@ r"""Protective separation distance, ISO/TS 15066:2016 5.5.4.2.3; upper bound: [W
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from msgspec import Meta
@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from seerob import figures, provenance
 from seerob.body_place import BodyPlaces
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge_interval, worst
-from seerob.errors import InputError
+from seerob.errors import InputError, Undecided
 from seerob.model import Gap, Model
 from seerob.norms import iso_13855
 from seerob.sensors.detection import Detection, device_of
@@ -24,6 +24,7 @@ from seerob.stopping.inputs import approach_speed, intrusion
 from seerob.stopping.largest import LargestSeparation
 from seerob.stopping.many_instants import separations
 from seerob.stopping.models import MOVING, Stop, StopModel, bind_stop
+from seerob.stopping.onset import LARGEST_WINDOW
 from seerob.stopping.search import TOP, factor_by_search
 from seerob.stopping.terms import At, Course, separation_distance, way_of_person
 from seerob.stopping.tolerances import SIMULATED, SeparationEnds, intervals, shifted, tolerances
@@ -34,6 +35,17 @@ from seerob.whereabouts.partly_seen import partly_seen
 from seerob.whereabouts.tracking_error import tracking
 
 __all__ = ["Detection", "Separation", "Stop", "separation_bound"]
+
+
+class Required(NamedTuple):
+    """S_p of each moving part."""
+
+    S_p: Array
+    """What is sure from below [m], shape (n,)."""
+    most: Array
+    """A bound from above [m], shape (n,)."""
+    doubt: str
+    """Why it may be still more; empty when it may not."""
 
 
 def separation_bound(v_r: Array, v_h: float, T_r: float, T_s: float, xi: float) -> Array:
@@ -186,26 +198,38 @@ class Separation(Criterion, frozen=True, kw_only=True):
             return separation_distance(course, self.human_speed, self.stop.reaction, K)
         return iso_13855.least_distance(lambda v_h: separation_distance(course, v_h, self.stop.reaction, K))
 
+    def looks_ahead(self, model: Model) -> Mapping[str, float]:
+        """See `Criterion.looks_ahead`: as long as the robot takes to react."""
+        if self.stop.acceleration is not None:
+            return {}
+        worst = self._by_device(model)[0].at_worst(model).stop.reaction
+        return {self._sides(model)[0]: min(worst, LARGEST_WINDOW) + model.workstation.engine.tick}
+
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         own, _, _ = self._by_device(model)
         if self.stop.model == "simulated":
             model.robot(self._sides(model)[0]).require_masses(self.name)
-        ends = SeparationEnds(
-            own._tolerances(),
-            lambda shifts: own._shifted(shifts).required(model),
-            remembers=own.mode == "fixed",
-        )
-        rest = self.unknown(model), LargestSeparation(), ends
+
+        def figure(shifts: Shifts) -> Callable[[State], Array]:
+            required = own._shifted(shifts).required(model)
+            return lambda state: required(state).S_p
+
+        ends = SeparationEnds(own._tolerances(), figure, remembers=own.mode == "fixed")
+        rest = self.unknown(model), (LargestSeparation(), LargestSeparation()), ends
         return partly_seen(model, own._gap(model), lambda gap: own._bound(model, gap, *rest))
 
     def _bound(
-        self, model: Model, gap: Gap, unknown: str, largest: LargestSeparation, ends: SeparationEnds
+        self,
+        model: Model,
+        gap: Gap,
+        unknown_ever: str,
+        largest: tuple[LargestSeparation, LargestSeparation],
+        ends: SeparationEnds,
     ) -> Evaluate:
         stop = self._stop(model)
         C, Z_d, Z_r = self._terms()[0]
         K = C + Z_d + Z_r + gap.deviation
-        unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
         places, names = BodyPlaces(model), [body.name for body in model.bodies]
         ends_of_distance = DistanceEnds(model, gap)
 
@@ -213,13 +237,17 @@ class Separation(Criterion, frozen=True, kw_only=True):
             found = state.closest_per_body(gap, estimates=True)
             course = stop.courses(state)
             now = course(1.0)
-            S_p = self._distance(now, K)
+            S_p, most, doubt = self._required(now, K)
             if self.mode == "fixed":
-                S_p = largest.including(state, S_p)
+                S_p, most = (each.including(state, x) for each, x in zip(largest, (S_p, most), strict=True))
+            unknown = "; ".join(filter(None, (unknown_ever, doubt)))
+            unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
             near, far = ends_of_distance.of_bodies(state, found.distance)
             span = ends.at(state) if ends.tolerances else None
-            spans = intervals(near, far, S_p, span)
-            off_at_all, bodies = span is not None or bool((far > near).any()), found.body_a.tolist()
+            # What its acceleration may add to S_p is as much less distance.
+            spans = intervals(near - (most - S_p), far, S_p, span)
+            open_at_all = span is not None or bool((far > near).any() or (most > S_p).any())
+            bodies = found.body_a.tolist()
             parts = tuple(
                 Result(
                     name=names[body],
@@ -228,7 +256,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
                     limit=least,
                     at_most=False,
                     verdict=self._verdict(ends_of_part, least, bool(unknown)),
-                    interval=ends_of_part if off_at_all else None,
+                    interval=ends_of_part if open_at_all else None,
                     reason=names[bone],
                 )
                 for body, distance, least, ends_of_part, bone in zip(
@@ -243,6 +271,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 widths = np.zeros(0) if span is None else span.widths[:, k]
                 seen = float(far[k] - near[k])
                 open_ = deciding((*ends.tolerances, tracking(seen / 2)), np.append(widths, seen))
+                if most[k] > S_p[k] and bool((most - S_p)[k] >= max(seen, *widths.tolist(), 0.0)):
+                    open_ = (
+                        f"S_p is up to {most[k]:.3f} m if the robot gets faster during the reaction time as "
+                        "its torques allow: give stop.acceleration"
+                    )
             nearest = places.named(state, int(found.body_a[k]), found.point_a[k])
             where = f"{parts[k].name} ↔ {nearest}"
             shown = figures.against(float(found.distance[k]), float(S_p[k]), self.unit, at_most=self.at_most)
@@ -264,7 +297,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 parts=(
                     *parts,
                     *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r)),
-                    *self._permissible(stop, course, now, found.distance, K),
+                    *self._permissible(stop, state, course, now, found.distance, K),
                 ),
                 markers=(segment,),
             )
@@ -301,10 +334,21 @@ class Separation(Criterion, frozen=True, kw_only=True):
             return None
         people, parts = rows_of(gap.a), rows_of(gap.b)
 
+        lasts = self.lasts(model)
+
         def falls(span: Span, _: Array | float) -> Fall:
-            return Fall(span.way(people) + span.fast[parts] * span.T + rises(span))
+            lost = span.way(people) + span.fast[parts] * span.T + rises(span)
+            # What S_p has ahead may leave it at once: the margin at the end says nothing of the way there.
+            return Fall(np.inf, lost) if lasts else Fall(lost)
 
         return falls
+
+    def lasts(self, model: Model) -> bool:
+        """Whether S_p of an instant is at least that of any other in the tick that begins with it.
+
+        But for how fast the robot gets meanwhile, `rises`.
+        """
+        return self._by_device(model)[0]._stop(model).lasts
 
     def rises(self, model: Model) -> Callable[[Span], Array] | None:
         """How much S_p of each of `Mechanism.moving` can change within a span [m]; None where not known."""
@@ -333,20 +377,33 @@ class Separation(Criterion, frozen=True, kw_only=True):
         off = [(part.value or 0.0) - part.interval[0] if part.interval else 0.0 for part in parts]
         return np.array(far), np.array(off)
 
-    def required(self, model: Model) -> Callable[[State], Array]:
-        """S_p of each of `Mechanism.moving` of the robot [m], in that order; to be asked at every tick."""
+    def _required(self, now: Course, K: float) -> Required:
+        S_p = self._distance(now, K)
+        most = S_p if now.most is None else np.maximum(self._distance(now.most, K), S_p)
+        doubts = (now.doubt, "" if now.most is None else now.most.doubt)
+        return Required(S_p, most, "; ".join(dict.fromkeys(filter(None, doubts))))
+
+    def required(self, model: Model) -> Callable[[State], Required]:
+        """S_p of each of `Mechanism.moving` of the robot, in that order; to be asked at every tick."""
         own, _, _ = self._by_device(model)
-        stop, largest = own._stop(model), LargestSeparation()
+        stop, largest = own._stop(model), (LargestSeparation(), LargestSeparation())
         K = sum(own._terms()[0]) + own._gap(model).deviation
 
-        def at(state: State) -> Array:
-            S_p = own._distance(stop.courses(state)(1.0), K)
-            return largest.including(state, S_p) if own.mode == "fixed" else S_p
+        def at(state: State) -> Required:
+            found = own._required(stop.courses(state)(1.0), K)
+            if own.mode != "fixed":
+                return found
+            S_p, most = (each.including(state, x) for each, x in zip(largest, found[:2], strict=True))
+            return Required(S_p, most, found.doubt)
 
         return at
 
     def inverse(self, model: Model) -> Callable[[State, Array], tuple[Array, tuple[Result, ...]]]:
-        """S_p of every moving part [m] and the largest permissible speed, at given distances of them [m]."""
+        """S_p of every moving part [m] and the largest permissible speed, at given distances of them [m].
+
+        Raises:
+            Undecided: When asked, where S_p may be larger than what is computed.
+        """
         if self.sensor is not None:
             return self._by_device(model)[0].inverse(model)
         gap, stop = self._gap(model), self._stop(model)
@@ -355,21 +412,35 @@ class Separation(Criterion, frozen=True, kw_only=True):
         def at(state: State, distance: Array) -> tuple[Array, tuple[Result, ...]]:
             course = stop.courses(state)
             now = course(1.0)
-            return self._distance(now, K), self._permissible(stop, course, now, distance, K)
+            required = self._required(now, K)
+            if required.doubt:
+                raise Undecided(required.doubt)
+            return required.most, self._permissible(stop, state, course, now, distance, K)
 
         return at
 
     def _permissible(
-        self, stop: StopModel, course: At, now: Course, distance: Array, K: float
+        self, stop: StopModel, state: State, course: At, now: Course, distance: Array, K: float
     ) -> tuple[Result, ...]:
         """Largest speed of the robot's fastest point for which no part is nearer than its S_p."""
         speed, factor, reason = None, None, ""
-        if stop.inverse is not None:
+
+        def S_p(scale: float) -> Array:
+            required = self._required(course(scale), K)
+            if required.doubt:
+                raise Undecided(required.doubt)
+            return required.most
+
+        if now.doubt or (now.most is not None and now.most.doubt):
+            reason = "S_p is at least what is shown: no speed follows"
+        elif stop.inverse is not None:
             given = self.human_speed
             v_h = iso_13855.speed_at(distance) if given is None else np.full(len(distance), given)
-            speed, factor = stop.inverse(now.v_r, distance, v_h, K)
+            least, most = stop.reactions(state)
+            onset = least if most is None else most
+            speed, factor = stop.inverse(onset(0.0), onset(1.0), distance, v_h, K)
         elif now.v_r.max() > MOVING:
-            factor = factor_by_search(lambda s: self._distance(course(s), K), distance, stop.costly)
+            factor = factor_by_search(S_p, distance, stop.costly)
             speed = factor * float(now.v_r.max())
             reason = "or more" if factor == (1.0 if stop.costly else TOP) else ""
         else:

@@ -67,7 +67,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         """See `Criterion.bind`."""
         criterion = self._criterion(model)
         moving, outside = self._sides(model)
-        required: Callable[[State], Array] = criterion.required(model)
+        required = criterion.required(model)
 
         def bound(outside: tuple[int, ...]) -> Evaluate:
             return self._bound(model, moving, outside, required, criterion.unknown(model))
@@ -83,8 +83,8 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         model: Model,
         moving: tuple[int, ...],
         outside: tuple[int, ...],
-        required: Callable[[State], Array],
-        unknown: str,
+        required: Callable[[State], Any],
+        unknown_ever: str,
     ) -> Evaluate:
         gap = model.gap(moving, outside)
         off = TrackingError(model, outside)
@@ -92,12 +92,14 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
 
         def evaluate(state: State) -> Result:
             state.require_bodies((*moving, *outside))
-            S_p = required(state)
+            S_p, most, more = required(state)
+            unknown = "; ".join(filter(None, (unknown_ever, more)))
             found = state.distances(gap.query, Per.PAIR)
             room = found.distance.reshape(len(moving), len(outside)) - S_p[:, None]
             nearest = room.argmin(axis=0)
             least = room[nearest, np.arange(len(outside))]
-            may = off.at(state) + gap.deviation
+            # What the robot's acceleration may add to S_p is as much less room.
+            may = off.at(state) + gap.deviation + float((most - S_p).max())
             surely = float((least - may).min())
             k, perhaps = int(least.argmin()), int((least - may).argmin())
             doubt = self._doubt(model, outside[perhaps], float(least[perhaps]), float(may[perhaps]), unknown)
@@ -159,14 +161,15 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
 
     def falls(self, model: Model, points: Points) -> Falls | None:
         """See `Criterion.falls`; where S_p follows from speeds alone."""
-        rises = self._criterion(model).rises(model)
+        rises, lasts = self._criterion(model).rises(model), self._criterion(model).lasts(model)
         if rises is None:
             return None
         moving, outside = map(rows_of, self._sides(model))
 
         def falls(span: Span, _: Array | float) -> Fall:
             nearer = span.fast[moving] * span.T + rises(span)
-            return Fall(span.way(outside) + float(nearer.max(initial=0.0)))
+            lost = span.way(outside) + float(nearer.max(initial=0.0))
+            return Fall(np.inf, lost) if lasts else Fall(lost)
 
         return falls
 

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import mujoco
 import numpy as np
-from msgspec.structs import replace
+from msgspec.structs import replace as changed
 
-from seerob.errors import InputError, Undecided
-from seerob.model import Body, Gap, Mechanism, Model
+from seerob.errors import InputError
+from seerob.model import Gap, Mechanism, Model
 from seerob.snapshot import Input, Origin
 from seerob.state import State
+from seerob.stopping.onset import Levers, Onset
 from seerob.stopping.table import JointStop, SpeedStop, StoppingTable, interpolate, joint_stop
-from seerob.stopping.terms import At, Course, course, travel
-from seerob.transforms import Array
+from seerob.stopping.terms import Braking, Course, braking, travel
 
-Bound = tuple[Callable[[State], At], tuple[Input, ...]]
+Bound = tuple[Braking, Callable[[Onset], Course] | None, tuple[Input, ...]]
 
 
 def not_its_own(table: StoppingTable, model: Model, robot: Mechanism) -> str:
@@ -32,7 +33,6 @@ def not_its_own(table: StoppingTable, model: Model, robot: Mechanism) -> str:
 
 def bind_table(
     table: StoppingTable,
-    T_r: float,
     others: float | None,
     model: Model,
     robot: Mechanism,
@@ -40,13 +40,13 @@ def bind_table(
     *,
     rated_payload: float | None = None,
 ) -> Bound:
-    """Course of a robot's moving parts by its stopping table, and the inputs that it needs.
+    """How a robot's moving parts brake by its stopping table, and the inputs that it needs.
 
-    Both kinds of tables are undecided above their largest payload, and where the payload is not known.
+    Beyond a table, and where the payload is not known, what the table has at its end is a bound from below:
+    figures that fall along an axis are not used, so none is less farther on. The course says so.
 
     Args:
         table: The maker's figures.
-        T_r: Reaction time [s].
         others: Stopping time of joints that the table does not have [s], None when nobody gave one.
         model: The workstation.
         robot: Who stops.
@@ -67,7 +67,7 @@ def bind_table(
     said = Origin.MISSING if table.rated_payload is None else Origin.STATED
     source = f"{table.source} ({table.confidence})"
     if rated_payload is not None:
-        table = replace(table, rated_payload=rated_payload)
+        table = changed(table, rated_payload=rated_payload)
         said, source = Origin.GIVEN, "workstation file"
     load = _payload(model, robot)
     inputs = (
@@ -87,88 +87,104 @@ def bind_table(
         ),
     )
     if table.tool is not None:
-        return _by_tool_speed(table, table.tool, T_r, robot, gap, load), inputs
-    return _by_joint(table, T_r, others, model, robot, gap, load), inputs
+        by_onset = _by_tool_speed(table, table.tool, robot, load)
+        return lambda state: lambda onset, scale: by_onset(onset), by_onset, inputs
+    return _by_joint(table, others, model, robot, gap, load), None, inputs
 
 
 def _by_tool_speed(
-    table: StoppingTable, tool: SpeedStop, T_r: float, robot: Mechanism, gap: Gap, load: float
-) -> Callable[[State], At]:
-    def courses(state: State) -> At:
-        share = _payload_share(table, robot, load)
-        if not share <= 1 + 1e-9:
-            raise Undecided(f"payload is {share:.3g} of the rated payload, at which the stopping table ends")
-        v = state.fastest_points(gap.b)[0]
-        # Any point counts as the tool's: the fastest decides for all.
-        top = float(v.max())
-        return lambda scale: course(
-            scale * v, T_r, interpolate([tool.speed], np.array(tool.time), [scale * top])
-        )
+    table: StoppingTable, tool: SpeedStop, robot: Mechanism, load: float
+) -> Callable[[Onset], Course]:
+    share, unknown = _payload_share(table, robot, load)
+    if share > 1 + 1e-9:
+        unknown = f"payload is {share:.3g} of the rated payload, at which the stopping table ends"
 
-    return courses
+    def after(onset: Onset) -> Course:
+        # Any point counts as the tool's: the fastest decides for all.
+        top, end = float(onset.v_s.max()), tool.speed[-1]
+        beyond = f"{top:.3g} m/s is beyond the stopping table, which ends at {end:g} m/s"
+        T_s = interpolate([tool.speed], np.array(tool.time), [min(top, end)])
+        doubts = (onset.doubt, unknown, beyond if top > end * (1 + 1e-9) else "")
+        return braking(replace(onset, doubt="; ".join(filter(None, doubts))), T_s)
+
+    return after
 
 
 def _by_joint(
     table: StoppingTable,
-    T_r: float,
     others: float | None,
     model: Model,
     robot: Mechanism,
     gap: Gap,
     load: float,
-) -> Callable[[State], At]:
+) -> Braking:
     entries = {entry.joint: entry for entry in table.joints}
     full = [_full_speed(entries.get(j), robot, j) for j in range(len(robot.joints))]
-    chains = [_chain(model, robot, model.bodies[i]) for i in gap.b]
-    kinds = model.mj.jnt_type[model.mj.dof_jntid[robot.v_address]]
-    turns = kinds == mujoco.mjtJoint.mjJNT_HINGE
+    levers = Levers(model, robot, gap)
+    share, unknown = _payload_share(table, robot, load)
 
-    def joint(j: int, speed: float, extension: float) -> tuple[float, float]:
+    def joint(j: int, speed: float, extension: float) -> tuple[float, float, str]:
+        """Way, time, and why both may be more."""
         name = robot.joints[j].name
         if speed == 0.0:
-            return 0.0, 0.0
+            return 0.0, 0.0, ""
         if j not in entries:
             if others is None:
-                raise Undecided(f"{name}: not in the stopping table, and stop.stopping is not given")
-            return speed * others, others
-        whole = full[j]
+                return 0.0, 0.0, f"{name}: not in the stopping table, and stop.stopping is not given"
+            return speed * others, others, ""
+        entry, whole = entries[j], full[j]
         if not whole:
-            raise Undecided(f"{name}: neither the stopping table nor the robot says what full speed is")
-        share = _payload_share(table, robot, load)
-        way, time = joint_stop(entries[j], speed / whole, share, extension)
-        return min(way, speed * time), time
+            return 0.0, 0.0, f"{name}: neither the stopping table nor the robot says what full speed is"
+        asked = (speed / whole, share, extension)
+        axes = (entry.speed, entry.payload, entry.extension)
+        within = tuple(min(x, axis[-1]) for x, axis in zip(asked, axes, strict=True))
+        beyond = next(
+            (
+                f"{name}: {what} is {x:.3g} of the full figure, the stopping table ends at {axis[-1]:g}"
+                for what, x, axis in zip(("speed", "payload", "extension"), asked, axes, strict=True)
+                if x > axis[-1] * (1 + 1e-9)
+            ),
+            "",
+        )
+        way, time = joint_stop(entry, *within)
+        return min(way, speed * time), time, beyond or unknown
 
-    def courses(state: State) -> At:
-        speeds = np.abs(state.qd(robot))
-        v = state.fastest_points(gap.b)[0]
-        levers = [_levers(state, robot, chain, index) for chain, index in zip(chains, gap.b, strict=True)]
+    def bound(state: State) -> Callable[[Onset, float], Course]:
+        chains = levers.at(state)
         extension = _extension(state, robot) / table.reach if table.reach is not None else 1.0
 
-        def at(scale: float) -> Course:
-            stops = [joint(j, float(scale * speed), extension) for j, speed in enumerate(speeds)]
-            ways = T_r * scale * speeds + np.array([way for way, _ in stops])
-            every = np.abs(robot.coupling) @ ways
-            total = np.array(
-                [travel(turns[c], every[c], arms) for c, arms in zip(chains, levers, strict=True)]
-            )
+        def at(onset: Onset, scale: float) -> Course:
+            speeds, ways, doubt = onset.speeds, onset.ways, onset.doubt
+            if speeds is None or ways is None:
+                speeds, ways = scale * np.abs(state.qd(robot)), np.zeros(len(robot.joints))
+                doubt = (
+                    "an acceleration of points says nothing of joints, and the stopping table is by joints: "
+                    f"give acceleration_limits of {robot.name} instead of stop.acceleration"
+                )
+            stops = [joint(j, float(speed), extension) for j, speed in enumerate(speeds)]
+            every = np.abs(robot.coupling) @ (ways + np.array([way for way, _, _ in stops]))
+            total = np.array([travel(turns.tolist(), every[rows], arms) for turns, rows, arms in chains])
             # What the way of both exceeds the reaction's by; the lever may grow during the reaction.
-            S_r = scale * v * T_r
-            return Course(scale * v, S_r, np.maximum(total - S_r, 0.0), max(time for _, time in stops))
+            beside = np.maximum(total - onset.S_r, 0.0)
+            doubts = dict.fromkeys((doubt, *(why for _, _, why in stops)))
+            longest = max(time for _, time, _ in stops)
+            return Course(onset.v_r, onset.S_r, beside, longest, "; ".join(filter(None, doubts)))
 
         return at
 
-    return courses
+    return bound
 
 
-def _payload_share(table: StoppingTable, robot: Mechanism, load: float) -> float:
+def _payload_share(table: StoppingTable, robot: Mechanism, load: float) -> tuple[float, str]:
+    """Share of the rated payload, and why it is not known: then 0, where a robot stops soonest."""
     if table.rated_payload is None:
-        raise Undecided(
+        return 0.0, (
             f"the stopping table of {table.robot} does not say for which payload it holds: give "
             "stop.rated_payload, from the robot's data sheet"
         )
     if not np.isfinite(load):
-        raise Undecided("; ".join(robot.unknown_masses))
-    return load / table.rated_payload
+        return 0.0, "; ".join(robot.unknown_masses)
+    return load / table.rated_payload, ""
 
 
 def _full_speed(entry: JointStop | None, robot: Mechanism, j: int) -> float | None:
@@ -184,32 +200,6 @@ def _payload(model: Model, robot: Mechanism) -> float:
         return float("nan")
     bodies = [model.mj.body(int(i)) for i in robot.mj_bodies]
     return float(sum(body.mass[0] for body in bodies if body.name not in robot.links))
-
-
-def _chain(model: Model, robot: Mechanism, body: Body) -> Array:
-    """Joints of a robot that move a body, from the base outward, as rows of its coupling, shape (k,)."""
-    found: list[int] = []
-    at = body.mj
-    while at:
-        here = [row for row, dof in enumerate(robot.v_address) if model.mj.dof_bodyid[dof] == at]
-        found = here + found
-        at = int(model.mj.body_parentid[at])
-    return np.array(found, np.int64)
-
-
-def _levers(state: State, robot: Mechanism, chain: Array, index: int) -> Array:
-    """Largest distance of a body from each axis of its chain [m], shape (k,)."""
-    body = state.model.bodies[index]
-    if index in state.bearers.away:
-        return np.zeros(len(chain))
-    joints = state.model.mj.dof_jntid[robot.v_address[chain]]
-    R, x = state.placed((index,))
-    data = state.data_of(robot.name)
-    corners = x[index] + body.corners @ R[index].T
-    arms = corners[None] - data.xanchor[joints][:, None]
-    along = np.einsum("kci,ki->kc", arms, data.xaxis[joints])
-    squares = np.einsum("kci,kci->kc", arms, arms) - along**2
-    return np.asarray(np.sqrt(np.maximum(squares, 0.0).max(axis=1)) + body.radius + body.deviation)
 
 
 def _extension(state: State, robot: Mechanism) -> float:

@@ -11,7 +11,8 @@ from seerob.criterion import EvaluateMany
 from seerob.model import Gap
 from seerob.states import States
 from seerob.stopping.models import SHARES, Stop
-from seerob.stopping.terms import Course, course
+from seerob.stopping.onset import accelerated
+from seerob.stopping.terms import Course, braking
 from seerob.transforms import Array
 
 
@@ -28,12 +29,16 @@ def separations(
     """
     if stop.model not in SHARES or stop.stopping is None or stop.tolerance is not None:
         return None
+    if stop.acceleration is None:
+        # What the motion does ahead is asked instant by instant.
+        return None
+    a = stop.acceleration
     T_s, share = stop.stopping, SHARES[stop.model]
 
     def evaluate(states: States) -> Answers:
         distance = states.closest_per_body(gap).distance
         v_r, _, _ = states.fastest_points(gap.b)
-        least = S_p(course(v_r, stop.reaction, T_s, share))
+        least = S_p(braking(accelerated(v_r, stop.reaction, a, np.zeros(0)), T_s, share))
         k = (distance - least).argmin(axis=1)[:, None]
         value, limit = (np.take_along_axis(found, k, axis=1)[:, 0] for found in (distance, least))
         found = Answers.against(value, limit, at_most=False)

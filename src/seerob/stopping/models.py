@@ -18,14 +18,18 @@ from seerob.snapshot import Input, Origin
 from seerob.state import State
 from seerob.stopping import table as stopping_table
 from seerob.stopping.by_table import bind_table, not_its_own
+from seerob.stopping.onset import At as OnsetAt
+from seerob.stopping.onset import Onset, accelerated
+from seerob.stopping.reaction import Reactions, bind_reaction
 from seerob.stopping.simulated import Stopped, StopSimulation
 from seerob.stopping.table import StoppingTable
 from seerob.stopping.terms import (
     BOUND,
     CONSTANT,
     At,
+    Braking,
     Course,
-    course,
+    braking,
     largest_factor,
     largest_speed_decelerating,
     largest_speed_in_time,
@@ -36,6 +40,8 @@ SHARE = 0.8
 """Of the torque limits, unless the file says otherwise."""
 SHARES = {"bound": BOUND, "constant_deceleration": CONSTANT}
 """Of v_r T_s, by how a stop is modelled whose time is known."""
+STEADY = 1e-3
+"""Speeds of joints that differ by less during the reaction time are the same [rad/s or m/s]."""
 MOVING = 1e-6
 """Speed above which a robot moves [m/s]."""
 INSTANTS = 16
@@ -78,6 +84,11 @@ class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Share of the torque limits that brakes, with ``simulated``."""
     direction: Literal["path", "toward"] = "path"
     """With ``simulated``: whole path of the part, or how much nearer to the person it comes."""
+    acceleration: Annotated[float, Meta(ge=0, extra={"unit": "m/s²"})] | None = None
+    """How fast any point of the robot may get faster during the reaction time [m/s²]; 0 where your safety
+    controller sees to it. When not given: what a motion from a file is known to do; of a live robot the
+    ``acceleration_limits`` of its table; else what its torque limits and masses allow, and between that and
+    none the verdict is undecided."""
     tolerance: StopTolerance | None = None
     """How far ``reaction``, ``stopping`` and ``deceleration`` may be off, either way."""
 
@@ -120,9 +131,10 @@ Courses = Callable[[State], At]
 """Course of the moving parts from where they are now; may raise `Undecided`."""
 
 
-Inverse = Callable[[Array, Array, Array, float], tuple[float, float | None]]
+Inverse = Callable[[Onset, Onset, Array, Array, float], tuple[float, float | None]]
 """Largest permissible speed of the fastest part [m/s], and as a factor of the present speeds (None at rest),
-from speeds [m/s] (n,), distances [m] (n,), approach speeds of the person [m/s] (n,) and K [m]."""
+from the onsets at rest and at the present speeds, distances [m] (n,), approach speeds of the person [m/s]
+(n,) and K [m]."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +142,8 @@ class StopModel:
     """A way to stop, bound to a robot and what it is to keep away from."""
 
     courses: Courses
+    reactions: Reactions
+    """What it does before it brakes."""
     formula: str
     """Of S_s."""
     inputs: tuple[Input, ...]
@@ -139,9 +153,27 @@ class StopModel:
     inverse: Inverse | None = None
     """In closed form, where there is one."""
     by_speed: Callable[[Array], Course] | None = None
-    """The course of parts of given speeds [m/s], where nothing else counts; never shorter for higher ones."""
+    """The course of parts of given speeds [m/s] that are held, or get faster as given, where nothing else
+    counts; never shorter for higher ones."""
+    lasts: bool = False
+    """Whether what is known ahead is in a course: then it is that of the whole tick that begins with it."""
     costly: bool = False
     """Takes milliseconds: searches ask it seldom."""
+
+
+@dataclass(frozen=True)
+class _Brakes:
+    """How a robot brakes, whatever it did before."""
+
+    braking: Braking
+    formula: str
+    inputs: tuple[Input, ...]
+    doubts: tuple[str, ...] = ()
+    not_modelled: tuple[str, ...] = ()
+    by_onset: Callable[[Onset], Course] | None = None
+    """The same, where nothing but that counts."""
+    timed: bool = False
+    costly: bool = False
 
 
 def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel:
@@ -157,27 +189,71 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         InputError: Options that do not fit the robot.
         UnknownName: No such table.
     """
-    if stop.model not in ("table", "simulated"):
-        return _timed(stop, gap)
-    bind = _tabulated if stop.model == "table" else _simulated
+    bind = {"table": _tabulated, "simulated": _simulated}.get(stop.model, _timed)
     found = bind(stop, model, robot, gap)
-    if robot.riders:
-        found = replace(found, courses=_while_riders_rest(found.courses, model, robot))
-    if not robot.on:
+    if not found.timed and robot.riders:
+        found = replace(found, braking=_while_riders_rest(found.braking, model, robot))
+    if not found.timed and robot.on:
+        doubt = f"{robot.on}, which carries {robot.name}, has a way to stop of its own that is not in it"
+        found = replace(found, doubts=(*found.doubts, doubt))
+    by_onset, T_r, a = found.by_onset, stop.reaction, stop.acceleration or 0.0
+    asked, how, left_out = bind_reaction(
+        model, robot, gap, stop.reaction, stop.acceleration, points=stop.model != "simulated"
+    )
+
+    def reactions(state: State) -> tuple[OnsetAt, OnsetAt | None]:
+        found: tuple[OnsetAt, OnsetAt | None] = state.once(("onset", asked), lambda: asked(state))
         return found
-    doubt = f"{robot.on}, which carries {robot.name}, has a way to stop of its own that is not in it"
-    return replace(found, doubts=(*found.doubts, doubt))
+
+    def courses(state: State) -> At:
+        least, most = reactions(state)
+        brake: Callable[[Onset, float], Course] | None = None
+        why = ""
+        try:
+            brake = found.braking(state)
+        except Undecided as reason:
+            why = str(reason)
+
+        def after(onset: Onset, scale: float) -> Course:
+            try:
+                if brake is not None:
+                    return brake(onset, scale)
+                doubts = (onset.doubt, why)
+            except Undecided as reason:
+                doubts = (onset.doubt, str(reason))
+            # It reacts before it brakes: so far it gets whatever the stop is like.
+            least = np.zeros_like(onset.S_r)
+            return Course(onset.v_r, onset.S_r, least, 0.0, "; ".join(filter(None, doubts)))
+
+        def at(scale: float) -> Course:
+            course = after(least(scale), scale)
+            return course if most is None else replace(course, most=after(most(scale), scale))
+
+        return at
+
+    return StopModel(
+        courses,
+        reactions,
+        found.formula,
+        (*found.inputs, how),
+        found.doubts,
+        (*found.not_modelled, *left_out),
+        _inverse(stop) if found.timed else None,
+        None if by_onset is None else lambda v: by_onset(accelerated(v, T_r, a, np.zeros(0))),
+        stop.acceleration is None,
+        found.costly,
+    )
 
 
-def _while_riders_rest(courses: Courses, model: Model, robot: Mechanism) -> Courses:
+def _while_riders_rest(braking: Braking, model: Model, robot: Mechanism) -> Braking:
     """The same, undecided while a machine on the robot moves: neither table nor simulation knows its stop."""
     riders = [model.mechanisms[name] for name in robot.riders]
 
-    def at(state: State) -> At:
+    def at(state: State) -> Callable[[Onset, float], Course]:
         state.require(*robot.riders)
         if name := first_moving(state, riders):
             raise Undecided(f"{name} moves on {robot.name}, and its own way to stop is not known")
-        return courses(state)
+        return braking(state)
 
     return at
 
@@ -186,59 +262,65 @@ def _given(name: str, value: float, unit: str) -> Input:
     return Input(name=name, value=value, unit=unit, origin=Origin.GIVEN, source="workstation file")
 
 
-def fastest(state: State, gap: Gap) -> Array:
-    """Speed of the fastest point of each moving part [m/s], shape (n,)."""
-    return state.fastest_points(gap.b)[0]
-
-
-def _timed(stop: Stop, gap: Gap) -> StopModel:
+def _timed(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
     share, a = SHARES[stop.model], stop.deceleration
     T_s = math.nan if stop.stopping is None else stop.stopping
 
-    def courses(state: State) -> At:
-        v = fastest(state, gap)
-        return lambda scale: by_speed(scale * v)
+    def after(onset: Onset) -> Course:
+        return braking(onset, T_s if a is None else float(onset.v_s.max()) / a, share)
 
-    def by_speed(v: Array) -> Course:
-        return course(v, stop.reaction, T_s if a is None else float(v.max()) / a, share)
-
-    def inverse(v: Array, d: Array, v_h: Array, K: float) -> tuple[float, float | None]:
-        T_r, top = stop.reaction, float(v.max())
-        if top < MOVING:
-            # At rest nobody knows which part will be fastest: each may be.
-            if a is None:
-                return float(largest_speed_in_time(d, v_h, T_r, T_s, K, share).min()), None
-            return float(largest_speed_decelerating(d, v_h, T_r, a, K).min()), None
-        if a is None:
-            factor = largest_factor(v_h * (T_r + T_s) + K - d, v * (T_r + share * T_s))
-        else:
-            factor = largest_factor(v_h * T_r + K - d, v_h * top / a + v * T_r, share * v * top / a)
-        return factor * top, factor
+    def bound(state: State) -> Callable[[Onset, float], Course]:
+        return lambda onset, scale: after(onset)
 
     known = _given("T_s", T_s, "s") if a is None else _given("deceleration", a, "m/s²")
     if share == BOUND:
-        return StopModel(
-            courses,
-            "S_s = v_r T_s",
-            (known,),
-            inverse=inverse,
-            by_speed=by_speed,
-            not_modelled=("deceleration during the stop: full speed is assumed until standstill",),
-        )
-    return StopModel(
-        courses,
-        "S_s = v_r T_s / 2" + ("" if a is None else ", T_s = v / a of the fastest point"),
-        (known,),
-        inverse=inverse,
-        by_speed=by_speed,
-        not_modelled=(
-            "a deceleration that sets in late or is uneven: published tables have joints that travel more "
-            "than half of speed times time (up to 0.51)",
-        ),
+        left_out = "deceleration during the stop: full speed is assumed until standstill"
+        return _Brakes(bound, "S_s = v_s T_s", (known,), not_modelled=(left_out,), by_onset=after, timed=True)
+    left_out = (
+        "a deceleration that sets in late or is uneven: published tables have joints that travel more "
+        "than half of speed times time (up to 0.51)"
     )
+    formula = "S_s = v_s T_s / 2" + ("" if a is None else ", T_s = v_s / a of the fastest point")
+    return _Brakes(bound, formula, (known,), not_modelled=(left_out,), by_onset=after, timed=True)
 
 
-def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel:
+def _inverse(stop: Stop) -> Inverse:
+    """Largest factor of the present speeds in closed form, where a stop's time or deceleration is given."""
+    share, a, T_r = SHARES[stop.model], stop.deceleration, stop.reaction
+    T_s = math.nan if stop.stopping is None else stop.stopping
+
+    def at(rest: Onset, now: Onset, d: Array, v_h: Array, K: float) -> tuple[float, float | None]:
+        top = float(now.v_r.max())
+        if top < MOVING:
+            # At rest nobody knows which part will be fastest: each may be.
+            more, faster = now.S_r - now.v_r * T_r, now.v_s - now.v_r
+            if a is None:
+                left = d - more - share * faster * T_s
+                return float(largest_speed_in_time(left, v_h, T_r, T_s, K, share).min()), None
+            # The speed at which it begins to brake is larger by what it gains until then.
+            gained = float(faster.max())
+            speeds = largest_speed_decelerating(d + gained * T_r - more, v_h, T_r, a, K)
+            return max(float(speeds.min()) - gained, 0.0), None
+        S_0, S_1 = rest.S_r, now.S_r - rest.S_r
+        v_0, v_1 = rest.v_s, now.v_s - rest.v_s
+        if a is None:
+            factor = largest_factor(
+                v_h * (T_r + T_s) + K - d + S_0 + share * v_0 * T_s, S_1 + share * v_1 * T_s
+            )
+        else:
+            t_0 = float(v_0.max())
+            t_1 = float(now.v_s.max()) - t_0
+            factor = largest_factor(
+                v_h * (T_r + t_0 / a) + K - d + S_0 + share * v_0 * t_0 / a,
+                v_h * t_1 / a + S_1 + share * (v_0 * t_1 + v_1 * t_0) / a,
+                share * v_1 * t_1 / a,
+            )
+        return factor * top, factor
+
+    return at
+
+
+def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
     table = stopping_table.table(stop.table) if isinstance(stop.table, str) else stop.table
     if table is None:
         raise InputError.at("stop", "table", "not given", "the name of a table, or a table")
@@ -248,8 +330,8 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopMode
         what = f"{stop.rated_payload:g} kg, and the table of {table.robot} says {table.rated_payload:g} kg"
         raise InputError.at("stop", "rated_payload", what, "leave it out: the table's own holds")
     doubt = not_its_own(table, model, robot) if stop.table_for is None else ""
-    courses, inputs = bind_table(
-        table, stop.reaction, stop.stopping, model, robot, gap, rated_payload=stop.rated_payload
+    by_table, by_onset, inputs = bind_table(
+        table, stop.stopping, model, robot, gap, rated_payload=stop.rated_payload
     )
     source = f"{table.source} ({table.confidence})" + (f"; {table.note}" if table.note else "")
     named = Input(name="stopping table", value=table.robot, origin=Origin.STATED, source=source)
@@ -260,12 +342,12 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopMode
         )
         rest = (said, *rest)
     formula = (
-        "S_s = v_r T_s(v_r)"
+        "S_s = v_s T_s(v_s)"
         if table.tool is not None
         else "S_s from each joint's way times its lever, T_s the longest"
     )
-    return StopModel(
-        courses,
+    return _Brakes(
+        by_table,
         formula,
         (named, *inputs, *rest),
         doubts=(doubt,) if doubt else (),
@@ -274,35 +356,51 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopMode
             "below the table's first speed, payload and extension its first stopping time holds"
             + ("" if table.tool is not None else ", and the lesser of its first way and speed times time"),
         ),
+        by_onset=by_onset,
     )
 
 
-def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel:
+def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
     brakes, origin, source = _brakes(stop, robot)
     unknown = [joint.name for joint, torque in zip(robot.joints, brakes, strict=True) if np.isnan(torque)]
     simulation = StopSimulation(model, robot, brakes, gap.b)
 
-    def courses(state: State) -> At:
+    def bound(state: State) -> Callable[[Onset, float], Course]:
         if unknown:
             raise Undecided(f"{robot.name}: nobody gave the torque limit of {', '.join(unknown)}")
 
-        def at(scale: float) -> Course:
-            stopped = simulation.stop(state, stop.reaction, scale)
+        def once(onset: Onset, scale: float, known: tuple[Array, Array] | None) -> Course:
+            stopped = simulation.stop(state, stop.reaction, scale, known)
             found = stopped.course()
+            S_r = np.maximum(found.S_r, onset.S_r)
             if stop.direction == "path":
-                return found
+                return Course(found.v_r, S_r, found.S_s, found.T_s, onset.doubt)
             nearer = approach(stopped, state, gap)
             # S_r and S_s only count together; neither may be larger than its path.
-            S_r = np.minimum(found.S_r, nearer)
-            return Course(found.v_r, S_r, nearer - S_r, found.T_s)
+            S_r = np.minimum(S_r, nearer)
+            return Course(found.v_r, S_r, nearer - S_r, found.T_s, onset.doubt)
+
+        def at(onset: Onset, scale: float) -> Course:
+            held = once(onset, scale, None)
+            if onset.q is None or onset.qd is None or not np.abs(onset.qd - state.qd(robot)).max() > STEADY:
+                return held
+            # A stop that begins sooner begins at the present speeds.
+            later = once(onset, scale, (onset.q, onset.qd))
+            return Course(
+                held.v_r,
+                np.maximum(held.S_r, later.S_r),
+                np.maximum(held.S_r + held.S_s, later.S_r + later.S_s) - np.maximum(held.S_r, later.S_r),
+                max(held.T_s, later.T_s),
+                onset.doubt,
+            )
 
         return at
 
     shown = ", ".join("?" if np.isnan(b) else f"{b:g}" for b in brakes)
     inputs = (Input(name="brake torques", value=shown, unit="N·m or N", origin=origin, source=source),)
     way = "whole path" if stop.direction == "path" else "loss of distance to where the person is now"
-    return StopModel(
-        courses,
+    return _Brakes(
+        bound,
         f"S_r + S_s: {way} from M q̈ + c + g = τ, |τ_j| ≤ B_j against q̇_j, until standstill",
         inputs,
         doubts=()
@@ -311,7 +409,6 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopMode
         not_modelled=(
             "joint friction, damping and mechanical stops, which would shorten the stop",
             "brakes that act late or one after the other: their delay belongs into the reaction time",
-            "acceleration during the reaction time",
         ),
         costly=True,
     )

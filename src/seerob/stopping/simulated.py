@@ -93,13 +93,21 @@ class StopSimulation:
         self._roots = model.mj.body_rootid[self._ids]
         self._M, self._b = np.zeros((model.mj.nv, model.mj.nv)), np.zeros(model.mj.nv)
 
-    def stop(self, state: State, reaction: float, scale: float = 1.0) -> Stopped:
+    def stop(
+        self,
+        state: State,
+        reaction: float,
+        scale: float = 1.0,
+        known: tuple[Array, Array] | None = None,
+    ) -> Stopped:
         """Stop from where the robot is.
 
         Args:
             state: The twin now; everything but the robot stands still where it is.
             reaction: Time until the brakes act [s].
             scale: Factor on the joint velocities.
+            known: Where its joints are and how fast at even instants of that time, the last at its end;
+                at their present velocities throughout when not given, shape (m, j) each.
 
         Raises:
             Undecided: Not heard, a mass that nobody gave, or brakes that do not bring it to a stand.
@@ -111,11 +119,16 @@ class StopSimulation:
         self._data.qvel[:] = 0.0
         trace = _Trace(self)
         q, v = state.q(self.robot).astype(float), scale * state.qd(self.robot)
-        steps = int(np.ceil(reaction / COASTING_STEP - 1e-9))
+        steps = int(np.ceil(reaction / COASTING_STEP - 1e-9)) if known is None else len(known[0])
         for k in range(steps):
-            self._place(q + k * reaction / steps * v, v)
-            trace.add(k * reaction / steps, q + k * reaction / steps * v, v)
+            at, speed = q + k * reaction / steps * v, v
+            if known is not None and k:
+                at, speed = known[0][k - 1], known[1][k - 1]
+            self._place(at, speed)
+            trace.add(k * reaction / steps, at, speed)
         t, q = reaction, q + reaction * v
+        if known is not None:
+            q, v = known[0][-1].astype(float), known[1][-1].astype(float)
         while True:
             self._place(q, v)
             trace.add(t, q, v)

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from seerob.state import State
+from seerob.stopping.onset import Onset
 from seerob.transforms import Array
 
 BOUND, CONSTANT = 1.0, 0.5
@@ -37,15 +39,26 @@ class Course:
     """Way while braking [m], shape (n,)."""
     T_s: float
     """Stopping time [s]."""
+    doubt: str = ""
+    """Why it may be more than this."""
+    most: Course | None = None
+    """A bound from above, where this is one from below."""
 
 
 At = Callable[[float], Course]
 """The course with all speeds multiplied by a factor."""
+Braking = Callable[[State], Callable[[Onset, float], Course]]
+"""From a state to what follows from an onset, with the factor on the present speeds that it has."""
 
 
 def way_of_person(v_h: float, T_r: float, T_s: Array | float) -> Array:
     """S_h of a person who comes near at constant speed [m]; a person who recedes counts as standing."""
     return np.asarray(max(v_h, 0.0) * (T_r + np.asarray(T_s)))
+
+
+def braking(onset: Onset, T_s: float, share: float = BOUND) -> Course:
+    """Course of parts that do something known before a stop that takes a known time; as `course`."""
+    return Course(onset.v_r, onset.S_r, share * onset.v_s * T_s, T_s, onset.doubt)
 
 
 def course(v_r: Array, T_r: float, T_s: float, share: float = BOUND) -> Course:

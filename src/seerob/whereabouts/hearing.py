@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -124,6 +125,19 @@ class Hearing:
             speed = f"{self.leaves_at:.3g} rad/s or m/s"
             return f"what drives it ends in motion, with {speed} at {last:.3f} s: nobody says that it stopped"
         return next((reason for _, reason in self.heard[k - 1 : k + 1] if reason), "")
+
+    def doubt_ahead(self, t: float, until: float) -> str:
+        """Why what was heard does not tell what it does from ``t`` to ``until`` [s]; empty when it does."""
+        for (a, _), (b, reason) in pairwise(self.heard):
+            if t + SLACK < b and a < until - SLACK:
+                if reason:
+                    return reason
+                if b - a > self.timeout + SLACK:
+                    return f"nothing is heard from {a:.3f} s to {b:.3f} s"
+        last = self.heard[-1][0] if self.heard else -np.inf
+        if last < until - SLACK and self.leaves_at > STANDS:
+            return f"its motion ends at {last:.3f} s, and what it does after is not known"
+        return ""
 
     def doubted(self, t: float) -> tuple[PartDoubt, ...]:
         """Bones that may not be relied on at ``t`` [s], with the reasons."""

@@ -24,7 +24,7 @@ def clamped(station: Station, regions: tuple[str, ...] = (HAND, CHEST), **motion
     """Which bodies clamp each region."""
     robot = station.model.robot("arm")
     state = state_at(station, **motion)
-    flags, _ = Clamping(station.model, robot, {}, regions, None).at(
+    flags, *_ = Clamping(station.model, robot, {}, regions, None).at(
         state, np.ones((len(robot.moving), len(regions)), bool)
     )
     names = [station.model.bodies[i].name for i in robot.moving]
@@ -76,6 +76,22 @@ def test_an_elbow_that_folds_on_a_hand_is_not_within_where_a_free_hand_would_be(
     assert ", clamped, " in folding.reason
     # 140 N against M/2 = 8 kg alone.
     assert folding.limit <= 140 / math.sqrt(8 * 75e3) + 1e-12
+
+
+def test_two_links_that_come_against_each_other_count_with_how_fast_they_close(tmp_path: Path) -> None:
+    """The outer link stands in the world while the inner one folds onto it, at half the speed each."""
+    station = made(
+        tmp_path,
+        f'{FLOATING}{ARM}[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\nfloor = false\n'
+        'mass = "simplified"\ncontact_area = { arm = 1e-4 }\n',
+        {"arm.urdf": two_r()},
+    )
+    q, w = 2.9, 0.2
+    found = results_at(station, arm=((0.0, q), (-w, 2 * w)))["pfl"]
+    part = next(part for part in found.parts if part.name == HAND)
+    assert ", clamped, " in part.reason
+    # l1 turns at w about its base, and its own end by about 1 m · w; l2 comes against it at 2 w.
+    assert part.value >= 0.9 * 2 * w * 0.7
 
 
 def test_once_folded_enough_it_stays_so_until_it_is_shut(tmp_path: Path) -> None:

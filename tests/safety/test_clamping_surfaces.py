@@ -234,3 +234,31 @@ def test_lowest_point_and_fall_of_a_dilated_mesh_are_those_of_its_vertices() -> 
     brute = np.array([(x + a)[:, 2].min(), -(v + np.cross(w, a))[:, 2].min()])
     assert found[1, 0] <= brute[0] < found[1, 0] + 1e-4
     assert found[1, 1] >= brute[1] > found[1, 1] - 1e-2
+
+
+# -- other robots -------------------------------------------------------------------------------
+
+
+def test_two_robots_that_come_against_each_other_count_with_both_speeds(tmp_path: Path) -> None:
+    """Two straight arms side by side, 0.2 m apart, that turn towards each other or the same way."""
+    other = TWO_R.replace('name = "arm"', 'name = "other"') + "base = { position = [0, 0.3, 0] }\n"
+    station = cell(tmp_path, other)
+
+    def hand(mine: float, others: float) -> Result:
+        found = results_at(station, arm=((0, 0), (mine, 0.0)), other=((0, 0), (others, 0.0)))["pfl"]
+        return next(p for p in found.parts if p.name == "Chest")
+
+    alone, towards, along = hand(0.1, 0.0), hand(0.1, -0.1), hand(0.1, 0.1)
+    assert clamped(alone)
+    assert clamped(towards)
+    assert towards.value == pytest.approx(2 * alone.value, rel=0.1)
+    assert towards.limit == alone.limit
+    # They turn about axes that lie beside each other: like one body, but for that.
+    assert along.value <= alone.value * 1.001
+
+
+def test_beside_a_robot_that_nobody_moves_an_arm_says_what_it_says_beside_a_wall(tmp_path: Path) -> None:
+    beside = regions(cell(tmp_path / "a", part("wall", (2, 0.1, 0.1), (1, 0.3, 0))))
+    other = TWO_R.replace('name = "arm"', 'name = "other"') + "base = { position = [0, 0.3, 0] }\n"
+    found = results_at(cell(tmp_path / "b", other), arm=((0, 0), (0.2, 0.0)), other=((0, 0), (0, 0)))["pfl"]
+    assert {p.name: p.limit for p in found.parts} == {n: p.limit for n, p in beside.items()}

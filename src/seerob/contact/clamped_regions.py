@@ -105,14 +105,16 @@ class Clamping:
         self._joints = JointGaps(
             model, robot, by_one, self._thickness, np.maximum(fits - deviation, 0.0), least=least
         )
-        self._moving, self._surfaces = robot.moving, pairs.surfaces
+        self._moving = robot.moving
         self._floor = None if floor is None else FloorGap(model, robot.moving, floor)
         self._asked = tuple(b.index for b in others)
         # All that carries a surface: where a machine is not known, nor are the gaps to it.
         self._carriers = [name for name, m in model.mechanisms.items() if m.role != "human"]
 
-    def at(self, state: State, wanted: Flags) -> tuple[Flags, Flags]:
-        """Which moving bodies clamp which regions, and which of those against the floor.
+    def at(self, state: State, wanted: Flags) -> tuple[Flags, Flags, Array]:
+        """Which moving bodies clamp which regions, which of those against the floor, and how fast.
+
+        That is against what moves itself [m/s], shape (b, r): both sides may be slower than they close.
 
         Args:
             state: The twin.
@@ -123,19 +125,16 @@ class Clamping:
         """
         state.require(*self._carriers)
         if not wanted.any():
-            return np.zeros_like(wanted), np.zeros_like(wanted)
-        speeds = state.fastest_points(self._moving)[0], self._fastest_surface(state)
-        twists = state.body_velocities(self._asked)
-        clamped = self._gaps.clamped(*state.placed(self._asked), twists, speeds, wanted)
-        clamped |= self._joints.clamped(state, wanted)
+            return np.zeros_like(wanted), np.zeros_like(wanted), np.zeros(wanted.shape)
+        v, twists = state.fastest_points(self._moving)[0], state.body_velocities(self._asked)
+        clamped, speeds = self._gaps.clamped(*state.placed(self._asked), twists, v, wanted)
+        at_joints = self._joints.speeds(state, wanted)
+        clamped |= at_joints > 0
+        speeds = np.maximum(speeds, at_joints)
         if self._floor is None:
-            return clamped, np.zeros_like(clamped)
+            return clamped, np.zeros_like(clamped), speeds
         floor = self._floor.clamped(state, self._thickness, wanted)
-        return clamped | floor, floor
-
-    def _fastest_surface(self, state: State) -> float:
-        """Speed of the fastest point of any surface [m/s]."""
-        return float(state.fastest_points(self._surfaces)[0].max()) if self._surfaces else 0.0
+        return clamped | floor, floor, speeds
 
 
 def floor_input(height: float | None) -> Input:

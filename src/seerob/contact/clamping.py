@@ -97,9 +97,9 @@ class PinchPairs:
     second: NDArray[np.int64]
     """Row in ``moving`` of the other side, -1 when it does not move or is a surface, shape (g,)."""
     across: NDArray[np.int64]
-    """Body of the other side, -1 of the gaps to any of the surfaces, shape (g,)."""
-    surfaces: tuple[int, ...]
-    """Bodies of the environment and of other robots."""
+    """Body of the other side, -1 of the gaps to any of the surfaces that stand, shape (g,)."""
+    inner: Flags
+    """Whether it is between two parts of the robot, shape (g,)."""
 
     def gaps(self, rotations: Array, positions: Array) -> tuple[Array, NDArray[np.int64]]:
         """Gaps [m] and the body on the other side (-1 beyond the cap), shape (g,).
@@ -120,6 +120,14 @@ class PinchPairs:
         found = [query.batch(rotations, positions, per).distance for query, per in self.queries]
         return np.concatenate([np.zeros((len(rotations), 0)), *found], axis=1)
 
+    def fastest(self, clamped: Flags, speed: Array) -> Array:
+        """Of gaps (g, r) and their speeds (g,) the largest that a moving body clamps at, 0: none, (b, r)."""
+        found = np.zeros((len(self.moving), clamped.shape[1]))
+        for side in (self.first, self.second):
+            for gap in np.flatnonzero((side >= 0) & (self.across >= 0) & clamped.any(axis=1)):
+                found[side[gap]] = np.maximum(found[side[gap]], np.where(clamped[gap], speed[gap], 0.0))
+        return found
+
     def per_body(self, clamped: Flags) -> Flags:
         """Of gaps (..., g, r), which moving bodies clamp: shape (..., b, r)."""
         found = np.zeros((*clamped.shape[:-2], len(self.moving), clamped.shape[-1]), bool)
@@ -137,6 +145,7 @@ def pinch_pairs(
     surfaces: Sequence[int],
     apart: frozenset[tuple[int, int]],
     *,
+    others: Sequence[int] = (),
     still: Sequence[int] = (),
     cap: float,
 ) -> PinchPairs:
@@ -145,7 +154,8 @@ def pinch_pairs(
     Args:
         shapes: Of the model.
         moving: Bodies that the robot's joints move.
-        surfaces: Bodies of the environment and of other robots.
+        surfaces: Bodies around that stand.
+        others: Bodies of other robots and of machines, which move.
         apart: Pairs of the robot's own bodies that are one, or that are judged place by place.
         still: The robot's own bodies that its joints do not move.
         cap: Largest gap that matters [m].
@@ -159,6 +169,12 @@ def pinch_pairs(
         first += range(len(moving))
         second += [-1] * len(moving)
         across += [-1] * len(moving)
+    if moving and others:
+        queries.append((Query(shapes, others, moving, cap=cap), Per.PAIR))
+        first += [*range(len(moving))] * len(others)
+        second += [-1] * (len(moving) * len(others))
+        across += [other for other in dict.fromkeys(others) for _ in moving]
+    outside = len(first)
     own = [*moving, *still]
     for row, body in enumerate(moving):
         others = [
@@ -171,7 +187,7 @@ def pinch_pairs(
             across += [own[k] for k in others]
     return PinchPairs(
         tuple(moving), tuple(queries), np.array(first, np.int64), np.array(second, np.int64),
-        np.array(across, np.int64), tuple(surfaces) if moving else (),
+        np.array(across, np.int64), np.arange(len(first)) >= outside,
     )  # fmt: skip
 
 
@@ -254,13 +270,15 @@ def robot_pinch_pairs(
     """
     own = (*robot.bodies, *robot.carried)
     still = [i for i in own if i not in robot.moving]
-    surfaces = [b.index for b in model.bodies if b.role not in ("human", "area") and b.index not in own]
+    around = [b for b in model.bodies if b.role not in ("human", "area") and b.index not in own]
+    surfaces = [b.index for b in around if not b.mover]
+    others = [b.index for b in around if b.mover]
     joints = OwnJoints(model)
     between = {(i, j): joints.between(i, j) for i in own for j in own if i < j}
     one = [(i, j, next(iter(of))) for (i, j), of in between.items() if len(of) == 1]
     apart = frozenset(pair for pair, of in between.items() if len(of) < 2)
-    pairs = pinch_pairs(model.shapes, robot.moving, surfaces, apart, still=still, cap=cap)
-    inner = pairs.across >= 0
+    pairs = pinch_pairs(model.shapes, robot.moving, surfaces, apart, others=others, still=still, cap=cap)
+    inner = pairs.inner
     widest = np.full(len(pairs.first), np.inf)
     if inner.any():
         every = sorted(set().union(*between.values()))
@@ -269,6 +287,6 @@ def robot_pinch_pairs(
         poses = joints.poses(
             {c: lo + draws[:, k] * (hi - lo) for k, (c, (lo, hi)) in enumerate(zip(every, ends, strict=True))}
         )
-        own_pairs = [query for query, per in pairs.queries if per is Per.PAIR]
+        own_pairs = [query for query, per in pairs.queries if per is Per.PAIR and query.a[0] in own]
         widest[inner] = np.concatenate([q.batch(*poses, Per.PAIR).distance.max(axis=0) for q in own_pairs])
     return pairs, widest, one

@@ -39,48 +39,50 @@ class ClosingGaps:
         self._hulls = stacked([_corners(shapes, body) for body in range(len(shapes.names))])
         moving = np.array(pairs.moving, np.int64)
         first = moving[pairs.first] if len(pairs.first) else pairs.first
-        self._inner = pairs.across >= 0
-        self._own = np.ascontiguousarray(np.column_stack([pairs.across, first])[self._inner])
+        self._seen = pairs.across >= 0
+        self._pair = np.ascontiguousarray(np.column_stack([pairs.across, first])[self._seen])
 
     def clamped(
         self,
         rotations: Array,
         positions: Array,
         twists: tuple[Array, Array],
-        speeds: tuple[Array, float],
+        speeds: Array,
         wanted: Flags,
-    ) -> Flags:
+    ) -> tuple[Flags, Array]:
         """Which moving bodies clamp which body parts now.
 
         Args:
             rotations: world_from_body of every body, shape (n, 3, 3).
             positions: Likewise [m], shape (n, 3).
             twists: Velocities of their origins [m/s] and angular ones [rad/s], world axes, shape (n, 3) each.
-            speeds: Of the fastest point of each moving body, shape (b,), and of any surface [m/s].
+            speeds: Of the fastest point of each moving body [m/s], shape (b,).
             wanted: Of which bodies, that move now, and which body parts that matters, shape (b, r).
 
         Returns:
-            Shape (b, r); False where it does not matter.
+            Shape (b, r); False where it does not matter. And how fast each does so, seen from a side that
+            moves too [m/s], 0 where none does, shape (b, r).
         """
         pairs = self._pairs
+        nothing = np.zeros_like(wanted), np.zeros(wanted.shape)
         if self._survey is None or not wanted.any():
-            return np.zeros_like(wanted)
+            return nothing
         # A row of False at the end is what -1 means.
         rows = np.concatenate([wanted, np.zeros((1, wanted.shape[1]), bool)])
-        speed = np.asarray(speeds[0])[pairs.first] + speeds[1]
-        own = np.empty(len(self._own))
-        relative_speeds(rotations, positions, *twists, self._own, *self._hulls, own)
-        speed[self._inner] = own
+        speed = np.asarray(speeds)[pairs.first]
+        seen = np.empty(len(self._pair))
+        relative_speeds(rotations, positions, *twists, self._pair, *self._hulls, seen)
+        speed[self._seen] = seen
         of_gaps = (rows[pairs.first] | rows[pairs.second]) & (speed > STILL)[:, None]
         widest = np.where(of_gaps, self._thickness, -np.inf).max(axis=1)
         caps = widest + np.minimum(speed * self._period, AHEAD) + ROUNDING
         if not (caps > -np.inf).any():
-            return np.zeros_like(wanted)
+            return nothing
         found = self._survey.within(rotations, positions, caps)
         known = (caps > -np.inf) & (found.reach != Reach.BEYOND_CAP)
         gaps = np.where(known, found.distance, np.inf)
-        flags = clamps(gaps, speed, self._period, self._thickness)
-        return np.asarray(pairs.per_body(flags & of_gaps) & wanted)
+        flags = clamps(gaps, speed, self._period, self._thickness) & of_gaps
+        return np.asarray(pairs.per_body(flags) & wanted), pairs.fastest(flags, speed) * wanted
 
 
 def _corners(shapes: Shapes, body: int) -> Array:

@@ -113,13 +113,14 @@ class _Table:
     rates: Array
     """See `closing`, shape (2, m - 1, r)."""
 
-    def at(self, q: float, qd: float, period: float) -> Flags:
-        """Which body parts the pair clamps."""
+    def at(self, q: float, qd: float, period: float) -> Array:
+        """How fast the pair clamps each body part [m/s], 0 where it does not, shape (r,)."""
         count = self.rates.shape[1]
         ends = sorted((int((q - self.low) // self.step), int((q + qd * period - self.low) // self.step)))
         seen = np.arange(ends[0], min(ends[1], ends[0] + count) + 1)
         seen = seen % count if self.turns else np.clip(seen, 0, count - 1)
-        return np.asarray(self.rates[int(qd < 0), seen].max(axis=0) * abs(qd) > STILL)
+        speed = self.rates[int(qd < 0), seen].max(axis=0) * abs(qd)
+        return np.where(speed > STILL, speed, 0.0)
 
 
 class JointGaps:
@@ -171,9 +172,14 @@ class JointGaps:
                 step = max((high - low) / STEPS, 1e-12)
                 self._tables.append(_Table(*coordinate, rows, low, step, turns, rates))
 
-    def clamped(self, state: State, wanted: Flags) -> Flags:
-        """Which moving bodies clamp which body parts now; shapes and meaning as of `ClosingGaps.clamped`."""
-        found = np.zeros_like(wanted)
+    def speeds(self, state: State, wanted: Flags) -> Array:
+        """At which speed moving bodies clamp body parts now [m/s], 0 where they do not, shape (b, r).
+
+        Args:
+            state: The twin.
+            wanted: Of which bodies, that move now, and which body parts that matters, shape (b, r).
+        """
+        found = np.zeros(wanted.shape)
         for table in self._tables:
             rows = list(table.rows)
             if not wanted[rows].any():
@@ -181,8 +187,9 @@ class JointGaps:
             mechanism = state.model.mechanisms[table.mechanism]
             qd = float(state.qd(mechanism)[table.column])
             if qd:
-                found[rows] |= table.at(float(state.q(mechanism)[table.column]), qd, self._period)
-        return found & wanted
+                at = table.at(float(state.q(mechanism)[table.column]), qd, self._period)
+                found[rows] = np.maximum(found[rows], at)
+        return found * wanted
 
 
 def _rates(

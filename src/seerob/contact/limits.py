@@ -151,6 +151,8 @@ class Judged:
     """Of the permissible speeds, shape (b, r), where something that they are made from may be off."""
     on_floor: NDArray[np.bool_] | None = None
     """Which of ``clamped`` are against the floor, shape (b, r)."""
+    closing: Array | None = None
+    """How fast surfaces come against others that move too, where these clamp [m/s], shape (b, k)."""
 
     @property
     def least(self) -> Array:
@@ -160,7 +162,19 @@ class Judged:
     @property
     def v(self) -> Array:
         """Bounds on the relative speed [m/s], shape (b, k)."""
-        return self.v_r[:, None] + self.v_h
+        return relative(self.v_r, self.v_h, self.closing)
+
+
+def relative(v_r: Array, v_h: Array, closing: Array | None) -> Array:
+    """Bounds on relative speeds [m/s], shape (b, k).
+
+    Args:
+        v_r: Of surfaces [m/s], shape (b,).
+        v_h: Of parts of a person, shape (k,).
+        closing: See `Judged.closing`: of two sides that come against each other both may be slower.
+    """
+    hits = v_r[:, None] + v_h
+    return hits if closing is None else np.maximum(hits, closing)
 
 
 def credited_input(largest: float, cap: float) -> Input:

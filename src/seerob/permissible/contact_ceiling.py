@@ -65,7 +65,8 @@ def _of_region(contacts: Contacts, judged: Judged, k: int) -> Ceiling | None:
         )  # fmt: skip
     speeds = judged.speeds
     v = np.maximum(judged.least[rows, column] - judged.v_h[k], 0.0)
-    shares = v / np.maximum(judged.v_r[rows], STANDSTILL)
+    own = judged.v_r if judged.closing is None else np.maximum(judged.v_r, judged.closing[:, k])
+    shares = v / np.maximum(own[rows], STANDSTILL)
     open_rows = np.isnan(speeds.pressure[rows, column])
     i = int(open_rows.argmax()) if open_rows.any() else int(shares.argmin())
     row = int(rows[i])

@@ -290,13 +290,18 @@ class Contacts:
         else:
             near, v_h = people.near(state, spec.person_speed)
         near &= (v_r > STANDSTILL)[:, None]
-        clamped, on_floor = self.clamping.at(state, near[:, self.in_regions])
+        clamped, on_floor, speed = self.clamping.at(state, near[:, self.in_regions])
+        closing = None
+        if speed.any():
+            closing = np.zeros(near.shape)
+            closing[:, self.in_regions] = speed
         speeds = self.arrays.speeds(masses, self.least, clamped)
         ends = None
         if self.ends.tolerances:
             ends = self.ends.at(state, self.moving, spec.mass, self.simplified, clamped, STANDSTILL)
-        governing = self._governing(v_r[:, None] + v_h, near, speeds, ends)
-        return Judged(v_r, v_h, near, projected, speeds, clamped, *governing, ends, on_floor)
+        v = contact_limits.relative(v_r, v_h, closing)
+        governing = self._governing(v, near, speeds, ends)
+        return Judged(v_r, v_h, near, projected, speeds, clamped, *governing, ends, on_floor, closing)
 
     def evaluate(self, state: State, people: Person | None = None) -> Result:
         """The result at a state; see `judge`."""

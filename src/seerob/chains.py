@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from seerob.geometry import Solid
 from seerob.model import Mechanism
 from seerob.model_io.description import Description, Inertial, Joint, Link
-from seerob.model_io.lint import DENSITIES, LIGHT, TIPS, too_light
+from seerob.model_io.lint import DENSITIES, FLANGES, LIGHT, TIPS, too_light
 from seerob.model_io.pose import base_from_links
 from seerob.model_io.rigid import groups
 from seerob.mounting.specification import extreme_points
@@ -137,6 +137,16 @@ def _heaviest(link: Link) -> float:
         return 0.0
     stands_out = max(solid.deviation for solid in solids)
     return float(DENSITIES[1] * (np.ptp(points, axis=0) + 2 * (radius + stands_out)).prod())
+
+
+def beyond_flange(description: Description) -> frozenset[str]:
+    """Links that a file mounts on the robot's flange or on its tip: a gripper, a sensor, a tool."""
+    found: set[str] = set()
+    for link in description.links:
+        parent = link.parent or ""
+        if parent in found or parent == description.tip or parent.lower().endswith(FLANGES):
+            found.add(link.name)
+    return frozenset(found)
 
 
 def unknown_masses(rows: Sequence[LinkMass]) -> tuple[str, ...]:

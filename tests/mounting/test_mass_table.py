@@ -6,9 +6,12 @@ import re
 
 import numpy as np
 import pytest
+import trimesh
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob.contact.impact_mass import moving_masses
 from seerob.errors import Undecided
+from seerob.mounting.mass_tolerances import MassTolerances
 
 BOX = '<collision><geometry><box size="{0} {0} {0}"/></geometry></collision>'
 SIX = '<inertia ixx="{0}" iyy="{0}" izz="{0}" ixy="0" ixz="0" iyz="0"/>'
@@ -179,3 +182,33 @@ def test_library_robots_weigh_what_their_links_do(tmp_path):
     assert sum(row.mass for row in robot.masses) == pytest.approx(total)
     moving = sum(row.mass for row in robot.masses if row.moves)
     assert moving == pytest.approx(np.sum(cell.model.mj.body_mass[robot.mj_bodies]))
+
+
+def test_a_gripper_of_the_robots_own_file_is_load(tmp_path):
+    """M/2 + m_L: what the file mounts on its flange counts in full, as a tool of the workstation does."""
+    urdf = two_r().replace('"tip"', '"tool0"')
+    grip = f'<link name="grip">{INERTIAL}{BOX.format(0.1)}</link><joint name="g" type="fixed">'
+    grip += '<parent link="tool0"/><child link="grip"/></joint>'
+    tool = '[[tools]]\nname = "grip"\non = "arm/tool0"\nshape = { box = [0.1, 0.1, 0.1] }\nmass = 3\n'
+    own = station(tmp_path / "own", urdf.replace("</robot>", grip + "</robot>"))
+    mounted = station(tmp_path / "mounted", urdf, tool)
+    for cell in (own, mounted):
+        assert moving_masses(cell.model, cell.model.robot("arm")) == pytest.approx((2, 3))
+
+
+def test_a_volume_that_is_known_within_bounds_leaves_the_mass_within_them(tmp_path):
+    """A ball with a hole: its mass by density has an error that energies and the load of a stop carry."""
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.1)
+    stl = trimesh.Trimesh(ball.vertices, ball.faces[7:]).export(file_type="stl")
+    tool = '[[tools]]\nname = "grip"\non = "arm/tip"\nmesh = "grip.stl"\nunits = "m"\ndensity = 500\n'
+    files = {"arm.urdf": two_r(), "grip.stl": stl}
+    cell = made(tmp_path, FLOATING + TWO_R + tool + CRITERIA, files)
+    (body,) = (b for b in cell.model.bodies if b.name == "grip")
+    assert body.mass.error > 1e-3
+    energy = results_at(cell, arm=FAST)[ENERGY]
+    low, high = energy.interval
+    carried = energy.value - 2.5
+    assert high - energy.value == pytest.approx(body.mass.error * carried, rel=1e-9)
+    assert energy.value - low == pytest.approx(body.mass.error * carried, rel=1e-9)
+    heaviest = MassTolerances(cell.model, cell.model.robot("arm")).heaviest_load()
+    assert heaviest == pytest.approx(body.mass.value * (1 + body.mass.error))

@@ -26,14 +26,14 @@ def simplified_mass(model: Model, robot: Mechanism) -> float:
 
 
 def moving_masses(model: Model, robot: Mechanism) -> tuple[float, float]:
-    """M and m_L: mass of the links that the joints move, and of tools and workpieces [kg].
+    """M and m_L: mass of the links that the joints move, and of what is mounted beyond the flange [kg].
 
+    A gripper counts as load, whether the robot's own file has it or the workstation file.
     Mean nothing where `Mechanism.unknown_masses` names any.
     """
-    names = {int(i): model.mj.body(int(i)).name for i in robot.mj_bodies}
-    masses = {i: float(model.mj.body_mass[i]) for i in names}
-    links = sum(masses[i] for i, name in names.items() if name in robot.links)
-    return links, sum(masses.values()) - links
+    masses = {int(i): float(model.mj.body_mass[i]) for i in robot.mj_bodies}
+    load = sum(masses[i] for i in sorted(robot.load))
+    return sum(masses.values()) - load, load
 
 
 def masses_along_motion(

@@ -33,6 +33,8 @@ class Quantity:
     value: float
     origin: Origin
     source: str
+    error: float = 0.0
+    """Relative uncertainty, of an estimate that has a bound; 0 when stated."""
 
 
 @dataclass(frozen=True, eq=False)

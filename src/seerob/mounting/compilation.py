@@ -21,7 +21,7 @@ from seerob.human import posture
 from seerob.machines import mounting as machine_mounting
 from seerob.model import Body, Frame, Mechanism, Model
 from seerob.model_io.calibration import calibrated_by
-from seerob.model_io.description import Link, Quantity
+from seerob.model_io.description import Inertial, Link, Quantity
 from seerob.model_io.loader import load_robot
 from seerob.mounting.areas import mount_sensor, mount_swept
 from seerob.mounting.body_list import listed
@@ -196,7 +196,7 @@ class _Compiler:
         mass = None
         if link.inertial is not None:
             self.mounting.inertial(body, link.inertial)
-            mass = Quantity(link.inertial.mass, link.inertial.origin, link.inertial.source)
+            mass = _weight(link.inertial)
         elif link.joints and link.solids:
             self.mounting.inertial(body, placeholder(link.solids))
         elif link.joints:
@@ -315,7 +315,7 @@ class _Compiler:
         mass = None
         if loaded.inertial is not None:
             self.mounting.inertial(body, loaded.inertial)
-            mass = Quantity(loaded.inertial.mass, loaded.inertial.origin, loaded.inertial.source)
+            mass = _weight(loaded.inertial)
         for piece in loaded.pieces:
             name = f"{thing.name}/{piece.name}" if piece.name else thing.name
             if piece.name:
@@ -388,6 +388,10 @@ class _Compiler:
     def _about(self, robot: Robot, mechanism: Mechanism) -> list[Finding]:
         given = self.chains[robot.name].tip is not None or robot.model.startswith("library:")
         return [*assumed(mechanism, tip_given=given), *payload(robot.name, self._riders().things(robot.name))]
+
+
+def _weight(inertial: Inertial) -> Quantity:
+    return Quantity(inertial.mass, inertial.origin, inertial.source, inertial.error)
 
 
 def _body_id(mj: Any, name: str) -> int:

@@ -37,6 +37,9 @@ from seerob.state import State
 from seerob.tolerances import Shifts, Tolerance
 from seerob.transforms import Array
 
+EXACT = 1e-4
+"""Relative error of a volume up to which it is told as exact."""
+
 
 class MassTolerances:
     """Masses of one robot, with everything mounted on it, that are known within tolerances.
@@ -47,31 +50,40 @@ class MassTolerances:
     """
 
     def __init__(self, model: Model, robot: Mechanism) -> None:
-        self.robot = robot
+        self._model, self.robot = model, robot
         names = {int(i): str(model.mj.body(int(i)).name) for i in robot.mj_bodies}
         station = model.workstation
         found: list[_Off] = []
         for table in station.robots:
             if table.name == robot.name:
                 links = [i for i, name in names.items() if name in robot.links]
-                found += _offs(table.name, links, 2, mass=table.mass_tolerance, com=table.com_tolerance)
+                found += _offs(table.name, links, mass=table.mass_tolerance, com=table.com_tolerance)
         for thing in (*station.tools, *station.workpieces):
             bodies = [i for i, name in names.items() if name == thing.name]
             found += _offs(
                 thing.name,
                 bodies,
-                1,
                 mass=thing.mass_tolerance,
                 density=thing.density_tolerance,
                 com=thing.com_tolerance,
             )
+        found += _estimates(model, robot)
         self.tolerances = tuple(off.tolerance for off in found)
         self._offs = found
         masses = model.mj.body_mass
         # Of M/2 + m_L: links by half, what is mounted in full. A centre of mass changes nothing in it.
         self._simplified = np.array(
-            [off.share * sum(float(masses[i]) for i in off.bodies) / off.divisor for off in found]
+            [
+                off.share * sum(float(masses[i]) * (1 if i in robot.load else 0.5) for i in off.bodies)
+                for off in found
+            ]
         )
+
+    def heaviest_load(self) -> float:
+        """What is mounted on the robot [kg], at most."""
+        masses, load = self._model.mj.body_mass, self.robot.load
+        off = sum(o.share * float(masses[i]) for o in self._offs for i in o.bodies if i in load)
+        return float(sum(float(masses[i]) for i in sorted(load))) + off
 
     def __len__(self) -> int:
         """How many tolerances there are."""
@@ -114,8 +126,6 @@ class _Off:
     tolerance: Tolerance
     bodies: tuple[int, ...]
     """Of `mujoco`."""
-    divisor: int
-    """Of M/2 + m_L."""
     share: float = 0.0
     """Of their masses."""
     way: float = 0.0
@@ -180,7 +190,6 @@ class _Part:
 def _offs(
     name: str,
     bodies: Sequence[int],
-    divisor: int,
     *,
     mass: float | None = None,
     density: float | None = None,
@@ -191,12 +200,23 @@ def _offs(
         return
     for key, share in (("mass_tolerance", mass), ("density_tolerance", density)):
         if share:
-            yield _Off(Tolerance(f"{key} of {name}", 100 * share, "%"), tuple(bodies), divisor, share=share)
+            yield _Off(Tolerance(f"{key} of {name}", 100 * share, "%"), tuple(bodies), share=share)
     if com:
         either = (mass or 0.0) + (density or 0.0)
         tolerance = Tolerance(f"com_tolerance of {name}", com, "m")
         lighter, heavier = max(1 - either, 0.0), 1 + either
-        yield _Off(tolerance, tuple(bodies), divisor, way=com, lighter=lighter, heavier=heavier)
+        yield _Off(tolerance, tuple(bodies), way=com, lighter=lighter, heavier=heavier)
+
+
+def _estimates(model: Model, robot: Mechanism) -> Iterator[_Off]:
+    """Masses that follow from a density and a volume of which only bounds are known."""
+    given = {thing.name: thing for thing in (*model.workstation.tools, *model.workstation.workpieces)}
+    for index in robot.carried:
+        body = model.bodies[index]
+        if body.mass is not None and body.mass.error > EXACT:
+            dense = getattr(given.get(body.owner), "density_tolerance", None) or 0.0
+            share = body.mass.error * (1 + dense)
+            yield _Off(Tolerance(f"volume of {body.owner}", 100 * share, "%"), (body.mj,), share=share)
 
 
 class Matrices:

@@ -10,7 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from seerob.chains import couple, unknown_masses, weighed
+from seerob.chains import beyond_flange, couple, unknown_masses, weighed
 from seerob.model import Body, Frame, Mechanism
 from seerob.model_io.description import Description
 from seerob.model_io.lint import DENSITIES, LIGHT
@@ -119,8 +119,10 @@ def mechanism(
     coupling, offset = couple(every, commanded)
     ids = [mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_JOINT, f"{name}/{joint.name}") for joint in every]
     aboard = (name, *riders.of(name))
-    own = (_body_id(mj, full) for full, carrier in carriers.items() if carrier in aboard)
-    mj_bodies = np.array(sorted(i for i in own if mj.body_weldid[i] != 0), np.int64)
+    own = {full: _body_id(mj, full) for full, carrier in carriers.items() if carrier in aboard}
+    mj_bodies = np.array(sorted(i for i in own.values() if mj.body_weldid[i] != 0), np.int64)
+    links = {f"{name}/{link.name}" for link in chain.description.links}
+    beyond = {f"{name}/{link}" for link in beyond_flange(chain.description)}
     moving_ids = set(mj_bodies.tolist())
     own_bodies = [b for b in bodies if b.carrier in aboard and b.role != "area"]
     tip = chain.tip if chain.tip is not None else Frame(f"{name}/{chain.description.tip}", -1, np.eye(4))
@@ -143,6 +145,9 @@ def mechanism(
         moving=tuple(b.index for b in own_bodies if b.mj in moving_ids),
         mj_bodies=mj_bodies,
         masses=masses,
+        load=frozenset(
+            i for full, i in own.items() if i in moving_ids and (full not in links or full in beyond)
+        ),
         unknown_masses=unknown_masses(masses),
         impossible_masses=tuple(
             link.impossible_mass

@@ -11,6 +11,7 @@ from msgspec.structs import replace as changed
 
 from seerob.errors import InputError
 from seerob.model import Gap, Mechanism, Model
+from seerob.mounting.mass_tolerances import MassTolerances
 from seerob.snapshot import Input, Origin
 from seerob.state import State
 from seerob.stopping.onset import Levers, Onset
@@ -195,11 +196,10 @@ def _full_speed(entry: JointStop | None, robot: Mechanism, j: int) -> float | No
 
 
 def _payload(model: Model, robot: Mechanism) -> float:
-    """Mass of tools and workpieces on a robot [kg]; NaN when nobody gave one."""
+    """Mass of all that a robot carries, the most that tolerances allow [kg]; NaN when nobody gave one."""
     if robot.unknown_masses:
         return float("nan")
-    bodies = [model.mj.body(int(i)) for i in robot.mj_bodies]
-    return float(sum(body.mass[0] for body in bodies if body.name not in robot.links))
+    return MassTolerances(model, robot).heaviest_load()
 
 
 def _extension(state: State, robot: Mechanism) -> float:

@@ -24,7 +24,6 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
     """Volume that a set has swept so far; no voxel that any of its points crossed is missing."""
 
     unit: ClassVar[str] = "m³"
-    by_shape: ClassVar[bool] = True
     instants: ClassVar[str] = "accepted: what is crossed between two instants is in the figure of the second"
 
     of: str

@@ -117,7 +117,7 @@ def motion():
 
 @pytest.fixture(scope="module")
 def batch(cell, motion):
-    return cell.batch(*motion, threads=2)
+    return cell.batch(*motion, t=T, threads=2)
 
 
 @pytest.fixture(scope="module")
@@ -158,7 +158,7 @@ def test_only_what_remembers_is_asked_instant_by_instant(batch):
 def test_number_of_threads_changes_no_bit(cell, motion, batch, monkeypatch):
     monkeypatch.setattr("seerob.batch.STRETCH", 9)
     for threads in (1, 3):
-        again = cell.batch(*motion, threads=threads)
+        again = cell.batch(*motion, t=T, threads=threads)
         for name, column in batch.items():
             np.testing.assert_array_equal(again[name].value, column.value)
             np.testing.assert_array_equal(again[name].answers.verdict, column.answers.verdict)

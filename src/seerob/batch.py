@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 from msgspec.structs import replace as changed
 
-from seerob.answers import UNDECIDED, WITHIN, Answers
+from seerob.answers import UNDECIDED, WITHIN, Answers, Flags
 from seerob.criterion import Criterion, EvaluateMany
 from seerob.errors import Undecided, UnknownName
 from seerob.judging import Judge, held, held_names, unmentioned
@@ -26,6 +26,7 @@ from seerob.model import Model
 from seerob.results.series import CODES
 from seerob.run import Bound, Feed, engine_of, settled
 from seerob.snapshot import Finding, Result, Verdict
+from seerob.spans import Path
 from seerob.state import Hearing, State
 from seerob.states import Bench, Motion, Questions, Reasons
 from seerob.transforms import Array
@@ -47,6 +48,8 @@ class Column:
     """Why an instant is UNDECIDED, as far as it is said, shape (N,)."""
     note: str = ""
     """Why it was asked instant by instant; empty when it was not."""
+    between: str = ""
+    """See `seerob.snapshot.CriterionInfo.between`; empty where the instants are no motion."""
 
     @property
     def value(self) -> Array:
@@ -58,7 +61,9 @@ class Column:
         """Of the whole: EXCEEDED before UNDECIDED before WITHIN before none."""
         there = set(np.unique(self.answers.verdict).tolist())
         order = (Verdict.EXCEEDED, Verdict.UNDECIDED, Verdict.WITHIN)
-        return next((verdict for verdict in order if CODES[verdict] in there), None)
+        found = next((verdict for verdict in order if CODES[verdict] in there), None)
+        known = not self.between or self.between.startswith("accepted: ")
+        return found if known or found is not Verdict.WITHIN else Verdict.UNDECIDED
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +107,7 @@ def recorded(model: Model, feed: Feed) -> Motion:
     engine = engine_of(replace(model, workstation=placed))
     engine.state = _Whereabouts(model, engine.state.data, engine.state.hearings, engine.state.signals)
     t, q, v = [], [], []
+    ways: list[Path] = []
     doubts: dict[str, list[str]] = {name: [] for name in engine.model.mechanisms}
     for seq, samples in enumerate(feed):
         engine.take(samples)
@@ -109,10 +115,12 @@ def recorded(model: Model, feed: Feed) -> Motion:
         t.append(state.t)
         q.append(state.data.qpos.copy())
         v.append(state.data.qvel.copy())
+        if state.path is not None:
+            ways.append(state.path)
         for name, found in doubts.items():
             found.append(state.doubt(name))
     reasons = {name: np.array(found, object) for name, found in doubts.items()}
-    return Motion(np.array(t), np.array(q), np.array(v), reasons, foreseen=True)
+    return Motion(np.array(t), np.array(q), np.array(v), reasons, ways=tuple(ways), foreseen=True)
 
 
 def judged(
@@ -138,6 +146,7 @@ def judged(
     parts = [motion.part(begin, end) for begin, end in pairwise([*range(0, n, STRETCH), n]) if begin < end]
     questions = Questions(model)
     found: dict[str, list[tuple[Answers, Reasons]]] = {name: [] for name in asked}
+    speeds: list[Array] = []
     if asked and parts:
         # Learns what distances are asked, so that every stretch asks for all of them together.
         _stretch(Bench(model, questions), asked, parts[0].part(0, 1))
@@ -145,17 +154,88 @@ def judged(
             shares = [parts[k::threads] for k in range(max(1, threads))]
             made = list(pool.map(lambda share: _share(model, questions, asked, share), shares))
         for k in range(len(parts)):
-            for name, answers in made[k % len(shares)][k // len(shares)].items():
+            stretch, fast = made[k % len(shares)][k // len(shares)]
+            speeds.append(fast)
+            for name, answers in stretch.items():
                 found[name].append(answers)
     slow = [one for one in bound if one.criterion.name not in asked]
     walked = _walked(model, slow, motion, findings) if slow else {}
+    walked |= {name: _joined(answers) for name, answers in found.items()}
+    if motion.ways and asked:
+        for one, spans in list(_uncleared(model, bound, asked, motion, walked, np.concatenate(speeds))):
+            again = _walked(model, [one], motion, findings, spans)
+            walked[one.criterion.name] = _with(walked[one.criterion.name], again[one.criterion.name], spans)
     columns = {}
     for one in bound:
         name = one.criterion.name
-        said, reasons = walked[name] if name in walked else _joined(found[name])
-        criterion = one.criterion
-        columns[name] = Column(name, criterion.unit, criterion.at_most, said, reasons, notes.get(name, ""))
+        said, reasons = walked[name]
+        criterion, between = one.criterion, one.between if motion.ways is not None else ""
+        columns[name] = Column(
+            name, criterion.unit, criterion.at_most, said, reasons, notes.get(name, ""), between
+        )
     return Batch(motion.t, columns)
+
+
+def _uncleared(
+    model: Model,
+    bound: Sequence[Bound],
+    asked: Mapping[str, _Able],
+    motion: Motion,
+    said: Stretch,
+    speeds: Array,
+) -> Iterator[tuple[Bound, Flags]]:
+    """Criteria that were judged together, and at which instants the way there is to be looked at.
+
+    The same bounds as on the road (`seerob.between_ticks`) clear the others.
+    """
+    assert motion.ways is not None
+    watches = {b.criterion.name: b for b in bound if b.criterion.name in asked and b.watch is not None}
+    ends: dict[str, tuple[Array, Array]] = {}
+    open_ = {name: np.zeros(len(motion.t), bool) for name in watches}
+    for name in watches:
+        answers, verdict = said[name][0], said[name][0].verdict
+        bare = (
+            answers.limit - answers.value
+            if watches[name].criterion.at_most
+            else answers.value - answers.limit
+        )
+        off = np.zeros(len(bare))
+        if answers.interval is not None:
+            low, high = answers.interval
+            off = high - answers.value if watches[name].criterion.at_most else answers.value - low
+        ends[name] = bare, off
+        within, exceeded = verdict == WITHIN, verdict == CODES[Verdict.EXCEEDED]
+        either = (within[1:] | within[:-1]) & ~(exceeded[1:] | exceeded[:-1])
+        open_[name][1:] = either & ~(within[1:] & within[:-1])
+    points = next((one.watch.points for one in watches.values() if one.watch is not None), None)
+    ids = np.array([body.mj for body in model.bodies], np.int64)
+    for k, way in enumerate(motion.ways if points is not None else ()):
+        assert points is not None
+        span = points.span(way, float(motion.t[k]), float(motion.t[k + 1]), ids, model.mj)
+        span.between_speeds(speeds[k], speeds[k + 1])
+        for name, one in watches.items():
+            verdict = said[name][0].verdict
+            if verdict[k] != WITHIN or verdict[k + 1] != WITHIN:
+                continue
+            assert one.watch is not None
+            bare, off = ends[name]
+            m, other = bare[k], bare[k + 1]
+            fall, bend = one.watch.falls(span, min(m - off[k], other - off[k + 1]))
+            low = np.maximum((m + other - fall) / 2, min(m, other) - bend) - max(off[k], off[k + 1])
+            open_[name][k + 1] = not np.min(low) >= 0
+    for name, one in watches.items():
+        if open_[name].any():
+            yield one, open_[name]
+
+
+def _with(
+    said: tuple[Answers, Reasons], again: tuple[Answers, Reasons], where: Flags
+) -> tuple[Answers, Reasons]:
+    """The same with what was said of some instants once the way there was looked at."""
+    (answers, reasons), (then, why) = said, again
+    picked = {key: np.where(where, getattr(then, key), getattr(answers, key)) for key in ("value", "limit")}
+    verdict = np.where(where, then.verdict, answers.verdict).astype(np.uint8)
+    return replace(answers, **picked, verdict=verdict), np.where(where, why, reasons)
 
 
 def _able(
@@ -197,13 +277,13 @@ def _share(
     questions: Questions,
     asked: dict[str, _Able],
     parts: Sequence[Motion],
-) -> list[Stretch]:
+) -> list[tuple[Stretch, Array]]:
     """The work of one thread."""
     bench = Bench(model, questions)
     return [_stretch(bench, asked, part) for part in parts]
 
 
-def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> Stretch:
+def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Stretch, Array]:
     states = bench.place(motion)
     found: Stretch = {}
     for name, one in asked.items():
@@ -220,7 +300,7 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> Stretch:
             reasons = np.where(answers.verdict == WITHIN, "; ".join(dict.fromkeys(texts)), reasons)
             answers = answers.open()
         found[name] = answers, reasons
-    return found
+    return found, states.largest_speeds() if motion.ways is not None else np.zeros((len(states), 0))
 
 
 def _doubted(answers: Answers, criterion: Criterion, reasons: Reasons) -> Answers:
@@ -264,14 +344,30 @@ def _joined(parts: Sequence[tuple[Answers, Reasons]]) -> tuple[Answers, Reasons]
     return joined, np.concatenate([np.zeros(0, object), *(reasons for _, reasons in parts)])
 
 
-def _walked(model: Model, bound: Sequence[Bound], motion: Motion, findings: Sequence[Finding]) -> Stretch:
-    """The same instant by instant, as on the road, each criterion at every instant."""
-    hearings = {name: Hearing(given=False, driven=True) for name in model.mechanisms}
+def _walked(
+    model: Model,
+    bound: Sequence[Bound],
+    motion: Motion,
+    findings: Sequence[Finding],
+    only: Flags | None = None,
+) -> Stretch:
+    """The same instant by instant, as on the road, each criterion at every instant.
+
+    Args:
+        model: The compiled workstation.
+        bound: The criteria.
+        motion: Where everybody is.
+        findings: See `judged`.
+        only: Instants that are asked, each with the one before; all of them when None. Of others it says
+            nothing that counts.
+    """
+    # Between two instants nobody is silent, however long it is.
+    hearings = {name: Hearing(given=False, driven=True, timeout=np.inf) for name in model.mechanisms}
     data = mujoco.MjData(model.mj)
     state = State(model, data, hearings)
     # With criteria that were bound for another run, what they remember of it would be in the way.
     fresh = [
-        Bound(changed(one.criterion, every=None), one.group, one.criterion.bind(model), one.basis)
+        Bound(changed(one.criterion, every=None), one.group, one.criterion.bind(model), one.basis, one.watch)
         for one in bound
     ]
     judge = Judge(fresh, findings)
@@ -280,12 +376,20 @@ def _walked(model: Model, bound: Sequence[Bound], motion: Motion, findings: Sequ
     rows: list[tuple[Result, ...]] = []
     with settled():
         for k, t in enumerate(motion.t.tolist()):
+            if only is not None and not (only[k] or only[min(k + 1, len(only) - 1)]):
+                rows.append(())
+                continue
             data.qpos[:], data.qvel[:] = motion.q[k], motion.v[k]
+            since = max(k - 1, 0)
             for name, hearing in hearings.items():
-                reason = motion.doubts[name][k].removeprefix(f"{name}: ")
-                hearing.heard, hearing.torques = [(t, reason)], [None]
+                said = [motion.doubts[name][i].removeprefix(f"{name}: ") for i in range(since, k + 1)]
+                hearing.heard = list(zip(motion.t[since : k + 1].tolist(), said, strict=True))
+                hearing.torques = [None] * len(said)
+            state.path = motion.ways[k - 1] if motion.ways and k and rows[-1] else None
             state.refresh(t)
             rows.append(judge(state))
+    said_nothing = tuple(Result(name=one.criterion.name) for one in bound)
+    rows = [row or said_nothing for row in rows]
     return {one.criterion.name: _of_results([row[i] for row in rows]) for i, one in enumerate(bound)}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 from seerob.answers import Flags
 from seerob.errors import InputError, Problem
 from seerob.model import Mechanism, Model
+from seerob.spans import Path
 from seerob.states import Motion, Reasons
 from seerob.transforms import Array
 
@@ -61,7 +63,11 @@ def motion_of(
         problems.append(Problem(WHERE, "t", "are not instants", f"{count} numbers that increase"))
     if problems:
         raise InputError(problems)
-    return _placed(model, given, instants)
+    motion = _placed(model, given, instants)
+    if t is None:
+        return motion
+    pairs = [slice(k, k + 2) for k in range(count - 1)]
+    return replace(motion, ways=tuple(Path(motion.t[k], motion.q[k], motion.v[k]) for k in pairs))
 
 
 def _placed(model: Model, given: Mapping[str, tuple[Array, Array]], t: Array) -> Motion:

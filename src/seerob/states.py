@@ -23,6 +23,7 @@ from seerob.joint_columns import Columns, moving_dofs
 from seerob.kernels.chain import held_many, jacobians
 from seerob.kernels.speed import fastest_many, stacked, velocities_many
 from seerob.model import Frame, Gap, Mechanism, Model
+from seerob.spans import Path
 from seerob.transforms import Array
 
 Reasons = NDArray[np.object_]
@@ -43,11 +44,15 @@ class Motion:
     """Why a robot or human may not be there, by name."""
     foreseen: bool = False
     """Whether one instant leads to the next: a motion, and not a collection of places."""
+    ways: tuple[Path, ...] | None = None
+    """From each instant to the next, N - 1 of them; None where the instants are no motion."""
 
     def part(self, begin: int, end: int) -> Motion:
         """Some instants that follow one another."""
         doubts = {name: found[begin:end] for name, found in self.doubts.items()}
-        return Motion(self.t[begin:end], self.q[begin:end], self.v[begin:end], doubts)
+        ways = None if self.ways is None else self.ways[begin : end - 1]
+        part = self.t[begin:end], self.q[begin:end], self.v[begin:end]
+        return Motion(*part, doubts, self.foreseen, ways)
 
 
 class Questions:
@@ -177,6 +182,10 @@ class States:
         if mechanism.unknown_masses:
             raise Undecided("; ".join(mechanism.unknown_masses))
 
+    def largest_speeds(self) -> Array:
+        """Bounds on the speeds of all bodies' points [m/s], shape (N, n): for bounds, never for a verdict."""
+        return np.asarray(self._fastest()[0])
+
     def jacobian(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> Array:
         """Jacobians of a point of a frame, linear rows first, world axes, shape (N, 6, n)."""
         self.require(mechanism.name)
@@ -204,6 +213,10 @@ class States:
         """
         self.require(*filter(None, (self.model.bodies[i].carrier for i in bodies)))
         self._settled(bodies)
+        speed, point, velocity = (found[:, list(bodies)] for found in self._fastest())
+        return speed, point, velocity
+
+    def _fastest(self) -> tuple[Array, Array, Array]:
         if "fastest" not in self._cache:
             bench, moved, shape = self._bench, self._moved, self.positions.shape
             twists = np.empty((2, *shape))
@@ -216,7 +229,7 @@ class States:
                 speed, point, velocity,
             )  # fmt: skip
             self._cache["fastest"] = speed, point, velocity
-        speed, point, velocity = (found[:, list(bodies)] for found in self._cache["fastest"])
+        speed, point, velocity = self._cache["fastest"]
         return speed, point, velocity
 
     def closest(self, gap: Gap) -> Closests:

@@ -222,7 +222,8 @@ class Station:
                 who is not named stands where the file says. Without it, what the workstation's sources
                 say at every tick.
             qd: Velocities likewise [rad/s or m/s].
-            t: Instants of ``q``, increasing [s], shape (N,); a tick apart when not given.
+            t: Instants of ``q``, increasing [s], shape (N,); the ways from each to the next are judged too.
+                When not given they are instants of their own, a tick apart.
             threads: How many work at once; as many as there are processors when not given.
 
         Returns:

@@ -192,17 +192,13 @@ def _uncleared(
     watches = {b.criterion.name: b for b in bound if b.criterion.name in asked and b.watch is not None}
     ends: dict[str, tuple[Array, Array]] = {}
     open_ = {name: np.zeros(len(motion.t), bool) for name in watches}
-    for name in watches:
+    for name, one in watches.items():
         answers, verdict = said[name][0], said[name][0].verdict
-        bare = (
-            answers.limit - answers.value
-            if watches[name].criterion.at_most
-            else answers.value - answers.limit
-        )
-        off = np.zeros(len(bare))
+        at_most, off = one.criterion.at_most, np.zeros(len(verdict))
+        bare = answers.limit - answers.value if at_most else answers.value - answers.limit
         if answers.interval is not None:
             low, high = answers.interval
-            off = high - answers.value if watches[name].criterion.at_most else answers.value - low
+            off = high - answers.value if at_most else answers.value - low
         ends[name] = bare, off
         within, exceeded = verdict == WITHIN, verdict == CODES[Verdict.EXCEEDED]
         either = (within[1:] | within[:-1]) & ~(exceeded[1:] | exceeded[:-1])

@@ -581,9 +581,16 @@ class State:
         speed, point, velocity = self._fastest()
         return float(speed[index]), point[index], velocity[index]
 
-    def fastest_points(self, bodies: tuple[int, ...]) -> tuple[Array, Array, Array]:
-        """The same of several bodies: speeds (b,), corners (b, 3) and their velocities (b, 3)."""
-        self.require_bodies(bodies)
+    def fastest_points(
+        self, bodies: tuple[int, ...], *, estimates: bool = False
+    ) -> tuple[Array, Array, Array]:
+        """The same of several bodies: speeds (b,), corners (b, 3) and their velocities (b, 3).
+
+        Args:
+            bodies: By index.
+            estimates: As in `require_bodies`.
+        """
+        self.require_bodies(bodies, estimates=estimates)
         rows = self._rows_of(bodies)
         speed, point, velocity = self._fastest()
         return speed[rows], point[rows], velocity[rows]

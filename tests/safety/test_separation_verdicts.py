@@ -293,3 +293,23 @@ def test_only_a_simulated_stop_asks_for_masses(tmp_path):
     assert found(tmp_path / "any", urdf=nothing).verdict is Verdict.WITHIN
     with pytest.raises(InputError, match="S needs it"):
         found(tmp_path / "refused", STIFF, urdf=nothing)
+
+
+@pytest.mark.parametrize("given", ["", "human_speed = 1.6\n"])
+@pytest.mark.parametrize("v", [4.0, 1.0])
+def test_a_person_who_is_seen_to_be_faster_counts_with_what_is_seen(tmp_path, given, v):
+    """The norm's walking speed is an assumption on somebody whom nobody watches."""
+    cell = station(tmp_path, BOUND, TERMS + given)
+    human = cell.model.human("op")
+    runs = np.zeros(len(human.joints))
+    runs[1] = v  # the pelvis goes along y
+    state = state_at(cell, arm=AT_HOME, op=(human.home, runs))
+    (S,) = Judge(cell.bound)(state)
+    wanted = (V + max(v, 1.6)) * T + K
+    assert S.limit == pytest.approx(wanted, rel=1e-6)
+    assert ("seen at 4.00 m/s" in S.reason) == (v > 1.6)
+    if given:
+        assert part(S, "S_h").value == pytest.approx(max(v, 1.6) * T)
+    assert part(S, "largest permissible speed").value == pytest.approx(
+        part(S, "share of the present speed").value * V, rel=1e-6
+    )

@@ -16,6 +16,7 @@ from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge_interval, 
 from seerob.errors import InputError, Undecided
 from seerob.model import Gap, Model
 from seerob.norms import iso_13855
+from seerob.norms.iso_13855 import WALKING
 from seerob.sensors.detection import Detection, device_of
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.spans import Fall, Falls, Margin, Points, Span, rows_of
@@ -192,11 +193,23 @@ class Separation(Criterion, frozen=True, kw_only=True):
         reasons = [f"not given: {', '.join(missing)}"] if missing else []
         return "; ".join([*reasons, *stop.doubts])
 
-    def _distance(self, course: Course, K: float) -> Array:
-        """S_p of each part [m]."""
+    def _distance(self, course: Course, K: float, seen: Array | float) -> Array:
+        """S_p of each part [m], of a person who is seen to be as fast as ``seen`` [m/s]."""
+
+        def at_speed(v_h: Array | float) -> Array:
+            return separation_distance(course, v_h, self.stop.reaction, K)
+
         if self.human_speed is not None:
-            return separation_distance(course, self.human_speed, self.stop.reaction, K)
-        return iso_13855.least_distance(lambda v_h: separation_distance(course, v_h, self.stop.reaction, K))
+            return at_speed(np.maximum(self.human_speed, seen))
+        assumed = iso_13855.least_distance(at_speed)
+        return np.asarray(np.maximum(assumed, at_speed(seen))) if np.any(seen > WALKING) else assumed
+
+    @staticmethod
+    def _seen(state: State, gap: Gap) -> float:
+        """Speed of the person's fastest point that may be relied on [m/s]."""
+        lost = state.lost_bodies(gap.a)
+        people = tuple(i for i in gap.a if i not in lost)
+        return float(state.fastest_points(people, estimates=True)[0].max(initial=0.0))
 
     def looks_ahead(self, model: Model) -> Mapping[str, float]:
         """See `Criterion.looks_ahead`: as long as the robot takes to react."""
@@ -231,13 +244,15 @@ class Separation(Criterion, frozen=True, kw_only=True):
         C, Z_d, Z_r = self._terms()[0]
         K = C + Z_d + Z_r + gap.deviation
         places, names = BodyPlaces(model), [body.name for body in model.bodies]
+        human = self._sides(model)[1]
         ends_of_distance = DistanceEnds(model, gap)
 
         def evaluate(state: State) -> Result:
             found = state.closest_per_body(gap, estimates=True)
             course = stop.courses(state)
             now = course(1.0)
-            S_p, most, doubt = self._required(now, K)
+            seen = self._seen(state, gap)
+            S_p, most, doubt = self._required(now, K, seen)
             if self.mode == "fixed":
                 S_p, most = (each.including(state, x) for each, x in zip(largest, (S_p, most), strict=True))
             unknown = "; ".join(filter(None, (unknown_ever, doubt)))
@@ -278,6 +293,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
                     )
             nearest = places.named(state, int(found.body_a[k]), found.point_a[k])
             where = f"{parts[k].name} ↔ {nearest}"
+            if seen > (self.human_speed or WALKING):
+                where += f", and {human} is seen at {seen:.2f} m/s, faster than v_h"
             shown = figures.against(float(found.distance[k]), float(S_p[k]), self.unit, at_most=self.at_most)
             segment = Segment(
                 start=tuple(found.point_b[k].tolist()),
@@ -296,7 +313,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 interval=parts[k].interval,
                 parts=(
                     *parts,
-                    *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r)),
+                    *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r), seen),
                     *self._permissible(stop, state, course, now, found.distance, K),
                 ),
                 markers=(segment,),
@@ -304,11 +321,13 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
         return evaluate
 
-    def _shown(self, now: Course, k: int, S_p: float, rest: tuple[float, float, float]) -> tuple[Result, ...]:
+    def _shown(
+        self, now: Course, k: int, S_p: float, rest: tuple[float, float, float], seen: float
+    ) -> tuple[Result, ...]:
         """The terms of S_p of the part that governs; S_h is what the others leave."""
         S_h = S_p - float(now.S_r[k] + now.S_s[k]) - sum(rest)
         if self.mode == "dynamic" and self.human_speed is not None:
-            S_h = float(way_of_person(self.human_speed, self.stop.reaction, now.T_s))
+            S_h = float(way_of_person(max(self.human_speed, seen), self.stop.reaction, now.T_s))
         terms = {"S_h": S_h, "S_r": float(now.S_r[k]), "S_s": float(now.S_s[k])}
         terms |= dict(zip(("C", "Z_d", "Z_r"), rest, strict=True))
         return tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
@@ -321,7 +340,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         if self.mode == "fixed" or own._tolerances():
             return None
         incomplete = bool(self.unknown(model))
-        return separations(own.stop, gap, lambda now: own._distance(now, K), incomplete=incomplete)
+        return separations(own.stop, gap, own._distance, K, incomplete=incomplete)
 
     def remembers(self, model: Model) -> bool:
         """See `Criterion.remembers`."""
@@ -332,9 +351,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         gap, rises = self._gap(model), self.rises(model)
         if rises is None:
             return None
-        people, parts = rows_of(gap.a), rows_of(gap.b)
-
-        lasts = self.lasts(model)
+        people, parts, lasts = rows_of(gap.a), rows_of(gap.b), self.lasts(model)
 
         def falls(span: Span, _: Array | float) -> Fall:
             lost = span.way(people) + span.fast[parts] * span.T + rises(span)
@@ -352,23 +369,25 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
     def rises(self, model: Model) -> Callable[[Span], Array] | None:
         """How much S_p of each of `Mechanism.moving` can change within a span [m]; None where not known."""
-        parts = rows_of(self._gap(model).b)
-        required: list[Callable[[Array], Array]] = []
+        gap = self._gap(model)
+        people, parts = rows_of(gap.a), rows_of(gap.b)
+        required: list[Callable[[Array, float], Array]] = []
         for each in dict.fromkeys((self, self.at_worst(model))):
             own = each._by_device(model)[0]
-            by_speed, K = own._stop(model).by_speed, sum(own._terms()[0]) + own._gap(model).deviation
+            by_speed, K = own._stop(model).by_speed, sum(own._terms()[0]) + gap.deviation
             if by_speed is None:
                 return None
             required.append(partial(own._at_speeds, by_speed, K))
 
         def rises(span: Span) -> Array:
-            ends = ((S_p(span.fast[parts]), S_p(span.slow[parts])) for S_p in required)
+            sides = [(v[parts], float(v[people].max(initial=0.0))) for v in (span.fast, span.slow)]
+            ends = ([S_p(*side) for side in sides] for S_p in required)
             return np.asarray(np.max([most - least for most, least in ends], axis=0))
 
         return rises
 
-    def _at_speeds(self, by_speed: Callable[[Array], Course], K: float, v: Array) -> Array:
-        return self._distance(by_speed(v), K)
+    def _at_speeds(self, by_speed: Callable[[Array], Course], K: float, v: Array, seen: float) -> Array:
+        return self._distance(by_speed(v), K, seen)
 
     def margin(self, result: Result) -> Margin:
         """See `Criterion.margin`, of each moving part."""
@@ -377,9 +396,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
         off = [(part.value or 0.0) - part.interval[0] if part.interval else 0.0 for part in parts]
         return np.array(far), np.array(off)
 
-    def _required(self, now: Course, K: float) -> Required:
-        S_p = self._distance(now, K)
-        most = S_p if now.most is None else np.maximum(self._distance(now.most, K), S_p)
+    def _required(self, now: Course, K: float, seen: float) -> Required:
+        S_p = self._distance(now, K, seen)
+        most = S_p if now.most is None else np.maximum(self._distance(now.most, K, seen), S_p)
         doubts = (now.doubt, "" if now.most is None else now.most.doubt)
         return Required(S_p, most, "; ".join(dict.fromkeys(filter(None, doubts))))
 
@@ -387,10 +406,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
         """S_p of each of `Mechanism.moving` of the robot, in that order; to be asked at every tick."""
         own, _, _ = self._by_device(model)
         stop, largest = own._stop(model), (LargestSeparation(), LargestSeparation())
-        K = sum(own._terms()[0]) + own._gap(model).deviation
+        gap = own._gap(model)
+        K = sum(own._terms()[0]) + gap.deviation
 
         def at(state: State) -> Required:
-            found = own._required(stop.courses(state)(1.0), K)
+            found = own._required(stop.courses(state)(1.0), K, own._seen(state, gap))
             if own.mode != "fixed":
                 return found
             S_p, most = (each.including(state, x) for each, x in zip(largest, found[:2], strict=True))
@@ -412,7 +432,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         def at(state: State, distance: Array) -> tuple[Array, tuple[Result, ...]]:
             course = stop.courses(state)
             now = course(1.0)
-            required = self._required(now, K)
+            required = self._required(now, K, self._seen(state, gap))
             if required.doubt:
                 raise Undecided(required.doubt)
             return required.most, self._permissible(stop, state, course, now, distance, K)
@@ -424,9 +444,10 @@ class Separation(Criterion, frozen=True, kw_only=True):
     ) -> tuple[Result, ...]:
         """Largest speed of the robot's fastest point for which no part is nearer than its S_p."""
         speed, factor, reason = None, None, ""
+        seen = self._seen(state, self._gap(state.model))
 
         def S_p(scale: float) -> Array:
-            required = self._required(course(scale), K)
+            required = self._required(course(scale), K, seen)
             if required.doubt:
                 raise Undecided(required.doubt)
             return required.most
@@ -435,7 +456,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
             reason = "S_p is at least what is shown: no speed follows"
         elif stop.inverse is not None:
             given = self.human_speed
-            v_h = iso_13855.speed_at(distance) if given is None else np.full(len(distance), given)
+            assumed = iso_13855.speed_at(distance) if given is None else np.full(len(distance), given)
+            v_h = np.maximum(assumed, seen)
             least, most = stop.reactions(state)
             onset = least if most is None else most
             speed, factor = stop.inverse(onset(0.0), onset(1.0), distance, v_h, K)
@@ -500,7 +522,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
             "no licensed text was opened"
         )
         return Basis(
-            formula=f"{formula}{fixed}; the distance must not fall below it",
+            formula=f"{formula}{fixed}; v_h is no less than that of the twin's person; the distance must "
+            "not fall below S_p",
             source=f"Weistroffer et al. 2022, Eq. 2 (upper bound of {norm})" if bound else norm,
             inputs=tuple(inputs),
             not_modelled=(
@@ -508,6 +531,6 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 *((SIMULATED,) if self.stop.model == "simulated" and tolerances(self.stop) else ()),
                 *(() if toward else ("direction: the speed counts in full, also of parts that move away",)),
                 *(self.detection.ways_around() if self.detection is not None else ()),
-                "a person whose own speed exceeds v_h",
+                "a person who gets faster than v_h, and than now",
             ),
         )

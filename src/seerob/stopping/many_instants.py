@@ -17,14 +17,15 @@ from seerob.transforms import Array
 
 
 def separations(
-    stop: Stop, gap: Gap, S_p: Callable[[Course], Array], *, incomplete: bool
+    stop: Stop, gap: Gap, S_p: Callable[[Course, float, Array], Array], K: float, *, incomplete: bool
 ) -> EvaluateMany | None:
     """What the part that governs comes to; None where the stopping time is not given, or has a tolerance.
 
     Args:
         stop: How the robot stops.
         gap: From whom to its moving parts.
-        S_p: Of a course [m], shape (N, b).
+        S_p: Of a course, K and the speed that a person is seen to have [m/s] (N, 1), shape (N, b) [m].
+        K: C + Z_d + Z_r [m].
         incomplete: Whether S_p may be larger than what is computed.
     """
     if stop.model not in SHARES or stop.stopping is None or stop.tolerance is not None:
@@ -38,7 +39,8 @@ def separations(
     def evaluate(states: States) -> Answers:
         distance = states.closest_per_body(gap).distance
         v_r, _, _ = states.fastest_points(gap.b)
-        least = S_p(braking(accelerated(v_r, stop.reaction, a, np.zeros(0)), T_s, share))
+        seen = states.fastest_points(gap.a)[0].max(axis=1, initial=0.0)[:, None]
+        least = S_p(braking(accelerated(v_r, stop.reaction, a, np.zeros(0)), T_s, share), K, seen)
         k = (distance - least).argmin(axis=1)[:, None]
         value, limit = (np.take_along_axis(found, k, axis=1)[:, 0] for found in (distance, least))
         found = Answers.against(value, limit, at_most=False)

@@ -51,9 +51,9 @@ Braking = Callable[[State], Callable[[Onset, float], Course]]
 """From a state to what follows from an onset, with the factor on the present speeds that it has."""
 
 
-def way_of_person(v_h: float, T_r: float, T_s: Array | float) -> Array:
+def way_of_person(v_h: Array | float, T_r: float, T_s: Array | float) -> Array:
     """S_h of a person who comes near at constant speed [m]; a person who recedes counts as standing."""
-    return np.asarray(max(v_h, 0.0) * (T_r + np.asarray(T_s)))
+    return np.asarray(np.maximum(v_h, 0.0) * (T_r + np.asarray(T_s)))
 
 
 def braking(onset: Onset, T_s: float, share: float = BOUND) -> Course:
@@ -74,7 +74,7 @@ def course(v_r: Array, T_r: float, T_s: float, share: float = BOUND) -> Course:
     return Course(v, v * T_r, share * v * T_s, T_s)
 
 
-def separation_distance(course: Course, v_h: float, T_r: float, K: float) -> Array:
+def separation_distance(course: Course, v_h: Array | float, T_r: float, K: float) -> Array:
     """S_p [m] of each part, shape (n,).
 
     Args:

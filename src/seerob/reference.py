@@ -145,6 +145,10 @@ class Reference:
         """Whether a jump led to the newest sample."""
         return bool(self._jumps) and self._jumps[-1] == self._times[-1]
 
+    def land(self, t: float) -> None:
+        """Let the twin be put there at ``t`` [s]: it is elsewhere, for it was not known before."""
+        self._landings.append(t)
+
     def lands(self, t: float) -> bool:
         """Whether a jump ended by ``t`` [s]; told once."""
         due = [jump for jump in self._landings if jump <= t + SLACK]

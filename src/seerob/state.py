@@ -288,7 +288,7 @@ class State:
         if reason:
             return f"{name}: {reason}"
         if hearing.lost > self.t - 2 * self._period:
-            return f"{name}: the physics could not follow what was heard"
+            return f"{name}: the twin had to be put back to what was heard"
         limit = self._tracking_limits[self.model.mechanisms[name].role]
         if hearing.error > limit:
             why = " (a torque limit is reached)" if hearing.saturated else ""

@@ -235,3 +235,27 @@ def test_a_live_machine_stands_where_it_was_said_to_be_however_late_it_hears_the
     way = [engine.tick().data.qpos[gate] for _ in range(300)]
     assert max(way) < 0.41
     assert way[100:] == pytest.approx([0.4] * 200, abs=1e-6)
+
+
+def test_after_a_hiccup_a_machine_is_not_as_fast_as_the_twin_that_catches_up(tmp_path):
+    """It goes on at 0.25 m/s while its PLC is not heard for 0.3 s, and comes late by 40 ms now and then."""
+    station = made(tmp_path, PERSON + GATE, POSITION, table("t,x", [(0, 0), (1, 0)]))
+    engine = Engine(station.model, driven={"gate": 0.5}, live={"gate"}, signals={"plc": 0.5})
+    told, seq, speeds, reasons = [0.05 * k for k in range(60) if not 1.0 <= 0.05 * k < 1.3], 0, [], []
+    gate = station.model.mechanism("gate")
+    for k in range(250):
+        now, samples = 0.01 * k, []
+        while told and told[0] - 0.02 + 0.04 * (seq % 10 == 7) <= now:
+            t = told.pop(0)
+            samples.append(SignalSample(source="plc", seq=seq, t=t, values={"gate/position": 0.25 * t}))
+            seq += 1
+        engine.take(samples)
+        state = engine.tick() if k else engine.start()
+        if reason := state.doubt("gate"):
+            reasons.append(reason)
+        else:
+            speeds.append(abs(float(state.qd(gate)[0])))
+    assert max(speeds) < 0.25 + 0.15
+    assert len(speeds) > 200
+    assert any("nobody says that it stopped" in reason for reason in reasons)
+    assert any("put back" in reason for reason in reasons)

@@ -78,7 +78,9 @@ class Hearing:
     older: float = 0.0
     """How much older than its instant what was heard last may be [s]."""
     leaves_at: float = 0.0
-    """Of a source that is known ahead: largest speed of a joint at its newest sample [rad/s or m/s]."""
+    """Of what stands where it was said to be: largest speed of a joint at its newest sample [rad/s or m/s]."""
+    grace: float = 0.0
+    """How long after its newest sample it may be late all the same [s]."""
     coarse: str = ""
     """Why what is heard is too coarse for energies and forces; empty when it is not."""
 
@@ -121,7 +123,7 @@ class Hearing:
         silence = self.heard[k][0] - last if k < len(self.heard) else 0.0
         if silence > self.timeout + SLACK and t - last > SLACK:
             return f"not heard for {silence:.2f} s from {last:.3f} s on (time-out {self.timeout:.3g} s)"
-        if k == len(self.heard) and t - last > SLACK and self.leaves_at > STANDS:
+        if k == len(self.heard) and t - last > self.grace + SLACK and self.leaves_at > STANDS:
             speed = f"{self.leaves_at:.3g} rad/s or m/s"
             return f"what drives it ends in motion, with {speed} at {last:.3f} s: nobody says that it stopped"
         return next((reason for _, reason in self.heard[k - 1 : k + 1] if reason), "")

@@ -1,0 +1,310 @@
+"""A stream that is spoiled on its way, compared tick by tick with a motion in closed form.
+
+Everything between socket and verdict is what a run has: the listener with its clock and its checks, the
+mailbox in which the newest wins, run time, the engine, a criterion. Only the time is the test's own.
+"""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from made_cell import TWO_R, made, two_r
+from seerob.engine import NEAR
+from seerob.live import real_time
+from seerob.live.device_clock import SETTLED, SLEW
+from seerob.live.listening import Listener, delay_of
+from seerob.live.real_time import Clock, hear
+from seerob.run import Judge, bind, engine_of
+from seerob.samples import JointSample, Mailbox
+
+RATE, TICK = 125.0, 0.01
+OMEGA, SIZE = 2.0, np.array([0.5, -0.3])
+FASTEST, HARDEST = 0.5 * OMEGA, 0.5 * OMEGA**2
+"""Of a joint [rad/s, rad/s²]."""
+WAY = 0.001
+"""From the device to here [s]."""
+OFFSET = -900.0
+"""Device time less the host's [s]."""
+
+STATION = (
+    TWO_R
+    + """
+[[sources]]
+kind = "rtde"
+robot = "arm"
+host = "127.0.0.1"
+frequency = 125
+[[safety]]
+kind = "velocity"
+name = "speed"
+at = "arm/tip"
+limit = 100.0
+"""
+)
+
+
+def motion(t):
+    """Positions and velocities at device time [s]."""
+    return SIZE * math.sin(OMEGA * t), SIZE * OMEGA * math.cos(OMEGA * t)
+
+
+def tip_speed(t):
+    """Of the tip of both links of 1 m."""
+    (a, b), (va, vb) = motion(t)
+    x = -math.sin(a) * va - math.sin(a + b) * (va + vb)
+    y = math.cos(a) * va + math.cos(a + b) * (va + vb)
+    return math.hypot(x, y)
+
+
+class Tick(NamedTuple):
+    """What a run made of it."""
+
+    t: float
+    decided: bool
+    off: float
+    """Of a joint from where it is [rad]."""
+    speed_off: float
+    """Of the tip's speed from what it is [m/s]."""
+    reason: str
+
+
+TIMES = np.linspace(0, 2 * math.pi / OMEGA, 2000)
+SPEEDS = np.array([tip_speed(t) for t in TIMES])
+FASTEST_TIP = SPEEDS.max()
+TIP = np.abs(np.diff(SPEEDS) / np.diff(TIMES)).max()
+"""Fastest change of the tip's speed [m/s²]."""
+SWING = NEAR * 2 * math.pi * 20 / math.e * 3 + 0.01
+"""Of the tip, when both joints are pulled to where they are found to be, at 20 Hz [m/s]."""
+
+
+class Spoiled:
+    """A run of so many ticks whose packets a test sends as it likes.
+
+    Args:
+        packets: Arrival [s], device time [s] and what is said, in order of arrival.
+        pauses: Tick → how long the run is held still in front of it [s].
+        again: When the connection is made anew [s].
+    """
+
+    def __init__(self, station, patch, packets, *, ticks=600, pauses=None, again=()):
+        self.now = 1000.0
+        patch.setattr(real_time, "time", SimpleNamespace(monotonic=lambda: self.now, sleep=self._sleep))
+        (source,) = station.workstation.sources
+        self.box = Mailbox()
+        self.ears = Listener(source, None, self.box.post)
+        self.delay = delay_of([source])
+        self.packets, self.again = list(packets), list(again)
+        self.pauses = pauses or {}
+        self.ticks = ticks
+        self.clock = Clock()
+        self.station = station
+
+    def _sleep(self, seconds):
+        self.now += seconds
+
+    def first(self):
+        self.now += 0.05
+        return self.take()
+
+    def take(self):
+        while self.packets and self.packets[0][0] <= self.now - 1000.0:
+            arrived, device, (q, qd) = self.packets.pop(0)
+            while self.again and self.again[0] <= arrived:
+                self.again.pop(0)
+                self.ears._clock.reconnect()
+            self.ears._take(
+                JointSample(
+                    source="", seq=0, target="arm", t=1000.0 + arrived, t_device=device,
+                    q=tuple(q), qd=None if qd is None else tuple(qd),
+                )
+            )  # fmt: skip
+        return self.box.take()
+
+    def live(self):
+        """Per tick: whether it is decided, how far the arm and its speed are from the truth, and why not."""
+        model = self.station.model
+        engine, judge = engine_of(model), Judge(bind(model))
+        arm = model.mechanism("arm")
+        feed = hear(iter(lambda: (), None), self, self.clock)
+        told = []
+        for k in range(self.ticks):
+            self.now += self.pauses.get(k, 0.0)
+            engine.take(next(feed))
+            state = engine.tick() if k else engine.start()
+            (result,) = judge(state)
+            there = self.clock.start - self.delay + state.t + OFFSET
+            off = np.abs(state.joint_positions(arm) - motion(there)[0]).max()
+            value = math.nan if result.value is None else result.value - tip_speed(there)
+            told.append(Tick(state.t, result.verdict == "within", off, abs(value), result.reason))
+            self.now += 0.003
+            self.clock.wait(state.t + TICK)
+        return told
+
+
+def stream(seconds=7.0, way=lambda t: WAY, device=lambda t: t, said=motion):
+    """Packets at 125 Hz: arrival, device time, content; each stays in its order."""
+    found, last = [], -math.inf
+    for k in range(int(seconds * RATE)):
+        t = k / RATE
+        last = max(last, t + way(t))
+        stamp = 1000.0 + t + OFFSET
+        found.append((last, device(stamp), said(stamp)))
+    return found
+
+
+@pytest.fixture(scope="module")
+def station(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("spoiled")
+    return made(folder, STATION, {"arm.urdf": two_r()})
+
+
+CHANCE = 5
+
+
+def jitter(scale):
+    chance = np.random.default_rng(CHANCE)
+    return lambda t: WAY + chance.exponential(scale)
+
+
+def lossy(share):
+    chance = np.random.default_rng(CHANCE)
+    return [p for p in stream() if chance.random() > share]
+
+
+def silent(packets):
+    return [(at, device, (q, None)) for at, device, (q, _) in packets]
+
+
+def looped(*, live):
+    """From 3 s on the last two seconds again and again, with the live packets among them or not."""
+    before = [p for p in stream() if p[0] < 3]
+    again = [p for p in before if p[0] >= 1]
+    loop = [(p[0] + 2 * n, *p[1:]) for n in (1, 2) for p in again]
+    return sorted([*before, *loop, *([p for p in stream() if p[0] >= 3] if live else ())], key=lambda p: p[0])
+
+
+def ahead(by):
+    return [(at, device + by * (k == 400), said) for k, (at, device, said) in enumerate(stream())]
+
+
+def shuffled():
+    found = stream()
+    for k in range(0, len(found) - 4, 4):
+        four = found[k : k + 4]
+        found[k : k + 4] = [(four[3][0], *four[j][1:]) for j in (2, 0, 3, 1)]
+    return found
+
+
+def burst(t):
+    return WAY + 0.1 * (t % 1.0 > 0.9) * (1.0 - t % 1.0) / 0.1
+
+
+def half(t):
+    """Held back for 0.15 s now and then, and let through at once."""
+    return WAY + max(0.0, 0.15 - t % 1.5) * (t > 1)
+
+
+class Case(NamedTuple):
+    """How a stream is spoiled, and what a run may make of it."""
+
+    packets: list
+    gap: float = 0.0
+    """How long the twin goes without a sample that has its time, while it is decided [s]."""
+    shift: float = 0.0
+    """How far the device's stamps are off without anybody seeing it [s]."""
+    least: float = 0.99
+    """Share of the ticks that are decided: what is ordinary stays so."""
+    until: float = math.inf
+    """Nothing is decided from then on [s]."""
+    why: str = ""
+    """What a reader of some verdict is told."""
+    pauses: dict | None = None
+    again: tuple = ()
+
+
+TIMEOUT = 0.19
+"""That the run counts [s], and one tick."""
+SPOILED = {
+    "as it is": Case(stream()),
+    "jitter of 5 ms": Case(stream(way=jitter(0.005)), gap=0.03, least=0.97),
+    "jitter of 20 ms": Case(stream(way=jitter(0.02)), gap=0.1, least=0.8),
+    "jitter, no velocities": Case(silent(stream(way=jitter(0.005))), gap=0.03, least=0.97),
+    "half is lost": Case(lossy(0.5), gap=0.06, least=0.97),
+    "nineteen of twenty are lost": Case(lossy(0.95), gap=TIMEOUT, least=0.4),
+    "bursts": Case(stream(way=burst), gap=0.1),
+    "held back": Case(stream(way=half), gap=0.15, least=0.98),
+    "held back, no velocities": Case(silent(stream(way=half)), gap=0.15, least=0.97),
+    "twice each": Case(sorted([*stream(), *stream()], key=lambda p: p[0])),
+    "in another order": Case(shuffled(), gap=0.04, least=0.97),
+    "delay grows": Case(stream(way=lambda t: WAY + 0.03 * t), gap=TIMEOUT, least=0.5),
+    "delay grows fast": Case(
+        stream(way=lambda t: WAY + 0.3 * max(t - 2, 0)), gap=TIMEOUT, least=0.3, until=2.9
+    ),
+    "delay of 2 s after a new connection": Case(
+        stream(way=lambda t: WAY + 2.0 * (t > 2)),
+        gap=TIMEOUT,
+        least=0.3,
+        until=2.2,
+        again=(4.0,),
+        why="later than at its best",
+    ),
+    "delay of 0.1 s after a new connection": Case(
+        stream(way=lambda t: WAY + 0.1 * (t > 2)), gap=0.12, least=0.8, again=(2.1,)
+    ),
+    "played again": Case(looped(live=False), gap=0.02, least=0.4, until=3.05, why="says again what it said"),
+    "played again, connected anew": Case(
+        looped(live=False), least=0.4, until=3.05, again=(3.0, 5.0), why="not for the first time"
+    ),
+    "played again among what is live": Case(looped(live=True), least=0.4, until=3.05),
+    "a stamp ahead": Case(ahead(0.15), gap=0.02, least=0.85, why="ahead of what its clock was"),
+    "a stamp far ahead": Case(ahead(3.0), gap=0.02, least=0.85),
+    "positions stand": Case(
+        stream(said=lambda t: (motion(100.0)[0], motion(t)[1])),
+        least=0,
+        until=0.0,
+        why="is not zero while the joint stands still",
+    ),
+    "velocities stand": Case(stream(said=lambda t: (motion(t)[0], (0.0, 0.0))), least=0, until=0.0),
+    "half the velocities": Case(
+        stream(said=lambda t: (motion(t)[0], 0.5 * motion(t)[1])), shift=math.inf, least=0, until=0.1
+    ),
+    "pauses of the run": Case(
+        stream(), gap=TIMEOUT, least=0.85, pauses={200: 0.5, 400: 0.2}, why="run time fell behind"
+    ),
+    "pauses, no velocities": Case(silent(stream()), gap=TIMEOUT, least=0.85, pauses={200: 0.5, 400: 0.2}),
+    "a clock that is 1 % slow": Case(stream(device=lambda t: 0.99 * t), gap=0.08, shift=0.06),
+    "a clock that starts again": Case(stream(device=lambda t: t - 50 * (t > 102)), gap=0.02, least=0.5),
+}
+
+
+LONG = {
+    "twice each",
+    "bursts",
+    "held back, no velocities",
+    "pauses, no velocities",
+    "a stamp far ahead",
+    "jitter of 20 ms",
+}
+
+
+@pytest.mark.parametrize(
+    "how", [pytest.param(how, marks=[pytest.mark.soak] * (how in LONG)) for how in SPOILED]
+)
+def test_what_is_decided_is_true_whatever_happens_to_the_stream(station, monkeypatch, how):
+    """As far as nobody knows the future: without a sample a robot goes on as it went, until the time-out."""
+    case = SPOILED[how]
+    told = Spoiled(station, monkeypatch, case.packets, pauses=case.pauses, again=case.again).live()
+    sure = [tick for tick in told if tick.decided]
+    assert len(sure) >= case.least * len(told)
+    assert all(tick.t < case.until for tick in sure)
+    for tick in sure:
+        assert tick.off < FASTEST * (WAY + SETTLED + case.shift) + HARDEST * case.gap**2 / 2 + NEAR
+        assert tick.speed_off < TIP * (
+            WAY + case.gap + case.shift
+        ) + SLEW * FASTEST_TIP + 0.01 + SWING * bool(case.gap)
+    assert any(case.why in tick.reason for tick in told)

@@ -6,6 +6,7 @@ from seerob.human import anthropometry
 from seerob.human.skeleton import AXES
 from seerob.human.tables import table
 from seerob.model_io import library
+from seerob.plausibility.ranges import data
 
 
 def plain(text: str) -> str:
@@ -34,6 +35,21 @@ def library_table() -> str:
         ]
         rows.append((f"`library:{name}`", str(len(joints)), mass, origin, ", ".join(known)))
     return markdown(("model", "joints", "mass of all links", "origin of the masses", "limits known"), rows)
+
+
+def plausible_table() -> str:
+    """Quantities of a workstation file, in which range each is plausible, and why."""
+    rows = [
+        (
+            "anything else" if row.key == "*" else f"`{row.key}`",
+            row.unit,
+            ("0, or " * row.zero * (row.low > 0)) + f"{row.low:g} to {row.high:g}",
+            f"{row.because}; {row.right}",
+            f"{row.source} ({row.confidence})",
+        )
+        for row in data().ranges
+    ]
+    return markdown(("key", "unit", "plausible", "because; what was probably meant", "source"), rows)
 
 
 def joints_table() -> str:

@@ -22,6 +22,14 @@ mass = 75
 sex = "male"
 at = { position = [1.3, 0, -0.7] }
 posture = "standing"
+[[confirmed]]
+key = "humans[0].feet"
+value = -0.7
+why = "stands in a pit"
+[[confirmed]]
+key = "safety[9].human_speed"
+value = 0.2
+why = "so that some instants are within"
 [[parts]]
 name = "wall"
 shape = { box = [0.1, 2, 2] }

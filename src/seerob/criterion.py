@@ -39,6 +39,8 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Unit of its results."""
     at_most: ClassVar[bool] = True
     """Whether its limit bounds from above."""
+    by_torque: ClassVar[bool] = False
+    """Whether it rests on torques that a source measured."""
     by_shape: ClassVar[bool] = True
     """Whether it is about the shapes of its subjects, so that what no shape shows of a robot could make it
     worse; False only where no distance, area, volume or point of a surface is in it."""

@@ -29,6 +29,7 @@ from seerob.machines.gripping import Grips, own_masses
 from seerob.model import Mechanism, Model
 from seerob.mounting.compilation import pose_matrix
 from seerob.moving_base import moved_by_poses
+from seerob.plausibility import own_words
 from seerob.reference import Course, Reference
 from seerob.sample_values import beyond_limits, is_possible, largest_speed, torques_of
 from seerob.samples import BodySample, JointSample, PoseSample, Sample, SignalSample
@@ -159,6 +160,8 @@ class Engine:
         """Who was put elsewhere during a tick."""
         self._force = np.zeros(self._mj.nv)
         self._almost = 0.999 * self._limits
+        self._said: dict[str, own_words.SaidTool | None] = {}
+        """By robot, where its own tool centre point may be."""
         self._followings: dict[str, Following] = {}
         """By person that devices see."""
         self.signals = Signals(model.dictionary, signals or {}, untimed)
@@ -194,7 +197,7 @@ class Engine:
             elif isinstance(sample, JointSample):
                 qd = None if sample.qd is None else np.array(sample.qd)
                 if mechanism.name in self._unread:
-                    reason = reason or beyond_limits(sample, mechanism)
+                    reason = reason or beyond_limits(sample, mechanism) or self._contradicted(sample)
                 taken = self._take_one(mechanism.name, sample.t, np.array(sample.q), qd)
             else:
                 taken, missed = self._take_pose(mechanism, sample)
@@ -210,6 +213,15 @@ class Engine:
                 self._references[name].take(found.t, found.q, None, anew=found.anew and self._tick > 0)
                 hearing.follow(found)
                 hearing.leaves_at = self._references[name].leaves_at if name in self._ahead else 0.0
+
+    def _contradicted(self, sample: JointSample) -> str:
+        """Why what a source says of itself is not the twin; empty when it may be."""
+        if sample.tcp is None:
+            return ""
+        if sample.target not in self._said:
+            self._said[sample.target] = own_words.bound(self.model, sample.target)
+        said = self._said[sample.target]
+        return "" if said is None else said.doubt(sample)
 
     def _silent(self, name: str) -> bool:
         """Whether what drives it was silent: of a live source only the newest sample is ever this old."""

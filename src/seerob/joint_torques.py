@@ -10,10 +10,14 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from seerob.errors import Undecided
 from seerob.kernels.chain import held
 from seerob.model import Mechanism
 from seerob.state import State
 from seerob.transforms import Array
+
+LONGEST = 0.05
+"""Between two evaluations; over a longer time a mean acceleration says nothing [s]."""
 
 
 def gravity(state: State, mechanism: Mechanism) -> Array:
@@ -50,3 +54,42 @@ def bias(state: State, mechanism: Mechanism) -> Array:
     every = np.zeros(state.model.mj.nv)
     mujoco.mj_rne(state.model.mj, state.data_of(mechanism.name), 0, every)
     return np.asarray(mechanism.coupling.T @ every[mechanism.v_address])
+
+
+class Needed:
+    r"""What the joints must spend on the motion: :math:`M \ddot q + c + g`, accelerated since the last call.
+
+    Args:
+        mechanism: The robot.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._robot = mechanism
+        self._before: tuple[float, Array] | None = None
+
+    def __call__(self, state: State) -> Array:
+        """Shape (n,) [N·m or N].
+
+        Raises:
+            Undecided: Not heard, a mass that nobody gave, moved by or moving others, or asked too seldom.
+        """
+        # Forgotten first: after a tick that is undecided a difference of speeds would bridge the gap.
+        last, self._before = self._before, None
+        robot = self._robot
+        if not robot.alone:
+            why = "what that accelerates is in the measured torques too"
+            raise Undecided(f"{robot.name} is moved, or moves others: {why}")
+        speeds = state.qd(robot).copy()
+        self._before = (state.t, speeds)
+        elapsed = np.nan if last is None else state.t - last[0]
+        if last is None or not 0 < elapsed <= LONGEST:
+            raise Undecided(
+                f"{robot.name}: an acceleration needs two evaluations within {LONGEST:g} s; "
+                "leave 'every' away or let the source send external torques"
+            )
+        qdd = (speeds - last[1]) / elapsed
+        return np.asarray(state.mass_matrix(robot) @ qdd + bias(state, robot))
+
+    def forget(self) -> None:
+        """Of an instant that is undecided for another reason: nothing bridges it."""
+        self._before = None

@@ -190,7 +190,7 @@ def held(criterion: Criterion, model: Model, findings: Iterable[Finding]) -> str
     bodies = {i for name in subjects for i in _meant(model, name)}
     for finding in findings:
         if any(
-            name == "*" or name in subjects or not bodies.isdisjoint(_meant(model, name))
+            name in ("*", criterion.name, *subjects) or not bodies.isdisjoint(_meant(model, name))
             for name in finding.holds
         ):
             reasons.append(finding.text)

@@ -10,9 +10,13 @@ from seerob.errors import InputError, Problem
 from seerob.live.listening import LiveSource, delay_of
 from seerob.model import Model
 from seerob.mounting.compilation import pose_matrix
+from seerob.plausibility.of_file import findings as implausible
+from seerob.plausibility.of_motion import quantities
+from seerob.plausibility.own_words import compared, said_by
 from seerob.snapshot import Finding
 from seerob.source import Matrix4, Opened, Source, Target
 from seerob.sources._variables import VariablesSource
+from seerob.trajectories.trajectory import TrajectorySamples
 
 MOST_NAMED = 5
 """Variables in one finding."""
@@ -37,7 +41,8 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
         problems += _too_short(model, source, delay)
         try:
             found = source.open(model.folder, source_target(model, source))
-            opened.append((source, replace(found, findings=(*found.findings, *_lateness(model, source)))))
+            found = replace(found, findings=(*found.findings, *_lateness(model, source)))
+            opened.append((source, _compared(model, i, source, found)))
         except InputError as error:
             problems += (_placed(problem, source, f"sources[{i}].file", file) for problem in error.problems)
     if problems:
@@ -77,6 +82,22 @@ def _lateness(model: Model, source: Source) -> Iterator[Finding]:
         yield Finding(
             level="assumed", subject=source.name, text=f"{text}; the file says {source.delay:g} s at most"
         )
+
+
+def _compared(model: Model, i: int, source: Source, opened: Opened) -> Opened:
+    """The same, with what is implausible of it, and what it says of itself compared with what it drives."""
+    name = source.target()
+    if isinstance(source, LiveSource) or name not in model.mechanisms:
+        return opened
+    found = list(opened.findings)
+    if isinstance(opened.samples, TrajectorySamples):
+        limits = [None if v is None else v.value for v in model.mechanisms[name].velocity_limits]
+        every = quantities(opened.samples.trajectory, limits, key=f"sources[{i}]", about=name)
+        found += implausible(every, model.workstation.confirmed)
+    said = said_by(opened.samples, getattr(source, "file", source.name))
+    if said is not None:
+        found += compared(model, name, said)
+    return replace(opened, findings=tuple(found))
 
 
 def _placed(problem: Problem, source: Source, key: str, file: str) -> Problem:

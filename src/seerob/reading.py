@@ -14,6 +14,7 @@ from seerob import naming, plugin
 from seerob.conversion import convert, tables
 from seerob.criterion import Criterion
 from seerob.errors import InputError, Problem, SeerobError
+from seerob.plausibility.of_file import unknown
 from seerob.sensors.controller_zones import zones_of
 from seerob.sink import Sink
 from seerob.source import Source
@@ -117,6 +118,7 @@ def _convert(table: Mapping[str, Any], file: str) -> Readable:
     head = _head({key: value for key, value in table.items() if key not in groups}, file, problems)
     names = naming.declared(table)
     between = naming.check(names, entries, file)
+    problems += unknown(entries["confirmed"], entries, head.engine, file)
     return Readable(head, entries, names, [*problems, *between], between)
 
 

@@ -74,6 +74,8 @@ class JointSample(SampleBase, frozen=True, kw_only=True, tag="joint"):
     """Joint velocities [rad/s or m/s]."""
     tau: tuple[float, ...] | None = None
     """Measured joint torques [N·m or N]."""
+    tcp: Vec3 | None = None
+    """Where the source itself has the tool's working point, in the base frame of its controller [m]."""
     placed: bool = True
     """Whether it says where a person stands; if not, it is of the posture alone."""
 

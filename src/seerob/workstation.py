@@ -10,7 +10,7 @@ import hashlib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from seerob.errors import InputError
 from seerob.machines.display_table import Display
@@ -106,6 +106,12 @@ class Robot(_Table, frozen=True, kw_only=True):
     """Largest jerk per joint [rad/s³], likewise."""
     masses: dict[str, Body] = {}
     """Mass properties by hand, per link name."""
+    controller_tcp: Pose | None = None
+    """Where its controller has its tool centre point, in the frame of the flange, when that is neither the
+    flange nor the ``tcp`` of a tool: what a source says of it is compared with the twin."""
+    tcp_tolerance: Annotated[float, unit("m", gt=0, le=0.2)] | None = None
+    """How far what a source says of the tool centre point may be from the twin's [m]; 10 mm when not given,
+    for no two arms of a type are alike. Beyond it, what rests on the robot is undecided."""
     mass_tolerance: Tolerance | None = None
     """How far the masses of its links may be off, all alike, as a share: 0.05 for ± 5 %."""
     com_tolerance: Annotated[float, unit("m", ge=0, le=10)] | None = None
@@ -304,6 +310,17 @@ class Contact(_Table, frozen=True, kw_only=True):
     between: tuple[str, str]
 
 
+class Confirmed(_Table, frozen=True, kw_only=True):
+    """A value that looks like a mistake and is meant: it does not keep verdicts undecided any more."""
+
+    key: Annotated[str, Meta(max_length=300)]
+    """Where it stands in the file, with the number of its entry from 0: ``robots[0].base.position``."""
+    value: float | list[Any]
+    """The value that is meant, as the file has it; another one later is not confirmed."""
+    why: Annotated[str, Meta(min_length=1, max_length=1000)]
+    """Why it is right; it stands in the report."""
+
+
 class Workstation(_Table, frozen=True, kw_only=True):
     """A workstation file."""
 
@@ -331,6 +348,7 @@ class Workstation(_Table, frozen=True, kw_only=True):
     triggers: tuple[Trigger, ...] = ()
     targets: tuple[CartesianTarget, ...] = ()
     contacts: tuple[Contact, ...] = ()
+    confirmed: tuple[Confirmed, ...] = ()
     sources: tuple[Any, ...] = ()
     """`Source`s, each of the type that its ``kind`` names."""
     safety: tuple[Any, ...] = ()
@@ -360,6 +378,7 @@ TABLES: dict[str, type[Struct]] = {
     "triggers": Trigger,
     "targets": CartesianTarget,
     "contacts": Contact,
+    "confirmed": Confirmed,
 }
 """Lists of tables and the type of their entries."""
 

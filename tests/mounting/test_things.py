@@ -55,8 +55,8 @@ def test_what_is_plausible_is_not_warned_of(tmp_path, density):
 def test_a_mesh_in_the_wrong_unit_names_the_one_that_fits(tmp_path):
     corners = "v 0 0 0\nv 90 0 0\nv 0 90 0\nv 0 0 90\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
     (tmp_path / "t.obj").write_text(corners)
-    said = dict(findings(tmp_path, TOOL + 'mesh = "t.obj"\nunits = "m"\n'))
-    assert "read as mm it would be 0.09 m" in said["warning"]
+    said = findings(tmp_path, TOOL + 'mesh = "t.obj"\nunits = "m"\n')
+    assert any("read as mm it would be 0.09 m" in text for level, text in said if level == "warning")
 
 
 @pytest.mark.parametrize(("table", "where"), [(TOOL, "tools[0]"), (PART, "parts[0]")])

@@ -205,7 +205,7 @@ def test_no_way_is_proven_clear_of_what_is_not_shown(tmp_path):
 
 def test_a_robot_that_must_stay_outside_counts_whole(tmp_path):
     """The area is that of a robot whose shapes are all there."""
-    other = '[[robots]]\nname = "other"\nmodel = "{}.urdf"\nbase = {{ position = [0, 8, 0] }}\nq = [0, 0]\n'
+    other = '[[robots]]\nname = "other"\nmodel = "{}.urdf"\nbase = {{ position = [0, 6, 0] }}\nq = [0, 0]\n'
     kinds = (
         f'[[safety]]\nkind = "{kind}"\nname = "{kind}"\n{ABOUT[kind].replace(old, new)}'
         for kind, old, new in (("separation", "", ""), ("separation_area", '"op"', '"other"'))

@@ -24,6 +24,10 @@ name = "axis"
 shape = { box = [0.1, 0.1, 0.1] }
 mass = 500
 slide = { along = [1, 0, 0], lower = -1, upper = 1 }
+[[confirmed]]
+key = "machines[0].bulk_density"
+value = 500000
+why = "the half tonne hangs below, where it touches nothing"
 """
 DICTIONARY = '[[variables]]\nname = "gate/position"\nsource = "plc"\naddress = "x"\nunit = "m"\n'
 PLC = """

@@ -33,25 +33,25 @@ def test_table_bounds_both_joints_and_the_longer_time_counts(tmp_path):
 
 
 def test_table_is_undecided_above_its_speed_or_payload_and_without_a_mass(tmp_path):
-    fast = separation(tmp_path / "v", TABLE, qd=(3.1, 0.0), x=20.0)
+    fast = separation(tmp_path / "v", TABLE, qd=(3.1, 0.0), x=11.0)
     assert fast.verdict == "undecided"
     assert "speed is 1.03" in fast.reason
     tool = '[[tools]]\nname = "t"\non = "arm/tip"\nshape = { box = [0.1, 0.1, 0.1] }\n'
-    heavy = separation(tmp_path / "m", TABLE, more=tool + "mass = 5.1\n", x=20.0)
+    heavy = separation(tmp_path / "m", TABLE, more=tool + "mass = 5.1\n", x=11.0)
     assert "payload is 1.02" in heavy.reason
-    unknown = separation(tmp_path / "u", TABLE, more=tool, x=20.0)
+    unknown = separation(tmp_path / "u", TABLE, more=tool, x=11.0)
     assert unknown.verdict == "undecided"
     assert "mass" in unknown.reason
-    light = separation(tmp_path / "l", TABLE, more=tool + "mass = 4.9\n", x=20.0)
+    light = separation(tmp_path / "l", TABLE, more=tool + "mass = 4.9\n", x=11.0)
     assert light.verdict == "within"
 
 
 def test_joint_without_a_table_needs_a_stopping_time(tmp_path):
     one = TABLE.replace(", " + JOINT.format(j=1, way=0.2, time=0.1), "")
-    unknown = separation(tmp_path / "u", one, qd=(1.0, 1.0), x=20.0)
+    unknown = separation(tmp_path / "u", one, qd=(1.0, 1.0), x=11.0)
     assert unknown.verdict == "undecided"
     assert "j2" in unknown.reason
-    given = separation(tmp_path / "g", one + ", stopping = 0.5", qd=(0.0, 1.0), x=20.0)
+    given = separation(tmp_path / "g", one + ", stopping = 0.5", qd=(0.0, 1.0), x=11.0)
     arm = np.hypot(1, 0.05)
     assert terms(given)[:3] == pytest.approx([1.6 * 0.6, 0.1 * arm, 0.5 * arm])
 
@@ -62,11 +62,11 @@ UR10_TABLE = 'acceleration = 0, reaction = 0.1, model = "table", table = "ur10_c
 def test_table_by_tool_speed_is_undecided_above_its_payload_and_without_a_mass(tmp_path):
     tool = '[[tools]]\nname = "t"\non = "arm/tip"\nshape = { box = [0.1, 0.1, 0.1] }\n'
     stop = UR10_TABLE + ', table_for = "arm"'
-    heavy = separation(tmp_path / "h", stop, more=tool + "mass = 15\n", x=20.0)
+    heavy = separation(tmp_path / "h", stop, more=tool + "mass = 15\n", x=11.0)
     assert (heavy.verdict, "payload is 1.5" in heavy.reason) == ("undecided", True)
-    unknown = separation(tmp_path / "u", stop, more=tool, x=20.0)
+    unknown = separation(tmp_path / "u", stop, more=tool, x=11.0)
     assert (unknown.verdict, "mass" in unknown.reason) == ("undecided", True)
-    light = separation(tmp_path / "l", stop, more=tool + "mass = 9.9\n", x=20.0)
+    light = separation(tmp_path / "l", stop, more=tool + "mass = 9.9\n", x=11.0)
     assert light.verdict == "within"
     inputs = {i.name: i.value for i in light.basis.inputs}
     assert inputs["payload of arm"] == pytest.approx(9.9)
@@ -75,10 +75,10 @@ def test_table_by_tool_speed_is_undecided_above_its_payload_and_without_a_mass(t
 
 @pytest.mark.parametrize("stop", [UR10_TABLE, TABLE.replace('robot = "arm"', 'robot = "another"')])
 def test_table_of_another_robot_keeps_nothing_within_unless_the_file_says_so(tmp_path, stop):
-    far = separation(tmp_path / "far", stop, x=20.0)
+    far = separation(tmp_path / "far", stop, x=11.0)
     assert (far.verdict, "stop.table_for" in far.reason) == ("undecided", True)
     assert separation(tmp_path / "near", stop, x=3.0).verdict == "exceeded"
-    said = separation(tmp_path / "said", stop + ', table_for = "arm"', x=20.0)
+    said = separation(tmp_path / "said", stop + ', table_for = "arm"', x=11.0)
     assert said.verdict == "within"
     assert any((i.name, i.origin) == ("stopping table is of", "given") for i in said.basis.inputs)
 
@@ -86,7 +86,7 @@ def test_table_of_another_robot_keeps_nothing_within_unless_the_file_says_so(tmp
 def test_table_of_the_librarys_robot_is_known_to_be_its_own(tmp_path):
     q = ([0.0, -1.2, 1.4, -1.5, -1.5, 0.0], [0.3, 0, 0, 0, 0, 0])
     for model, verdict in (("ur10", "within"), ("ur10e", "undecided")):
-        text = UR10.replace("library:ur10", f"library:{model}") + PERSON.format(x=15.0)
+        text = UR10.replace("library:ur10", f"library:{model}") + PERSON.format(x=11.0)
         text += f'[[safety]]\nkind = "separation"\nname = "S"\nbetween = ["arm", "op"]\n{KNOWN}'
         cell = made(tmp_path / model, text + f"stop = {{ {UR10_TABLE} }}\n")
         assert results_at(cell, arm=q)["S"].verdict == verdict
@@ -100,7 +100,7 @@ def test_table_without_a_payload_gives_its_printed_figures_once_the_file_says_wh
     for key in ("", ", rated_payload = 20.0"):
         stop = 'acceleration = 0, reaction = 0.1, model = "table", table = "kuka_kr20_r3100"'
         stop += f', table_for = "arm"{key}'
-        text = UR10 + PERSON.format(x=15.0)
+        text = UR10 + PERSON.format(x=11.0)
         text += f'[[safety]]\nkind = "separation"\nname = "S"\nbetween = ["arm", "op"]\n{KNOWN}'
         found[key] = results_at(made(tmp_path / str(len(key)), text + f"stop = {{ {stop} }}\n"), arm=q)["S"]
     assert found[""].verdict == "undecided"

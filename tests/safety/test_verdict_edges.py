@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob import joint_torques
 from seerob.contact.areas import area_results, margin
 from seerob.contact.limits import Judged, RegionArrays
 from seerob.contact.shape import ContactShape, force_at_pressure
@@ -21,7 +22,6 @@ from seerob.errors import InputError
 from seerob.judging import Judge
 from seerob.norms.body_limits import SHIPPED, parse, shipped
 from seerob.norms.iso_13855 import Approach, Edition, intrusion, minimum_distance, speed_at
-from seerob.safety import tool_force
 from seerob.safety.effective_mass import inverse_effective_mass, principal_masses
 from seerob.safety.manipulability import Manipulability, singular_values
 from seerob.safety.minimum_distance import MinimumDistance
@@ -373,4 +373,4 @@ def test_a_slow_motion_has_a_direction_and_its_mass_is_drawn_at_the_point(tmp_pa
 
 
 def test_an_acceleration_needs_two_evaluations_within_50_ms():
-    assert tool_force.LONGEST == 0.05
+    assert joint_torques.LONGEST == 0.05

@@ -26,8 +26,6 @@ DRAWN = 0.002
 LARGEST_DRAWN = 1.0
 NOTHING = 1e-9
 """Share of a force that may be hidden without a word."""
-LONGEST = 0.05
-"""Between two evaluations; over a longer time a mean acceleration says nothing [s]."""
 
 
 class Wrench(NamedTuple):
@@ -91,6 +89,7 @@ def largest_error(gain: Array, uncertainty: Array) -> Array:
 class ToolForce(Criterion, frozen=True, kw_only=True):
     """Force that the robot exerts at its tool, from the joint torques that its source measures."""
 
+    by_torque: ClassVar[bool] = True
     unit: ClassVar[str] = "N"
     by_shape: ClassVar[bool] = False
 
@@ -126,29 +125,15 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
         offset = np.array(self.offset)
         uncertainty = self._uncertainty(model, robot)
         rows = 3 if self.contact == "zero_moment" else 6
-        before: tuple[float, Array] | None = None
+        needed = joint_torques.Needed(robot)
 
         def external(state: State) -> Array:
-            nonlocal before
-            # Forgotten first: after a tick that is undecided a difference of speeds would bridge the gap.
-            last, before = before, None
-            tau = state.measured_torques(robot)
-            if self.torques == "external":
-                return tau
-            if not robot.alone:
-                raise Undecided(
-                    f"{robot.name} is moved, or moves others: "
-                    "what that accelerates is in the measured torques too"
-                )
-            before = (state.t, state.qd(robot).copy())
-            elapsed = np.nan if last is None else state.t - last[0]
-            if last is None or not 0 < elapsed <= LONGEST:
-                raise Undecided(
-                    f"{robot.name}: an acceleration needs two evaluations within {LONGEST:g} s; "
-                    "leave 'every' away or let the source send external torques"
-                )
-            qdd = (before[1] - last[1]) / elapsed
-            return tau - state.mass_matrix(robot) @ qdd - joint_torques.bias(state, robot)
+            try:
+                tau = state.measured_torques(robot)
+            except Undecided:
+                needed.forget()
+                raise
+            return tau if self.torques == "external" else tau - needed(state)
 
         def evaluate(state: State) -> Result:
             tau = external(state)

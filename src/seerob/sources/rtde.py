@@ -76,6 +76,7 @@ def joint_sample(values: Mapping[str, Value], *, target: str, arrived: float) ->
         q=_vector(values["actual_q"]),
         qd=_vector(values["actual_qd"]) if "actual_qd" in values else None,
         tau=_vector(values["actual_current_as_torque"]) if "actual_current_as_torque" in values else None,
+        tcp=_place(values["actual_TCP_pose"]) if "actual_TCP_pose" in values else None,
         quality=quality(_whole(values.get("robot_mode")), _safety(values)),
     )
 
@@ -115,6 +116,11 @@ def _vector(value: Value) -> tuple[float, ...]:
     if not isinstance(value, tuple) or len(value) != 6:
         raise ProtocolError(f"not six values: {value}")
     return tuple(map(float, value))
+
+
+def _place(value: Value) -> tuple[float, float, float]:
+    x, y, z, *_ = _vector(value)
+    return x, y, z
 
 
 def _whole(value: Value | None) -> int | None:

@@ -51,8 +51,10 @@ class UrRecord(TrajectoryFile, frozen=True, kw_only=True):
         qd = _vector(log, f"{prefix}_qd")
         # actual_current is in ampere, and its factor to a torque is not published.
         tau = _vector(log, "actual_current_as_torque")
+        # The rotation vector behind it tells nothing that the joints do not.
+        tcp = _vector(log, f"{prefix}_TCP_pose")[:3]
         status: list[str] = [c for c in ("robot_mode", "safety_status", "safety_mode") if c in log.names]
-        values = log.read(["timestamp", *q, *qd, *tau, *status])
+        values = log.read(["timestamp", *q, *qd, *tau, *tcp, *status])
         invalid, warnings = _status(values, status)
         trajectory = Trajectory(
             file=self.file,
@@ -60,6 +62,8 @@ class UrRecord(TrajectoryFile, frozen=True, kw_only=True):
             q=values.table(q),
             qd=values.table(qd) if len(qd) == len(q) else None,
             tau=values.table(tau) if len(tau) == len(q) else None,
+            tcp_position=values.table(tcp) if tcp else None,
+            tcp_in_base=True,
             invalid=invalid,
             rows=values.rows,
         )

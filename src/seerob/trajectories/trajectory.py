@@ -171,6 +171,8 @@ class Trajectory(Timed):
     """Tool centre point in whatever frame the file uses [m], shape (n, 3)."""
     tcp_wxyz: Array | None = None
     """Orientation of the tool in whatever frame the file uses, unit quaternions, shape (n, 4)."""
+    tcp_in_base: bool = False
+    """Whether that frame is the base of the robot's controller."""
     degrees: bool = False
     """Whether angles were converted from degrees because a table or its mapping says so."""
     invalid: NDArray[np.bool_] | None = None
@@ -264,6 +266,7 @@ class TrajectorySamples:
     def __iter__(self) -> Iterator[JointSample]:
         motion = self.trajectory
         start = float(motion.t[0])
+        tcp = motion.tcp_position if motion.tcp_in_base else None
         for i, t in enumerate(motion.t.tolist()):
             yield JointSample(
                 source=self.source,
@@ -275,4 +278,5 @@ class TrajectorySamples:
                 q=tuple(motion.q[i].tolist()),
                 qd=None if self.qd is None else tuple(self.qd[i].tolist()),
                 tau=None if motion.tau is None else tuple(motion.tau[i].tolist()),
+                tcp=None if tcp is None else tuple(tcp[i].tolist()),
             )

@@ -1,0 +1,233 @@
+"""What a source says of its tool and its torques is compared with the twin. The arms that speak are foreign:
+Denavit–Hartenberg parameters of their maker, and Pinocchio's dynamics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from oracles.pinocchio_oracle import pinocchio_model
+from seerob.engine import Engine
+from seerob.model_io import library
+from seerob.plausibility.own_words import fixed_offset, rigid_error, sign_or_unit
+from seerob.run import Judge, bind
+from seerob.samples import JointSample
+from seerob.snapshot import Finding, Verdict
+from seerob.station import Station, load
+from seerob.transforms import rotation_from_rpy
+
+DH = {
+    # a2, a3, d1, d4, d5, d6 [m]: Universal Robots, "DH Parameters for calculations of kinematics"
+    "ur5e": (-0.425, -0.3922, 0.1625, 0.1333, 0.0997, 0.0996),
+    "ur10e": (-0.6127, -0.57155, 0.1807, 0.17415, 0.11985, 0.11655),
+    "ur3e": (-0.24355, -0.2132, 0.15185, 0.13105, 0.08535, 0.0921),
+    "ur10": (-0.612, -0.5723, 0.1273, 0.163941, 0.1157, 0.0922),
+}
+TURN = np.pi / 2
+
+
+def dh_tcp(robot: str, q: np.ndarray, tool: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:
+    """TCP in the controller's base [m], shape (N, 3): standard DH, multiplied out by hand."""
+    a2, a3, d1, d4, d5, d6 = DH[robot]
+    found = []
+    for angles in q:
+        T = np.eye(4)
+        for theta, d, a, alpha in zip(
+            angles, (d1, 0, 0, d4, d5, d6), (0, a2, a3, 0, 0, 0), (TURN, 0, 0, TURN, -TURN, 0), strict=True
+        ):
+            c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+            T = T @ [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]]
+        found.append(T[:3, :3] @ tool + T[:3, 3])
+    return np.array(found)
+
+
+T = np.arange(0, 1, 0.05)
+MOVING = np.array([0.3, -1.2, 1.1, -1.4, -1.5, 0.2]) + 0.4 * np.sin(np.outer(T, [1.0, 1.5, 2, 2.5, 3, 3.5]))
+STANDING = np.tile(MOVING[0], (len(T), 1))
+
+
+def log_of(folder: Path, q: np.ndarray, tcp: np.ndarray | None, tau: np.ndarray | None = None) -> None:
+    """As ``record.py`` of Universal Robots writes it."""
+    names = ["timestamp", *(f"actual_q_{i}" for i in range(6))]
+    table = [T[:, None], q]
+    if tcp is not None:
+        names += [f"actual_TCP_pose_{i}" for i in range(6)]
+        table += [tcp, np.zeros((len(T), 3))]
+    if tau is not None:
+        names += [f"actual_current_as_torque_{i}" for i in range(6)]
+        table.append(tau)
+    np.savetxt(folder / "log.csv", np.hstack(table), header=" ".join(names), comments="")
+
+
+def station(
+    folder: Path, model: str = "ur5e", robot: str = "", tools: str = "", source: str = "ur_record"
+) -> Station:
+    """One arm that follows the log, and a distance that is within."""
+    (folder / "workstation.toml").write_text(f"""
+[[robots]]
+name = "arm"
+model = "library:{model}"
+base = {{ position = [0.3, -0.2, 0.8], rpy_deg = [0, 0, 37] }}
+{robot}
+{tools}
+[[humans]]
+name = "operator"
+sex = "female"
+stature = 1.65
+mass = 60
+at = {{ position = [3.5, 0, 0] }}
+[[sources]]
+kind = "{source}"
+robot = "arm"
+file = "log.csv"
+[[safety]]
+kind = "minimum_distance"
+name = "distance"
+between = ["arm", "operator"]
+limit = 0.05
+[[safety]]
+kind = "tool_force"
+name = "force"
+at = "arm"
+limit = 100
+""")
+    return load(folder)
+
+
+def about_tool(station: Station) -> Finding:
+    """The one finding about the tool centre point."""
+    (found,) = (f for _, o in station.sources for f in o.findings if "tool centre point" in f.text)
+    return found
+
+
+TOOL = """
+[[tools]]
+name = "gripper"
+on = "arm/tool0"
+shape = { box = [0.05, 0.05, 0.15] }
+mass = 0.5
+at = { position = [0, 0, 0.075] }
+tcp = { position = [0, 0, 0.075] }
+"""
+
+
+@pytest.mark.parametrize("q", [MOVING, STANDING], ids=["moving", "standing"])
+@pytest.mark.parametrize("model", ["ur5e", "ur10e", "ur10"])
+def test_the_log_of_another_robot_is_not_within_and_its_robot_is_named(
+    tmp_path: Path, model: str, q: np.ndarray
+) -> None:
+    log_of(tmp_path, q, dh_tcp("ur5e", q))
+    found = about_tool(station(tmp_path, model))
+    if model == "ur5e":
+        assert (found.level, found.holds) == ("note", ())
+        return
+    assert (found.level, found.holds) == ("warning", ("arm",))
+    assert "library:ur5e would fit, with its flange, to 0.0 mm" in found.text
+
+
+def test_a_verdict_of_the_wrong_robot_is_undecided(tmp_path: Path) -> None:
+    log_of(tmp_path, MOVING, dh_tcp("ur5e", MOVING))
+    right, wrong = (station(tmp_path, model).run().results["distance"].verdict for model in ("ur5e", "ur10e"))
+    assert (right, wrong) == (Verdict.WITHIN, Verdict.UNDECIDED)
+
+
+def test_a_tool_that_the_file_forgets_is_missed(tmp_path: Path) -> None:
+    log_of(tmp_path, MOVING, dh_tcp("ur5e", MOVING, (0, 0, 0.15)))
+    found = about_tool(station(tmp_path))
+    assert found.holds == ("arm",)
+    assert "a tool centre point at [0, 0, 150] mm of the flange would fit" in found.text
+    assert about_tool(station(tmp_path, tools=TOOL)).text.endswith("the tcp of gripper, to 0.0 mm")
+    given = "controller_tcp = { position = [0, 0, 0.15] }"
+    assert about_tool(station(tmp_path, robot=given)).level == "note"
+    typed = "controller_tcp = { position = [0, 0, 0.12] }"
+    assert about_tool(station(tmp_path, robot=typed)).holds == ("arm",)
+
+
+def test_a_controller_without_a_tool_says_nothing_of_the_twins(tmp_path: Path) -> None:
+    log_of(tmp_path, MOVING, dh_tcp("ur5e", MOVING))
+    found = about_tool(station(tmp_path, tools=TOOL))
+    assert found.level == "note"
+    assert "its controller knows of no tool" in found.text
+
+
+@pytest.mark.parametrize(("off", "robot", "holds"), [
+    (0.008, "", ()), (0.013, "", ("arm",)), (0.013, "tcp_tolerance_mm = 15", ()),
+    (0.008, "tcp_tolerance_mm = 2", ("arm",)),
+])  # fmt: skip
+def test_calibration_of_an_arm_has_a_tolerance_that_the_file_can_give(
+    tmp_path: Path, off: float, robot: str, holds: tuple[str, ...]
+) -> None:
+    log_of(tmp_path, MOVING, dh_tcp("ur5e", MOVING) + np.array([0, 0, off]))
+    assert about_tool(station(tmp_path, robot=robot)).holds == holds
+
+
+def csv_of(folder: Path, tcp: np.ndarray) -> None:
+    """A table of a simulator that says nothing of the frame."""
+    names = ["t [s]", *(f"J{i + 1} [rad]" for i in range(6)), "X [m]", "Y [m]", "Z [m]"]
+    np.savetxt(
+        folder / "log.csv",
+        np.column_stack([T, MOVING, tcp]),
+        header=",".join(names),
+        comments="",
+        delimiter=",",
+    )
+
+
+def test_a_table_may_speak_of_any_frame_but_not_of_another_robot(tmp_path: Path) -> None:
+    own, turned = dh_tcp("ur5e", MOVING), rotation_from_rpy((0.3, -0.4, 2.0))
+    for tcp in (own, own @ turned.T + [5, -3, 1]):
+        csv_of(tmp_path, tcp)
+        found = [f for _, o in station(tmp_path, source="csv").sources for f in o.findings if f.holds]
+        assert found == []
+    csv_of(tmp_path, dh_tcp("ur10e", MOVING) @ turned.T)
+    assert about_tool(station(tmp_path, source="csv")).holds == ("arm",)
+
+
+def test_each_live_sample_is_compared(tmp_path: Path) -> None:
+    log_of(tmp_path, MOVING, None)
+    made = station(tmp_path)
+    said = dh_tcp("ur5e", MOVING)
+    doubts = []
+    for tcp in (None, said, said + np.array([0, 0.02, 0])):
+        engine = Engine(made.model, driven={"arm": 0.2}, live={"arm"})
+        for i in range(3):
+            engine.take([JointSample(source="s", seq=i, t=0.05 * i, target="arm", q=tuple(MOVING[i]),
+                                     tcp=None if tcp is None else tuple(tcp[i]))])  # fmt: skip
+        doubts.append(engine.start().doubt("arm"))
+    assert doubts[:2] == ["", ""]
+    assert "20 mm from the twin's, more than 10 mm (tcp_tolerance)" in doubts[2]
+    result = Judge(bind(made.model))(engine.start())[0]
+    assert result.verdict is Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(1.0, ""), (-1.0, "opposite sign"), (1000.0, "N·mm read as N·m")]
+)
+def test_torques_of_the_opposite_sign_are_told(tmp_path: Path, factor: float, said: str) -> None:
+    oracle = pinocchio_model(library.load("ur5e"))
+    data = oracle.createData()
+    tau = np.array([pin.computeGeneralizedGravity(oracle, data, q) for q in STANDING])
+    log_of(tmp_path, STANDING, None, factor * tau + [0.5, -1, 0.8, 0.1, -0.1, 0.05])
+    found = [f for _, o in station(tmp_path).sources for f in o.findings if "its torques" in f.text]
+    assert [f.holds for f in found] == [("force",)] * bool(said)
+    assert all(said in f.text for f in found)
+
+
+def test_what_fits_exactly_is_found_exactly() -> None:
+    rng = np.random.default_rng(4)
+    rotations = np.array([rotation_from_rpy(rng.uniform(-3, 3, 3)) for _ in range(30)])
+    positions, offset = rng.uniform(-1, 1, (30, 3)), np.array([0.1, -0.2, 0.3])
+    fit = fixed_offset(rotations, positions, rotations @ offset + positions)
+    np.testing.assert_allclose(fit.offset, offset, atol=1e-12)
+    assert fit.error < 1e-12
+    mirrored = positions * [1, 1, -1]
+    assert rigid_error(positions, positions @ rotations[0].T + 2) < 1e-12
+    assert rigid_error(positions, mirrored) > 0.1
+
+
+def test_small_torques_tell_no_sign() -> None:
+    assert sign_or_unit(np.array([[1.0, -1.0]]), np.array([[-1.0, 1.0]])) == ""
+    assert "opposite" in sign_or_unit(np.array([[10.0, -10.0]]), np.array([[-10.0, 10.0]]))

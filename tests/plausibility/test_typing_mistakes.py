@@ -1,0 +1,369 @@
+"""A value that nobody would mean keeps verdicts undecided until the file confirms it."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from seerob import plugin
+from seerob.errors import InputError
+from seerob.expectations import is_struct, members, unit_of
+from seerob.plausibility.in_place import implausible
+from seerob.plausibility.of_file import FOLLOWS, LISTS, PLUGINS, entries_of, unknown
+from seerob.plausibility.ranges import data
+from seerob.reading import BASES
+from seerob.snapshot import Finding, Verdict
+from seerob.station import Station, load
+from seerob.workstation import TABLES, Confirmed, Engine
+
+ROOT = Path(__file__).parents[2]
+CELL = {
+    "base": "position = [0, 0, 0.75]",
+    "tool": "shape = { box = [0.08, 0.1, 0.12] }\nmass = 1.2",
+    "at": "at = { position = [1.75, 0, 0], rpy_deg = [0, 0, 180] }",
+    "stop": "reaction = 0.1, stopping = 0.35",
+    "separation": "human_speed = 1.6",
+    "limit": "limit = 1.0",
+    "table": "at = { position = [0.8, 0, 0.37] }",
+    "more": "",
+    "person": "stature = 1.75\nmass = 75",
+}
+
+
+def cell(**changed: str) -> str:
+    """A sensible cell whose three criteria are within, but for what is changed."""
+    c = CELL | changed
+    return f"""
+[[robots]]
+name = "ur5"
+model = "library:ur5"
+base = {{ {c["base"]} }}
+q_deg = [180, -90, -90, -90, 90, 0]
+[[tools]]
+name = "gripper"
+on = "ur5/tool0"
+{c["tool"]}
+[[parts]]
+name = "table"
+shape = {{ box = [0.8, 1.4, 0.74] }}
+{c["table"]}
+[[humans]]
+name = "operator"
+sex = "male"
+{c["person"]}
+{c["at"]}
+[[safety]]
+kind = "velocity"
+name = "speed"
+at = "ur5"
+{c["limit"]}
+[[safety]]
+kind = "minimum_distance"
+name = "distance"
+between = ["ur5", "operator"]
+limit = 0.2
+[[safety]]
+kind = "separation"
+name = "separation"
+between = ["ur5", "operator"]
+stop = {{ {c["stop"]} }}
+{c["separation"]}
+intrusion = 0.0
+human_uncertainty = 0.05
+robot_uncertainty = 0.005
+{c["more"]}
+"""
+
+
+def station_of(folder: Path, text: str) -> Station:
+    """The workstation of a text."""
+    (folder / "workstation.toml").write_text(text)
+    return load(folder)
+
+
+def doubted(station: Station) -> list[Finding]:
+    """What is implausible of it."""
+    return [f for f in station.model.findings if "not plausible" in f.text]
+
+
+def verdicts(station: Station) -> dict[str, Verdict | None]:
+    """At the first tick."""
+    from seerob.engine import Engine as Twin
+    from seerob.run import Judge, bind
+
+    return {r.name: r.verdict for r in Judge(bind(station.model))(Twin(station.model).start())}
+
+
+def test_a_sensible_cell_is_within_and_nothing_of_it_is_implausible(tmp_path: Path) -> None:
+    station = station_of(tmp_path, cell())
+    assert doubted(station) == []
+    assert set(verdicts(station).values()) == {Verdict.WITHIN}
+
+
+INCH = 'units = "mm"\nmesh = "tool.stl"\n'
+MISTAKES: dict[str, tuple[dict[str, str], str, set[str]]] = {
+    # what is typed, the key that is named, the criteria that may still be within
+    "degrees in rpy": ({"base": "position = [0, 0, 0.75], rpy = [0, 0, 90]"}, "robots[0].base.rpy", set()),
+    "base at 75 m": ({"base": "position = [75, 0, 0.75]"}, "robots[0].base.position", set()),
+    "mm for m in a base": ({"base": "position = [30, 0, 0.75]"}, "robots[0].nobody_within", set()),
+    "reaction of 100 s": (
+        {"stop": "reaction = 100, stopping = 0.35"},
+        "safety[2].stop.reaction",
+        {"speed", "distance"},
+    ),
+    "m/s in mm/s": ({"separation": "human_speed_mm_s = 1.6"}, "safety[2].human_speed", {"speed", "distance"}),
+    "inside the table": (
+        {"table": "at = { position = [2.0, 0, 0.37] }"},
+        "humans[0].inside.table",
+        {"speed"},
+    ),
+    "a metre above the floor": ({"at": "at = { position = [1.75, 0, 1.0] }"}, "humans[0].feet", {"speed"}),
+    "below the floor": ({"at": "at = { position = [1.75, 0, -0.3] }"}, "humans[0].feet", {"speed"}),
+    "robot inside the table": ({"base": "position = [0.8, 0, 0.4]"}, "robots[0].inside.table", set()),
+    "inch mesh in mm": ({"tool": INCH + "density = 7850"}, "tools[0].mass", set()),
+    "inch mesh in mm, weighed": ({"tool": INCH + "mass = 3"}, "tools[0].bulk_density", set()),
+    "tool in mm": ({"tool": "shape = { box = [80, 100, 120] }\nmass = 1.2"}, "tools[0].extent", set()),
+    "grams for kilograms": (
+        {"tool": "shape = { box = [0.08, 0.1, 0.12] }\nmass = 800"},
+        "tools[0].mass",
+        set(),
+    ),
+    "above the payload": (
+        {"tool": "shape = { box = [0.08, 0.1, 0.12] }\nmass = 8"},
+        "robots[0].payload",
+        set(),
+    ),
+    "tcp at 120 m": (
+        {"tool": CELL["tool"] + "\ntcp = { position = [0, 0, 4] }"},
+        "tools[0].tcp.position",
+        set(),
+    ),
+    "limit in mm/s": ({"limit": "limit = 250"}, "safety[0].limit", {"distance", "separation"}),
+    "a time-out of 10 s": (
+        {"more": '[[sources]]\nkind = "csv"\nrobot = "ur5"\nfile = "m.csv"\ntimeout = 10\n'},
+        "sources[0].timeout",
+        set(),
+    ),
+    "no gravity": ({"more": "[engine]\ngravity = [0, 0, -981]\n"}, "engine.gravity", set()),
+    "a tracking limit of 3 rad": ({"more": "[engine]\ntracking_limit = 3\n"}, "engine.tracking_limit", set()),
+    "pounds": ({"person": "stature = 1.75\nmass = 200"}, "humans[0].mass", {"speed"}),
+    "light for the stature": ({"person": "stature = 2.05\nmass = 45"}, "humans[0].bmi", {"speed"}),
+    "a deceleration of 9810": (
+        {"stop": 'model = "constant_deceleration", reaction = 0.1, deceleration = 9810'},
+        "safety[2].stop.deceleration",
+        {"speed", "distance"},
+    ),
+    "asked once in an hour": (
+        {"limit": "limit = 1.0\nevery = 3600"},
+        "safety[0].every",
+        {"distance", "separation"},
+    ),
+    "180 for 180°/s": (
+        {"more": ""},
+        "robots[0].velocity_limits",
+        set(),
+    ),
+}
+
+
+def _typed(folder: Path, changed: Mapping[str, str], key: str) -> Station:
+    import trimesh
+
+    trimesh.creation.box((6.0, 5.0, 15.0)).export(folder / "tool.stl")
+    (folder / "m.csv").write_text(
+        "t [s],J1 [deg],J2 [deg],J3 [deg],J4 [deg],J5 [deg],J6 [deg]\n"
+        "0,180,-90,-90,-90,90,0\n1,180,-90,-90,-90,90,0\n"
+    )
+    text = cell(**changed)
+    if key.endswith("velocity_limits"):
+        text = text.replace("q_deg", "velocity_limits = [180, 180, 180, 180, 180, 180]\nq_deg", 1)
+    return station_of(folder, text)
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_is_found_and_what_rests_on_it_is_not_within(name: str, tmp_path: Path) -> None:
+    changed, key, rest = MISTAKES[name]
+    station = _typed(tmp_path, changed, key)
+    found = [f for f in doubted(station) if f.text.startswith(f"{key} = ")]
+    assert len(found) == 1, [f.text for f in station.model.findings]
+    assert found[0].level == "warning"
+    within = {name for name, verdict in verdicts(station).items() if verdict is Verdict.WITHIN}
+    assert within <= rest
+    # As the message says, so it is confirmed, and only then.
+    line = re.search(r"\[\[confirmed\]\] key = .*, value = .*, why = \"…\"", found[0].text)
+    assert line
+    table = tomllib.loads(
+        line[0].replace("]] ", "]]\n").replace(", value", "\nvalue").replace(", why", "\nwhy")
+    )
+    one = msgspec.convert(table["confirmed"][0], Confirmed)
+    workstation = msgspec.structs.replace(station.workstation, confirmed=(one,))
+    again = implausible(dataclasses.replace(station.model, workstation=workstation))
+    (said,) = (f for f in again if f.text.startswith(f"{key} = "))
+    assert (said.holds, said.level) == ((), "note")
+    assert said.text.endswith("; confirmed: …")
+    assert not unknown({0: one}, entries_of(station.workstation), station.workstation.engine, "file")
+
+
+@pytest.mark.parametrize(
+    ("header", "factor", "key"),
+    [
+        ("t [s],J1 [deg]", (0.01, 50.0), None),
+        ("t [s],J1 [deg]", (10.0, 50.0), "sources[0].step"),  # ms
+        ("t [s],J1 [deg]", (0.01, 1.0), "sources[0].degrees"),  # rad
+        ("t [s],J1 [rad]", (0.01, 5.0), "sources[0].speed"),
+    ],
+)
+def test_units_of_a_motion(tmp_path: Path, header: str, factor: tuple[float, float], key: str | None) -> None:
+    unit = header[-5:].strip("1 ")
+    names = ",".join(["t [s]", *(f"J{i + 1} {unit}" for i in range(6))])
+    k = np.arange(40)
+    q = factor[1] * 0.02 * np.column_stack([k, *[np.zeros(40)] * 5])
+    np.savetxt(
+        tmp_path / "m.csv", np.column_stack([k * factor[0], q]), header=names, comments="", delimiter=","
+    )
+    mapping = f'[sources.mapping]\njoint_unit = "{unit[1:4]}"\ntime_unit = "s"\n'
+    more = f'[[sources]]\nkind = "csv"\nrobot = "ur5"\nfile = "m.csv"\n{mapping}'
+    station = station_of(tmp_path, cell(more=more))
+    held = [f for _, o in station.sources for f in o.findings if f.holds]
+    assert [f.text.partition(" = ")[0] for f in held] == [key] * (key is not None)
+    assert all(f.holds == ("ur5",) for f in held)
+
+
+def test_another_value_is_not_confirmed(tmp_path: Path) -> None:
+    confirmed = '[[confirmed]]\nkey = "safety[2].stop.reaction"\nvalue = 3\nwhy = "measured"\n'
+    mine, typed = ("reaction = 3, stopping = 0.35", "reaction = 30, stopping = 0.35")
+    assert doubted(station_of(tmp_path, cell(stop=mine, more=confirmed))) == []
+    (found,) = doubted(station_of(tmp_path, cell(stop=typed, more=confirmed)))
+    assert "the file confirms 3.0, another value" in found.text
+
+
+def test_a_confirmation_may_have_the_unit_of_the_file(tmp_path: Path) -> None:
+    confirmed = '[[confirmed]]\nkey = "safety[2].human_speed_mm_s"\nvalue = 1.6\nwhy = "a snail"\n'
+    station = station_of(tmp_path, cell(separation="human_speed_mm_s = 1.6", more=confirmed))
+    assert doubted(station) == []
+
+
+@pytest.mark.parametrize(
+    "key", ["robots[1].base.rpy", "safety[0].limits", "humans[0].inside.nobody", "x", ""]
+)
+def test_a_confirmation_of_nothing_is_a_mistake(key: str, tmp_path: Path) -> None:
+    confirmed = f'[[confirmed]]\nkey = "{key}"\nvalue = 1\nwhy = "because"\n'
+    with pytest.raises(InputError, match=r"confirmed\[0\].key: .* is no quantity of this file"):
+        station_of(tmp_path, cell(more=confirmed))
+
+
+OWN = '''
+from typing import Annotated
+from msgspec import Meta
+from seerob.criterion import Criterion
+from seerob.snapshot import Basis, Result, Verdict
+
+class Own(Criterion, frozen=True, kw_only=True):
+    """Always within."""
+    robot: str
+    reach: Annotated[float, Meta(extra={"unit": "m"})]
+    def bind(self, model):
+        return lambda state: Result(name=self.name, value=1.0, verdict=Verdict.WITHIN)
+    def basis(self, model):
+        return Basis(formula="1", source="none")
+'''
+
+
+def test_a_quantity_of_somebody_elses_criterion_is_looked_at(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "rules_of_mine").mkdir()
+    (tmp_path / "rules_of_mine/own.py").write_text(OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+    more = '[[safety]]\nkind = "rules_of_mine.own"\nname = "own"\nrobot = "ur5"\nreach = 1300\n'
+    station = station_of(tmp_path, cell(more=more))
+    assert [f.holds for f in doubted(station)] == [("own",)]
+    assert verdicts(station)["own"] is Verdict.UNDECIDED
+
+
+SHIPPED = sorted(p.parent for p in ROOT.glob("workstations/*/workstation.toml"))
+
+
+@pytest.mark.parametrize("folder", [*SHIPPED, ROOT / "src/seerob/commands/starter"], ids=lambda p: p.name)
+def test_nothing_that_ships_is_implausible(folder: Path) -> None:
+    station = load(folder)
+    assert doubted(station) == []
+    assert station.workstation.confirmed == ()
+
+
+_position = st.tuples(st.floats(-4, 4), st.floats(-4, 4)).filter(lambda p: np.hypot(*p) > 1.6)
+
+
+@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    where=_position,
+    yaw=st.floats(-360, 360),
+    base=st.floats(0.0, 1.2),
+    stature=st.floats(1.5, 1.95),
+    bmi=st.floats(18, 35),
+    load=st.floats(0.05, 4),
+    reaction=st.floats(0.02, 0.5),
+    stopping=st.floats(0.1, 1.5),
+    walk=st.floats(1.0, 2.5),
+)
+def test_sensible_cells_are_plausible(
+    tmp_path: Path, where: tuple[float, float], yaw: float, base: float, stature: float, bmi: float,
+    load: float, reaction: float, stopping: float, walk: float,
+) -> None:  # fmt: skip
+    text = cell(
+        base=f"position = [0, 0, {base + 0.0}]",
+        at=f"at = {{ position = [{where[0]}, {where[1]}, 0], rpy_deg = [0, 0, {yaw}] }}",
+        table="at = { position = [0, 7, 0.37] }",
+        tool=f"shape = {{ box = [0.08, 0.1, 0.12] }}\nmass = {load}",
+        person=f"stature = {stature}\nmass = {bmi * stature**2}",
+        stop=f"reaction = {reaction}, stopping = {stopping}",
+        separation=f"human_speed = {walk}",
+    )
+    assert doubted(station_of(tmp_path, text)) == []
+
+
+def test_every_row_of_the_data_is_of_something() -> None:
+    from fnmatch import fnmatchcase
+
+    kinds: set[tuple[str, str]] = set()
+
+    def walk(table: Any, key: str, depth: int = 0) -> None:
+        for field in msgspec.structs.fields(table):
+            name = f"{key}.{field.encode_name}"
+            kinds.add((name, unit_of(field.type) or ""))
+            kinds.add((f"{name}.x", unit_of(field.type) or ""))
+            for member in members(field.type):
+                for one in (member, *get_args(member)):
+                    if is_struct(one) and depth < 4:
+                        walk(one, name, depth + 1)
+                        walk(one, f"{name}.x", depth + 1)
+
+    for group in LISTS:
+        walk(TABLES[group], group)
+        for what in FOLLOWS.get(group, ()):
+            kinds |= {(f"{group}.{what}x" if what.endswith(".") else f"{group}.{what}", unit)
+                      for unit in ("m", "kg", "kg/m²", "kg/m³", "")}  # fmt: skip
+    walk(Engine, "engine")
+    for group in PLUGINS:
+        kinds |= {(f"{group}.{what}", unit) for what in FOLLOWS.get(group, ()) for unit in ("s", "°", "")}
+        for kind in plugin.kinds(group):
+            walk(plugin.load(group, kind, BASES[group]), f"{group}.{kind}")
+    for row in data().ranges:
+        if row.key != "*":
+            assert any(unit == row.unit and fnmatchcase(kind, row.key) for kind, unit in kinds), row.key
+        assert row.low <= row.high
+        assert all((row.because, row.right, row.source))
+        assert row.confidence in ("stated", "field", "choice")
+    units = {unit for _, unit in kinds}
+    fallbacks = {row.unit for row in data().ranges if row.key == "*"}
+    assert {"m", "rad", "s", "kg", "N", "m/s"} <= fallbacks <= units | {"N·m", "m³", "m²", "m/s²", "rad/s²"}

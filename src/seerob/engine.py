@@ -49,7 +49,7 @@ NEAR = 2e-3
 speed is off by 0.09 rad/s or m/s for a moment, as much as that of a robot that brakes at 3 rad/s² and was not
 heard for 30 ms. Ordinary jitter stays below."""
 BEATS = 0.05
-"""Between two pictures of a machine that says something [s]: from then on it is silent, and if it was in motion
+"""Between two pictures of a machine that is heard [s]: after that it is silent, and when it was in motion
 nobody says that it stopped."""
 POSE_TOLERANCE = 1e-4
 """Largest error of a solved Cartesian target [m or rad] that still counts as reached."""
@@ -187,7 +187,6 @@ class Engine:
                 continue
             mechanism = self._target(sample)
             reason = sample.doubt("its source")
-            reference = self._references[mechanism.name]
             if not is_possible(sample):
                 # Nothing to be pulled to; not knowing where it is must show all the same.
                 taken, reason = (

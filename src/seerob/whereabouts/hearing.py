@@ -78,7 +78,7 @@ class Hearing:
     older: float = 0.0
     """How much older than its instant what was heard last may be [s]."""
     leaves_at: float = 0.0
-    """Of what stands where it was said to be: largest speed of a joint at its newest sample [rad/s or m/s]."""
+    """Of who stands where he was last said to be: largest speed of a joint then [rad/s or m/s]."""
     grace: float = 0.0
     """How long after its newest sample it may be late all the same [s]."""
     coarse: str = ""

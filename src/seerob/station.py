@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from seerob import batch
 from seerob import run as road
 from seerob.batch import Batch
+from seerob.contact.measured import curves
 from seerob.criterion import Criterion
 from seerob.errors import InputError
 from seerob.given_states import motion_of
@@ -100,6 +101,10 @@ class Station:
         named += [getattr(rule, "limits", None) for rule in (*station.safety, *station.ergonomics)]
         named += [getattr(rule, "table", None) for rule in station.ergonomics]
         named += [getattr(rule, "map", None) for rule in station.safety]
+        measured = [
+            name for rule in station.safety if isinstance(name := getattr(rule, "measurements", None), str)
+        ]
+        named += [*measured, *(curve for name in measured for curve in curves(self.model.folder / name))]
         references = [name for name in named if isinstance(name, str)]
         return {**self.model.files, **source_files(references, folder=self.model.folder)}
 

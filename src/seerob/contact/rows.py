@@ -7,13 +7,15 @@ Table A.2): so there is a row per area, and each says which speed every one of t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from msgspec.structs import replace
 
 from seerob.contact.collision import speed_at_force
 from seerob.contact.limits import Judged, RegionArrays
+from seerob.contact.measured import worse
 from seerob.contact.regions import FORBIDDEN, REGIONS
 from seerob.contact.tolerances import area_verdict
 from seerob.human.skeleton import SIDES
@@ -66,7 +68,12 @@ class ContactRows:
         }
 
     def of(
-        self, found: Iterable[tuple[Result, int]], judged: Judged, bones: Callable[[str], tuple[str, ...]]
+        self,
+        found: Iterable[tuple[Result, int]],
+        judged: Judged,
+        bones: Callable[[str], tuple[str, ...]],
+        *,
+        measured: Mapping[str, Sequence[Result]] | None = None,
     ) -> tuple[Row, ...]:
         """Rows of all areas of the regions that can be hit.
 
@@ -74,6 +81,7 @@ class ContactRows:
             found: Result of a region, and the row of the moving body that governs it.
             judged: What they were made from.
             bones: Full names of the bones of a region that can be hit; none without a person.
+            measured: What was measured of regions by name: of each row the worse counts.
         """
         pressed = self._speeds_by_pressure(judged)
         rows: list[Row] = []
@@ -82,7 +90,10 @@ class ContactRows:
             if column is None or part.limit is None:
                 rows += self._unlimited(part, bones(part.name))
             else:
-                rows += self._limited(part, row, column, judged, pressed, bones(part.name))
+                told = (measured or {}).get(part.name, ())
+                for one in self._limited(part, row, column, judged, pressed, bones(part.name)):
+                    verdict, reason = worse(one.verdict, one.reason, told)
+                    rows.append(replace(one, verdict=verdict, reason=reason) if told else one)
         return tuple(rows)
 
     def _speeds_by_pressure(self, judged: Judged) -> list[float]:

@@ -64,10 +64,11 @@ def _of_region(contacts: Contacts, judged: Judged, k: int) -> Ceiling | None:
             governs="no contact permitted" if stopped else "", reason=reason,
         )  # fmt: skip
     speeds = judged.speeds
-    v = np.maximum(judged.least[rows, column] - judged.v_h[k], 0.0)
+    measured = contacts.measured.permits(column, judged.clamped[:, column])[rows]
+    v = np.maximum(np.minimum(judged.least[rows, column], measured) - judged.v_h[k], 0.0)
     own = judged.v_r if judged.closing is None else np.maximum(judged.v_r, judged.closing[:, k])
     shares = v / np.maximum(own[rows], STANDSTILL)
-    open_rows = np.isnan(speeds.pressure[rows, column])
+    open_rows = np.isnan(speeds.pressure[rows, column]) | np.isnan(measured)
     i = int(open_rows.argmax()) if open_rows.any() else int(shares.argmin())
     row = int(rows[i])
     how = "clamped" if judged.clamped[row, column] else "free"
@@ -75,6 +76,8 @@ def _of_region(contacts: Contacts, judged: Judged, k: int) -> Ceiling | None:
         how = "clamped on the floor"
     if open_rows.any():
         why = f"contact pressure of {bodies[i]} ({how}): {contacts.unknown[row]}"
+        if np.isnan(measured[i]):
+            why = f"what was measured of {bodies[i]} permits no speed that is known"
         return Ceiling(spec.name, math.nan, math.nan, name, bodies[i], how, reason=why)
     governs = Governing(int(speeds.governing[row, column])).name.lower()
     reason = ""
@@ -83,6 +86,8 @@ def _of_region(contacts: Contacts, judged: Judged, k: int) -> Ceiling | None:
         reason = "the person alone is faster than permitted" if moves else "no speed of contact is permitted"
     limit = _limit(contacts, name, governs, row, clamped=bool(judged.clamped[row, column]))
     share, speed = float(shares[i]), float(v[i])
+    if measured[i] < judged.least[row, column]:
+        return Ceiling(spec.name, share, speed, name, bodies[i], how, "measurement", reason)
     return Ceiling(spec.name, share, speed, name, bodies[i], how, governs, reason, limit=limit)
 
 

@@ -21,6 +21,7 @@ from seerob.contact.drawn import ContactMarkers
 from seerob.contact.given import given_contacts
 from seerob.contact.impact_mass import masses_along_motion, moving_masses, simplified_mass
 from seerob.contact.limits import Judged
+from seerob.contact.measured import Measurements, with_measured
 from seerob.contact.regions import REGIONS, Person, without_limit
 from seerob.contact.rows import ContactRows
 from seerob.contact.tolerances import ContactEnds, ranks, robot_masses
@@ -85,6 +86,8 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     """How far the stiffness k of every body region may be off, as a share: 0.1 for ± 10 %."""
     area_tolerance: Tolerance = 0.0
     """Likewise every contact area."""
+    measurements: str | None = None
+    """File of contacts that were measured at the robot: the worse of measurement and prediction counts."""
     thickness: dict[str, _Positive] = field(default_factory=dict)
     """Gap in which a body region can be clamped [m], instead of the gaps of ISO 13854."""
     floor: bool = True
@@ -143,6 +146,11 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         radii, areas = self._contacts(model)
         return frozenset({*radii, *areas})
 
+    def measured(self, model: Model) -> Measurements:
+        """What was measured at the robot."""
+        arrays = contact_limits.RegionArrays.of(self.table(model), multiplier=self.multiplier)
+        return Measurements(model, model.robot(self.robot), arrays, self.measurements)
+
     def _contacts(self, model: Model) -> tuple[dict[int, float], dict[int, float]]:
         """Radii [m] and areas [m²] that the file gives, by moving body."""
         return given_contacts(model, model.robot(self.robot), self.contact_radius, self.contact_area)
@@ -170,6 +178,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
                 *gap_inputs(self.thickness, [r.name for r in limits.regions.values() if r.permitted]),
                 floor_input(self.floor_height if self.floor else None),
                 *(excluded_input(region) for region in self.excluded),
+                *self.measured(model).inputs(),
             ),
             not_modelled=(
                 "a design estimate: power and force limiting needs measurement at the real robot",
@@ -264,6 +273,7 @@ class Contacts:
         )
         hand = {human.name: human.hand for human in model.workstation.humans}.get(spec.human or "")
         self.rows = ContactRows(self, hand=hand)
+        self.measured = spec.measured(model)
 
     def without(self, lost: tuple[int, ...]) -> Evaluate:
         """The same about the other bones of the person."""
@@ -308,7 +318,13 @@ class Contacts:
         people = people or self.people
         spec, judged = self.spec, self.judge(state, people)
         near, projected = judged.near, judged.projected
-        found = [self._region(int(k), judged) for k in np.flatnonzero(near.any(axis=0))]
+        found: list[tuple[Result, int]] = []
+        measured: dict[str, tuple[Result, ...]] = {}
+        for k in np.flatnonzero(near.any(axis=0)).tolist():
+            part, row = self._region(k, judged)
+            if told := self._measured(k, judged):
+                part, measured[part.name] = with_measured(part, told), told
+            found.append((part, row))
         known = projected[np.isfinite(projected)]
         heaviest, still = (float(known.max()), "") if len(known) else (None, "no part moves")
         mass_parts = (
@@ -332,7 +348,9 @@ class Contacts:
             interval=part.interval,
             parts=(*(part for part, _ in found), *mass_parts),
             markers=self.markers.of(state, part, row, judged),
-            rows=self.rows.of(found, judged, (lambda _: ()) if people is None else people.hit),
+            rows=self.rows.of(
+                found, judged, (lambda _: ()) if people is None else people.hit, measured=measured
+            ),
         )
 
     def _governing(
@@ -398,3 +416,11 @@ class Contacts:
                 v=value,
             ),
         ), row
+
+    def _measured(self, k: int, judged: Judged) -> tuple[Result, ...]:
+        """What was measured of one of `REGIONS`."""
+        name = REGIONS[k]
+        column = self.columns.get(name)
+        if column is None or name in self.spec.excluded:
+            return ()
+        return self.measured.results(column, judged.v[:, k], judged.near[:, k], judged.clamped[:, column])

@@ -1,0 +1,267 @@
+"""Contacts measured at the robot: what is read from a record, and that the worse of both counts."""
+
+from __future__ import annotations
+
+import datetime as dt
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from made_cell import FLOATING, TWO_R, made, results_at, two_r
+from seerob.contact.measured import peaks, read, read_curve
+from seerob.errors import InputError, UnknownName
+from seerob.safety.power_and_force import PowerAndForce
+from seerob.snapshot import Origin, Result, Verdict
+from seerob.station import Station
+
+CHEST = "Chest"
+GOOD = {
+    "part": '"arm/l2"', "region": f'"{CHEST}"', "contact": '"free"', "speed": "0.45", "force_N": "200",
+    "pressure_N_cm2": "150", "tools": "[]", "device": '"PFMD 7"', "spring_N_mm": "25", "pad": '"70 Shore A"',
+    "date": "2026-03-01", "calibrated": "2025-09-01",
+}  # fmt: skip
+"""280 N and 240 N/cm² are the transient limits of the chest, 140 N and 120 N/cm² the quasi-static ones."""
+
+
+def entry(**changed: str | None) -> str:
+    rows = {**GOOD, **changed}
+    return "[[measurements]]\n" + "".join(f"{k} = {v}\n" for k, v in rows.items() if v is not None)
+
+
+def cell(
+    folder: Path, *entries: str, files: dict[str, str] | None = None, more: str = "", tool: str = ""
+) -> Station:
+    text = (
+        f'{FLOATING}{TWO_R}{tool}[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\n'
+        'mass = "simplified"\ncontact_area = { arm = 1e-4 }\nfloor = false\n'
+        + ('measurements = "measured.toml"\n' if entries else "")
+        + more
+    )
+    return made(folder, text, {"arm.urdf": two_r(), "measured.toml": "".join(entries), **(files or {})})
+
+
+def chest(station: Station, speed: float = 0.45) -> Result:
+    found = results_at(station, arm=([0.0, 0.0], [speed / np.hypot(2, 0.05), 0]))["pfl"]
+    rows = [row for row in found.rows if row.group == CHEST]
+    part = next(part for part in found.parts if part.name == CHEST)
+    order = [Verdict.WITHIN, Verdict.UNDECIDED, Verdict.EXCEEDED]
+    # What was measured of the region counts for each of its areas.
+    least = (
+        max(order.index(p.verdict) for p in part.parts if p.name.startswith("measured"))
+        if "measured" in str([p.name for p in part.parts])
+        else 0
+    )
+    assert all(order.index(row.verdict) >= least for row in rows)
+    return part
+
+
+def test_without_measurements_it_is_the_prediction(tmp_path: Path) -> None:
+    assert chest(cell(tmp_path)).verdict is Verdict.WITHIN
+
+
+def test_both_within_is_within_and_says_what_was_measured(tmp_path: Path) -> None:
+    station = cell(tmp_path, entry())
+    part = chest(station)
+    assert part.verdict is Verdict.WITHIN
+    told = {p.name.partition(":")[0]: (p.value, p.limit, p.unit) for p in part.parts if "measured" in p.name}
+    assert told == {
+        "measured force, first half second": (200.0, 280.0, "N"),
+        "measured pressure": (150e4, 240e4, "Pa"),
+    }
+    inputs = [i for i in station.bound[0].basis.inputs if i.origin is Origin.MEASURED]
+    assert [(i.value, i.unit) for i in inputs] == [(200.0, "N"), (150e4, "Pa")]
+    assert all("PFMD 7" in i.source and "2026-03-01" in i.source for i in inputs)
+    assert "measured.toml" in station.files
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"force_N": "281"},
+        {"pressure_N_cm2": "241"},
+        {"spring_N_mm": "20", "force_N": "281"},
+        {"speed": "0.3", "force_N": "281"},
+    ],
+)
+def test_what_was_measured_above_its_limit_is_exceeded(tmp_path: Path, changed: dict[str, str]) -> None:
+    """A softer spring and a slower robot than here tell less than there is."""
+    part = chest(cell(tmp_path, entry(**changed)))
+    assert part.verdict is Verdict.EXCEEDED
+    assert part.reason.startswith("measured ")
+
+
+@pytest.mark.parametrize(
+    ("changed", "reason"),
+    [
+        ({"speed": "0.4"}, "measured at 0.4 m/s, and it moves at 0.45 m/s here"),
+        ({"spring_N_mm": None}, "the spring constant of the device is not told"),
+        ({"spring_N_mm": "20"}, "is softer than 25 N/mm"),
+        ({"tools": None}, "what the robot carried is not told"),
+        ({"tools": '["gripper"]'}, "the robot carried gripper, and carries nothing here"),
+        ({"device": None}, "which device measured it is not told"),
+        ({"calibrated": None}, "is not told (date, calibrated)"),
+        ({"date": None}, "is not told (date, calibrated)"),
+        ({"calibrated": "2025-02-01"}, "more than a year before"),
+        ({"calibrated": "2026-03-02"}, "after the measurement"),
+        ({"pressure_N_cm2": None}, "not measured"),
+        ({"force_N": None}, "not measured"),
+        # Above its limit, and more than a body part would feel.
+        ({"spring_N_mm": "35", "force_N": "281"}, "is stiffer than 25 N/mm"),
+        ({"speed": "0.6", "force_N": "281"}, "measured at 0.6 m/s"),
+        ({"contact": '"clamped"', "force_N": "281", "static_force_N": "100"}, "it is free here"),
+    ],
+)
+def test_what_was_measured_otherwise_leaves_it_open(tmp_path: Path, changed: dict, reason: str) -> None:
+    part = chest(cell(tmp_path, entry(**changed)))
+    assert part.verdict is Verdict.UNDECIDED
+    assert reason in part.reason
+
+
+def test_a_measurement_never_relieves_a_prediction(tmp_path: Path) -> None:
+    fast = {"speed": "9", "force_N": "1", "pressure_N_cm2": "1"}
+    for speed in (0.2, 1.0, 1.6, 2.0, 4.0):
+        before, after = (
+            chest(cell(tmp_path / f"{n}{speed}", *rows), speed)
+            for n, rows in (("a", ()), ("b", [entry(**fast)]))
+        )
+        assert before.verdict is after.verdict
+        assert before.limit == after.limit
+
+
+def test_several_measurements_count_all(tmp_path: Path) -> None:
+    other = entry(place='"at the belt"', force_N="300")
+    assert chest(cell(tmp_path / "a", entry(), other)).verdict is Verdict.EXCEEDED
+    assert (
+        chest(cell(tmp_path / "b", entry(), entry(region='"Abdomen"', force_N="300"))).verdict
+        is Verdict.WITHIN
+    )
+    assert (
+        chest(cell(tmp_path / "c", entry(), entry(part='"arm/l1"', force_N="300", speed="0.2"))).verdict
+        is Verdict.EXCEEDED
+    )
+
+
+def test_with_the_same_tool_it_counts_and_with_another_not(tmp_path: Path) -> None:
+    tool = '[[tools]]\nname = "hook"\non = "arm/tip"\nmass = 0.1\nshape = { sphere = 0.03 }\n'
+    area = "contact_area = { arm = 1e-4, hook = 1e-4 }"
+    for tools, verdict in (('["hook"]', Verdict.WITHIN), ("[]", Verdict.UNDECIDED)):
+        folder = tmp_path / str(len(tools))
+        station = cell(folder, entry(tools=tools), tool=tool)
+        text = folder.joinpath("workstation.toml").read_text().replace("contact_area = { arm = 1e-4 }", area)
+        station = made(folder, text)
+        assert chest(station).verdict is verdict
+
+
+def test_a_clamped_body_part_asks_for_a_clamped_measurement(tmp_path: Path) -> None:
+    wall = '[[parts]]\nname = "wall"\nshape = { box = [1, 0.1, 1] }\nat = { position = [1.5, 0.3, 0] }\n'
+    clamped = {"contact": '"clamped"', "force_N": "200", "static_force_N": "130", "pressure_N_cm2": "110"}
+    free = chest(cell(tmp_path / "a", entry(), tool=wall), 0.3)
+    assert "it is clamped here" in free.reason
+    assert free.verdict is Verdict.UNDECIDED
+    cases = (
+        ({}, Verdict.WITHIN),
+        ({"static_force_N": "141"}, Verdict.EXCEEDED),
+        ({"static_force_N": None}, Verdict.UNDECIDED),
+        ({"pressure_N_cm2": "121"}, Verdict.EXCEEDED),
+    )
+    for n, (more, verdict) in enumerate(cases):
+        found = chest(cell(tmp_path / str(n), entry(**{**clamped, "speed": "0.3", **more}), tool=wall), 0.3)
+        assert found.verdict is verdict, more
+
+
+# -- records ------------------------------------------------------------------------------------
+
+
+def test_peaks_are_those_of_the_first_half_second_and_of_the_rest() -> None:
+    t = np.arange(0, 2, 1e-3)
+    force = np.where(t < 0.3, 0.5, 0) + np.where((t >= 0.3) & (t < 0.35), 250.0, 0)
+    force += np.where((t >= 0.35) & (t < 0.85), 90, 0) + np.where(t >= 0.85, 60, 0)
+    assert peaks(t, force) == (250.0, 90.0)  # the sample at 0.8 s counts for both
+    assert peaks(t[:500], force[:500]) == (250.0, None)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_no_sample_of_a_contact_is_in_neither_peak(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(rng.uniform(1e-3, 0.05, 60))
+    force = rng.uniform(0, 200, 60)
+    transient, static = peaks(t, force)
+    assert max(transient, static or 0.0) == force.max()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Time [ms];Force [N]\n0;0\n1,5;100,5\n700;50\n",
+        "device;PFMD\nserial;7\n\nZeit [s];Weg [mm];Kraft [N]\n0;1;0\n0,0015;2;100,5\n0,7;3;50\n",
+        "t (s),F (kN)\n0,0\n0.0015,0.1005\n0.7,0.05\n",
+        "Time [s]\tForce [N]\n0\t0\n0.0015\t100.5\n0.7\t50\n",
+    ],
+)
+def test_records_are_read_with_their_units(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    t, force = read_curve(path, "a.csv")
+    np.testing.assert_allclose(t, [0, 0.0015, 0.7])
+    np.testing.assert_allclose(force, [0, 100.5, 50])
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("Time;Force\n0;1\n1;2\n", "no columns of time and force with units"),
+        ("Time [s];Force [N]\n1;1\n0;2\n", "do not rise"),
+        ("Time [s];Force [N]\n0;-1\n1;0\n", "no force above 0"),
+        ("Time [s];Force [N]\n0;x\n1;0\n", "'x'"),
+        ("", "empty"),
+    ],
+)
+def test_what_is_no_record_says_so(tmp_path: Path, text: str, what: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=what):
+        read_curve(path, "a.csv")
+
+
+def test_a_curve_is_judged_like_its_peaks_and_goes_with_the_recording(tmp_path: Path) -> None:
+    curve = {"files": {"curves/a.csv": "Time [s];Force [N]\n0;0\n0,01;290\n0,4;10\n"}}
+    station = cell(tmp_path, entry(curve='"curves/a.csv"', force_N=None), **curve)
+    assert chest(station).verdict is Verdict.EXCEEDED
+    assert "curves/a.csv" in station.files
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        (entry(speed="-1"), "speed"),
+        (entry(force="3"), "force"),
+        (entry(curve='"a.csv"'), "a curve, and forces beside it"),
+        (entry(force_N=None, pressure_N_cm2=None), "nothing was measured"),
+        ("", "measurements"),
+        ("[[measurements", "not TOML"),
+    ],
+)
+def test_slips_in_the_file_are_told(tmp_path: Path, text: str, what: str) -> None:
+    path = tmp_path / "measured.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=what):
+        read(path)
+
+
+@pytest.mark.parametrize("changed", [{"part": '"arm/l9"'}, {"region": '"Face"'}, {"area": '"Palm"'}])
+def test_what_is_not_there_is_told_at_start(tmp_path: Path, changed: dict[str, str]) -> None:
+    station = cell(tmp_path, entry(**changed))
+    criterion = next(c for c in station.workstation.safety if isinstance(c, PowerAndForce))
+    with pytest.raises(UnknownName):
+        criterion.bind(station.model)
+
+
+def test_dates_are_those_of_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "measured.toml"
+    path.write_text(entry())
+    (one,) = read(path)
+    assert one.date == dt.date(2026, 3, 1)

@@ -99,7 +99,7 @@ def test_each_multiplier_at_its_ends():
     assert asymmetry_multiplier(np.radians([0, 90, -90, 135, 136])) == pytest.approx(
         [1, 0.712, 0.712, 0.568, 0]
     )
-    with pytest.raises(ValueError, match="below the floor"):
+    with pytest.raises(ValueError, match="hands above the floor"):
         vertical_multiplier(-0.1)
 
 

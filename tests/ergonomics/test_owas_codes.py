@@ -31,7 +31,7 @@ def test_categories(code, category):
 
 
 def test_a_code_that_the_method_does_not_have_is_refused():
-    with pytest.raises(IndexError, match="not within"):
+    with pytest.raises(ValueError, match=" to "):
         owas(5, 1, 1, 1)
 
 

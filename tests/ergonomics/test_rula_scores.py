@@ -58,7 +58,7 @@ def test_vectors(scores, expected):
 
 @pytest.mark.parametrize("scores", [(0, 1, 1, 1, 1, 1, 1), (7, 1, 1, 1, 1, 1, 1), (1, 1, 1, 3, 1, 1, 1)])
 def test_a_score_that_the_tables_do_not_have_is_refused(scores):
-    with pytest.raises(IndexError, match="not within"):
+    with pytest.raises(ValueError, match=" to "):
         rula(*scores)
 
 

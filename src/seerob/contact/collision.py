@@ -22,6 +22,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seerob.domains import number
 from seerob.kernels.axes import mobility, reciprocals
 from seerob.transforms import Array
 
@@ -34,6 +35,10 @@ class Governing(IntEnum):
     ENERGY = 2
 
 
+LEAST = 1e-9
+"""What divides is greater [kg, N/m]."""
+
+
 def robot_mass(M: ArrayLike, m_L: ArrayLike) -> Array:
     """Effective mass of a robot, A.4: half of its moving parts and all of the load [kg].
 
@@ -41,7 +46,7 @@ def robot_mass(M: ArrayLike, m_L: ArrayLike) -> Array:
         M: Mass of the moving parts of the robot [kg].
         m_L: Mass of tool and workpiece [kg].
     """
-    return np.asarray(np.asarray(M, float) / 2 + np.asarray(m_L, float))
+    return np.asarray(number("M", M, 0, unit="kg") / 2 + number("m_L", m_L, 0, unit="kg"))
 
 
 def reduced_mass(m_H: ArrayLike, m_R: ArrayLike) -> Array:
@@ -51,7 +56,7 @@ def reduced_mass(m_H: ArrayLike, m_R: ArrayLike) -> Array:
         m_H: Effective mass of the body region [kg].
         m_R: Effective mass of the robot [kg].
     """
-    m_H, m_R = np.asarray(m_H, float), np.asarray(m_R, float)
+    m_H, m_R = number("m_H", m_H, LEAST, unit="kg"), number("m_R", m_R, LEAST, unit="kg")
     return np.asarray(1.0 / (1.0 / m_H + 1.0 / m_R))
 
 
@@ -73,27 +78,29 @@ def mass_of_rows(w: Array, M: Array) -> Array:
 
 def spring_energy(F: ArrayLike, k: ArrayLike) -> Array:
     """Energy in the spring at a force, A.1 [J]. F [N], k [N/m]."""
-    return np.asarray(np.square(F) / (2 * np.asarray(k)))
+    return np.asarray(np.square(F) / (2 * number("k", k, LEAST, unit="N/m")))
 
 
 def speed_at_force(F: ArrayLike, mu: ArrayLike, k: ArrayLike) -> Array:
     """Relative speed at which an impact reaches a force, A.5 [m/s]. F [N], μ [kg], k [N/m]."""
-    return np.asarray(np.asarray(F) / np.sqrt(np.asarray(mu) * k))
+    return np.asarray(np.asarray(F) / np.sqrt(np.asarray(mu) * number("k", k, LEAST, unit="N/m")))
 
 
 def speed_at_pressure(p: ArrayLike, A: ArrayLike, mu: ArrayLike, k: ArrayLike) -> Array:
     """Relative speed at which an impact reaches a pressure, A.6 [m/s]. p [Pa], A [m²], μ [kg], k [N/m]."""
-    return np.asarray(np.asarray(p) * A / np.sqrt(np.asarray(mu) * k))
+    area = number("A", A, 0, unit="m²")
+    return np.asarray(np.asarray(p) * area / np.sqrt(np.asarray(mu) * number("k", k, LEAST, unit="N/m")))
 
 
 def speed_at_energy(E: ArrayLike, mu: ArrayLike) -> Array:
     """Relative speed of an energy [m/s]. E [J], μ [kg]."""
-    return np.asarray(np.sqrt(2 * np.asarray(E) / mu))
+    return np.asarray(np.sqrt(2 * number("E", E, 0, unit="J") / number("mu", mu, LEAST, unit="kg")))
 
 
 def energy_limit(F: ArrayLike, k: ArrayLike, printed: ArrayLike) -> Array:
     """The smaller of the energy at the force limit and the printed one [J]; NaN means not printed."""
-    return np.fmin(spring_energy(F, k), printed)
+    spring = spring_energy(F, k)
+    return np.where(np.isnan(np.asarray(printed, float)), spring, np.minimum(spring, printed))
 
 
 def permissible_speed(v_F: ArrayLike, v_P: ArrayLike, v_E: ArrayLike) -> tuple[Array, NDArray[np.int64]]:
@@ -103,8 +110,9 @@ def permissible_speed(v_F: ArrayLike, v_P: ArrayLike, v_E: ArrayLike) -> tuple[A
     whoever asks must not call a speed below it within.
     """
     # Where the energy limit is that of the force, rounding must not say that energy governs.
-    v_E = np.where(np.asarray(v_E) < np.asarray(v_F) * (1 - 1e-12), v_E, v_F)
-    least = np.fmin(np.fmin(v_F, v_P), v_E)
+    v_E = np.where(np.asarray(v_E) >= np.asarray(v_F) * (1 - 1e-12), v_F, v_E)
+    # Only the pressure may be unknown: what else is not a number stays so.
+    least = np.minimum(np.where(np.isnan(v_P), v_F, np.minimum(v_F, v_P)), v_E)
     which = np.where(
         least == v_F, Governing.FORCE, np.where(least == v_P, Governing.PRESSURE, Governing.ENERGY)
     )

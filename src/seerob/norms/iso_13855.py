@@ -105,7 +105,10 @@ def intrusion(
         InputError: A capability or height that the norm does not admit.
         Undecided: A case of the edition that no public source settles.
     """
+    approach, edition = Approach(approach), Edition(edition)
     _check(approach, capability, height)
+    for what, way in (("over", over), ("under", under)):
+        _distance(what, way)
     if approach is Approach.TWO_HAND:
         if edition is Edition.E2024:
             raise Undecided("ISO 13855:2024 for a two-hand control: no public source was found")
@@ -162,6 +165,8 @@ def minimum_distance(
     """
     if not (np.isfinite(time) and time >= 0):
         raise InputError.at("ISO 13855", "time", f"{time} s is not a time", "seconds, 0 or more")
+    approach, edition = Approach(approach), Edition(edition)
+    _distance("supplement", supplement)
     found = intrusion(approach, edition, capability=capability, height=height, over=over, under=under)
     if found.uncovered:
         raise Undecided(f"ISO 13855:{edition}: nothing is said of {', '.join(found.uncovered)}")
@@ -191,7 +196,7 @@ def least_distance(at_speed: Callable[[float], Array]) -> Array:
 
 def speed_at(distance: Array) -> Array:
     """Approach speed that decides whether a distance [m] is at least `least_distance`, same shape [m/s]."""
-    return np.where(np.asarray(distance) < ARM_REACH, REACHING, WALKING)
+    return np.where(np.asarray(distance) >= ARM_REACH, WALKING, REACHING)
 
 
 def _across(edition: Edition, capability: float | None) -> Intrusion:
@@ -241,6 +246,11 @@ def _along(edition: Edition, capability: float | None, height: float | None) -> 
 def _lowest(capability: float) -> float:
     """Least height of a field along the floor, 15 (d - 50 mm) [m] (2S)."""
     return max(15 * (capability - 0.05), 0.0)
+
+
+def _distance(what: str, value: float | None) -> None:
+    if value is not None and not (np.isfinite(value) and value >= 0):
+        raise InputError.at("ISO 13855", what, f"{value} m is no distance", "metres, 0 or more")
 
 
 def _check(approach: Approach, capability: float | None, height: float | None) -> None:

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from seerob import figures, provenance
 from seerob.body_place import BodyPlaces
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge_interval, worst
+from seerob.domains import number
 from seerob.errors import InputError, Undecided
 from seerob.model import Gap, Model
 from seerob.norms import iso_13855
@@ -64,7 +65,9 @@ def separation_bound(v_r: Array, v_h: float, T_r: float, T_s: float, xi: float) 
     Returns:
         S_p [m], shape (...).
     """
-    return (np.maximum(v_r, 0.0) + v_h) * (T_r + T_s) + xi
+    person, time = number("v_h", v_h, 0, unit="m/s"), number("T_r", T_r, 0, unit="s")
+    time = time + number("T_s", T_s, 0, unit="s")
+    return (np.maximum(v_r, 0.0) + person) * time + number("xi", xi, 0, unit="m")
 
 
 class Separation(Criterion, frozen=True, kw_only=True):

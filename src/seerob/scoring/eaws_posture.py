@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from msgspec import Struct
 
+from seerob.domains import number
+from seerob.errors import UnknownName
 from seerob.human.angles import Angles
 from seerob.postures.task_phase import Stance
 from seerob.scoring.edges import ROUNDING, reached
@@ -82,6 +84,9 @@ POSITIONS: Mapping[Stance, str] = {
 
 def line_points(line: str, share: float, interpolation: Interpolation = Interpolation.LINEAR) -> float:
     """Points of a posture that lasts for a share of the time, 0 to 1."""
+    if line not in lines():
+        raise UnknownName("line of the form", line, lines())
+    number("share", share, 0, 1 + _ROUNDING)
     points = lines()[line].points
     shares = published("eaws_posture")["shares"][: len(points)]
     if Interpolation(interpolation) is Interpolation.STEP:
@@ -97,6 +102,7 @@ def asymmetry_points(at_least: tuple[float, ...]) -> float:
         at_least: Share of the time at or beyond each of the form's three angles.
     """
     table = published("eaws_posture")
+    number("share", at_least, 0, 1 + _ROUNDING)
     best = 0.0
     for share, points in zip(at_least, table["asymmetry_points"], strict=True):
         reached = int(np.searchsorted(table["asymmetry_shares"], share + _ROUNDING, side="right"))

@@ -17,8 +17,11 @@ ROUNDING = 1e-6
 
 
 def reached(angle: Array | float, edge: float) -> NDArray[np.bool_]:
-    """Whether an angle is at an edge or beyond it [rad]; at an edge of 0, which is neutral, only beyond."""
-    return np.asarray(np.asarray(angle) >= (edge - ROUNDING if edge else ROUNDING))
+    """Whether an angle is at an edge or beyond it [rad]; at an edge of 0, which is neutral, only beyond.
+
+    What is not a number is, so that it never scores least.
+    """
+    return np.asarray(~(np.asarray(angle) < (edge - ROUNDING if edge else ROUNDING)))
 
 
 def fallen(angle: Array | float, edge: float) -> NDArray[np.bool_]:

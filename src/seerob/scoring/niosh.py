@@ -14,6 +14,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
+from seerob.domains import number
 from seerob.scoring.published import published
 from seerob.transforms import Array
 
@@ -53,6 +54,7 @@ def duration(work: float, recovery: float) -> Duration:
     """
     if not 0 <= work <= 8 * 3600:
         raise ValueError(f"{work / 3600:g} h of lifting: the equation applies to 0 to 8 h")
+    number("recovery", recovery, 0, unit="s")
     if work <= 3600 and recovery >= work:
         return Duration.SHORT
     return Duration.MODERATE if work <= 7200 and recovery >= 0.3 * work else Duration.LONG
@@ -60,27 +62,25 @@ def duration(work: float, recovery: float) -> Duration:
 
 def horizontal_multiplier(H: ArrayLike) -> Array:
     """HM = 0.25/H of the distance from the ankles' middle to the hands [m]; 0 beyond 0.63 m."""
-    distance = np.asarray(H, float)
+    distance = number("H", H, 0, unit="m")
     return np.where(distance > 0.63 + _ROUNDING, 0.0, 0.25 / np.maximum(distance, 0.25))
 
 
 def vertical_multiplier(V: ArrayLike) -> Array:
     """VM = 1 - 0.3 |V - 0.75| of the height of the hands [m]; 0 beyond 1.75 m."""
-    height = np.asarray(V, float)
-    if np.any(height < 0):
-        raise ValueError("hands below the floor: V must not be negative")
+    height = number("V, the height of the hands above the floor,", V, 0, unit="m")
     return np.where(height > 1.75 + _ROUNDING, 0.0, 1 - 0.3 * np.abs(height - MIDDLE))
 
 
 def distance_multiplier(D: ArrayLike) -> Array:
     """DM = 0.82 + 0.045/D of the vertical travel [m]; 0 beyond 1.75 m."""
-    travel = np.asarray(D, float)
+    travel = number("D", D, 0, unit="m")
     return np.where(travel > 1.75 + _ROUNDING, 0.0, 0.82 + 0.045 / np.maximum(travel, 0.25))
 
 
 def asymmetry_multiplier(A: ArrayLike) -> Array:
     """AM = 1 - 0.0032 A/1° of the turn of the trunk [rad]; 0 beyond 135°."""
-    angle = np.degrees(np.abs(np.asarray(A, float)))
+    angle = np.degrees(np.abs(number("A", A, -2 * math.pi, 2 * math.pi, "rad")))
     return np.where(angle > 135 + _ROUNDING, 0.0, 1 - 0.0032 * angle)
 
 
@@ -92,9 +92,11 @@ def frequency_multiplier(F: float, V: float, spell: Duration) -> float:
         V: Height of the hands at the origin [m].
         spell: How long the lifting lasts.
     """
+    number("F", F, 0, unit="per minute")
+    number("V", V, 0, unit="m")
     table = published("niosh")
     rows = table["frequencies"]
-    column = 2 * list(Duration).index(spell) + int(V >= MIDDLE - _ROUNDING)
+    column = 2 * list(Duration).index(Duration(spell)) + int(V >= MIDDLE - _ROUNDING)
     values = [row[column] for row in table["frequency_multiplier"]]
     if rows[-1] < F:
         return 0.0
@@ -104,6 +106,7 @@ def frequency_multiplier(F: float, V: float, spell: Duration) -> float:
 
 def coupling_multiplier(grip: Grip, V: float) -> float:
     """CM of the table, V being where the multiplier is taken [m]."""
+    number("V", V, 0, unit="m")
     return float(published("niosh")["coupling"][Grip(grip).value][int(V >= MIDDLE - _ROUNDING)])
 
 
@@ -134,6 +137,10 @@ class Task:
     frequency: float
     """Lifts per minute."""
     grip: Grip
+
+    def __post_init__(self) -> None:
+        number("average", self.average, 0, unit="kg")
+        number("heaviest", self.heaviest, self.average, unit="kg")
 
 
 def frequency_independent(task: Task, end: End) -> float:
@@ -170,12 +177,14 @@ def composite_index(tasks: Sequence[Task], spell: Duration) -> float:
     column of task n.
 
     Args:
-        tasks: At least one.
+        tasks: At least one, else a `ValueError`.
         spell: How long all of them last together.
 
     Returns:
         The index, infinite where a recommended weight is 0.
     """
+    if not tasks:
+        raise ValueError("no lifting task, an index is of at least one")
     rated = sorted(
         tasks, key=lambda task: (-_ratio(task.average, recommended_weight(task, spell)), -task.frequency)
     )

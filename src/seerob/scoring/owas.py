@@ -14,6 +14,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import ArrayLike, NDArray
 
+from seerob.domains import number, whole
 from seerob.human.angles import Angles
 from seerob.scoring.edges import ROUNDING
 from seerob.scoring.measured import Accuracy, Measured
@@ -69,12 +70,10 @@ def owas(back: ArrayLike, arms: ArrayLike, legs: ArrayLike, load: ArrayLike) -> 
         load: 1 to 3.
 
     Raises:
-        IndexError: A code that the method does not have.
+        ValueError: A code that the method does not have.
     """
-    codes = [np.asarray(x) for x in (back, arms, legs, load)]
-    for code, most in zip(codes, CODES.values(), strict=True):
-        if code.size and (code.min() < 1 or code.max() > most):
-            raise IndexError(f"a code is not within 1 to {most}")
+    given = (back, arms, legs, load)
+    codes = [whole(name, code, 1, CODES[name]) for name, code in zip(CODES, given, strict=True)]
     return np.asarray(cells("owas", "category")[tuple(code - 1 for code in codes)])
 
 
@@ -109,12 +108,15 @@ def settled(codes: Mapping[str, Possible], around: Mapping[str, Possible]) -> di
 
 def only(code: int, of: int) -> Possible:
     """The set of one code."""
-    return np.asarray(np.arange(1, of + 1) == code)
+    return np.asarray(np.arange(1, of + 1) == whole("code", code, 1, of))
 
 
 def load_codes(kg: float | None) -> Possible:
     """1 below 10 kg, 2 up to 20 kg, 3 beyond; all when nobody said."""
-    return np.ones(3, bool) if kg is None else only(1 + (kg >= 10) + (kg > 20), 3)
+    if kg is None:
+        return np.ones(3, bool)
+    number("load", kg, 0, unit="kg")
+    return only(1 + (kg >= 10) + (kg > 20), 3)
 
 
 def back_codes(angles: Angles, thresholds: OwasThresholds, accuracy: Accuracy = 0.0) -> Possible:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from seerob.domains import number
 from seerob.scoring.repetition import GAP
 
 _ROUNDING = 1e-9
@@ -29,6 +30,7 @@ class PostureTime:
 
     def add(self, t: float, posture: str) -> None:
         """The posture from the instant before up to this one [s]."""
+        number("the instant", t, unit="s")
         step = t - self._t
         if math.isnan(step):
             self._posture, self._since = posture, t

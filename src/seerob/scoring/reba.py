@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from seerob.domains import number, whole
 from seerob.human.angles import Angles
 from seerob.scoring.edges import fallen, reached
 from seerob.scoring.measured import Accuracy, Measured
@@ -100,19 +101,17 @@ def reba(
         activity: 0 to 3, added at the end.
 
     Raises:
-        IndexError: A score that the tables do not have.
+        ValueError: A score that the method does not have.
     """
-    head, back, feet, upper, lower, hand = (
-        np.asarray(x) for x in (neck, trunk, legs, upper_arm, lower_arm, wrist)
+    given = (neck, trunk, legs, upper_arm, lower_arm, wrist, load, coupling, activity)
+    head, back, feet, upper, lower, hand, weight, grip, active = (
+        whole(name, score, LEAST[name], MOST[name]) for name, score in zip(LEAST, given, strict=True)
     )
-    for score, most in ((head, 3), (back, 5), (feet, 4), (upper, 6), (lower, 2), (hand, 3)):
-        if score.size and (score.min() < 1 or score.max() > most):
-            raise IndexError(f"a component score is not within 1 to {most}")
     table_A = cells("reba", "A")[head - 1, back - 1, feet - 1]
     table_B = cells("reba", "B")[upper - 1, lower - 1, hand - 1]
-    A, B = table_A + np.asarray(load), table_B + np.asarray(coupling)
+    A, B = table_A + weight, table_B + grip
     C = cells("reba", "C")[np.minimum(A, 12) - 1, np.minimum(B, 12) - 1]
-    return RebaScores(table_A, table_B, A, B, C, C + np.asarray(activity))
+    return RebaScores(table_A, table_B, A, B, C, C + active)
 
 
 def trunk(flexion: Array, upright: float) -> Ints:
@@ -150,6 +149,8 @@ def wrist(flexion: Array) -> Ints:
 
 def load(kg: float | None, shock: bool | None) -> Span:
     """Score of a load [kg], one more for shock or rapid build-up; what is not given may be anything."""
+    if kg is not None:
+        number("load", kg, 0, unit="kg")
     weight = between(0, 2) if kg is None else exactly((kg >= 5) + (kg > 10))
     sudden = between(0, 1) if shock is None else exactly(int(shock))
     return weight + sudden
@@ -157,7 +158,7 @@ def load(kg: float | None, shock: bool | None) -> Span:
 
 def coupling(grip: Coupling | None) -> Span:
     """Score of the grip."""
-    return between(0, 3) if grip is None else exactly(list(Coupling).index(grip))
+    return between(0, 3) if grip is None else exactly(list(Coupling).index(Coupling(grip)))
 
 
 def posture_components(

@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seerob.domains import number
 from seerob.scoring.published import Ints
+from seerob.transforms import Array
 
 GAP = 1.0
 """A posture that is left for less [s] was not left."""
@@ -31,7 +33,8 @@ def static(t: ArrayLike, scores: ArrayLike, hold: float, *, gap: float = GAP) ->
     Returns:
         Shape (n,); the interruptions within a held posture belong to it.
     """
-    instants, vectors = np.asarray(t, float), np.asarray(scores)
+    instants, vectors = _increasing(t), np.asarray(scores)
+    number("hold", hold, 0, unit="s")
     found = np.zeros(len(instants), bool)
     if len(instants) < 2:
         return found
@@ -58,7 +61,15 @@ def repetitions(t: ArrayLike, scores: ArrayLike, *, window: float = WINDOW) -> I
     Returns:
         Counts, shape (n,); 4 or more per minute is repeated work in RULA's worksheet, more than 4 in REBA.
     """
-    instants, values = np.asarray(t, float), np.asarray(scores)
+    instants, values = _increasing(t), np.asarray(scores)
+    number("window", window, 0, unit="s")
     rises = instants[1:][np.diff(values) > 0]
     first = np.searchsorted(rises, instants - window + _ROUNDING, side="right")
     return np.asarray(np.searchsorted(rises, instants, side="right") - first)
+
+
+def _increasing(t: ArrayLike) -> Array:
+    instants = number("an instant", t, unit="s")
+    if (np.diff(instants) <= 0).any():
+        raise ValueError("instants do not increase")
+    return instants

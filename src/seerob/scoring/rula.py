@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from seerob.domains import number, whole
 from seerob.human.angles import Angles
 from seerob.scoring.edges import fallen, reached
 from seerob.scoring.measured import Accuracy, Measured
@@ -121,28 +122,25 @@ def rula(
         force_body: 0 to 3, added to B.
 
     Raises:
-        IndexError: A score that the tables do not have.
+        ValueError: A score that the method does not have.
     """
-    upper, lower, bent, turned = (np.asarray(x) for x in (upper_arm, lower_arm, wrist, wrist_twist))
-    head, back, feet = (np.asarray(x) for x in (neck, trunk, legs))
-    _check((upper, 6), (lower, 3), (bent, 4), (turned, 2), (head, 6), (back, 6), (feet, 2))
+    scores = (upper_arm, lower_arm, wrist, wrist_twist, neck, trunk, legs)
+    added = (muscle_arms, force_arms, muscle_body, force_body)
+    upper, lower, bent, turned, head, back, feet, held_arms, loaded_arms, held_body, loaded_body = (
+        whole(name, score, LEAST[name], MOST[name])
+        for name, score in zip(LEAST, (*scores, *added), strict=True)
+    )
     A = cells("rula", "A")[upper - 1, lower - 1, 2 * (bent - 1) + turned - 1]
     B = cells("rula", "B")[head - 1, 2 * (back - 1) + feet - 1]
-    C = A + np.asarray(muscle_arms) + np.asarray(force_arms)
-    D = B + np.asarray(muscle_body) + np.asarray(force_body)
+    C = A + held_arms + loaded_arms
+    D = B + held_body + loaded_body
     return RulaScores(A, B, C, D, cells("rula", "C")[np.minimum(C, 8) - 1, np.minimum(D, 7) - 1])
-
-
-def _check(*scores: tuple[Ints, int]) -> None:
-    for score, most in scores:
-        if score.size and (score.min() < 1 or score.max() > most):
-            raise IndexError(f"a component score is not within 1 to {most}")
 
 
 def upper_arm(flexion: Array) -> Ints:
     """1 to 4 of the flexion [rad], without modifiers."""
     raised = sum(reached(flexion, edge * _RAD).astype(np.int64) for edge in (20, 45, 90))
-    return 1 + fallen(flexion, -20 * _RAD).astype(np.int64) + raised
+    return np.asarray(np.minimum(1 + fallen(flexion, -20 * _RAD).astype(np.int64) + raised, 4))
 
 
 def lower_arm(flexion: Array) -> Ints:
@@ -174,6 +172,8 @@ def force(load: float | None, use: LoadUse | None, profile: Profile) -> Span:
 
     Less than 2 kg, static or repeated, has no row: it counts as 0, muscle use apart.
     """
+    if load is not None:
+        number("load", load, 0, unit="kg")
     uses = list(LoadUse) if use is None else [LoadUse(use)]
     heavy = 3 if Profile(profile) is Profile.WORKSHEET else 2
     loads = [0.0, math.inf] if load is None else [load]

@@ -45,7 +45,8 @@ def arm_score(measured: Measured, score: Callable[[Array], Ints], policy: ArmPol
     angles = measured.angles
     accuracy = measured.error("shoulder_flexion", "shoulder_elevation")
     flexion, side = angles.shoulder_flexion, angles.shoulder_abduction
-    spread, rounding = turned(accuracy, np.cos(side)), turned(ROUNDING, np.cos(side))
+    spread = turned(accuracy, np.cos(side))
+    rounding = turned(ROUNDING, np.cos(np.where(np.isnan(side), 0.0, side)))
     if ArmPolicy(policy) is ArmPolicy.PROJECTION:
         return _projected(flexion, score, spread, rounding)
     azimuth = np.abs(np.arctan2(np.sin(side), np.cos(side) * np.sin(flexion)))

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from seerob.domains import number
 from seerob.state import State
 from seerob.stopping.onset import Onset
 from seerob.transforms import Array
@@ -51,6 +52,15 @@ Braking = Callable[[State], Callable[[Onset, float], Course]]
 """From a state to what follows from an onset, with the factor on the present speeds that it has."""
 
 
+LEAST = 1e-9
+"""A deceleration is greater [m/s²]."""
+
+
+def _check(**given: float) -> None:
+    for name, value in given.items():
+        number(name, value, 0)
+
+
 def way_of_person(v_h: Array | float, T_r: float, T_s: Array | float) -> Array:
     """S_h of a person who comes near at constant speed [m]; a person who recedes counts as standing."""
     return np.asarray(np.maximum(v_h, 0.0) * (T_r + np.asarray(T_s)))
@@ -70,6 +80,7 @@ def course(v_r: Array, T_r: float, T_s: float, share: float = BOUND) -> Course:
         T_s: Stopping time [s].
         share: `BOUND` or `CONSTANT`.
     """
+    _check(T_r=T_r, T_s=T_s)
     v = np.maximum(np.asarray(v_r, float), 0.0)
     return Course(v, v * T_r, share * v * T_s, T_s)
 
@@ -96,6 +107,8 @@ def decelerating(v: Array | float, v_h: float, T_r: float, a: float, K: float) -
         a: Deceleration [m/s²].
         K: C + Z_d + Z_r [m].
     """
+    _check(T_r=T_r, v_h=v_h)
+    number("a", a, LEAST, unit="m/s²")
     v = np.maximum(v, 0.0)
     return np.asarray(v_h * (T_r + v / a) + v * T_r + v**2 / (2 * a) + K)
 
@@ -105,6 +118,8 @@ def largest_speed_decelerating(d: Array | float, v_h: Array | float, T_r: float,
 
     :math:`\sqrt{b^2 + 2a(d - K - v_h T_r)} - b` with :math:`b = a T_r + v_h`; 0 where no speed is.
     """
+    _check(T_r=T_r)
+    number("a", a, LEAST, unit="m/s²")
     b = a * T_r + np.asarray(v_h)
     left = np.asarray(d) - K - np.asarray(v_h) * T_r
     return np.asarray(np.sqrt(b**2 + 2 * a * np.maximum(left, 0.0)) - b)
@@ -117,6 +132,7 @@ def largest_speed_in_time(
 
     0 where no speed is, also when S_p is larger than ``d`` at standstill.
     """
+    _check(T_r=T_r, T_s=T_s)
     left = np.asarray(d) - K - np.asarray(v_h) * (T_r + T_s)
     return np.asarray(np.maximum(left, 0.0) / (T_r + share * T_s))
 

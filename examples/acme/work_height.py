@@ -7,6 +7,7 @@ from typing import ClassVar
 from seerob.criterion import Criterion, Evaluate, judge
 from seerob.model import Model
 from seerob.snapshot import Basis, Result
+from seerob.spans import Falls, Points, approaching
 from seerob.state import State
 
 
@@ -35,6 +36,11 @@ class WorkHeight(Criterion, frozen=True, kw_only=True):
             return Result(name=self.name, value=height, unit=self.unit, limit=self.limit, verdict=verdict)
 
         return evaluate
+
+    def falls(self, model: Model, points: Points) -> Falls:
+        """See `Criterion.falls`: the height changes by no more than the point's way between two ticks."""
+        frame = model.frame(self.at)
+        return approaching([points.add(frame.mj, frame.body_from_frame[:3, 3])], ())
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

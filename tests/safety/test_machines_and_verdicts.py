@@ -47,6 +47,7 @@ name = "F"
 robot = "arm"
 contact_area = { arm = 1e-4 }
 excluded = ["Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"]
+between_samples = "accepted: contact is asked at ticks"
 """
 DISTANCE = '[[safety]]\nkind = "minimum_distance"\nbetween = ["arm", "gate"]\n'
 SEPARATION = """

@@ -70,6 +70,9 @@ class ResultLog(Mapping[str, Series]):
             return self._worse
         self._last = snapshot
         self.ticks += 1
+        if self.ticks == 2:
+            for series in self._series.values():
+                series.lasts()
         if self.start is None:
             self.start = snapshot.t
         self.end = snapshot.t

@@ -124,7 +124,8 @@ class Series:
         between: str = "",
     ) -> None:
         self.name = name
-        self.open = "" if between.startswith("accepted: ") else between
+        self._between = "" if between.startswith("accepted: ") else between
+        self.open = ""
         """Why the run is not within although every instant of it is; empty when nothing is open."""
         self.unit = unit
         self.at_most = at_most
@@ -147,6 +148,10 @@ class Series:
     def repeats(self, result: Result) -> bool:
         """Whether this is the last result of a criterion with a period, shown again."""
         return result.t is not None and result.t == self._last_t
+
+    def lasts(self) -> None:
+        """The run has more than one instant: what nobody knows between them counts from now on."""
+        self.open = self._between
 
     def append(self, result: Result, t: float) -> None:
         """Add what the criterion said in the snapshot at run time ``t`` [s]."""

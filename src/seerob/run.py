@@ -9,7 +9,7 @@ import gc
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from seerob.between_ticks import watched
 from seerob.engine import Engine
@@ -108,7 +108,37 @@ def pump(
 # -- the loop -----------------------------------------------------------------------------------
 
 
-def snapshot(state: State, seq: int, results: tuple[Result, ...], looks: Looks | None = None) -> Snapshot:
+class Lateness:
+    """How late live sources are heard, by what they drive, and how late they may be [s].
+
+    Args:
+        model: The compiled workstation.
+    """
+
+    def __init__(self, model: Model) -> None:
+        live = [s for s in model.workstation.sources if isinstance(s, LiveSource) and s.target()]
+        self._drives = {source.name: (source.target(), source.timeout) for source in live}
+        self._late: dict[str, float] = {}
+
+    def take(self, samples: Sequence[Sample]) -> dict[str, tuple[float, float]]:
+        """The latest of each; of several devices of one person the worst."""
+        for sample in samples if self._drives else ():
+            if sample.t_device is not None and sample.source in self._drives:
+                self._late[sample.source] = sample.late
+        found: dict[str, tuple[float, float]] = {}
+        for source, late in self._late.items():
+            target, bound = self._drives[source]
+            found[target] = max((late, bound), found.get(target, (late, bound)))
+        return found
+
+
+def snapshot(
+    state: State,
+    seq: int,
+    results: tuple[Result, ...],
+    looks: Looks | None = None,
+    late: dict[str, tuple[float, float]] | None = None,
+) -> Snapshot:
     """What goes out of a state."""
     mechanisms = state.model.mechanisms.values()
     return Snapshot(
@@ -118,6 +148,7 @@ def snapshot(state: State, seq: int, results: tuple[Result, ...], looks: Looks |
         joints={m.name: tuple(state.joint_positions(m).tolist()) for m in mechanisms},
         tracking={m.name: state.hearings[m.name].error for m in mechanisms},
         bones={m.name: bones for m in mechanisms if (bones := state.hearings[m.name].bones)},
+        late=late or {},
         results=results,
         looks={} if looks is None else looks.at(state),
         doubts=in_doubt(state),
@@ -163,11 +194,12 @@ def ticks(
     engine: Engine, judge: Callable[[State], tuple[Result, ...]], feed: Feed
 ) -> Iterator[tuple[Snapshot, tuple[Sample, ...]]]:
     """The road: for each tick what goes out, and the samples it was made from."""
-    looks = Looks(engine.model)
+    looks, lateness = Looks(engine.model), Lateness(engine.model)
     for seq, samples in enumerate(feed):
         engine.take(samples)
+        late = lateness.take(samples)
         state = engine.tick() if seq else engine.start()
-        yield snapshot(state, seq, judge(state), looks), samples
+        yield snapshot(state, seq, judge(state), looks, late), samples
 
 
 @contextmanager
@@ -194,6 +226,8 @@ class Summary:
     """Time it took [s]."""
     slipped: float
     """Real time that was lost in a live run [s]."""
+    late: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Of what live sources drive: by how much its samples came too late at worst, and may have come [s]."""
 
     @property
     def verdict(self) -> Verdict | None:
@@ -227,6 +261,7 @@ def run(
     log = ResultLog(scene.criteria)
     begun = time.perf_counter()
     count, t = 0, 0.0
+    late: dict[str, tuple[float, float]] = {}
     with ExitStack() as open_writers, settled():
         for writer in writers:
             open_writers.enter_context(writer)
@@ -238,6 +273,8 @@ def run(
             for writer in writers:
                 writer.write(out, samples)
             log.add(out)  # after those who look on
+            for name, latest in out.late.items():
+                late[name] = max(latest, late.get(name, latest))
             progress(t)
             if stop():
                 break
@@ -250,4 +287,5 @@ def run(
         duration=t,
         wall=time.perf_counter() - begun,
         slipped=0.0 if clock is None else clock.slipped,
+        late=late,
     )

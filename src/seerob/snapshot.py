@@ -236,6 +236,9 @@ class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot"):
     bones: dict[str, dict[str, tuple[float | None, float | None]]] = {}
     """Of people that devices see: bone → how far the twin's bone is from the device's, position [m] and
     angle [rad]; null where the device has none."""
+    late: dict[str, tuple[float, float]] = {}
+    """Of what live sources drive whose devices send their time: how much later than the fastest sample the
+    newest one arrived, and how late it may be to count [s]."""
     results: tuple[Result, ...] = ()
     looks: dict[str, tuple[float, float, float] | None] = {}
     """Nodes whose look follows a variable: red, green, blue in 0…1; null where one is not drawn."""

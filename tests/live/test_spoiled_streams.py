@@ -19,7 +19,7 @@ from seerob.live import real_time
 from seerob.live.device_clock import SETTLED, SLEW
 from seerob.live.listening import Listener, delay_of
 from seerob.live.real_time import Clock, hear
-from seerob.run import Judge, bind, engine_of
+from seerob.run import Judge, bind, engine_of, ticks
 from seerob.samples import JointSample, Mailbox
 
 RATE, TICK = 125.0, 0.01
@@ -308,3 +308,13 @@ def test_what_is_decided_is_true_whatever_happens_to_the_stream(station, monkeyp
             WAY + case.gap + case.shift
         ) + SLEW * FASTEST_TIP + 0.01 + SWING * bool(case.gap)
     assert any(case.why in tick.reason for tick in told)
+
+
+def test_how_late_it_is_goes_out_with_every_snapshot(station):
+    q, qd = motion(0.0)
+    name = station.workstation.sources[0].name
+    said = JointSample(
+        source=name, seq=0, target="arm", t=0.0, t_device=5.0, q=tuple(q), qd=tuple(qd), late=0.05
+    )
+    told = ticks(engine_of(station.model), Judge(bind(station.model)), iter([(said,), ()]))
+    assert [snapshot.late for snapshot, _ in told] == [{"arm": (0.05, 0.2)}] * 2

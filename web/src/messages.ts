@@ -23,6 +23,7 @@ export interface Frame {
   t: number;
   joints: { [name: string]: number[] };
   tracking: { [name: string]: number };
+  late: Snapshot["late"];
   results: Result[];
   looks: Snapshot["looks"];
   doubts: Snapshot["doubts"];

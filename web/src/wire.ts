@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "4e67ae40627bda0b";
+export const SCHEMA = "49aed87f09bc7272";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -299,6 +299,11 @@ export interface Snapshot {
    * angle [rad]; null where the device has none.
    */
   bones: Record<string, Record<string, [number | null, number | null]>>;
+  /**
+   * Of what live sources drive whose devices send their time: how much later than the fastest sample the
+   * newest one arrived, and how late it may be to count [s].
+   */
+  late: Record<string, [number, number]>;
   results: Result[];
   /** Nodes whose look follows a variable: red, green, blue in 0…1; null where one is not drawn. */
   looks: Record<string, Vec3 | null>;

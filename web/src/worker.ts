@@ -91,8 +91,8 @@ function show(snapshot: Snapshot): void {
     new Uint8Array(buffer).set(snapshot.poses);
     post({ kind: "poses", buffer, t: snapshot.t, seq: snapshot.seq }, [buffer]);
   }
-  const { seq, t, joints, tracking, results, looks, doubts } = snapshot;
-  waiting = { seq, t, joints, tracking, results, looks, doubts };
+  const { seq, t, joints, tracking, late, results, looks, doubts } = snapshot;
+  waiting = { seq, t, joints, tracking, late, results, looks, doubts };
   deliver();
 }
 

@@ -107,6 +107,9 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
             writers += _targets(station, allow=options.allow_writing)
             summary = station.run(writers=[view, *writers], live=True, scene=scene, stop=over, progress=note)
     line("ran", f"{summary.duration:.1f} s" + _slipped(summary.slipped))
+    for name, (late, bound) in summary.late.items():
+        text = f"{name}: heard up to {1e3 * late:.0f} ms later than at its best; {1e3 * bound:.0f} ms may be"
+        line("late", text, "yellow" if late > bound else "")
     tell_results(summary)
     tell_files(sinks, folder)
     return exit_code(summary.verdict)

@@ -50,6 +50,7 @@ export function Properties() {
           <NoteRow key={note} note={note} />
         ))}
         {mechanism && <Tracking mechanism={mechanism} />}
+        {mechanism && <Lateness mechanism={mechanism} />}
       </dl>
       {mechanism && <Joints mechanism={mechanism} />}
       {findings.length > 0 && <FindingList findings={findings} />}
@@ -112,6 +113,22 @@ function Tracking({ mechanism }: { mechanism: MechanismInfo }) {
     <>
       <dt title="Largest joint error between the twin and what was heard">Tracking error</dt>
       <dd class={stale.value ? "stale" : ""}>{shown}</dd>
+    </>
+  );
+}
+
+function Lateness({ mechanism }: { mechanism: MechanismInfo }) {
+  const late = frame.value?.late[mechanism.name];
+  if (late === undefined) return null;
+  const [by, bound] = late;
+  return (
+    <>
+      <dt title="How much later than the fastest sample the newest one arrived, and how late it may be">
+        Late
+      </dt>
+      <dd class={stale.value ? "stale" : by > bound ? "unknown" : ""}>
+        {formatNumber(1e3 * by)} ms, counts up to {formatNumber(1e3 * bound)} ms
+      </dd>
     </>
   );
 }

@@ -288,7 +288,8 @@ def files(cell: Cell) -> dict[str, str]:
         + _length(cell, "tolerance", 0.001 + cell.uncertainty),
         "felt": f'kind = "effective_mass"\nat = "{arm}"\ntoward = "{op}"\nlimit = {limits["mass"]!r}\n',
         "contact": f'kind = "power_and_force"\nrobot = "{arm}"\nhuman = "{op}"\n'
-        f"contact_area = {{ {arm} = 1e-4 }}\nlargest_area = 1e-4\n",
+        f"contact_area = {{ {arm} = 1e-4{', tool = 1e-4' if cell.tool is not None else ''} }}\n"
+        "largest_area = 1e-4\n",
         "posture": f'kind = "owas"\nhuman = "{op}"\n',
     }
     asked = [(name, text) for name, text in criteria.items() if name not in cell.left_out]

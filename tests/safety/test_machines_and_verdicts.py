@@ -21,7 +21,7 @@ slide = { along = [0, 1, 0], position = "gate/position", lower = 0, upper = 5 }
 AXIS = """
 [[machines]]
 name = "axis"
-shape = { box = [0.1, 0.1, 0.1] }
+shape = { box = [0.3, 0.3, 0.3] }
 mass = 500
 slide = { along = [1, 0, 0], lower = -1, upper = 1 }
 [[confirmed]]

@@ -10,10 +10,11 @@ from seerob.model import Mechanism, Model
 
 def given_contacts(
     model: Model, robot: Mechanism, radii: Mapping[str, float], areas: Mapping[str, float]
-) -> tuple[dict[int, float], dict[int, float]]:
+) -> tuple[dict[int, float], dict[int, float], dict[int, str]]:
     """Radii and areas by moving body: of several names that mean it, that of the fewest bodies counts.
 
-    Of names that mean as many an area counts before a radius, and the lesser one.
+    Of names that mean as many an area counts before a radius, and the lesser one. The robot's name means the
+    links up to its flange here, for how an arm touches says nothing of its tool.
 
     Args:
         model: The compiled workstation.
@@ -21,20 +22,27 @@ def given_contacts(
         radii: Of its sharpest edges, by name [m].
         areas: Of its smallest contacts, by name [m²].
 
+    Returns:
+        Radii [m], areas [m²], and the name by which each is given.
+
     Raises:
         UnknownName: A part that the robot does not move.
     """
-    meant: list[tuple[int, int, float, list[int]]] = []
+    meant: list[tuple[int, int, float, str, list[int]]] = []
+    arm = {i for i in robot.bodies if model.bodies[i].mj not in robot.load}
     for kind, given in enumerate((radii, areas)):
         for name, value in given.items():
-            bodies = [i for i in model.select(name) if i in robot.moving]
+            named = {*model.select(name)}
+            bodies = [i for i in robot.moving if i in (arm if name == robot.name else named)]
             if not bodies:
                 known = [model.bodies[i].name for i in robot.moving]
                 raise UnknownName(f"moving part of {robot.name}", name, known)
-            meant.append((-len(bodies), kind, -value, bodies))
+            meant.append((-len(named.intersection(robot.moving)), kind, -value, name, bodies))
     found: tuple[dict[int, float], dict[int, float]] = {}, {}
-    for _, kind, value, bodies in sorted(meant):
+    by: dict[int, str] = {}
+    for _, kind, value, name, bodies in sorted(meant):
         for body in bodies:
             found[1 - kind].pop(body, None)
             found[kind][body] = -value
-    return found
+            by[body] = name
+    return *found, by

@@ -190,7 +190,7 @@ def credited_input(largest: float, cap: float) -> Input:
 
 
 def contact_input(
-    name: str, shape: ContactShape, *, radius: float | None = None, area: float | None = None
+    name: str, shape: ContactShape, *, radius: float | None = None, area: float | None = None, by: str = ""
 ) -> Input:
     """Where the contact area of a part is from.
 
@@ -199,9 +199,10 @@ def contact_input(
         shape: By which it touches.
         radius: That the workstation file gives [m].
         area: Likewise, instead [m²].
+        by: Name by which it gives it.
     """
     what, sharpest = f"contact radius of {name}", shape.sharpest[0]
-    file = "workstation file"
+    file = f"workstation file, of {by}" if by else "workstation file"
     if area is not None:
         return Input(name=f"contact area of {name}", value=area, unit="m²", origin=Origin.GIVEN, source=file)
     if radius is not None:

@@ -77,9 +77,10 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     mass: Literal["larger", "simplified", "projected"] = "larger"
     """Mass of the robot: M/2 + m_L, the effective mass along the motion, or the larger of both."""
     contact_radius: dict[str, _Positive] = field(default_factory=dict)
-    """Radius of the sharpest edge of parts by name [m], instead of what their meshes tell."""
+    """Radius of the sharpest edge of parts by name [m], instead of what their meshes tell; the robot's name
+    means its links up to the flange, not what is mounted there."""
     contact_area: dict[str, _Area] = field(default_factory=dict)
-    """Smallest contact area of parts by name [m²], instead of what their meshes tell."""
+    """Smallest contact area of parts by name [m²], likewise."""
     largest_area: _Credited = CAP
     """Area above which a contact is not credited [m²]; never more than 1 cm²."""
     stiffness_tolerance: Tolerance = 0.0
@@ -121,7 +122,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
             UnknownName: A part that the robot does not move.
         """
         moving = model.robot(self.robot).moving
-        radii, _ = self._contacts(model)
+        radii, _, _ = self._contacts(model)
         known = contact_shape.body_shape
         return [
             contact_shape.round_shape(radii[i]) if i in radii else known(model.bodies[i].solids)
@@ -134,7 +135,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         Free and clamped; see `contact_limits.RegionArrays.pressure_force`.
         """
         moving = model.robot(self.robot).moving
-        _, given = self._contacts(model)
+        _, given, _ = self._contacts(model)
         found = [arrays.pressure_force(shape, self.largest_area) for shape in self.shapes(model)]
         for row, body in enumerate(moving):
             if body in given:
@@ -143,16 +144,15 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
 
     def given_contacts(self, model: Model) -> frozenset[int]:
         """Bodies of which the file says how they touch."""
-        radii, areas = self._contacts(model)
-        return frozenset({*radii, *areas})
+        return frozenset(self._contacts(model)[2])
 
     def measured(self, model: Model) -> Measurements:
         """What was measured at the robot."""
         arrays = contact_limits.RegionArrays.of(self.table(model), multiplier=self.multiplier)
         return Measurements(model, model.robot(self.robot), arrays, self.measurements)
 
-    def _contacts(self, model: Model) -> tuple[dict[int, float], dict[int, float]]:
-        """Radii [m] and areas [m²] that the file gives, by moving body."""
+    def _contacts(self, model: Model) -> tuple[dict[int, float], dict[int, float], dict[int, str]]:
+        """Radii [m] and areas [m²] that the file gives, by moving body, and by which name."""
         return given_contacts(model, model.robot(self.robot), self.contact_radius, self.contact_area)
 
     def basis(self, model: Model) -> Basis:
@@ -212,12 +212,16 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         found += [provenance.given(key, share, "") for key, share in tolerances.items() if share]
         if self.person_speed is not None:
             found.append(provenance.given("person_speed", self.person_speed, "m/s"))
-        radii, areas = self._contacts(model)
+        radii, areas, by = self._contacts(model)
         return (
             *found,
             *(
                 contact_limits.contact_input(
-                    model.bodies[body].name, shape, radius=radii.get(body), area=areas.get(body)
+                    model.bodies[body].name,
+                    shape,
+                    radius=radii.get(body),
+                    area=areas.get(body),
+                    by=by.get(body, ""),
                 )
                 for body, shape in zip(robot.moving, self.shapes(model), strict=True)
             ),

@@ -33,6 +33,7 @@ COMMANDS = (
     "emulate",
     "probe",
     "variables",
+    "explain",
     "measure",
     "capture",
     "import_aml",

@@ -17,6 +17,8 @@ from seerob.batch import Batch
 from seerob.contact.measured import curves
 from seerob.criterion import Criterion
 from seerob.errors import InputError
+from seerob.explanation import Explanation
+from seerob.explanation import explain as explained
 from seerob.given_states import motion_of
 from seerob.live.ears import Listening
 from seerob.live.listening import LiveSource
@@ -28,6 +30,7 @@ from seerob.opening import open_sources, source_target
 from seerob.permissible import evaluation
 from seerob.permissible.evaluation import PermissibleSpeed, Say, Wish
 from seerob.permissible.joint_limits import Given, joint_limits
+from seerob.plausibility.own_words import said_by
 from seerob.reading import read
 from seerob.recordings.filing import source_files
 from seerob.recordings.recording import Recording
@@ -248,6 +251,25 @@ class Station:
             motion = motion_of(self.model, q, qd or {}, t)
         threads = threads or os.cpu_count() or 1
         return batch.judged(self.model, self.bound, motion, threads=threads, findings=findings)
+
+    def explain(self, robot: str) -> Explanation:
+        """Whether the model explains the torques that a recorded source measured, and what would.
+
+        Raises:
+            InputError: No recorded source of that robot measures torques, or too little can be told.
+            UnknownName: There is no such robot.
+        """
+        name = self.model.robot(robot).name
+        for source, opened in self.sources:
+            if source.target() == name and not isinstance(source, LiveSource):
+                file = getattr(source, "file", source.name)
+                said = said_by(opened.samples, file)
+                if said is not None and said.tau is not None:
+                    return explained(self.model, name, said)
+        remedy = (
+            "log them: actual_current_as_torque of RTDE, measured torques of FRI, torque columns of a table"
+        )
+        raise InputError.at("explain", name, "no recorded source of it measures torques", remedy)
 
     def permissible_speed(
         self,

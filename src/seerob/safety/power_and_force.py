@@ -22,11 +22,13 @@ from seerob.contact.given import given_contacts
 from seerob.contact.impact_mass import masses_along_motion, moving_masses, simplified_mass
 from seerob.contact.limits import Judged
 from seerob.contact.measured import Measurements, with_measured
+from seerob.contact.reach import HeightReach, reach_inputs
 from seerob.contact.regions import REGIONS, Person, without_limit
 from seerob.contact.rows import ContactRows
 from seerob.contact.tolerances import ContactEnds, ranks, robot_masses
 from seerob.criterion import Criterion, Evaluate, worst
 from seerob.errors import Undecided, UnknownName
+from seerob.human.anthropometry import STATURE_RANGE
 from seerob.kernels.contact_speeds import governing
 from seerob.model import Model
 from seerob.norms import body_limits
@@ -50,6 +52,7 @@ CAP = 1e-4
 _Positive = Annotated[float, Meta(gt=0, extra={"unit": "m"})]
 _Height = Annotated[Coordinate, Meta(extra={"unit": "m"})]
 _Area = Annotated[float, Meta(gt=0, extra={"unit": "m²"})]
+_Stature = Annotated[float, Meta(ge=STATURE_RANGE[0], le=STATURE_RANGE[1], extra={"unit": "m"})]
 _Credited = Annotated[float, Meta(gt=0, le=CAP, extra={"unit": "m²"})]
 
 
@@ -87,6 +90,13 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     """How far the stiffness k of every body region may be off, as a share: 0.1 for ± 10 %."""
     area_tolerance: Tolerance = 0.0
     """Likewise every contact area."""
+    postures: tuple[str, ...] = ()
+    """Without a person: postures of the library in which people can be there, such as ``standing``; regions
+    that a part cannot reach by its height are then left out, and listed. Without it, every region counts."""
+    postures_source: str | None = None
+    """What says so: the risk assessment, with its number."""
+    statures: tuple[_Stature, _Stature] = STATURE_RANGE
+    """Least and largest stature of these people [m]."""
     measurements: str | None = None
     """File of contacts that were measured at the robot: the worse of measurement and prediction counts."""
     thickness: dict[str, _Positive] = field(default_factory=dict)
@@ -95,6 +105,14 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     """Whether the floor is a surface that clamps, also where no part of the workstation is drawn there."""
     floor_height: _Height = 0.0
     """Its height, z in the world [m]."""
+
+    def __post_init__(self) -> None:
+        if self.postures and self.human is not None:
+            raise ValueError("postures speak of anyone: who is named by human is where the twin has them")
+        if self.postures and not self.postures_source:
+            raise ValueError("postures rest on somebody's word: name it in postures_source")
+        if self.statures[0] > self.statures[1]:
+            raise ValueError(f"statures = {list(self.statures)}: the least comes first")
 
     def subjects(self) -> tuple[str, ...]:
         """The robot and the human."""
@@ -178,6 +196,11 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
                 *gap_inputs(self.thickness, [r.name for r in limits.regions.values() if r.permitted]),
                 floor_input(self.floor_height if self.floor else None),
                 *(excluded_input(region) for region in self.excluded),
+                *(
+                    reach_inputs(self.postures, self.postures_source or "", self.statures, self.floor_height)
+                    if self.postures
+                    else ()
+                ),
                 *self.measured(model).inputs(),
             ),
             not_modelled=(
@@ -190,6 +213,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
                     else ("rotor inertia: the effective mass along the motion is link side only",)
                 ),
                 *self._motion_left_out(),
+                *(("people in other postures than those that are named",) if self.postures else ()),
             ),
         )
 
@@ -278,6 +302,14 @@ class Contacts:
         hand = {human.name: human.hand for human in model.workstation.humans}.get(spec.human or "")
         self.rows = ContactRows(self, hand=hand)
         self.measured = spec.measured(model)
+        self.reach = (
+            HeightReach(
+                model, self.robot, spec.postures, spec.statures,
+                horizon=spec.horizon, floor=spec.floor_height,
+            )
+            if spec.postures and self.moving
+            else None
+        )  # fmt: skip
 
     def without(self, lost: tuple[int, ...]) -> Evaluate:
         """The same about the other bones of the person."""
@@ -300,6 +332,8 @@ class Contacts:
         people = people or self.people
         if people is None:
             near: NDArray[np.bool_] = np.ones((len(v_r), len(REGIONS)), bool)
+            if self.reach is not None:
+                near &= self.reach.at(state)
             v_h = np.full(len(REGIONS), spec.person_speed or 0.0)
         else:
             near, v_h = people.near(state, spec.person_speed)
@@ -329,12 +363,17 @@ class Contacts:
             if told := self._measured(k, judged):
                 part, measured[part.name] = with_measured(part, told), told
             found.append((part, row))
+        found += self._out_of_reach(judged)
         known = projected[np.isfinite(projected)]
         heaviest, still = (float(known.max()), "") if len(known) else (None, "no part moves")
-        mass_parts = (
+        mass_parts: tuple[Result, ...] = (
             Result(name="M/2 + m_L", value=self.simplified, unit="kg"),
             Result(name="m_u along the motion, heaviest part", value=heaviest, unit="kg", reason=still),
         )
+        if people is not None and found:
+            left = [REGIONS[k] for k in np.flatnonzero(~near.any(axis=0)).tolist()]
+            far = f"farther than {spec.horizon:g} m from every moving part: {', '.join(left)}"
+            mass_parts = (*mass_parts, *((Result(name="out of reach", reason=far),) if left else ()))
         if not found:
             nobody = f"nobody within {spec.horizon:g} m of a moving part"
             reason = nobody if (judged.v_r > STANDSTILL).any() else "no part moves"
@@ -420,6 +459,18 @@ class Contacts:
                 v=value,
             ),
         ), row
+
+    def _out_of_reach(self, judged: Judged) -> list[tuple[Result, int]]:
+        """Regions that no moving part can hit by its height."""
+        moves = judged.v_r > STANDSTILL
+        if self.reach is None or not moves.any():
+            return []
+        row = int(judged.v_r.argmax())
+        reason = f"out of reach: no moving part within {self.spec.horizon:g} m of where it is while "
+        return [
+            (Result(name=REGIONS[k], unit="m/s", reason=reason + self.reach.words), row)
+            for k in np.flatnonzero(~judged.near.any(axis=0)).tolist()
+        ]
 
     def _measured(self, k: int, judged: Judged) -> tuple[Result, ...]:
         """What was measured of one of `REGIONS`."""

@@ -127,6 +127,44 @@ def test_kinetic_energy_is_conserved_in_free_motion(tmp_path, name):
     assert np.abs(qd).max() > 0.1
 
 
+@pytest.mark.parametrize("name", ["ur10", "iiwa14", "ur5e"])
+def test_the_integrator_of_a_run_changes_free_energy_in_proportion_to_its_step(tmp_path, name):
+    """Unlike that of free motion, which nothing pulls: stiff gains want one that damps implicitly."""
+    drift = []
+    for step in (0.002, 0.001):
+        text = f"engine = {{ gravity = [0, 0, 0], timestep = {step} }}\n"
+        station = made(tmp_path / str(step), f'{text}[[robots]]\nname = "arm"\nmodel = "library:{name}"\n')
+        robot, n = station.model.robot("arm"), len(station.model.robot("arm").joints)
+        rng = np.random.default_rng(3)
+        engine = Engine(station.model, controllers=False)
+        engine._mj.opt.integrator = station.model.mj.opt.integrator
+        engine.take([heard("arm", 0.0, rng.uniform(-1, 1, n), rng.uniform(-1, 1, n))])
+        states = (engine.tick() if k else engine.start() for k in range(201))
+        energies = [0.5 * s.qd(robot) @ s.mass_matrix(robot) @ s.qd(robot) for s in states]
+        drift.append(np.ptp(energies) / energies[0])
+    assert drift[0] < 0.009
+    assert drift[0] / drift[1] == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("velocities", "within"), [(True, 2e-5), (False, 5e-4)])
+def test_the_energy_of_a_run_is_that_of_the_motion_it_follows(ur10, velocities, within):
+    """Pulled as in every run, with 100 Hz samples: of the largest energy, which is that of a pinned motion."""
+    robot, mj = ur10.model.robot("arm"), ur10.model.mj
+    data, M = mujoco.MjData(mj), np.zeros((mj.nv, mj.nv))
+    off, largest = 0.0, 0.0
+    for state in followed(ur10, "arm", recorded("arm", wave, 100, 1.5, velocities=velocities)):
+        data.qpos[robot.q_address], qd = wave(state.t)
+        mujoco.mj_kinematics(mj, data)
+        mujoco.mj_comPos(mj, data)
+        mujoco.mj_makeM(mj, data)
+        mujoco.mj_fullM(mj, data, M)
+        truth = 0.5 * qd @ M @ qd
+        found = 0.5 * state.qd(robot) @ state.mass_matrix(robot) @ state.qd(robot)
+        off, largest = max(off, abs(found - truth)), max(largest, truth)
+    assert largest > 10
+    assert off < within * largest
+
+
 def test_free_fall_gains_the_energy_it_loses_in_height(tmp_path):
     turned = TWO_R + "base = { rpy_deg = [90, 0, 0] }\n"
     station = made(tmp_path, turned, {"arm.urdf": two_r()})

@@ -98,7 +98,10 @@ def test_a_reference_angle_moves_the_zero(tmp_path):
 
 
 def test_limits_and_their_sources(tmp_path):
-    a, b, c, d = read(tmp_path, arm(one_ref=False)).joints()
+    made = read(tmp_path, arm(one_ref=False))
+    a, b, c, d = made.joints()
+    (rotor,) = (f.text for f in made.findings if "armature" in f.text)
+    assert "a 0.1" in rotor
     assert (a.lower, a.upper) == pytest.approx((-np.pi / 2, 2 * np.pi / 3))
     assert (a.damping, a.friction, a.armature.value, a.effort.value) == (0.5, 0.2, 0.1, 40)
     assert b.effort.value == 20  # the weaker side of gear · control range

@@ -255,6 +255,7 @@ def _findings(description: Description) -> Iterator[tuple[str, str, str]]:
             )
     if joints and all(joint.armature is None for joint in joints):
         yield "assumed", "", ROTOR
+    yield from rotors(joints)
 
 
 def flat_limits(which: str, joints: Iterable[Joint]) -> Iterator[tuple[str, str, str]]:
@@ -269,6 +270,19 @@ def flat_limits(which: str, joints: Iterable[Joint]) -> Iterator[tuple[str, str,
                 "",
                 f"{which} limit is {same}: check the source",
             )
+
+
+def rotors(joints: Iterable[Joint]) -> Iterator[tuple[str, str, str]]:
+    """What a file says of rotor inertias, which are in every energy and effective mass that follows."""
+    given = [(joint.name, joint.armature) for joint in joints if joint.armature is not None]
+    if not given:
+        return
+    shown = ", ".join(f"{name} {armature.value:g}" for name, armature in given)
+    yield "note", "", f"rotor inertia (armature) from the file is in the mass matrix [kg·m² or kg]: {shown}"
+    if len(given) >= 4 and len({armature.value for _, armature in given}) == 1:
+        same = f"{given[0][1].value:g} for all {len(given)} joints alike"
+        text = f"rotor inertia is {same}: check the source, it may have been chosen for a stable simulation"
+        yield "warning", "", text
 
 
 def massless(description: Description) -> Iterator[tuple[str, str, str]]:

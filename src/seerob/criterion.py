@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from msgspec import Meta, Struct
 
+from seerob.errors import UnknownName
 from seerob.quantities import Seconds
 from seerob.snapshot import Basis, Result, Verdict
 
@@ -125,6 +127,19 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def depends(self, model: Model) -> tuple[str, ...]:
         """Names of all whose place or motion its results depend on; its subjects when not said."""
         return self.subjects()
+
+    def judged(self, model: Model) -> set[int]:
+        """Bodies whose motion or place it judges: who moves and is judged by nobody is a finding."""
+        found: set[int] = set()
+        for name in self.subjects():
+            mechanism = model.mechanisms.get(name)
+            if mechanism is not None and not self.by_shape:
+                # Of what carries it only criteria speak that are about shapes.
+                found |= {*mechanism.bodies, *mechanism.carried}
+                continue
+            with suppress(UnknownName):
+                found |= set(model.select(name))
+        return found
 
     def unseen(self, model: Model) -> str:
         """Why nothing is within: what no shape shows of the robots that it speaks of; empty for nothing."""

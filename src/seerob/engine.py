@@ -116,7 +116,7 @@ class Engine:
         }
         # What a variable says of a machine stands until it says something else.
         coasting = set(live) - {machine.name for machine in model.workstation.machines}
-        self._ahead = set(driven) - set(live)
+        self._ahead = set(driven) - set(live) - {m.name for m in model.workstation.machines}
         """Whose future is known: past their newest sample nothing will be said."""
         following = {machine.name for machine in model.workstation.machines if machine.motion.variables()}
         self._stands = self._ahead | following

@@ -235,6 +235,27 @@ class Model:
             raise UnknownName("robot", name, robots)
         return robots[name]
 
+    def mover(self, name: str) -> Mechanism:
+        """The robot or machine of that name; UnknownName when there is none."""
+        movers = {n: m for n, m in self.mechanisms.items() if m.role != "human"}
+        if name not in movers:
+            raise UnknownName("robot or machine", name, movers)
+        return movers[name]
+
+    def carriers_of(self, name: str) -> tuple[str, ...]:
+        """Machines that carry a robot or machine, the nearest first."""
+        found: list[str] = []
+        above = self.mechanisms[name].on
+        while above:
+            found.append(above)
+            above = self.mechanisms[above].on
+        return tuple(found)
+
+    def moving_of(self, name: str) -> tuple[int, ...]:
+        """Moving bodies of a robot or machine, and of what carries it: whoever stops it stops both."""
+        names = (self.mover(name).name, *self.carriers_of(name))
+        return tuple(dict.fromkeys(i for each in names for i in self.mechanisms[each].moving))
+
     def human(self, name: str) -> Mechanism:
         """The human of that name; UnknownName when there is none."""
         humans = {n: m for n, m in self.mechanisms.items() if m.role == "human"}
@@ -264,9 +285,10 @@ class Model:
     def select(self, name: str) -> tuple[int, ...]:
         """Bodies that a name means.
 
-        A robot's name means all of its links and everything mounted on it; a human's the whole
-        person; a tool's or part's name, or a prefix that ends before a ``/``, everything below
-        it; ``*`` stands for any characters. A safety area is meant by its own name only.
+        A robot's name means all of its links and everything mounted on it, and what carries it: a cart
+        that hits somebody is no less of the robot that stands on it (``arm/*`` means its links alone). A
+        human's means the whole person; a tool's or part's name, or a prefix that ends before a ``/``,
+        everything below it; ``*`` stands for any characters. A safety area is meant by its own name only.
 
         Raises:
             UnknownName: The name means no body that has a shape.
@@ -274,6 +296,10 @@ class Model:
         if name in self.mechanisms:
             mechanism = self.mechanisms[name]
             found: tuple[int, ...] = mechanism.bodies + mechanism.carried
+            carriers = [self.mechanisms[each] for each in self.carriers_of(name)]
+            if mechanism.role == "robot":
+                every = (i for each in carriers for i in (*each.bodies, *each.carried))
+                found = tuple(dict.fromkeys((*found, *every)))
         else:
             found = tuple(
                 body.index

@@ -32,6 +32,7 @@ from seerob.mounting.picked_up import picked_up
 from seerob.mounting.specification import Mounting
 from seerob.mounting.specification import pose_matrix as pose_matrix  # noqa: PLC0414
 from seerob.mounting.things import AREA_COLOR, PART_COLOR, TOOL_COLOR, WORKPIECE_COLOR, MadeArea, load_thing
+from seerob.mounting.unasked import unasked
 from seerob.plausibility.in_place import implausible
 from seerob.recordings.filing import filed
 from seerob.snapshot import Finding
@@ -374,7 +375,8 @@ class _Compiler:
             files={**self.station.files, **self.mounting.files},
             dictionary=self.bound.variables,
         )
-        return replace(model, findings=(*model.findings, *self._too_small(model), *implausible(model)))
+        findings = (*model.findings, *self._too_small(model), *implausible(model), *unasked(model))
+        return replace(model, findings=findings)
 
     def _too_small(self, model: Model) -> Iterator[Finding]:
         """What is said of areas that something sweeps of which no shape shows a part."""

@@ -11,7 +11,7 @@ from seerob import figures, provenance
 from seerob.answers import Answers
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
 from seerob.errors import Undecided
-from seerob.model import Model
+from seerob.model import Mechanism, Model
 from seerob.mounting.mass_tolerances import MassTolerances
 from seerob.moving_base import energy_of
 from seerob.snapshot import Basis, Result, Sphere, Verdict
@@ -39,12 +39,13 @@ def kinetic_energy(M: Array, qd: Array) -> Array:
 
 
 class KineticEnergy(Criterion, frozen=True, kw_only=True):
-    """Kinetic energy of a whole robot with everything mounted on it."""
+    """Kinetic energy of a whole robot or machine with everything mounted on it."""
 
     unit: ClassVar[str] = "J"
     by_shape: ClassVar[bool] = False
 
     robot: str
+    """A robot, with the speed that what carries it gives it; or a machine."""
     limit: Annotated[float, Meta(gt=0, extra={"unit": "J"})] | None = None
     """Largest admissible energy [J]."""
 
@@ -54,19 +55,21 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
 
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
-        robot = model.robot(self.robot)
-        robot.require_masses(self.name)
-        masses = MassTolerances(model, robot)
+        robot = model.mover(self.robot)
+        aboard = _aboard(model, robot)
+        for each in (robot, *aboard):
+            each.require_masses(self.name)
+        masses, alone = MassTolerances(model, robot), robot.alone and not aboard
 
         def evaluate(state: State) -> Result:
             qd = state.qd(robot)
             energy = (
                 float(kinetic_energy(state.mass_matrix(robot), qd))
-                if robot.alone
-                else energy_of(state, robot)
+                if alone
+                else sum(energy_of(state, each) for each in (robot, *aboard))
             )
             verdict, interval, reason = judge(energy, self.limit), None, ""
-            if len(masses) and not robot.alone:
+            if len(masses) and not alone:
                 raise Undecided(
                     f"{robot.name}: mass_tolerance is not followed on what moves it: leave it out here"
                 )
@@ -98,8 +101,8 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
 
     def batch(self, model: Model) -> EvaluateMany | None:
         """See `Criterion.batch`; where no mass has a tolerance and nothing else moves it."""
-        robot = model.robot(self.robot)
-        if len(MassTolerances(model, robot)) or not robot.alone:
+        robot = model.mover(self.robot)
+        if len(MassTolerances(model, robot)) or not robot.alone or _aboard(model, robot):
             return None
 
         def evaluate(states: States) -> Answers:
@@ -114,17 +117,20 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         :math:`\sqrt{2E}` is a norm of the velocities of all that has a mass, so it changes by no more than
         the norm of how much they change.
         """
-        robot, mj = model.robot(self.robot), model.mj
+        robot, mj = model.mover(self.robot), model.mj
         if self.limit is None or len(MassTolerances(model, robot)):
             return None
-        limit, bodies = self.limit, [int(b) for b in robot.mj_bodies if mj.body_mass[b] > 0]
+        every = (robot, *_aboard(model, robot))
+        heavy = dict.fromkeys(int(b) for each in every for b in each.mj_bodies)
+        limit, bodies = self.limit, [b for b in heavy if mj.body_mass[b] > 0]
         masses = mj.body_mass[bodies]
         # The mean square distance from the centre of mass is what its moments of inertia say.
         radii = np.sqrt(mj.body_inertia[bodies].sum(axis=1) / 2 / masses)
         rows = rows_of(
             points.add(body, mj.body_ipos[body], radius) for body, radius in zip(bodies, radii, strict=True)
         )
-        dofs, rotors = robot.v_address, mj.dof_armature[robot.v_address]
+        dofs = np.concatenate([each.v_address for each in every])
+        rotors = mj.dof_armature[dofs]
 
         def falls(span: Span, least: Array | float) -> Fall:
             turned = rotors @ (span.qdd[dofs] * span.T) ** 2
@@ -137,15 +143,23 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
-        robot = model.robot(self.robot)
+        robot = model.mover(self.robot)
+        aboard = _aboard(model, robot)
+        alone = robot.alone and not aboard
         return Basis(
-            formula="E = ½ q̇ᵀ M(q) q̇, whole robot" if robot.alone else "E = ½ Σ (m v² + ωᵀ I ω), whole robot",
+            formula="E = ½ q̇ᵀ M(q) q̇, whole robot" if alone else "E = ½ Σ (m v² + ωᵀ I ω), whole robot",
             source="Weistroffer et al. 2022, Eq. 5",
-            inputs=provenance.motion(model, robot.name)
-            + provenance.masses(model, robot)
+            inputs=provenance.motion(model, robot.name, *(each.name for each in aboard))
+            + tuple(given for each in (robot, *aboard) for given in provenance.masses(model, each))
             + provenance.limit(self.limit, "J"),
             not_modelled=(
                 "not the energy of an impact, ½ μ v_rel², that ISO/TS 15066 limits per body region",
                 *(() if robot.rotor_inertia_known else ("energy of rotors and gears",)),
             ),
         )
+
+
+def _aboard(model: Model, machine: Mechanism) -> tuple[Mechanism, ...]:
+    """Robots that a machine carries: they have joints and speeds of their own."""
+    robots = (m for m in model.mechanisms.values() if m.role == "robot")
+    return tuple(m for m in robots if machine.name in model.carriers_of(m.name))

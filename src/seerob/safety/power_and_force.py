@@ -114,6 +114,10 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         if self.statures[0] > self.statures[1]:
             raise ValueError(f"statures = {list(self.statures)}: the least comes first")
 
+    def judged(self, model: Model) -> set[int]:
+        """See `Criterion.judged`; of what carries the robot it knows the speed, and not the contact."""
+        return {i for name in self.subjects() for i in model.mechanism(name).moving}
+
     def subjects(self) -> tuple[str, ...]:
         """The robot and the human."""
         return (self.robot,) if self.human is None else (self.robot, self.human)

@@ -71,14 +71,14 @@ def separation_bound(v_r: Array, v_h: float, T_r: float, T_s: float, xi: float) 
 
 
 class Separation(Criterion, frozen=True, kw_only=True):
-    """Speed and separation monitoring: every moving part of the robot against every part of the person."""
+    """Speed and separation monitoring: every moving part of a robot or machine against the person."""
 
     unit: ClassVar[str] = "m"
     whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 
     between: tuple[str, str]
-    """A robot and a human."""
+    """A robot or a machine, and a human. What carries it counts with it."""
     stop: Stop
     mode: Literal["dynamic", "fixed"] = "dynamic"
     """S_p of the present speeds, or the largest that occurred so far."""
@@ -147,19 +147,22 @@ class Separation(Criterion, frozen=True, kw_only=True):
     def _sides(self, model: Model) -> tuple[str, str]:
         """Robot and human, in that order."""
         roles = {name: model.mechanism(name).role for name in self.between}
-        if sorted(roles.values()) != ["human", "robot"]:
-            raise InputError.at(
-                self.name, "between", f"{list(self.between)} are not a robot and a human", "name one of each"
-            )
+        if sorted(role == "human" for role in roles.values()) != [False, True]:
+            what = f"{list(self.between)} are not a robot or machine and a human"
+            raise InputError.at(self.name, "between", what, "name one of each")
         first, second = self.between
-        return (first, second) if roles[first] == "robot" else (second, first)
+        return (second, first) if roles[first] == "human" else (first, second)
+
+    def moving(self, model: Model) -> tuple[int, ...]:
+        """Bodies of which each has an S_p: the moving parts of the robot or machine, and what carries it."""
+        return model.moving_of(self._sides(model)[0])
 
     def _gap(self, model: Model) -> Gap:
         robot, human = self._sides(model)
-        return model.gap(model.select(human), model.robot(robot).moving)
+        return model.gap(model.select(human), model.moving_of(robot))
 
     def _stop(self, model: Model) -> StopModel:
-        return bind_stop(self.stop, model, model.robot(self._sides(model)[0]), self._gap(model))
+        return bind_stop(self.stop, model, model.mover(self._sides(model)[0]), self._gap(model))
 
     def _intrusion(self) -> tuple[float | None, str, str]:
         """C [m] when known, why it is not complete, and its source."""
@@ -225,7 +228,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         """See `Criterion.bind`."""
         own, _, _ = self._by_device(model)
         if self.stop.model == "simulated":
-            model.robot(self._sides(model)[0]).require_masses(self.name)
+            model.mover(self._sides(model)[0]).require_masses(self.name)
 
         def figure(shifts: Shifts) -> Callable[[State], Array]:
             required = own._shifted(shifts).required(model)
@@ -371,7 +374,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return self._by_device(model)[0]._stop(model).lasts
 
     def rises(self, model: Model) -> Callable[[Span], Array] | None:
-        """How much S_p of each of `Mechanism.moving` can change within a span [m]; None where not known."""
+        """How much S_p of each of `moving` can change within a span [m]; None where not known."""
         gap = self._gap(model)
         people, parts = rows_of(gap.a), rows_of(gap.b)
         required: list[Callable[[Array, float], Array]] = []
@@ -406,7 +409,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return Required(S_p, most, "; ".join(dict.fromkeys(filter(None, doubts))))
 
     def required(self, model: Model) -> Callable[[State], Required]:
-        """S_p of each of `Mechanism.moving` of the robot, in that order; to be asked at every tick."""
+        """S_p of each of `moving`, in that order; to be asked at every tick."""
         own, _, _ = self._by_device(model)
         stop, largest = own._stop(model), (LargestSeparation(), LargestSeparation())
         gap = own._gap(model)
@@ -503,7 +506,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             *stop.inputs,
         ]
         if self.stop.model == "simulated":
-            inputs += provenance.masses(model, model.robot(robot))
+            inputs += provenance.masses(model, model.mover(robot))
         stated = None if self.detection is None else self.detection.stated()
         inputs += [approach_speed(self.human_speed), stated or intrusion(self.intrusion)]
         for name, value in (("Z_d", self.human_uncertainty), ("Z_r", self.robot_uncertainty)):

@@ -48,6 +48,10 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         """What must stay outside."""
         return names_of(self.of)
 
+    def judged(self, model: Model) -> set[int]:
+        """See `Criterion.judged`."""
+        return super().judged(model) | set(self._criterion(model).moving(model))
+
     def _criterion(self, model: Model) -> Any:
         known = {c.name: c for c in model.workstation.safety if hasattr(c, "required")}
         if self.separation not in known:
@@ -56,8 +60,8 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
 
     def _sides(self, model: Model) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Moving parts of the robot, and what must stay outside."""
-        names = [n for n in self._criterion(model).between if model.mechanism(n).role == "robot"]
-        moving, outside = model.robot(names[0]).moving, bodies_of(model, self.of)
+        names = [n for n in self._criterion(model).between if model.mechanism(n).role != "human"]
+        moving, outside = self._criterion(model).moving(model), bodies_of(model, self.of)
         if not outside or set(outside) & set(moving):
             what = "nothing in it has a shape" if not outside else f"{names[0]!r} cannot be outside of itself"
             raise InputError.at(self.name, "of", what, "name what must stay away from the robot")

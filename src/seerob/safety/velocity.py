@@ -60,6 +60,13 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         """The point or the set."""
         return (self.at or self.of or "",)
 
+    def judged(self, model: Model) -> set[int]:
+        """See `Criterion.judged`; of a point the body that it is of."""
+        if self.of is not None:
+            return super().judged(model)
+        at = model.frame(self.at or "").mj
+        return {body.index for body in model.bodies if body.mj == at}
+
     def unseen(self, model: Model) -> str:
         """See `Criterion.unseen`; a point needs no shape."""
         return super().unseen(model) if self.of else ""

@@ -128,7 +128,7 @@ class Foreseen:
         """
         self._model, self._robot, self._gap, self._T_r = model, robot, gap, T_r
         self._period = model.workstation.engine.tick
-        self._with = (robot.name, *robot.riders, *_carriers(model, robot))
+        self._with = (robot.name, *robot.riders, *model.carriers_of(robot.name))
         self._data = mujoco.MjData(model.mj)
         self._bodies = [model.bodies[i] for i in gap.b]
         self._corners = stacked([body.corners for body in self._bodies])
@@ -210,15 +210,6 @@ def farthest(t: Array, speeds: Array, T_r: float, lead: float) -> Array:
     ends = most[(t[:-1] < lead - SLACK) | (t[1:] > T_r + SLACK)].min(axis=0)
     moved = np.tensordot(steps, most, axes=1) - lead * ends
     return np.asarray(np.maximum(moved, speeds[0] * T_r), float)
-
-
-def _carriers(model: Model, robot: Mechanism) -> tuple[str, ...]:
-    """Who carries a robot, and who carries that."""
-    found: list[str] = []
-    while robot.on:
-        found.append(robot.on)
-        robot = model.mechanisms[robot.on]
-    return tuple(found)
 
 
 def speeds_of(

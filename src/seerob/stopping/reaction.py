@@ -59,11 +59,12 @@ def bind_reaction(
     torques = np.array([np.nan if limit is None else limit.value for limit in robot.effort_limits])
     levers = Levers(model, robot, gap)
     largest = np.array([np.inf if limit is None else limit.value for limit in robot.velocity_limits])
+    carriers, now = model.carriers_of(robot.name), np.zeros(0)
     bias, lead = _Bias(model, robot), model.workstation.engine.tick
 
     def reactions(state: State) -> tuple[At, At | None]:
         known = foreseen.at(state)
-        if known is not None:
+        if known is not None and all(state.foresee(each, now) is not None for each in carriers):
             return known, None
         v, qd = state.fastest_points(gap.b)[0], state.qd(robot)
         if robot.role != "robot":

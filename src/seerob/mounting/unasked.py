@@ -1,0 +1,53 @@
+"""What moves in a workstation with people, and no criterion asks about."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+from seerob.errors import SeerobError
+from seerob.model import Mechanism, Model
+from seerob.snapshot import Finding
+
+
+def unasked(model: Model) -> Iterator[Finding]:
+    """Robots and machines that move and are judged by nobody.
+
+    One that carries a robot which somebody asks about holds that robot: nothing said of an arm is within
+    while what moves it is not looked at.
+    """
+    station = model.workstation
+    if not station.humans or not station.safety:
+        return
+    judged: set[int] = set()
+    for criterion in station.safety:
+        # A name that does not exist is told where the criterion is bound.
+        with suppress(SeerobError):
+            judged |= criterion.judged(model)
+    named = {name for criterion in station.safety for name in criterion.subjects()}
+    for mechanism in model.mechanisms.values():
+        own = {i for i in mechanism.moving if model.bodies[i].carrier == mechanism.name}
+        if not own or not own.isdisjoint(judged) or not _moves(model, mechanism):
+            continue
+        carried = tuple(
+            m.name
+            for m in model.mechanisms.values()
+            if mechanism.name in model.carriers_of(m.name)
+            and (m.name in named or not judged.isdisjoint(m.bodies))
+        )
+        remedy = (
+            f'name it in one, such as separation between = ["{mechanism.name}", "{station.humans[0].name}"]'
+        )
+        what = f"not evaluated: {mechanism.name} moves"
+        if carried:
+            what += f" and carries {', '.join(carried)}"
+        text = f"{what}, and no criterion asks about it: {remedy}"
+        yield Finding(level="warning", subject=mechanism.name, text=text, holds=carried)
+
+
+def _moves(model: Model, mechanism: Mechanism) -> bool:
+    """Whether a source or variables drive it."""
+    station = model.workstation
+    if mechanism.name in {source.target() for source in station.sources}:
+        return mechanism.role != "human"
+    return any(m.name == mechanism.name and m.motion.variables() for m in station.machines)

@@ -1,0 +1,132 @@
+"""What moves a robot, and what is no robot: carts and doors keep away from people, too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made_cell import heard, made, person, two_r
+from seerob.engine import Engine
+from seerob.errors import InputError
+from seerob.judging import Judge
+from seerob.verdict import Verdict
+
+VARIABLES = "".join(
+    f'[[variables]]\nname = "{name}"\nsource = "plc"\naddress = "{name}"\nunit = "{unit}"\n'
+    for name, unit in (("x", "m"), ("y", "m"), ("heading", "rad"), ("angle", "rad"))
+)
+CELL = (
+    'variables = "variables.toml"\n[engine]\nphysics = false\ngravity = [0, 0, 0]\n'
+    + person("op", 2.0, 0, 0)
+    + """
+[[sources]]
+kind = "signals_csv"
+name = "plc"
+file = "signals.csv"
+time = "t"
+time_unit = "s"
+[[machines]]
+name = "agv"
+shape = { box = [1.0, 0.6, 0.3] }
+at = { position = [0, 0, 0.2] }
+mass = 100
+vehicle = { x = "x", y = "y", heading = "heading" }
+[[robots]]
+name = "arm"
+model = "arm.urdf"
+on = "agv"
+rotor_inertia = [0.0, 0.0]
+base = { position = [-0.4, 0, 1.5] }
+"""
+)
+FILES = {
+    "arm.urdf": two_r(),
+    "variables.toml": VARIABLES,
+    "signals.csv": "t,x,y,heading,angle\n0,0,0,0,0\n1,0,0,0,0\n",
+}
+STOP = "stop = { reaction = 0.1, stopping = 0.3, acceleration = 0 }\n"
+TERMS = "human_speed = 1.6\nintrusion = 0\nhuman_uncertainty = 0\nrobot_uncertainty = 0\n"
+
+
+def separation(who):
+    return f'[[safety]]\nkind = "separation"\nname = "{who}"\nbetween = ["{who}", "op"]\n' + STOP + TERMS
+
+
+def judged(folder, criteria, *, v=1.0, x=0.0, arm=(np.pi, 0.0)):
+    """Results by name with the cart at x [m] and v [m/s], the arm turned away from the person."""
+    station = made(folder, CELL + criteria, FILES)
+    engine = Engine(station.model, driven={"agv": 1.0, "arm": 1.0}, live={"agv", "arm"})
+    engine.take([heard("agv", 0.0, (x, 0.0, 0.0), (v, 0.0, 0.0)), heard("arm", 0.0, arm, (0.0, 0.0))])
+    return {r.name: r for r in Judge(station.bound, station.model.findings)(engine.start())}, station
+
+
+def test_a_cart_is_judged_like_a_robot_and_with_the_robot_that_it_carries(tmp_path):
+    """Its front is a few centimetres from the person, the arm a metre behind it."""
+    found, _ = judged(tmp_path, separation("arm") + separation("agv"), x=1.35)
+    for name in ("arm", "agv"):
+        assert found[name].verdict is Verdict.EXCEEDED
+        assert found[name].reason.startswith("agv/")
+        assert found[name].value < 0.15
+        assert found[name].limit == pytest.approx((1.0 + 1.6) * 0.4)
+    assert {part.name for part in found["arm"].parts} >= {"agv/body", "arm/l1", "arm/l2"}
+
+
+def test_what_nobody_said_of_a_cart_s_acceleration_leaves_it_open(tmp_path):
+    quiet = separation("agv").replace(", acceleration = 0", "")
+    found, _ = judged(tmp_path, quiet, x=-5.0)
+    assert found["agv"].verdict is Verdict.UNDECIDED
+    assert "how fast agv may get faster" in found["agv"].reason
+    near, _ = judged(tmp_path / "near", quiet, x=1.0)
+    assert near["agv"].verdict is Verdict.EXCEEDED
+
+
+@pytest.mark.parametrize("stop", ['model = "simulated"', 'model = "table", table = "ur10_cb3"'])
+def test_a_cart_has_neither_brakes_nor_a_table_of_a_robot(tmp_path, stop):
+    wrong = separation("agv").replace("stopping = 0.3", stop)
+    with pytest.raises(InputError, match="agv is a machine"):
+        _ = made(tmp_path, CELL + wrong, FILES).bound
+
+
+DISTANCE = '[[safety]]\nkind = "minimum_distance"\nname = "d"\nbetween = ["arm", "op"]\nlimit = 0.5\n'
+ENERGY = '[[safety]]\nkind = "kinetic_energy"\nname = "{0}"\nrobot = "{0}"\nlimit = 1000\n'
+AREA = (
+    '[[areas]]\nname = "front"\nshape = { box = [1, 1, 0.4] }\nat = { position = [1.5, 0, 0.2] }\n'
+    '[[safety]]\nkind = "safety_area"\nname = "a"\narea = "front"\nof = "arm"\n'
+)
+
+
+def test_the_name_of_a_carried_robot_means_what_carries_it(tmp_path):
+    found, station = judged(tmp_path, DISTANCE + AREA, x=1.0)
+    assert (found["d"].verdict, found["a"].verdict) == (Verdict.EXCEEDED, Verdict.EXCEEDED)
+    names = {station.model.bodies[i].name for i in station.model.select("arm")}
+    assert "agv/body" in names
+    assert not [i for i in station.model.select("arm/*") if station.model.bodies[i].owner == "agv"]
+
+
+def test_nothing_of_an_arm_is_within_while_nobody_asks_about_what_carries_it(tmp_path):
+    found, station = judged(tmp_path, ENERGY.format("arm"), v=0.01)
+    assert found["arm"].verdict is Verdict.UNDECIDED
+    assert "not evaluated: agv moves and carries arm" in found["arm"].reason
+    (finding,) = [f for f in station.model.findings if f.subject == "agv" and "not evaluated" in f.text]
+    assert finding.holds == ("arm",)
+    both, _ = judged(tmp_path / "both", ENERGY.format("arm") + ENERGY.format("agv"), v=0.01)
+    assert {both[name].verdict for name in ("arm", "agv")} == {Verdict.WITHIN}
+
+
+def test_the_energy_of_a_cart_has_that_of_the_arm_on_it(tmp_path):
+    found, station = judged(tmp_path, ENERGY.format("agv") + ENERGY.format("arm"), v=2.0)
+    masses = station.model.mj.body_mass
+    arm = masses[station.model.robot("arm").mj_bodies].sum()
+    assert found["arm"].value == pytest.approx(0.5 * arm * 4)
+    assert found["agv"].value == pytest.approx(0.5 * (100 + arm) * 4, rel=1e-3)
+
+
+def test_a_door_that_nobody_asks_about_is_told(tmp_path):
+    door = (
+        '[[machines]]\nname = "door"\nmass = 20\n'
+        'shape = { box = [0.8, 0.05, 2] }\nat = { position = [3, 1, 1] }\nturn = { angle = "angle" }\n'
+    )
+    _, station = judged(tmp_path, door + separation("arm"))
+    told = [f for f in station.model.findings if "not evaluated" in f.text]
+    assert [(f.subject, f.holds) for f in told] == [("door", ())]
+    assert 'between = ["door", "op"]' in told[0].text

@@ -97,12 +97,13 @@ def test_of_a_live_robot_the_limits_of_its_joints_count_and_else_its_torques_lea
     (found, *_) = recorded(station(tmp_path / "a", OPEN, WALKS, arm=limited), still, 0.02, live=["arm"])
     gain = 3 * 0.1 * (V + np.hypot(1, 0.05))
     assert (V_H + 0.9 * gain) * T_S < found.limit - V_H * T_R - K < (V_H + 1.6 * gain) * T_S + gain * T_R
-    (unsure, *_) = recorded(station(tmp_path / "b", OPEN, WALKS), still, 0.02, live=["arm"])
+    weak = two_r(effort=1.0)
+    (unsure, *_) = recorded(station(tmp_path / "b", OPEN, WALKS, x=3.4, urdf=weak), still, 0.02, live=["arm"])
     assert unsure.limit == pytest.approx(V_H * (T_R + T_S) + K)
     assert unsure.verdict is Verdict.UNDECIDED
     assert "give stop.acceleration" in unsure.reason
-    (far, *_) = recorded(station(tmp_path / "c", OPEN, WALKS, x=40.0), still, 0.02, live=["arm"])
-    (near, *_) = recorded(station(tmp_path / "d", OPEN, WALKS, x=2.5), still, 0.02, live=["arm"])
+    (far, *_) = recorded(station(tmp_path / "c", OPEN, WALKS, x=9.0, urdf=weak), still, 0.02, live=["arm"])
+    (near, *_) = recorded(station(tmp_path / "d", OPEN, WALKS, x=2.5, urdf=weak), still, 0.02, live=["arm"])
     assert (far.verdict, near.verdict) == (Verdict.WITHIN, Verdict.EXCEEDED)
     silent = two_r().replace(' effort="1000.0"', "")
     (open_, *_) = recorded(

@@ -491,6 +491,15 @@ class Engine:
             hearing = self._hearings[mechanism.name]
             hearing.error = float(off[mechanism.q_address].max(initial=0.0))
             hearing.saturated = bool(reached[mechanism.v_address].any())
+            if mechanism.role == "human" and self.controllers:
+                self._note_captured(mechanism, hearing)
+
+    def _note_captured(self, person: Mechanism, hearing: Hearing) -> None:
+        """Where a person was captured, and how well that is what devices saw, where the twin is elsewhere."""
+        hearing.captured = self._course.q[-1][person.q_address].copy()
+        if hearing.error > self.model.workstation.engine.human_tracking_limit:
+            following = self._followings.get(person.name)
+            hearing.residual = following.errors(self.state.t, hearing.captured) if following else {}
 
     def _check_finite(self) -> None:
         if np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qvel).all():

@@ -79,6 +79,8 @@ class State:
             "machine": engine.tracking_limit,
             "human": engine.human_tracking_limit,
         }
+        self._wanted: Any = None
+        """Where people were captured; made when somebody asks."""
         self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
         self._cache: dict[Any, Any] = {}
         self._relied_on: set[tuple[str, ...]] = set()
@@ -230,6 +232,11 @@ class State:
         Raises:
             Undecided: Nothing of the person may be relied on.
         """
+        if reason := self.whole_doubt(name):
+            raise Undecided(reason)
+        return self._bones_in_doubt(name)
+
+    def _bones_in_doubt(self, name: str) -> tuple[str, ...]:
         turned = self.bones_turned_in_doubt(name)
         key = ("bones in doubt", name)
         if key not in self._cache:
@@ -248,7 +255,7 @@ class State:
             Undecided: Nothing of the person may be relied on.
         """
         self.asked.add(name)
-        if reason := self.whole_doubt(name):
+        if reason := self.heard_doubt(name):
             raise Undecided(reason)
         key = ("bones turned in doubt", name)
         if key not in self._cache:
@@ -258,15 +265,19 @@ class State:
         bones: tuple[str, ...] = self._cache[key]
         return bones
 
-    def require_bodies(self, bodies: tuple[int, ...], *, estimates: bool = False) -> None:
+    def require_bodies(
+        self, bodies: tuple[int, ...], *, estimates: bool = False, strayed: bool = False
+    ) -> None:
         """Raise `Undecided` unless these bodies are where the twin shows them: of a person, these bones only.
 
         Args:
             bodies: By index.
             estimates: Whether bones that nobody sees will do where the file accepts them
                 (``unseen_uncertainty``): whoever asks adds `seerob.whereabouts.tracking_error.TrackingError`.
+            strayed: Whether people will do of whom the twin is elsewhere than they were captured, as a table
+                or a robot stops it (`stray`): likewise.
         """
-        key = ("relied on", bodies, estimates)
+        key = ("relied on", bodies, estimates, strayed)
         others, people = self._bones(bodies)
         self.asked.update(others, people)
         if key in self._cache:
@@ -275,7 +286,9 @@ class State:
         if lost := self.bearers.unknown.keys() & set(bodies):
             raise Undecided(self.bearers.unknown[min(lost)])
         for name, bones in people.items():
-            if bones.isdisjoint(self.bones_in_doubt(name)):
+            if (reason := self.whole_doubt(name)) and not (strayed and reason == self.stray(name)):
+                raise Undecided(reason)
+            if bones.isdisjoint(self._bones_in_doubt(name)):
                 continue
             if not estimates or self.model.estimates.get(name) is None or self.interrupted(name):
                 raise Undecided(self.doubt(name))
@@ -284,17 +297,93 @@ class State:
     def whole_doubt(self, name: str) -> str:
         """The same without what is only said of single bones of a person."""
         hearing = self._hearings[name]
-        reason = hearing.doubt(self.t)
-        if reason:
-            return f"{name}: {reason}"
+        if reason := self.heard_doubt(name):
+            return reason
         if hearing.lost > self.t - 2 * self._period:
             return f"{name}: the twin had to be put back to what was heard"
         limit = self._tracking_limits[self.model.mechanisms[name].role]
         if hearing.error > limit:
             why = " (a torque limit is reached)" if hearing.saturated else ""
             return f"{name}: the twin is off by {hearing.error:.3g} rad or m, more than {limit:g}{why}"
+        return ""
+
+    def heard_doubt(self, name: str) -> str:
+        """The same of what was heard, whether or not the twin follows it."""
+        reason = self._hearings[name].doubt(self.t)
+        if reason:
+            return f"{name}: {reason}"
         above = self.model.mechanisms[name].on
         return self.whole_doubt(above) if above else ""
+
+    def stray(self, name: str) -> str:
+        """Why the twin of a person is elsewhere than the person was captured, when it is known by how much.
+
+        Empty when it is not, or when where the person was captured is in doubt itself.
+        """
+        hearing = self._hearings[name]
+        limit = self._tracking_limits[self.model.mechanisms[name].role]
+        if hearing.captured is None or hearing.error <= limit or self.heard_doubt(name):
+            return ""
+        reason = self.whole_doubt(name)
+        return reason if hearing.lost <= self.t - 2 * self._period else ""
+
+    def captured(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
+        """Where bones of a person were captured, wherever the physics lets the twin be.
+
+        A hand that lies on a table, or that a robot pushes, is stopped there in the twin; what was captured
+        is what the person did.
+
+        Args:
+            name: Of the person.
+            bodies: Its bones, by index.
+
+        Returns:
+            World from bone, shape (n, 3, 3), and the bones' origins in the world [m], (n, 3), in the order of
+            ``bodies``.
+
+        Raises:
+            Undecided: What was heard of the person may not be relied on.
+        """
+        self.asked.add(name)
+        if reason := self.heard_doubt(name):
+            raise Undecided(reason)
+        return self._captured(name, bodies)
+
+    def _captured(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
+        rows, q = self._rows_of(bodies), self._hearings[name].captured
+        if q is None:
+            return self._rotations[rows], self._positions[rows]
+        key = ("captured", name)
+        if key not in self._cache:
+            if self._wanted is None:
+                self._wanted = mujoco.MjData(self.model.mj)
+            self._wanted.qpos[:] = self._data.qpos
+            self._wanted.qpos[self.model.mechanisms[name].q_address] = q
+            mujoco.mj_kinematics(self.model.mj, self._wanted)
+            self._cache[key] = self._wanted.xmat.reshape(-1, 3, 3).copy(), self._wanted.xpos.copy()
+        R, x = self._cache[key]
+        ids = self.bearers.ids[rows]
+        return R[ids], x[ids]
+
+    def strayed(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
+        """How far bones of the twin of a person are from where they were captured.
+
+        Args:
+            name: Of the person.
+            bodies: Its bones, by index.
+
+        Returns:
+            Between their origins [m], shape (n,), and the angles between them [rad], (n,); 0 where
+            the twin follows within its tracking limit.
+        """
+        if not self.stray(name):
+            return np.zeros(len(bodies)), np.zeros(len(bodies))
+        rows, (R, x) = self._rows_of(bodies), self._captured(name, bodies)
+        trace = np.einsum("nij,nij->n", self._rotations[rows], R)
+        return (
+            np.linalg.norm(self._positions[rows] - x, axis=1),
+            np.arccos(np.clip((trace - 1) / 2, -1.0, 1.0)),
+        )
 
     def lost_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
         """Those of some bodies that are bones in doubt of people of whom the others may be relied on."""
@@ -345,19 +434,28 @@ class State:
         self.asked |= asked
         return made
 
-    def hearing(self, name: str) -> Hearing:
+    def hearing(self, name: str, *, strayed: bool = False) -> Hearing:
         """What is known of where a robot or human really is, bone by bone of a person.
+
+        Args:
+            name: Of the robot or human.
+            strayed: As in `require_bodies`.
 
         Raises:
             Undecided: Nothing of it may be relied on.
         """
         self.asked.add(name)
-        if reason := self.whole_doubt(name):
+        if (reason := self.whole_doubt(name)) and not (strayed and reason == self.stray(name)):
             raise Undecided(reason)
         return self._hearings[name]
 
     def placed(
-        self, bodies: tuple[int, ...], *, estimates: bool = False, doubted: bool = False
+        self,
+        bodies: tuple[int, ...],
+        *,
+        estimates: bool = False,
+        doubted: bool = False,
+        strayed: bool = False,
     ) -> tuple[Array, Array]:
         """Where bodies are: world from body, and the world position of their origins [m].
 
@@ -366,6 +464,7 @@ class State:
             estimates: As in `require_bodies`.
             doubted: Also bones in doubt of people of whom the others may be relied on, as they are shown: for
                 whoever judges bone by bone (`bones_in_doubt`).
+            strayed: As in `require_bodies`.
 
         Returns:
             Of all bodies, shape (n, 3, 3) and (n, 3), so that indices stay what they are; of others they are
@@ -378,9 +477,9 @@ class State:
             others, people = self._bones(bodies)
             self.require(*others)
             for name in people:
-                self.hearing(name)
+                self.hearing(name, strayed=strayed)
         else:
-            self.require_bodies(bodies, estimates=estimates)
+            self.require_bodies(bodies, estimates=estimates, strayed=strayed)
         if bodies not in self._places:
             if len(self._places) == MOST_PLACES:
                 self._places.clear()
@@ -615,14 +714,14 @@ class State:
 
     # -- distances --------------------------------------------------------------------------
 
-    def closest(self, gap: Gap, *, estimates: bool = False) -> Closest:
-        """Where two sets are nearest; ``estimates`` as in `require_bodies`."""
-        self.require_bodies((*gap.a, *gap.b), estimates=estimates)
+    def closest(self, gap: Gap, *, estimates: bool = False, strayed: bool = False) -> Closest:
+        """Where two sets are nearest; ``estimates`` and ``strayed`` as in `require_bodies`."""
+        self.require_bodies((*gap.a, *gap.b), estimates=estimates, strayed=strayed)
         return self._distances(gap.query, Per.SETS).at(0)
 
-    def closest_per_body(self, gap: Gap, *, estimates: bool = False) -> Closests:
+    def closest_per_body(self, gap: Gap, *, estimates: bool = False, strayed: bool = False) -> Closests:
         """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``."""
-        self.require_bodies((*gap.a, *gap.b), estimates=estimates)
+        self.require_bodies((*gap.a, *gap.b), estimates=estimates, strayed=strayed)
         return self._distances(gap.query, Per.BODY)
 
     def distances(self, query: Query, per: Per, *, estimates: bool = False) -> Closests:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
-import numpy as np
-
 from seerob.errors import UnknownName
 from seerob.human.angles import Angles, angles
 from seerob.human.skeleton import BONES
@@ -47,14 +45,14 @@ def bind_posture(model: Model, name: str, unmeasured: Collection[str] = ()) -> C
         if bone not in BONES:
             raise UnknownName("bone", bone, BONES)
     bones = tuple(bone_rows(model, human))
-    rows = np.array(bones)
 
     def read(state: State) -> Angles:
-        hearing = state.hearing(human.name)
+        doubted = state.bones_turned_in_doubt(human.name)
+        hearing = state.hearing(human.name, strayed=True)
         # How a hand is turned of which only the wrist is seen is a guess, too.
-        doubted = (*state.bones_turned_in_doubt(human.name), *hearing.unaimed(state.t))
-        R, x = state.placed(bones, doubted=True)
-        found = angles(R[rows], x[rows])
+        doubted = (*doubted, *hearing.unaimed(state.t))
+        # What was captured, not where a table or a robot stops the twin.
+        found = angles(*state.captured(human.name, bones))
         # What devices see changes with time: of a leg that nobody sees no score is made.
         lost = (*unmeasured, *doubted) if doubted else unmeasured
         found = found.without(lost) if lost else found

@@ -60,7 +60,7 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
         ends = DistanceEnds(model, gap)
 
         def evaluate(state: State) -> Result:
-            closest = state.closest(gap, estimates=True)
+            closest = state.closest(gap, estimates=True, strayed=True)
             distance = closest.distance
             low, high = ends.of_sets(state, distance)
             seen = (high - low) / 2

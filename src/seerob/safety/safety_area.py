@@ -75,7 +75,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
             nearest, perhaps = (np.inf, ""), (np.inf, "", 0.0)
             parts: list[Result] = []
             lit: list[Marker] = []
-            asked = [state.closest_per_body(each.gap) for each in watched]
+            asked = [state.closest_per_body(each.gap, strayed=True) for each in watched]
             entered: list[tuple[_Watched, Closests, int]] = []
             for each, found, off in zip(watched, asked, offs, strict=True):
                 errors, on = off.at(state), len(each.gap.a)
@@ -89,7 +89,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
                 perhaps = min(perhaps, (float(room[i]), _where(model, each, i, several), float(may[i])))
                 entered += [(each, found, i) for i in np.flatnonzero(found.distance <= 0).tolist()]
             pairs = [(int(found.body_a[i]), each.gap.b[i]) for each, found, i in entered]
-            deeps = depths.ask(*state.placed(concerned), pairs) if pairs else []
+            deeps = depths.ask(*state.placed(concerned, strayed=True), pairs) if pairs else []
             for (each, found, i), deep in zip(entered, deeps, strict=True):
                 parts.append(
                     Result(

@@ -71,6 +71,10 @@ class Hearing:
     places: list[tuple[float, Places]] = field(default_factory=list)
     """Of a person that devices see: instant [s], and of which bones nobody says where they are; oldest
     first."""
+    captured: Array | None = None
+    """Of a person whom the physics moves: the joint positions that the twin is pulled to now [rad or m]."""
+    residual: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
+    """As `bones`, of those joint positions instead of the twin's, where the twin does not follow."""
     lost: float = -np.inf
     """When the physics last lost it, so that it was put back [s]."""
     saturated: bool = False

@@ -23,7 +23,8 @@ class TrackingError:
     what the file accepts (``unseen_uncertainty``), else nothing: how wrong it is nobody knows, and
     `State.require_bodies` leaves it undecided. What is held because it was not seen just now, or what
     another device sees elsewhere, adds `Hearing.slack`. A bone between two that are seen adds how far the
-    lengths of bones let its ends be (`seerob.whereabouts.told_bones`).
+    lengths of bones let its ends be (`seerob.whereabouts.told_bones`). Where something stops the twin, the
+    way from there to where the person was captured is added to what devices are off from that.
 
     Args:
         model: The compiled workstation.
@@ -53,8 +54,10 @@ class TrackingError:
         }
 
     def none(self, state: State) -> bool:
-        """Whether no device says where any of these people are: nothing is off then."""
-        return not any(state.hearing(person).bones for person in self._bones)
+        """Whether no device says where any of these people are, and the twin follows: nothing is off then."""
+        return not any(
+            state.hearing(person, strayed=True).bones or state.stray(person) for person in self._bones
+        )
 
     def at(self, state: State) -> Array:
         """Of each body [m], shape (b,)."""
@@ -62,8 +65,9 @@ class TrackingError:
         if self.none(state):
             return found
         for person, bones in self._bones.items():
-            hearing = state.hearing(person)
-            errors = hearing.bones
+            hearing = state.hearing(person, strayed=True)
+            stray = bool(state.stray(person))
+            errors = hearing.residual if stray else hearing.bones
             unaimed = hearing.unaimed(state.t) if errors else {}
             for row, bone, reach in bones if errors else ():
                 position, angle = errors.get(bone, (None, None))
@@ -72,6 +76,12 @@ class TrackingError:
             told = self._told(state, person, errors) if errors else {}
             for row, bone, _ in bones if told else ():
                 found[row] = max(found[row], told.get(bone, 0.0))
+            if stray:
+                away, turns = state.strayed(person, tuple(self._joints[person].values()))
+                place = {bone: k for k, bone in enumerate(self._joints[person])}
+                for row, bone, reach in bones:
+                    k = place[bone]
+                    found[row] += away[k] + 2 * reach * np.sin(turns[k] / 2)
             slack = hearing.slack(state.t) if errors else {}
             for row, bone, _ in bones if slack else ():
                 found[row] += slack.get(bone, 0.0)
@@ -89,8 +99,8 @@ class TrackingError:
         seen = {bone for bone, error in errors.items() if error != (None, None) and bone in where}
         if not told_between(seen):
             return {}
-        _, x = state.placed(tuple(where.values()), doubted=True)
-        return told_errors(seen, errors, {bone: x[i] for bone, i in where.items()})
+        _, x = state.captured(person, tuple(where.values()))
+        return told_errors(seen, errors, dict(zip(where, x, strict=True)))
 
 
 def tracking(error: float) -> Tolerance:

@@ -1,0 +1,110 @@
+"""A table stops the twin and not what was captured: postures are the captured ones, distances bound both."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_capture import PERSON, captured, frames_of, source, workstation
+from msgspec.structs import replace
+from test_touching import desk, pressing
+
+from seerob import run as road
+from seerob.engine import Engine
+from seerob.errors import Undecided
+from seerob.human.angles import angles
+from seerob.human.skeleton import BONES, bone_poses
+from seerob.postures.ergonomic_posture import bind_posture
+from seerob.run import Judge
+from seerob.safety.minimum_distance import MinimumDistance
+from seerob.snapshot import Verdict
+from seerob.station import Station
+from seerob.whereabouts.tracking_error import TrackingError
+
+POST = {"name": "post", "at": {"position": [1.0, -0.2, 0.9]}, "shape": {"box": [0.05, 0.05, 0.05]}}
+
+
+@pytest.fixture(scope="module")
+def stopped():
+    """Of every tick what a person who presses a hand through a desk is said to do."""
+    t, q = pressing()
+    tables = desk()
+    tables["parts"] = [*tables["parts"], POST]
+    station = workstation(source(captured(frames_of(t, q))), **tables)
+    criteria = tuple(
+        MinimumDistance(name=f"{limit:g}", between=("post", "operator/right_hand"), limit=limit)
+        for limit in (0.02, 0.2, 0.6)
+    )
+    stage = Station(replace(station, safety=criteria))
+    engine, judge = Engine(stage.model, driven={"operator": 0.2}), Judge(stage.bound)
+    read = bind_posture(stage.model, "operator")
+    hand = tuple(b.index for b in stage.model.bodies if b.name == "operator/right_hand")
+    off = TrackingError(stage.model, hand)
+    told = []
+    for seq, samples in enumerate(road.pump(stage.sources, 0.01)):
+        engine.take(samples)
+        state = engine.tick() if seq else engine.start()
+        place = state.positions[hand[0]].copy()
+        stray = state.stray("operator")
+        told.append((state.t, judge(state), read(state), stray, place, float(off.at(state)[0])))
+    return t, q, told
+
+
+def test_the_twin_is_stopped_and_the_posture_is_the_captured_one(stopped):
+    t, q, told = stopped
+    assert told[-1][3].startswith("operator: the twin is off by")
+    for instant, _, found, *_ in told:
+        now = np.array([np.interp(instant, t, joint) for joint in q.T])
+        expected = angles(*bone_poses(PERSON, now))
+        for name in ("shoulder_flexion", "elbow_flexion", "trunk_flexion", "wrist_flexion"):
+            assert getattr(found, name) == pytest.approx(getattr(expected, name), abs=0.01), (instant, name)
+
+
+def test_distances_of_a_stopped_hand_lie_between_the_worse_of_both(stopped):
+    t, q, told = stopped
+    late = [each for each in told if each[3]]
+    assert len(late) > 50
+    assert {far.verdict for _, (far, _, _), *_ in late} == {Verdict.WITHIN}
+    assert Verdict.UNDECIDED in {near.verdict for _, (_, _, near), *_ in late}
+    for instant, _, _, _, place, bound in late:
+        now = np.array([np.interp(instant, t, joint) for joint in q.T])
+        _, positions = bone_poses(PERSON, now)
+        assert np.linalg.norm(positions[BONES.index("right_hand")] - place) <= bound + 2e-3
+    assert max(each[5] for each in late) > 0.1
+
+
+def test_nothing_is_relieved_where_the_capture_itself_is_in_doubt(stopped):
+    t, q = pressing()
+    frames = frames_of(t, q)
+    for frame in frames[50:]:
+        frame.positions[:] = np.nan
+        frame.orientations[:] = np.nan
+    stage = Station(workstation(source(captured(frames)), **desk()))
+    engine = Engine(stage.model, driven={"operator": 0.2})
+    read = bind_posture(stage.model, "operator")
+    for seq, samples in enumerate(road.pump(stage.sources, 0.01)):
+        engine.take(samples)
+        state = engine.tick() if seq else engine.start()
+        if state.t > 49 / 60 + 0.21:
+            assert state.stray("operator") == ""
+            with pytest.raises(Undecided, match="not heard"):
+                read(state)
+
+
+def test_what_knows_no_bound_stays_undecided(stopped):
+    t, q = pressing(seconds=1.2)
+    stage = Station(workstation(source(captured(frames_of(t, q))), **desk()))
+    engine = Engine(stage.model, driven={"operator": 0.2})
+    for seq, samples in enumerate(road.pump(stage.sources, 0.01)):
+        engine.take(samples)
+        state = engine.tick() if seq else engine.start()
+    hand = next(b.index for b in stage.model.bodies if b.name == "operator/right_hand")
+    assert state.stray("operator")
+    for ask in (
+        lambda: state.require("operator"),
+        lambda: state.fastest_point(hand),
+        lambda: state.fastest_points((hand,), estimates=True),
+        lambda: state.placed((hand,), estimates=True),
+        lambda: state.mass_matrix(stage.model.mechanisms["operator"]),
+    ):
+        with pytest.raises(Undecided, match="the twin is off"):
+            ask()

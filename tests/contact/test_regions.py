@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, made, state_at, two_r
+from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.contact.clamped_regions import Clamping
 from seerob.contact.regions import FEET, REGIONS, SENSITIVE, Person
+from seerob.snapshot import Verdict
 from seerob.station import Station, load
 from seerob.transforms import Array
 
@@ -93,3 +94,21 @@ def test_own_links_that_fold_clamp_a_hand_whatever_was_before(tmp_path: Path) ->
         state.t = t
         found.append(bool(clamping.at(state, wanted)[0].any()))
     assert found == [True, False, True, True]
+
+
+@pytest.mark.parametrize("touched", [True, False])
+def test_who_is_touched_all_the_same_was_not_kept_from_contact(tmp_path: Path, touched: bool) -> None:
+    """The arm at the height of a pelvis that the file keeps from contact: in it, or 0.1 m before it."""
+    text = (
+        f"{FLOATING}{TWO_R}base = {{ position = [0, 0, 1] }}\n"
+        '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
+        f"at = {{ position = [{1.0 if touched else 2.3}, 0, 0] }}\n"
+        '[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\nhuman = "op"\n'
+        'contact_area = { arm = 1e-4 }\nexcluded = ["Pelvis"]\n'
+    )
+    station = made(tmp_path, text, {"arm.urdf": two_r()})
+    home = station.model.mechanisms["op"].home
+    found = results_at(station, arm=((0, 0), (0.1, 0)), op=(home, np.zeros(len(home))))["pfl"]
+    pelvis = next(part for part in found.parts if part.name == "Pelvis")
+    assert ("touched by arm/l" in pelvis.reason) == touched
+    assert pelvis.verdict is (Verdict.UNDECIDED if touched else None)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace as dataclass_replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from msgspec.structs import replace
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob.contact.clamped_regions import FloorGap
@@ -146,10 +144,8 @@ def test_floor_counts_where_the_arm_may_be_by_the_next_tick(
     When it was asked before does not matter.
     """
     station = over_floor(tmp_path, 0.16)
-    engine = replace(station.model.workstation.engine, tick=tick)
-    model = dataclass_replace(station.model, workstation=replace(station.model.workstation, engine=engine))
     state = state_at(station, arm=((0.0, 0.0), (0.2, 0.0)))
-    floor = FloorGap(model, model.robot("arm").moving, 0.0)
+    floor = FloorGap(station.model, station.model.robot("arm").moving, 0.0, period=tick)
     thickness, wanted = np.array([0.1]), np.ones((2, 1), bool)
     for t in (0.0, 0.1, 0.11, 0.05):
         state.t = t
@@ -159,7 +155,9 @@ def test_floor_counts_where_the_arm_may_be_by_the_next_tick(
 def test_a_gap_exactly_as_wide_as_the_body_part_clamps_it(tmp_path: Path) -> None:
     station = over_floor(tmp_path, 0.16)
     state = state_at(station, arm=((0.0, 0.0), (0.2, 0.0)))
-    floor = FloorGap(station.model, station.model.robot("arm").moving, 0.0)
+    floor = FloorGap(
+        station.model, station.model.robot("arm").moving, 0.0, period=station.model.workstation.engine.tick
+    )
     gap, fall = floor.lowest_and_falling(state)[1]
     exactly = gap - fall * station.model.workstation.engine.tick
     thickness, wanted = np.array([exactly, np.nextafter(exactly, 0)]), np.ones((2, 2), bool)

@@ -31,19 +31,20 @@ ROOM = 0.1
 class FloorGap:
     """The gap between the moving bodies of a robot and the floor, bound once."""
 
-    def __init__(self, model: Model, moving: Sequence[int], height: float) -> None:
+    def __init__(self, model: Model, moving: Sequence[int], height: float, *, period: float) -> None:
         """Bind.
 
         Args:
             model: The compiled workstation.
             moving: Bodies that the robot's joints move.
             height: Of the floor, z in the world [m].
+            period: At which it is asked for [s].
         """
         bodies = [model.bodies[i] for i in moving]
         self._height, self._moving, self._bodies = height, np.array(moving, np.int64), tuple(moving)
         self._corners = stacked([body.corners for body in bodies])
         self._radius = np.array([body.radius for body in bodies], float)
-        self._period = model.workstation.engine.tick
+        self._period = period
 
     def lowest_and_falling(self, state: State) -> Array:
         """Gap to the floor [m] and largest downward speed [m/s] of each moving body, shape (b, 2)."""
@@ -79,6 +80,8 @@ class Clamping:
         gaps: dict[str, float],
         regions: Sequence[str],
         floor: float | None,
+        *,
+        every: float | None = None,
     ) -> None:
         """Bind.
 
@@ -88,6 +91,7 @@ class Clamping:
             gaps: Thickness of body regions by name [m], instead of those of ISO 13854.
             regions: Body regions in the order of the answers.
             floor: Height of the floor [m]; None when it is no surface.
+            every: Period at which it is asked for [s]; None: at every tick.
         """
         known = {**crushing_gaps()[0], **gaps}
         others = [b for b in model.bodies if b.role not in ("human", "area")]
@@ -98,15 +102,16 @@ class Clamping:
         self._thickness = plain + deviation
         cap = float(self._thickness.max(initial=0.0)) + ROOM
         pairs, widest, by_one = robot_pinch_pairs(model, robot, cap=cap)
-        period = model.workstation.engine.tick
+        period = max(model.workstation.engine.tick, every or 0.0)
         least = min(openings()[0].values())
         between = thickest(widest + deviation, fits, plain, sizes(), least=least) + deviation
         self._gaps = ClosingGaps(model.shapes, pairs, between, period=period)
         self._joints = JointGaps(
-            model, robot, by_one, self._thickness, np.maximum(fits - deviation, 0.0), least=least
-        )
+            model, robot, by_one, self._thickness, np.maximum(fits - deviation, 0.0),
+            least=least, period=period,
+        )  # fmt: skip
         self._moving = robot.moving
-        self._floor = None if floor is None else FloorGap(model, robot.moving, floor)
+        self._floor = None if floor is None else FloorGap(model, robot.moving, floor, period=period)
         self._asked = tuple(b.index for b in others)
         # All that carries a surface: where a machine is not known, nor are the gaps to it.
         self._carriers = [name for name, m in model.mechanisms.items() if m.role != "human"]

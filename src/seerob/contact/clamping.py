@@ -22,7 +22,7 @@ from the shapes and the ranges of the joints:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -221,6 +221,20 @@ class OwnJoints:
         found = (self._of_joint.get(dof, set()) for dof in ways[0] ^ ways[1])
         return frozenset(coordinate for each in found for coordinate in each)
 
+    def in_order(self, coordinates: Iterable[Coordinate]) -> list[Coordinate]:
+        """From the ground outward, whatever the robot and its machines are called."""
+        mj = self._model.mj
+
+        def depth(coordinate: Coordinate) -> tuple[int, int]:
+            name, column = coordinate
+            m = self._model.mechanisms[name]
+            at, above = int(mj.dof_bodyid[m.v_address[m.own[column]]]), 0
+            while at:
+                at, above = int(mj.body_parentid[at]), above + 1
+            return above, column
+
+        return sorted(coordinates, key=depth)
+
     def range(self, coordinate: Coordinate) -> tuple[float, float]:
         """Ends of a joint [rad or m]; a turn that has none goes round once, a slide some way."""
         name, column = coordinate
@@ -281,7 +295,7 @@ def robot_pinch_pairs(
     inner = pairs.inner
     widest = np.full(len(pairs.first), np.inf)
     if inner.any():
-        every = sorted(set().union(*between.values()))
+        every = joints.in_order(set().union(*between.values()))
         draws = np.random.default_rng(0).random((SAMPLED, len(every)))
         ends = [joints.range(coordinate) for coordinate in every]
         poses = joints.poses(

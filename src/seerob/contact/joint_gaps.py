@@ -135,6 +135,7 @@ class JointGaps:
         fits: Array,
         *,
         least: float,
+        period: float,
     ) -> None:
         """Bind.
 
@@ -145,8 +146,9 @@ class JointGaps:
             thickness: Of body parts [m], shape (r,).
             fits: Thinnest that a body part is [m], shape (r,).
             least: See `closing`.
+            period: At which it is asked for [s].
         """
-        self._period = model.workstation.engine.tick
+        self._period = period
         row = {body: k for k, body in enumerate(robot.moving)}
         joints = OwnJoints(model)
         self._tables: list[_Table] = []

@@ -96,6 +96,18 @@ class Person:
             self._names[i] for i in np.flatnonzero(self._close & self._member[:, REGIONS.index(region)])
         )
 
+    def touched(self, state: State) -> NDArray[np.bool_]:
+        """Which moving bodies touch which regions, or may since surfaces stick out, shape (b, len(REGIONS)).
+
+        Raises:
+            Undecided: As of `near`.
+        """
+        state.require_bodies(self._asked)
+        caps = np.tile(np.nextafter(self._gap.deviation, np.inf) + self._off.at(state), self._shape[0])
+        found = self._farther.within(*state.placed(self._asked), caps)
+        close: NDArray[np.bool_] = np.asarray(found.reach == _WITHIN_CAP).reshape(self._shape)
+        return close @ self._member
+
     def near(self, state: State, speed: float | None) -> tuple[NDArray[np.bool_], Array]:
         """What could be hit.
 

@@ -295,7 +295,9 @@ class Contacts:
             area=spec.area_tolerance,
         )
         floor = spec.floor_height if spec.floor else None
-        self.clamping = Clamping(model, self.robot, spec.thickness, tuple(self.columns), floor)
+        self.clamping = Clamping(
+            model, self.robot, spec.thickness, tuple(self.columns), floor, every=spec.every
+        )
         if spec.human is not None:
             model.human(spec.human)
         self.people = (
@@ -362,8 +364,14 @@ class Contacts:
         near, projected = judged.near, judged.projected
         found: list[tuple[Result, int]] = []
         measured: dict[str, tuple[Result, ...]] = {}
+        # Who is touched all the same was not kept from contact.
+        touched = people.touched(state) & near if spec.excluded and people is not None else None
         for k in np.flatnonzero(near.any(axis=0)).tolist():
             part, row = self._region(k, judged)
+            if touched is not None and REGIONS[k] in spec.excluded and touched[:, k].any():
+                row = int(touched[:, k].argmax())
+                reason = f"{part.reason}, and touched by {self.names[row]} here"
+                part = replace(part, verdict=Verdict.UNDECIDED, reason=reason)
             if told := self._measured(k, judged):
                 part, measured[part.name] = with_measured(part, told), told
             found.append((part, row))

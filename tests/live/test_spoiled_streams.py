@@ -43,7 +43,7 @@ frequency = 125
 kind = "velocity"
 name = "speed"
 at = "arm/tip"
-limit = 100.0
+limit = 5.0
 """
 )
 

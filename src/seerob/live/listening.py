@@ -46,6 +46,7 @@ STOP_WITHIN = 1.0
 """A listener that does not end by then is left behind [s]; its thread keeps no process alive."""
 ASK_WITHIN = 1.5
 """At start [s]."""
+UNTIMED = "it sends no time, so that nobody knows how late it is: give a bound as delay of the source"
 
 
 _said: ContextVar[set[str]] = ContextVar("said")
@@ -70,12 +71,15 @@ class LiveSource(Source, frozen=True, kw_only=True):
 
     delay: Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})] | None = None
     """How far the twin is behind the world [s]; one period of the source and 5 ms when not given. Of
-    variables that are sent without a time also how late they are at most."""
+    what is sent without a time also how late it is at most."""
 
     apart: ClassVar[bool] = True
     """Whether it may listen in another process: not who takes what this one has."""
     loads: ClassVar[tuple[str, ...]] = ()
     """Libraries that it needs when it listens: loaded before anybody does, since that holds others up."""
+    asked: ClassVar[bool] = False
+    """Whether what is sent without a time is the answer to a question that was asked at its ``t``, or comes
+    from this process: then nothing is late unseen."""
     asks: ClassVar[str] = ""
     """A line of the workstation file that it needs and that no device can say: `seerob probe` shows it."""
 
@@ -294,6 +298,8 @@ class Listener:
             return
         late = self._clock.latency if sample.t_device is not None else 0.0
         reason = heard.doubt or self._contradiction(sample, what, host)
+        if sample.t_device is None and not self._source.asked and self._source.delay is None:
+            reason = reason or UNTIMED
         quality = sample.quality
         if late > self._bound:
             reason = f"heard {late:.2f} s later than at its best (bound {self._bound:g} s)"

@@ -37,6 +37,7 @@ class ModbusRobot(LiveSource, frozen=True, kw_only=True):
     """A robot whose controller has its joints in Modbus registers."""
 
     loads: ClassVar[tuple[str, ...]] = ("pymodbus.client",)
+    asked: ClassVar[bool] = True
 
     robot: str
     """The robot it drives."""

@@ -34,6 +34,7 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
     """A robot, live, through OPC UA for Robotics (OPC 40010)."""
 
     loads: ClassVar[tuple[str, ...]] = ("asyncua",)
+    asked: ClassVar[bool] = True
 
     robot: str
     """The robot it drives."""

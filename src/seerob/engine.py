@@ -182,10 +182,14 @@ class Engine:
                 for moved in self._machines.hear(sample):
                     self._move(moved)
                 continue
+            untimed = sample.late if sample.t_device is None else 0.0
             if isinstance(sample, BodySample):
                 self._following(sample.target).hear(sample)
+                hearing = self._hearings[sample.target]
+                hearing.older = max(untimed, hearing.older)
                 continue
             mechanism = self._target(sample)
+            self._hearings[mechanism.name].older = untimed
             reason = sample.doubt("its source")
             if not is_possible(sample):
                 # Nothing to be pulled to; not knowing where it is must show all the same.

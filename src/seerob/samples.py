@@ -52,7 +52,8 @@ class SampleBase(Struct, frozen=True, kw_only=True, tag=True):
     reason: str = ""
     """Why it may not be relied on, as whoever heard it found; empty when nobody found anything."""
     late: float = 0.0
-    """How much later it arrived than what came fastest from that device [s]; 0 where it sends no time."""
+    """How much later it arrived than what came fastest from that device [s]; where that sends no time, how
+    much older than ``t`` it may be, as the file says."""
 
     def doubt(self, who: str) -> str:
         """Why it may not be relied on; empty when it may.

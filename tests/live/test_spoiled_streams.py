@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from made_cell import TWO_R, made, two_r
 from seerob.engine import NEAR
@@ -318,3 +319,17 @@ def test_how_late_it_is_goes_out_with_every_snapshot(station):
     )
     told = ticks(engine_of(station.model), Judge(bind(station.model)), iter([(said,), ()]))
     assert [snapshot.late for snapshot, _ in told] == [{"arm": (0.05, 0.2)}] * 2
+
+
+def test_who_sends_no_time_is_as_old_as_the_file_allows(station, monkeypatch):
+    """Nobody sees how late it is: undecided, or with a bound that counts as age."""
+    packets = [(at, None, said) for at, _, said in stream(2.0)]
+    blind = Spoiled(station, monkeypatch, packets, ticks=150)
+    assert all("give a bound as delay" in tick.reason for tick in blind.live())
+    bounded = Spoiled(station, monkeypatch, packets, ticks=300)
+    bounded.ears._source = replace(bounded.ears._source, delay=0.05)
+    told = bounded.live()
+    assert [tick.decided for tick in told[10:190]] == [True] * 180
+    silent = next(tick.t for tick in told if "not heard for" in tick.reason)
+    last = 1000.0 + packets[-1][0] - bounded.clock.start + bounded.delay
+    assert silent == pytest.approx(last + 0.2 - bounded.delay - 0.05, abs=0.011)

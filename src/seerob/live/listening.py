@@ -296,12 +296,14 @@ class Listener:
                 # No news, and a doubt about what was said before.
                 self._doubt(what, heard.doubt)
             return
-        late = self._clock.latency if sample.t_device is not None else 0.0
+        late = (self._source.delay or 0.0) * (not self._source.asked)
+        if sample.t_device is not None:
+            late = self._clock.latency
         reason = heard.doubt or self._contradiction(sample, what, host)
         if sample.t_device is None and not self._source.asked and self._source.delay is None:
             reason = reason or UNTIMED
         quality = sample.quality
-        if late > self._bound:
+        if late > self._bound and sample.t_device is not None:
             reason = f"heard {late:.2f} s later than at its best (bound {self._bound:g} s)"
             quality = Quality.LATE if quality is Quality.GOOD else quality
         if reason and quality is Quality.GOOD:

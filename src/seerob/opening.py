@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import islice
 
+import numpy as np
 from msgspec.structs import replace
 
 from seerob.errors import InputError, Problem
 from seerob.live.listening import LiveSource, delay_of
 from seerob.model import Model
 from seerob.mounting.compilation import pose_matrix
+from seerob.plausibility.in_place import implausible_motion
 from seerob.plausibility.of_file import findings as implausible
 from seerob.plausibility.of_motion import quantities
 from seerob.plausibility.own_words import compared, said_by
+from seerob.samples import JointSample
 from seerob.snapshot import Finding
 from seerob.source import Matrix4, Opened, Source, Target
 from seerob.sources._variables import VariablesSource
 from seerob.trajectories.trajectory import TrajectorySamples
+from seerob.transforms import Array
 
+FIRST, LOOKS = 2000, 8
+"""Samples at the begin of a recorded motion, and how many of them are looked at for where it goes."""
 MOST_NAMED = 5
 """Variables in one finding."""
 
@@ -47,7 +54,27 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
             problems += (_placed(problem, source, f"sources[{i}].file", file) for problem in error.problems)
     if problems:
         raise InputError(problems)
+    if opened and (found := implausible_motion(model, _begins(model, opened))):
+        source, first = opened[0]
+        opened[0] = source, replace(first, findings=(*first.findings, *found))
     return tuple(opened)
+
+
+def _begins(model: Model, opened: Sequence[tuple[Source, Opened]]) -> dict[str, list[Array]]:
+    """Joint positions of robots and people at some instants of the first samples of recorded sources."""
+    found: dict[str, list[Array]] = {}
+    for source, one in opened:
+        if isinstance(source, LiveSource) or source.target() not in model.mechanisms:
+            continue
+        # What devices saw of a person becomes a posture only in the loop.
+        if not isinstance(next(iter(one.samples), None), JointSample):
+            continue
+        said = [s for s in islice(one.samples, FIRST) if isinstance(s, JointSample) and s.placed]
+        n = len(model.mechanisms[source.target()].joints)
+        q = [np.array(s.q) for s in said[:: max(1, -(-len(said) // LOOKS))] if len(s.q) == n]
+        if q and np.isfinite(q).all():
+            found[source.target()] = q
+    return found
 
 
 def _too_short(model: Model, source: Source, delay: float) -> Iterator[Problem]:

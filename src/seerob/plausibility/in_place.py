@@ -1,12 +1,13 @@
 """What follows from the compiled workstation and can be implausible: where things are, how large and heavy.
 
-The questions are asked once, of everybody at home: robots and people that a source moves are elsewhere later,
-and are not asked for what depends on that.
+The questions are asked once, of everybody at home; of whom a recorded source moves, when it was opened, of
+where its samples begin. Whom a live source moves is not asked for what depends on that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 import mujoco
 
@@ -39,9 +40,32 @@ def _following(model: Model) -> Iterator[Quantity]:
     yield from _payloads(model)
     yield from _people(model)
     place = _Home(model)
-    yield from _feet(model, place)
-    yield from _overlaps(model, place)
-    yield from _nobody(model, place)
+    yield from _feet(model, place, place.still)
+    yield from _overlaps(model, place, {*place.still, *(robot.name for robot in model.workstation.robots)})
+    yield from _nobody(model, [place])
+
+
+def implausible_motion(model: Model, q: Mapping[str, Sequence[Array]]) -> tuple[Finding, ...]:
+    """The same of where recorded motions go.
+
+    Args:
+        model: The compiled workstation.
+        q: Joint positions by robot or human at some instants of its motion, the first one first, shape (n,).
+    """
+    if not q:
+        return ()
+    places = [
+        _Home(model, {name: at[min(k, len(at) - 1)] for name, at in q.items()}) for k in range(_most(q))
+    ]
+    people = q.keys() & {human.name for human in model.workstation.humans}
+    every = [*_feet(model, places[0], people), *_overlaps(model, places[0], people)]
+    if people:
+        every += _nobody(model, places)
+    return tuple(findings(every, model.workstation.confirmed))
+
+
+def _most(q: Mapping[str, Sequence[Array]]) -> int:
+    return max(len(at) for at in q.values())
 
 
 # -- sizes and masses ---------------------------------------------------------------------------
@@ -98,12 +122,13 @@ def _people(model: Model) -> Iterator[Quantity]:
 
 
 class _Home:
-    """Everybody at home."""
+    """Everybody at home, or where motions put them."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, q: Mapping[str, Array] = MappingProxyType({})) -> None:
         data = mujoco.MjData(model.mj)
         for mechanism in model.mechanisms.values():
-            data.qpos[mechanism.q_address] = mechanism.coupling @ mechanism.home + mechanism.offset
+            at = q.get(mechanism.name, mechanism.home)
+            data.qpos[mechanism.q_address] = mechanism.coupling @ at + mechanism.offset
         mujoco.mj_kinematics(model.mj, data)
         ids = [body.mj for body in model.bodies]
         self.rotations: Array = data.xmat[ids].reshape(-1, 3, 3).copy()
@@ -113,7 +138,7 @@ class _Home:
         self.still = {
             name
             for name, m in model.mechanisms.items()
-            if name not in driven and (m.home_given or not m.joints)
+            if name in q or (name not in driven and (m.home_given or not m.joints))
         }
         """Robots, people and machines that stand where they are now, as far as the file says."""
 
@@ -155,14 +180,14 @@ def _of(model: Model, mechanism: Mechanism) -> list[Body]:
     return _seen([model.bodies[i] for i in (*mechanism.bodies, *mechanism.carried)])
 
 
-def _feet(model: Model, place: _Home) -> Iterator[Quantity]:
+def _feet(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity]:
     """How far people who stand still are from what they stand or sit on."""
     parts = [b for b in _seen(model.bodies) if b.role in ("part", "machine")]
     under = [b.index for b in parts]
     # Where nothing stands at 0, the origin is somewhere else, such as at the base of the robot.
     floor = any(abs(place.lowest([b])) <= LEVEL for b in parts)
     for i, human in enumerate(model.workstation.humans):
-        if human.name not in place.still:
+        if human.name not in who:
             continue
         bodies = _of(model, model.mechanisms[human.name])
         gap = place.lowest(bodies)
@@ -177,15 +202,15 @@ def _feet(model: Model, place: _Home) -> Iterator[Quantity]:
         yield Quantity(f"humans[{i}].feet", "humans.feet", "m", (gap,), (human.name,), said)
 
 
-def _overlaps(model: Model, place: _Home) -> Iterator[Quantity]:
-    """How deep people who stand still, and bases of robots, reach into what stands."""
+def _overlaps(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity]:
+    """How deep people and bases of robots reach into what stands."""
     standing = _standing(model)
     owners: dict[str, list[Body]] = {}
     for body in standing:
         owners.setdefault(body.owner, []).append(body)
     for group in ("humans", "robots"):
         for i, table in enumerate(getattr(model.workstation, group)):
-            if group == "humans" and table.name not in place.still:
+            if table.name not in who:
                 continue
             own = (
                 _of(model, model.mechanisms[table.name]) if group == "humans" else owners.get(table.name, [])
@@ -207,8 +232,9 @@ def _overlaps(model: Model, place: _Home) -> Iterator[Quantity]:
                 )
 
 
-def _nobody(model: Model, place: _Home) -> Iterator[Quantity]:
-    """How near anybody is to each robot and machine that stands in the world."""
+def _nobody(model: Model, places: Sequence[_Home]) -> Iterator[Quantity]:
+    """How near anybody comes to each robot and machine."""
+    place = places[0]
     people = [model.mechanisms[h.name] for h in model.workstation.humans]
     still = [b.index for m in people if m.name in place.still for b in _of(model, m)]
     if not still or len({m.name for m in people} - place.still):
@@ -217,7 +243,7 @@ def _nobody(model: Model, place: _Home) -> Iterator[Quantity]:
         for i, table in enumerate(getattr(model.workstation, group)):
             own = [b.index for b in _of(model, model.mechanisms[table.name])]
             if own:
-                near = max(place.distance(still, own, SIGHT), 0.0)
+                near = max(min(at.distance(still, own, SIGHT) for at in places), 0.0)
                 said = f"from {table.name} to whoever is nearest, where the file puts them"
                 key = "nobody_within"
                 yield Quantity(f"{group}[{i}].{key}", f"{group}.{key}", "m", (near,), (table.name,), said)

@@ -187,6 +187,5 @@ def _of_value(value: Any, wanted: Any, key: str, kind: str, about: tuple[str, ..
         for i, entry in enumerate(value):
             yield from _of_value(entry, wanted, f"{key}[{i}]", kind, about)
     elif numbers := tuple(_numbers(value)):
-        unit = unit_of(wanted)
-        if unit is not None or kind.endswith("tolerance"):
-            yield Quantity(key, kind, unit or "", numbers, about)
+        # What has no unit of its own, or one that hangs on the joint, is looked at where a row names it.
+        yield Quantity(key, kind, unit_of(wanted) or "", numbers, about)

@@ -11,7 +11,7 @@ from seerob.run import Judge, engine_of, looks_ahead, pump, ticks
 from seerob.snapshot import Verdict
 
 STICK = (
-    '[[tools]]\nname = "stick"\non = "arm/tip"\nmass = 0.1\n'
+    '[[tools]]\nname = "stick"\non = "arm/tip"\nmass = 0.01\n'
     "shape = { box = [0.1, 0.004, 0.004] }\nat = { position = [0.05, 0, 0] }\n"
 )
 POST = (

@@ -260,6 +260,8 @@ class Judge:
         self._needs: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] | None = None
         self._unmentioned: tuple[dict[str, str], ...] = ()
         self._kept: dict[int, _Kept] = {}
+        self._why = [""] * len(bound)
+        """Of each criterion, why nothing that it said last is within."""
         self._between = BetweenTicks([one.watch for one in bound])
         self._warned: set[str] = set()
 
@@ -281,7 +283,12 @@ class Judge:
         def look(i: int, evaluate: Evaluate, shadow: State) -> Result:
             return self._now(i, evaluate, shadow)[0]
 
-        return self._between(state, results, Asking(ask, look, undecided))
+        # What is held is taken back last: what is exceeded between two ticks is looked for all the same.
+        found = self._between(state, results, Asking(ask, look, undecided))
+        return tuple(
+            undecided(result, why) if why and not result.muted else result
+            for result, why in zip(found, self._why, strict=True)
+        )
 
     def _one(self, i: int, bound: Bound, state: State) -> Result:
         kept = self._kept.get(i)
@@ -289,6 +296,7 @@ class Judge:
         if kept and self._lasts(kept, criterion, state):
             return kept.result
         result, muted = self._now(i, bound.evaluate, state)
+        self._why[i] = self._reason(i, state)
         if criterion.every is not None:
             result = replace(result, t=state.t)
             due, asked = state.t + criterion.every, tuple(sorted(state.asked))
@@ -335,8 +343,6 @@ class Judge:
                 raise Undecided(reason)
         elif result.value is not None and not math.isfinite(result.value):
             raise Undecided(f"the value is {result.value}, not a finite number")
-        if held := self._reason(i, state):
-            reason = f"{reason}; {held}" if reason else held
         return undecided(result, reason) if reason else result
 
     def _failed(self, bound: Bound, error: Exception) -> str:
@@ -380,4 +386,5 @@ class Judge:
             limit=getattr(criterion, "limit", None),
             at_most=criterion.at_most,
             reason=f"not asked: {criterion.active} is false",
+            muted=True,
         )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from seerob.verdict import Verdict
+
 
 class Hello(Struct, frozen=True, kw_only=True, tag="hello"):
     """First message of the server."""
@@ -35,6 +37,34 @@ class History(Struct, frozen=True, kw_only=True, tag="history"):
     """What happened so far (live) or all of it (replay), thinned without losing an extremum."""
 
     traces: tuple[Trace, ...]
+
+
+class CriterionSoFar(Struct, frozen=True, kw_only=True):
+    """What one criterion came to."""
+
+    verdict: Verdict | None
+    decided: float
+    """Share of the run in which it was within or exceeded, 0…1."""
+    undecided: float
+    muted: float
+    """It did not apply."""
+    nothing: float
+    """It was asked, and there was nothing to judge, or no limit to judge by."""
+    open: float
+    """It was not asked, and nothing says what it would have said."""
+    reason: str = ""
+    """Why what was within whenever it was asked is not known to be within throughout."""
+
+
+class SoFar(Struct, frozen=True, kw_only=True, tag="so_far"):
+    """What the run came to by now (live) or as far as the recording was read; sent when it changes."""
+
+    verdict: Verdict | None
+    decided: float | None
+    """Least share that a criterion with a verdict decided of the time in which it applied, 0…1."""
+    criteria: dict[str, CriterionSoFar]
+    whole: bool = False
+    """Whether that is all of the run."""
 
 
 class Transport(Struct, frozen=True, kw_only=True, tag="transport"):

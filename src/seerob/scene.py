@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 
-from seerob.judging import Bound
+from seerob.judging import UNBOUNDED, Bound
 from seerob.model import Model
+from seerob.norms.editions import headline
 from seerob.opening import coarse
+from seerob.results.series import STILL
 from seerob.snapshot import CriterionInfo, Finding, JointInfo, MechanismInfo, Node, Scene
-from seerob.workstation import content_hash
+from seerob.workstation import Workstation, content_hash
 
 
 def scene_of(
@@ -20,7 +22,7 @@ def scene_of(
     too_coarse = coarse(model)
     return Scene(
         title=station.title,
-        edition=station.edition,
+        edition=headline((b.basis for b in bound), station.edition),
         version=version("seerob"),
         workstation_hash=content_hash(files),
         period=station.engine.tick,
@@ -63,13 +65,24 @@ def scene_of(
                 limit=getattr(b.criterion, "limit", None),
                 at_most=b.criterion.at_most,
                 basis=b.basis,
-                between=b.between,
                 levels=getattr(b.criterion, "levels", ()),
+                between=_between(b, station),
             )
             for b in bound
         ),
         findings=tuple(dict.fromkeys((*model.findings, *_without_physics(model), *findings))),
     )
+
+
+def _between(bound: Bound, station: Workstation) -> str:
+    """See `CriterionInfo.between`; what lies in a method is of instants as dense as the ticks."""
+    criterion, tick = bound.criterion, station.engine.tick
+    if not station.sources:
+        return STILL
+    sparse = criterion.every is not None and criterion.every > 1.5 * tick
+    if bound.watch is None and sparse and criterion.between_samples is None:
+        return UNBOUNDED
+    return bound.between
 
 
 def _without_physics(model: Model) -> tuple[Finding, ...]:

@@ -26,7 +26,17 @@ from seerob.markers import (
     Vec3,
     Vec4,
 )
-from seerob.page_messages import Command, Hello, History, Trace, Tracked, Tracking, Transport
+from seerob.page_messages import (
+    Command,
+    CriterionSoFar,
+    Hello,
+    History,
+    SoFar,
+    Trace,
+    Tracked,
+    Tracking,
+    Transport,
+)
 from seerob.verdict import Verdict
 
 __all__ = [
@@ -37,6 +47,7 @@ __all__ = [
     "Box",
     "Command",
     "CriterionInfo",
+    "CriterionSoFar",
     "Ellipsoid",
     "Finding",
     "Hello",
@@ -61,6 +72,7 @@ __all__ = [
     "Scene",
     "Segment",
     "Snapshot",
+    "SoFar",
     "Sphere",
     "Trace",
     "Tracked",
@@ -219,6 +231,8 @@ class Result(Struct, frozen=True, kw_only=True):
     """None on parts, which share their parent's, and on the wire, where it is sent once."""
     t: float | None = None
     """Instant it speaks of [s] when that is not the snapshot's (a criterion with a period)."""
+    muted: bool = False
+    """Whether the criterion does not apply now, as a variable says: then it says nothing."""
 
 
 class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot"):
@@ -347,7 +361,8 @@ class Scene(Struct, frozen=True, kw_only=True, tag="scene"):
 
     title: str
     edition: str
-    """Edition of the norm that limits are taken from, as the workstation file says."""
+    """Editions of norms that figures are from, as the bases of the criteria say; and the one that the file
+    asks for, where no figure is from it."""
     version: str
     """Version of seerob that wrote this."""
     workstation_hash: str

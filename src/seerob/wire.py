@@ -29,6 +29,7 @@ FROM_SERVER = (
     snapshot.Hello,
     snapshot.Scene,
     snapshot.History,
+    snapshot.SoFar,
     snapshot.Transport,
     snapshot.Snapshot,
     snapshot.Tracked,

@@ -5,9 +5,11 @@ import time
 
 import numpy as np
 import pytest
+from msgspec.structs import replace as replaced
 
 from live_story import wait_for
 from seerob.recordings.recording import Recording
+from seerob.results.result_log import ResultLog
 from seerob.server import hub
 from seerob.server.client import WINDOW
 from seerob.server.live import Live, LiveView
@@ -15,7 +17,7 @@ from seerob.server.player import Player
 from seerob.server.serving import Server
 from seerob.sink import Writer
 from seerob.sinks.recorder import Recorder
-from seerob.snapshot import Hello, History, Scene, Snapshot, Transport
+from seerob.snapshot import Hello, History, Scene, Snapshot, SoFar, Transport, Verdict
 from seerob.wire import schema
 from server.frames import MESHES, Remembered, Visitor, scene, snapshot, stripped
 
@@ -342,3 +344,47 @@ def test_nothing_is_left_after_a_stop():
         with Server(scene=scene(), meshes={}, feed=Live(), port=port) as moved:
             assert moved.port > port
             assert str(moved.port) in moved.notice
+
+
+# -- what the run came to -----------------------------------------------------------------------
+
+
+def judged(verdict):
+    """Of a snapshot, by its number."""
+
+    def made(k):
+        one = snapshot(k)
+        result = replaced(one.results[0], verdict=verdict(k), value=0.4, limit=0.5)
+        return replaced(one, results=(result,))
+
+    return made
+
+
+def test_a_recording_that_exceeded_says_so_whatever_instant_is_shown():
+    frames = [judged(lambda k: Verdict.EXCEEDED if k == 20 else Verdict.WITHIN)(k) for k in range(41)]
+    with replay(frames) as server, Visitor(server) as page:
+        told = page.until(lambda m: isinstance(m, SoFar) and m.whole)
+        assert told.verdict is Verdict.EXCEEDED
+        (one,) = told.criteria.values()
+        assert (one.verdict, one.decided) == (Verdict.EXCEEDED, 1.0)
+        page.ask("seek", frames[3].t)
+        assert page.of(Snapshot).results[0].verdict is Verdict.WITHIN
+
+
+def test_a_live_run_tells_what_it_came_to_when_that_changes_and_to_who_comes_late(live):
+    server, feed = live
+    feed.log = ResultLog(scene().criteria)
+    made = judged(lambda k: Verdict.UNDECIDED if k == 5 else Verdict.WITHIN)
+    with Visitor(server) as page:
+        for k in range(3):
+            feed.log.add(made(k))
+            feed.publish(made(k))
+        assert page.until(lambda m: isinstance(m, SoFar) and m.verdict is Verdict.WITHIN).whole is False
+        for k in range(3, 9):
+            feed.log.add(made(k))
+            feed.publish(made(k))
+        assert page.until(lambda m: isinstance(m, SoFar) and m.verdict is Verdict.UNDECIDED)
+        with Visitor(server) as late:
+            assert late.of(SoFar).verdict is Verdict.UNDECIDED
+        feed.finish()
+        assert page.until(lambda m: isinstance(m, SoFar) and m.whole).verdict is Verdict.UNDECIDED

@@ -9,6 +9,7 @@ import pytest
 
 from seerob.errors import InputError
 from seerob.figures import DECIMALS
+from seerob.norms.editions import editions
 from seerob.results.result_log import log_of
 from seerob.results.series import CODES
 from seerob.sinks import _sheets as sheets_module
@@ -83,7 +84,7 @@ def test_the_summary_has_every_criterion_with_verdict_and_basis(book):
     assert data["separation"][9:] == [
         made_run.SEPARATION.formula,
         made_run.SEPARATION.source,
-        made_run.scene().edition,
+        ", ".join(editions([made_run.SEPARATION])) or None,
     ]
     assert data["never heard"][7] == "never gave a result"
     assert data["inputs, SHA-256"][1] == "f" * 64

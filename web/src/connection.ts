@@ -10,6 +10,7 @@ import {
   lookingAt,
   now,
   reach,
+  soFar,
   stale,
   traces,
   tracesRevision,
@@ -93,6 +94,9 @@ export class Connection {
         return;
       case "transport":
         transport.value = message.transport;
+        return;
+      case "so_far":
+        soFar.value = message.soFar;
         return;
       case "tracked":
         tracked.value = message.tracked;

@@ -1,6 +1,6 @@
 // What the worker and the page tell each other. The worker owns the socket; the page owns the screen.
 
-import type { Hello, History, Result, Scene, Snapshot, Tracked, Tracking, Transport } from "./wire";
+import type { Hello, History, Result, Scene, Snapshot, SoFar, Tracked, Tracking, Transport } from "./wire";
 
 /** What a page asks of the server; `ack` is the worker's own affair. */
 export type Action = "play" | "pause" | "seek" | "speed" | "step" | "loop";
@@ -35,6 +35,8 @@ export type FromWorker =
   | { kind: "scene"; scene: Scene; shared: SharedArrayBuffer | null }
   | { kind: "history"; history: History }
   | { kind: "transport"; transport: Transport }
+  /** What the run came to. */
+  | { kind: "so_far"; soFar: SoFar }
   /** What became of what this page's headset sees. */
   | { kind: "tracked"; tracked: Tracked }
   | { kind: "frame"; frame: Frame }

@@ -5,7 +5,7 @@ import { type Elsewhere, worseElsewhere } from "./elsewhere";
 import type { Frame, LinkState } from "./messages";
 import { Trace } from "./traces";
 import { type State, stateOf, worstState } from "./verdicts";
-import type { CriterionInfo, Hello, Node, Result, Scene, Tracked, Transport } from "./wire";
+import type { CriterionInfo, Hello, Node, Result, Scene, SoFar, Tracked, Transport } from "./wire";
 
 export interface Selection {
   /** `node` and `criterion` name one thing; `owner` a whole robot, human, tool or part. */
@@ -39,6 +39,9 @@ export const transport = signal<Transport>({
 
 /** What became of what this page's headset sees; null before it offered anything. */
 export const tracked = signal<Tracked | null>(null);
+
+/** What the run came to by now, or as far as the recording was read; null where nobody says. */
+export const soFar = signal<SoFar | null>(null);
 
 /** Shown results and joints; replaced at most ten times a second. */
 export const frame = signal<Frame | null>(null);
@@ -85,6 +88,15 @@ export const elsewhere = computed<Elsewhere | null>(() => {
   // Traces are changed in place: only the revision tells.
   if (tracesRevision.value < 0) return null;
   return worseElsewhere(traces.values(), overall.value);
+});
+
+/** What the run came to: never better than what is on screen, or than what the page knows of other times. */
+export const runState = computed<State>(() => {
+  const known: State[] = [overall.value];
+  if (elsewhere.value) known.push(elsewhere.value.verdict);
+  if (soFar.value) known.push(soFar.value.verdict ?? "none");
+  const worst = worstState(known);
+  return worst === "close" ? "within" : worst;
 });
 
 /** Nodes of the selection, by full name. */
@@ -137,6 +149,7 @@ export function beginScene(next: Scene): void {
       mutedCriteria.value = new Set();
     }
     scene.value = next;
+    soFar.value = null;
     frame.value = null;
     now.value = Number.NaN;
     lookingAt.value = null;

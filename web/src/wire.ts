@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "49aed87f09bc7272";
+export const SCHEMA = "6dca70364f6c0b00";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -132,12 +132,6 @@ export interface Sphere {
 export type Vec3 = [number, number, number];
 
 export type Vec4 = [number, number, number, number];
-
-/** What a limit says of a value. An evaluation, never a certificate. */
-export type Verdict =
-  | "within"
-  | "exceeded"
-  | "undecided";
 
 /**
  * Where a number comes from, best first.
@@ -280,6 +274,8 @@ export interface Result {
   basis: Basis | null;
   /** Instant it speaks of [s] when that is not the snapshot's (a criterion with a period). */
   t: number | null;
+  /** Whether the criterion does not apply now, as a variable says: then it says nothing. */
+  muted: boolean;
 }
 
 /** The twin and its results at one tick. */
@@ -406,7 +402,10 @@ export interface MechanismInfo {
 export interface Scene {
   type: "scene";
   title: string;
-  /** Edition of the norm that limits are taken from, as the workstation file says. */
+  /**
+   * Editions of norms that figures are from, as the bases of the criteria say; and the one that the file
+   * asks for, where no figure is from it.
+   */
   edition: string;
   /** Version of seerob that wrote this. */
   version: string;
@@ -419,6 +418,12 @@ export interface Scene {
   criteria: CriterionInfo[];
   findings: Finding[];
 }
+
+/** What a limit says of a value. An evaluation, never a certificate. */
+export type Verdict =
+  | "within"
+  | "exceeded"
+  | "undecided";
 
 /** First message of the server. */
 export interface Hello {
@@ -449,6 +454,33 @@ export interface Trace {
 export interface History {
   type: "history";
   traces: Trace[];
+}
+
+/** What one criterion came to. */
+export interface CriterionSoFar {
+  verdict: Verdict | null;
+  /** Share of the run in which it was within or exceeded, 0…1. */
+  decided: number;
+  undecided: number;
+  /** It did not apply. */
+  muted: number;
+  /** It was asked, and there was nothing to judge, or no limit to judge by. */
+  nothing: number;
+  /** It was not asked, and nothing says what it would have said. */
+  open: number;
+  /** Why what was within whenever it was asked is not known to be within throughout. */
+  reason: string;
+}
+
+/** What the run came to by now (live) or as far as the recording was read; sent when it changes. */
+export interface SoFar {
+  type: "so_far";
+  verdict: Verdict | null;
+  /** Least share that a criterion with a verdict decided of the time in which it applied, 0…1. */
+  decided: number | null;
+  criteria: Record<string, CriterionSoFar>;
+  /** Whether that is all of the run. */
+  whole: boolean;
 }
 
 /** State of the player; sent on every change. */
@@ -501,6 +533,6 @@ export interface Command {
   value?: number | null;
 }
 
-export type ServerMessage = Hello | Scene | History | Transport | Snapshot | Tracked;
+export type ServerMessage = Hello | Scene | History | SoFar | Transport | Snapshot | Tracked;
 
 export type PageMessage = Command | Tracking;

@@ -50,6 +50,9 @@ function received(message: ServerMessage, raw: Uint8Array): void {
     case "transport":
       post({ kind: "transport", transport: message });
       return;
+    case "so_far":
+      post({ kind: "so_far", soFar: message });
+      return;
     case "tracked":
       post({ kind: "tracked", tracked: message });
       return;

@@ -119,7 +119,9 @@ test("what was worse before is named beside what is now, and a click goes to its
   // Something exceeded goes by every few seconds; the note is there while nothing is.
   const found = await page.waitForFunction(() => {
     const text = document.querySelector(".pill")?.textContent ?? "";
-    const told = text.match(/NOW.*exceeded (?:just now|\d+ (?:s|min) ago): ([a-z ]+?)(?: \+\d+)*$/);
+    const told = text.match(
+      /EXCEEDED SO FAR.*now .*exceeded (?:just now|\d+ (?:s|min) ago): ([a-z ]+?)(?: \+\d+)*$/,
+    );
     if (!told) return null;
     document.querySelector(".pill-elsewhere").click();
     return told[1];

@@ -56,7 +56,11 @@ def criteria() -> tuple[CriterionInfo, ...]:
     """What this file adds to the workstation."""
     return (
         CriterionInfo(
-            name="scanner", kind="scanner_field", group="safety", title="What a scanner sees.", unit="m"
+            name="scanner",
+            kind="scanner_field",
+            group="safety",
+            title="What a scanner sees.",
+            unit="m",
         ),
         CriterionInfo(
             name="contacts",

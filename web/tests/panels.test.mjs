@@ -272,9 +272,9 @@ test("posture and separation of the same instant stand in one row", async () => 
 
 test("the pill leads to the worst instant of what it names, and its figures stay", async () => {
   await seek(10);
-  await page.waitForSelector(".pill.state-undecided .elsewhere-exceeded");
+  await page.waitForSelector(".pill.state-exceeded .now-undecided");
   await page.locator(".pill-elsewhere").click();
-  await page.waitForSelector(".pill.state-exceeded");
+  await page.waitForSelector(".pill.state-exceeded .now-exceeded");
   const seen = await page.locator(".visited").innerText();
   const at = await settled(page);
   const here = (await served.tell(`snapshot ${at}`)).results.find((r) => r.name === "separation");

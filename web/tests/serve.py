@@ -19,6 +19,7 @@ import msgspec
 import numpy as np
 from made_up_cell import PERIOD, snapshot, workstation
 
+from seerob.results.result_log import ResultLog
 from seerob.server.live import Live
 from seerob.server.player import Player
 from seerob.server.serving import Server
@@ -53,7 +54,10 @@ def _publish(live: Live, frozen: threading.Event, over: threading.Event) -> None
     begun, k = time.monotonic(), 0
     while not over.is_set():
         if not frozen.is_set():
-            live.publish(snapshot(k, k * PERIOD))
+            made = snapshot(k, k * PERIOD)
+            live.publish(made)
+            if live.log is not None:
+                live.log.add(made)
         k += 1
         over.wait(max(0.0, begun + k * PERIOD - time.monotonic()))
 
@@ -80,6 +84,7 @@ def main() -> None:
     frozen, over = threading.Event(), threading.Event()
     recording = Remembered(scene, options.seconds) if options.mode == "replay" else None
     live = Live()
+    live.log = ResultLog(scene.criteria)
 
     def open_server(port: int) -> Server:
         feed = Player(recording) if recording else live

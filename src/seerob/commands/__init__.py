@@ -218,10 +218,15 @@ def tell(findings: tuple[Finding, ...]) -> None:
 
 def tell_results(summary: Summary) -> None:
     """One line per criterion, in the order of the file; and when none of them has a verdict."""
+    from seerob.sinks._sentences import covered
+
     width = min(max((len(name) for name in summary.results), default=0), _WIDEST_NAME)
     for name, series in summary.results.items():
         word, style = WORDS[series.verdict]
-        line(word, f"{name:<{width}}  {extreme(series)}", style)
+        text = extreme(series)
+        if "of the time" not in text and (share := covered(series)):
+            text += f"; {share}"
+        line(word, f"{name:<{width}}  {text}", style)
     for person, errors in summary.results.bones.items():
         line("bones", f"{person}: {_missing(errors)}")
     if summary.verdict is None:
@@ -256,6 +261,8 @@ def extreme(series: Series) -> str:
 
     It is ``worst`` where a limit that moves decides at another instant than that of the extreme value.
     """
+    if not series.known:
+        return "never gave a result"
     worst = series.worst()
     if worst.reason and (worst.value is None or series.verdict is Verdict.UNDECIDED):
         first = f"{worst.reason} (first at {worst.t:.2f} s)" if worst.t is not None else worst.reason
@@ -292,13 +299,16 @@ def results_json(summary: Summary, **more: Any) -> str:
     """The results for machines."""
     criteria = []
     for name, series in summary.results.items():
-        worst = series.worst()
+        worst = series.worst() if series.known else None
         criteria.append(
             {
                 "name": name,
                 "verdict": series.verdict,
+                "times": series.times()._asdict(),
+                "between": series.between,
                 "unit": series.unit,
-                "worst": {
+                "worst": worst
+                and {
                     "t": worst.t,
                     "value": worst.value,
                     "limit": worst.limit,
@@ -310,6 +320,7 @@ def results_json(summary: Summary, **more: Any) -> str:
         )
     whole = {
         "verdict": summary.verdict,
+        "decided": summary.results.decided,
         "duration": summary.duration,
         "ticks": summary.ticks,
         "workstation_hash": summary.scene.workstation_hash,

@@ -15,7 +15,7 @@ from seerob.errors import UnknownName
 from seerob.results.bone_errors import BoneErrors
 from seerob.results.column import Spill
 from seerob.results.series import Series, Spread, Worst, WorstTracker, worst_verdict
-from seerob.snapshot import CriterionInfo, History, Result, Snapshot, Verdict
+from seerob.snapshot import CriterionInfo, CriterionSoFar, History, Result, Snapshot, SoFar, Verdict
 
 __all__ = ["JointLog", "ResultLog", "Series", "Spread", "Worst"]
 
@@ -40,7 +40,6 @@ class ResultLog(Mapping[str, Series]):
     def __init__(self, criteria: Iterable[CriterionInfo] = ()) -> None:
         self._series: dict[str, Series] = {}
         self._worst: dict[str, WorstTracker] = {}
-        self._between: dict[str, str] = {}
         self._tracking: dict[str, JointLog] = {}
         self._bones: dict[str, BoneErrors] = {}
         self._spill = Spill()
@@ -53,8 +52,7 @@ class ResultLog(Mapping[str, Series]):
         self.end: float | None = None
         """Run time of the last snapshot [s]."""
         for criterion in criteria:
-            self._between[criterion.name] = criterion.between
-            self._begin(criterion.name, criterion.unit, criterion.at_most)
+            self._begin(criterion.name, criterion.unit, criterion.at_most, criterion.between)
 
     def add(self, snapshot: Snapshot) -> tuple[str, ...]:
         """Take the results of one tick.
@@ -70,22 +68,28 @@ class ResultLog(Mapping[str, Series]):
             return self._worse
         self._last = snapshot
         self.ticks += 1
-        if self.ticks == 2:
-            for series in self._series.values():
-                series.lasts()
         if self.start is None:
             self.start = snapshot.t
+        passed = max(snapshot.t - self.end, 0.0) if self.end is not None else 0.0
         self.end = snapshot.t
         worse = []
         for result in snapshot.results:
             series = self._series.get(result.name)
-            if series is None or not series.known:
-                series = self._begin(result.name, result.unit, result.at_most)
+            if series is None:
+                series = self._begin(result.name, result.unit, result.at_most, None)
+            elif not series.known:
+                series.unit, series.at_most = result.unit, result.at_most
+            series.pass_time(result, passed)
             if series.repeats(result):
                 continue
             series.append(result, snapshot.t)
             if self._worst[result.name].take(result, snapshot):
                 worse.append(result.name)
+        if len(snapshot.results) < len(self._series):
+            said = {result.name for result in snapshot.results}
+            for name, series in self._series.items():
+                if name not in said:
+                    series.pass_time(None, passed)
         for name, error in snapshot.tracking.items():
             known = self._tracking.get(name)
             # A nan is not at most anything, so it shows; and nothing replaces it.
@@ -96,15 +100,10 @@ class ResultLog(Mapping[str, Series]):
         self._worse = tuple(worse)
         return self._worse
 
-    def _begin(self, name: str, unit: str, at_most: bool) -> Series:
+    def _begin(self, name: str, unit: str, at_most: bool, between: str | None) -> Series:
         tracker = WorstTracker()
         series = Series(
-            name=name,
-            unit=unit,
-            at_most=at_most,
-            tracker=tracker,
-            spill=self._spill,
-            between=self._between.get(name, ""),
+            name=name, unit=unit, at_most=at_most, tracker=tracker, spill=self._spill, between=between
         )
         self._series[name], self._worst[name] = series, tracker
         return series
@@ -132,6 +131,40 @@ class ResultLog(Mapping[str, Series]):
     def verdict(self) -> Verdict | None:
         """Verdict of the whole run; None when no criterion has one."""
         return worst_verdict(s.verdict for s in tuple(self._series.values()))
+
+    def verdicts(self) -> tuple[Verdict | None, ...]:
+        """Verdict of each criterion so far."""
+        return tuple(series.verdict for series in tuple(self._series.values()))
+
+    @property
+    def decided(self) -> float | None:
+        """Least share of the run that a criterion with a verdict decided, 0…1; None when none has one.
+
+        What a criterion did not apply in, or had nothing to judge in, takes nothing from it.
+        """
+        shares = []
+        for series in tuple(self._series.values()):
+            times = series.times()
+            if series.verdict is not None:
+                asked = 1.0 - times.muted - times.nothing
+                shares.append(times.decided / asked if asked > 0 else 0.0)
+        return min(shares, default=None)
+
+    def so_far(self, *, whole: bool) -> SoFar:
+        """What a page is told of the run: ``whole`` when that is all of it."""
+        criteria = {}
+        for name, series in tuple(self._series.items()):
+            times = series.times()
+            criteria[name] = CriterionSoFar(
+                verdict=series.verdict,
+                decided=times.decided,
+                undecided=times.undecided,
+                muted=times.muted,
+                nothing=times.nothing,
+                open=times.open,
+                reason=series.gap(),
+            )
+        return SoFar(verdict=self.verdict, decided=self.decided, criteria=criteria, whole=whole)
 
     @property
     def tracking(self) -> tuple[JointLog, ...]:

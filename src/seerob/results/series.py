@@ -1,4 +1,10 @@
-"""One criterion over time, in columns that grow without being copied at each tick."""
+"""One criterion over time, in columns that grow without being copied at each tick.
+
+What a run is, is said here once. It is exceeded when an instant of it is. It is within when at every instant
+at which the criterion applied it was within: also between the instants at which it was asked, as far as that
+is bounded, or accepted (`CriterionInfo.between`). It is undecided when any of that is not known, when the
+criterion never applied, or when it was never heard. Without any limit it has no verdict, and informs.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +33,9 @@ CODES: dict[Verdict | None, int] = {
 MAX_REASONS = 4096
 """Distinct reasons kept per series; a reason with a changing number in it must not fill the memory."""
 
+STILL = "accepted: no source moves anybody"
+"""Of `CriterionInfo.between`: one instant then is all of a run."""
+
 _RANK = {Verdict.EXCEEDED: 0, Verdict.UNDECIDED: 1, Verdict.WITHIN: 2, None: 3}
 
 
@@ -46,6 +55,34 @@ class Worst(NamedTuple):
     """The part whose verdict this is; empty when no part has it."""
     interval: tuple[float, float] | None = None
     """Where the true value lies, given the tolerances of the inputs; of a whole criterion only."""
+
+
+class Times(NamedTuple):
+    """How a run is divided, each a share of it, 0…1; of a run of one instant, 1 of what that is."""
+
+    within: float
+    exceeded: float
+    undecided: float
+    muted: float
+    """It did not apply."""
+    nothing: float
+    """It was asked, and there was nothing to judge, or no limit to judge by."""
+    open: float
+    """It was not asked, and nothing says what it would have said."""
+
+    @property
+    def decided(self) -> float:
+        """Share in which it was within or exceeded."""
+        return self.within + self.exceeded
+
+
+_WITHIN, _EXCEEDED, _UNDECIDED, _MUTED, _NOTHING, _OPEN = range(6)
+_STATE: dict[Verdict | None, int] = {
+    Verdict.WITHIN: _WITHIN,
+    Verdict.EXCEEDED: _EXCEEDED,
+    Verdict.UNDECIDED: _UNDECIDED,
+    None: _NOTHING,
+}
 
 
 class Spread(NamedTuple):
@@ -121,12 +158,25 @@ class Series:
         at_most: bool,
         tracker: WorstTracker | None = None,
         spill: Spill | None = None,
-        between: str = "",
+        between: str | None = None,
     ) -> None:
+        """Begin.
+
+        Args:
+            name: Of the criterion or part.
+            unit: Of its values.
+            at_most: Whether limits bound from above.
+            tracker: Of its worst instant; a part has none.
+            spill: Takes full blocks.
+            between: As of `CriterionInfo`; None of what no run announced, whose instants are all there is.
+        """
+        self.between = between
+        self._seconds = [0.0] * 6
+        self._instants = [0] * 6
+        self._snapshots = 0
         self.name = name
-        self._between = "" if between.startswith("accepted: ") else between
-        self.open = ""
-        """Why the run is not within although every instant of it is; empty when nothing is open."""
+        self.open = "" if between is None or between.startswith("accepted: ") else between
+        """Why the time between its instants is not within although they are; empty when that is known."""
         self.unit = unit
         self.at_most = at_most
         """Whether limits bound from above."""
@@ -137,6 +187,8 @@ class Series:
         self._reason_of: dict[str, int] = {"": 0}
         self._parts: dict[str, Series] = {}
         self._last_t: float | None = None
+        self._said: set[int] = set()
+        self._has_limit = False
         # Appended last at each tick: its length is how many ticks are whole.
         self._verdicts = Column("B", spill)
 
@@ -149,9 +201,54 @@ class Series:
         """Whether this is the last result of a criterion with a period, shown again."""
         return result.t is not None and result.t == self._last_t
 
-    def lasts(self) -> None:
-        """The run has more than one instant: what nobody knows between them counts from now on."""
-        self.open = self._between
+    def pass_time(self, result: Result | None, dt: float) -> None:
+        """Count the time since the snapshot before [s] for what the criterion says in this one.
+
+        Args:
+            result: None when it is not in the snapshot.
+            dt: Not below 0.
+        """
+        self._snapshots += 1
+        if result is None:
+            state = _OPEN
+        elif result.muted:
+            state = _MUTED
+        else:
+            state = _STATE[result.verdict]
+            if state == _WITHIN and self.open:
+                self._instants[_WITHIN] += 1
+                self._seconds[_OPEN] += dt
+                return
+        self._seconds[state] += dt
+        self._instants[state] += 1
+
+    def times(self) -> Times:
+        """How the run is divided so far; of what no run announced, its instants."""
+        counted: list[float] | list[int] = self._seconds if sum(self._seconds) > 0 else self._instants
+        if not sum(counted):
+            counted = [int((self.verdicts == CODES[v]).sum()) for v in Verdict] if self.known else []
+            shares = dict(zip((_STATE[v] for v in Verdict), counted, strict=False))
+            counted = [shares.get(state, 0) for state in range(6)]
+            counted[_NOTHING] = len(self) - sum(counted)
+        whole = sum(counted) or 1.0
+        return Times(*(part / whole for part in counted))
+
+    @property
+    def _is_open(self) -> bool:
+        return self.between is not None and self._seconds[_OPEN] > 0
+
+    @property
+    def _is_one_instant(self) -> bool:
+        return self.between is not None and self._snapshots == 1 and self.between != STILL
+
+    def gap(self) -> str:
+        """Why what was within whenever it was asked is not known to be within throughout; empty if it is."""
+        if self._is_open:
+            why = self.open or "it was not asked"
+            return f"not known in {self._seconds[_OPEN]:.4g} s of the run: {why}"
+        if self._is_one_instant:
+            return "the run is one instant, and sources say that something moves"
+        return ""
 
     def append(self, result: Result, t: float) -> None:
         """Add what the criterion said in the snapshot at run time ``t`` [s]."""
@@ -169,6 +266,8 @@ class Series:
                 series = Series(name=part.name, unit=part.unit, at_most=part.at_most, spill=self._spill)
                 self._parts[part.name] = series
             series.append(part, t)
+        self._said.add(CODES[result.verdict])
+        self._has_limit = self._has_limit or result.limit is not None
         self._verdicts.append(CODES[result.verdict])
 
     def __len__(self) -> int:
@@ -212,18 +311,21 @@ class Series:
 
     @property
     def verdict(self) -> Verdict | None:
-        """Of the whole run; UNDECIDED when nothing was heard, or a limit was never judged."""
+        """Of the whole run so far; see above."""
         if not self.known:
             return Verdict.UNDECIDED
-        present = set(np.unique(self.verdicts).tolist())
-        found = worst_verdict(v for v, code in CODES.items() if code in present)
-        if found is Verdict.WITHIN and self.open:
+        found = worst_verdict(v for v, code in CODES.items() if code in self._said)
+        if found is None and (self._never_judged() or self._never_applied()):
             return Verdict.UNDECIDED
-        return Verdict.UNDECIDED if found is None and self._never_judged() else found
+        open_ = self._is_open or self._is_one_instant
+        return Verdict.UNDECIDED if found is Verdict.WITHIN and open_ else found
+
+    def _never_applied(self) -> bool:
+        return self._instants[_MUTED] > 0 and self._instants[_MUTED] == sum(self._instants)
 
     def _never_judged(self) -> bool:
         """Whether a criterion, not a part of one, has a limit and a run too short to judge it by."""
-        return self._tracker is not None and not np.isnan(self.limits).all()
+        return self._tracker is not None and self._has_limit
 
     def max(self) -> float:
         """Largest value.
@@ -260,11 +362,11 @@ class Series:
             Undecided: Nothing was heard.
         """
         if self._tracker is not None and self._tracker.worst is not None:
-            worst = self._tracker.worst
-            if worst.verdict is Verdict.WITHIN and self.open:
-                reason = f"{self.open}; {worst.reason}".removesuffix("; ")
-                return worst._replace(verdict=self.verdict, reason=reason)
-            return worst if worst.verdict is not None else worst._replace(verdict=self.verdict)
+            worst, verdict = self._tracker.worst, self.verdict
+            if verdict is worst.verdict:
+                return worst
+            reason = "; ".join(filter(None, (self.gap() if worst.verdict else "", worst.reason)))
+            return worst._replace(verdict=verdict, reason=reason)
         if not self.known:
             raise Undecided(f"{self.name} was never heard in this run")
         return self._worst_of_arrays()

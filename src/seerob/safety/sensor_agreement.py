@@ -21,7 +21,6 @@ class SensorAgreement(Criterion, frozen=True, kw_only=True):
     """How long a real device and the twin have disagreed about whether somebody is in its field."""
 
     unit: ClassVar[str] = "s"
-
     variable: str
     """Variable of the dictionary, a bool, that the device tells."""
     field: str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from seerob.snapshot import Command, History, Snapshot, Transport
+from seerob.snapshot import Command, History, Snapshot, SoFar, Transport
 
 
 class Audience(Protocol):
@@ -13,7 +13,7 @@ class Audience(Protocol):
     def show(self, snapshot: Snapshot) -> None:
         """Send a snapshot; a page that is behind gets the newest only."""
 
-    def tell(self, message: Transport | History) -> None:
+    def tell(self, message: Transport | History | SoFar) -> None:
         """Send what changed; of each kind the newest only."""
 
 
@@ -30,6 +30,9 @@ class Feed(Protocol):
 
     def history(self) -> History:
         """What a page is told of the past when it connects."""
+
+    def so_far(self) -> SoFar | None:
+        """What the run came to; None when nobody judges it here."""
 
     def transport(self) -> Transport:
         """State of the player."""

@@ -24,6 +24,7 @@ from seerob.snapshot import (
     History,
     Scene,
     Snapshot,
+    SoFar,
     Tracked,
     Tracking,
     Transport,
@@ -91,7 +92,7 @@ class Hub:
         for client in self.clients:
             client.offer_frame(snapshot.seq, payload)
 
-    def tell(self, message: Transport | History) -> None:
+    def tell(self, message: Transport | History | SoFar) -> None:
         """Send a change to every page."""
         payload = _encode(message)
         for client in self.clients:
@@ -126,6 +127,8 @@ class Hub:
         client.offer("Hello", self._hello)
         client.offer("Scene", self._scene)
         client.offer("History", _encode(self._feed.history()))
+        if (so_far := self._feed.so_far()) is not None:
+            client.offer("SoFar", _encode(so_far))
         client.offer("Transport", _encode(self._feed.transport()))
         if self._newest is not None:
             client.offer_frame(self._newest.seq, _encode(on_the_wire(self._newest)))

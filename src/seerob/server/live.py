@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
+from time import monotonic
 
+from seerob.results.result_log import ResultLog
 from seerob.samples import Sample
 from seerob.server.feed import Audience
 from seerob.server.past import Past
 from seerob.server.serving import Server
 from seerob.sink import Closing
-from seerob.snapshot import Command, History, Scene, Snapshot, Transport
+from seerob.snapshot import Command, History, Scene, Snapshot, SoFar, Transport
 
 WAITING = 8192
 """Snapshots that wait for the server's thread; more than that are missing in the history only."""
+
+TELL_EVERY = 1.0
+"""How often pages are told the shares of a run that goes on [s]; a verdict that changes, at once."""
 
 
 class Live:
@@ -35,6 +40,8 @@ class Live:
         self._past = Past()
         self._newest = 0.0
         self._finished = False
+        self.log: ResultLog | None = None
+        """Of the run, which adds to it in its own thread."""
 
     def publish(self, snapshot: Snapshot) -> None:
         """Hand over what is now; returns at once."""
@@ -50,6 +57,10 @@ class Live:
         """What happened so far."""
         return self._past.history()
 
+    def so_far(self) -> SoFar | None:
+        """What the run came to by now."""
+        return None if self.log is None else self.log.so_far(whole=self._finished)
+
     def transport(self) -> Transport:
         """Always live; not playing once the run has ended."""
         return Transport(playing=not self._finished, t=self._newest, live=True)
@@ -60,6 +71,8 @@ class Live:
     async def run(self, audience: Audience) -> None:
         """Show the newest, at most ``rate`` times a second, until cancelled."""
         said_finished = False
+        told: tuple[object, ...] = ()
+        again = 0.0
         while True:
             finished = self._finished  # before looking: what was published earlier comes first
             newest = None
@@ -70,6 +83,14 @@ class Live:
                 self._newest = newest.t
                 audience.show(newest)
                 self._past.tidy()
+            now = monotonic()
+            if (
+                self.log is not None
+                and (verdicts := self.log.verdicts())
+                and (verdicts != told or now > again or (finished and not said_finished))
+            ):
+                told, again = verdicts, now + TELL_EVERY
+                audience.tell(self.log.so_far(whole=finished))
             if finished and not said_finished:
                 audience.tell(self.transport())
                 said_finished = True
@@ -107,6 +128,10 @@ class LiveView(Closing):
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Show one tick; never waits for a page."""
         self._live.publish(snapshot)
+
+    def share(self, log: ResultLog) -> None:
+        """Show what the run comes to, too."""
+        self._live.log = log
 
     def finish(self) -> None:
         """The run is over; pages may go on looking at what happened until `close`."""

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from seerob.results.result_log import ResultLog
 from seerob.server.feed import Audience
-from seerob.snapshot import Command, History, Scene, Snapshot, Transport
+from seerob.snapshot import Command, History, Scene, Snapshot, SoFar, Transport
 
 SLOWEST, FASTEST = 0.01, 100.0
 """Speeds are brought into this range."""
@@ -67,6 +67,7 @@ class Player:
         self._wake = asyncio.Event()
         self._log = ResultLog(recording.scene.criteria)
         self._history = self._log.history(POINTS)
+        self._so_far = self._log.so_far(whole=False)
 
     @property
     def duration(self) -> float:
@@ -76,6 +77,10 @@ class Player:
     def history(self) -> History:
         """The whole recording, or as much of it as was read by now."""
         return self._history
+
+    def so_far(self) -> SoFar:
+        """What the recorded run came to, as far as it was read by now."""
+        return self._so_far
 
     def transport(self) -> Transport:
         """State of the player."""
@@ -175,6 +180,7 @@ class Player:
         while more:
             more = await asyncio.to_thread(self._read_some, snapshots, monotonic() + _TELL_EVERY)
             audience.tell(self._history)
+            audience.tell(self._so_far)
 
     def _read_some(self, snapshots: Iterator[Snapshot], until: float) -> bool:
         more = False
@@ -184,4 +190,5 @@ class Player:
                 more = True
                 break
         self._history = self._log.history(POINTS)
+        self._so_far = self._log.so_far(whole=not more)
         return more

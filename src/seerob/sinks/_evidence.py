@@ -76,7 +76,7 @@ def evaluated(report: Report) -> Html:
     span = f"{figure(log.start, 's')} to {figure(log.end, 's')}, {log.ticks} ticks, period {scene.period:g} s"
     facts: list[list[str | Html]] = [
         ["workstation", scene.title],
-        ["edition of the limits", scene.edition],
+        ["editions of the figures", scene.edition],
         ["run time", span],
         *([what, value] for what, value in how.engine),
         *(

@@ -35,7 +35,7 @@ def page(report: Report) -> str:
     body = tag(
         "body",
         tag("h1", title),
-        tag("p", f"seerob {scene.version} · limits from {scene.edition} · {report.date}", class_="lead"),
+        tag("p", f"seerob {scene.version} · figures from {scene.edition} · {report.date}", class_="lead"),
         _opening(report),
         _verdicts(report),
         _criteria(report),
@@ -46,6 +46,12 @@ def page(report: Report) -> str:
         evaluated(report),
     )
     return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en") + "\n"
+
+
+_SHARES = (
+    "Shares are of the run's time. Decided is what was within or exceeded; what is left of it was undecided, "
+    "or a criterion did not apply (muted, nobody near)."
+)
 
 
 def _opening(report: Report) -> Html:
@@ -80,9 +86,9 @@ def _verdicts(report: Report) -> Html:
     for series in report.log.ranked():
         link = tag("a", series.name, href=f"#{_anchor(report, series)}")
         if not series.known:
-            rows.append([link, badge(series.verdict), "–", "–", "–", "–", "–", "never gave a result"])
+            rows.append([link, badge(series.verdict), *["–"] * 6, "never gave a result"])
             continue
-        worst, shares = series.worst(), series.shares()
+        worst, times = series.worst(), series.times()
         rows.append(
             [
                 link,
@@ -90,8 +96,9 @@ def _verdicts(report: Report) -> Html:
                 whole(reached(worst, series)),
                 whole(_limit(series)),
                 whole(f"{worst.t:.2f} s"),
-                percent(shares.get(Verdict.EXCEEDED, 0.0)),
-                percent(shares.get(Verdict.UNDECIDED, 0.0)),
+                "–" if series.verdict is None else percent(times.decided),
+                percent(times.exceeded),
+                percent(times.undecided + times.open),
                 worst.reason or worst.part,
             ]
         )
@@ -101,6 +108,7 @@ def _verdicts(report: Report) -> Html:
         "worst value",
         "limit",
         "at",
+        "decided",
         "exceeded",
         "undecided",
         "what governs, or why",
@@ -110,7 +118,7 @@ def _verdicts(report: Report) -> Html:
         [
             tag("h2", "Verdicts"),
             table(head, rows, class_="overview"),
-            tag("p", "Shares are of the evaluated ticks.", class_="lead"),
+            tag("p", _SHARES, class_="lead"),
             tag("figure", _plots.lanes(shown, salt="lanes"), tag("figcaption", "The verdicts over the run."))
             if shown
             else None,
@@ -149,7 +157,8 @@ def _described(info: CriterionInfo | None) -> Html | None:
     if info is None:
         return None
     about_ = f" Speaks of {', '.join(info.subjects)}." if info.subjects else ""
-    return tag("p", f"{info.title}{about_}", class_="lead")
+    between = f" Between the instants at which it was asked: {info.between or 'bounded'}."
+    return tag("p", f"{info.title}{about_}{between}", class_="lead")
 
 
 def _picture(report: Report, series: Series) -> Html | None:

@@ -123,6 +123,26 @@ def summary(log: ResultLog) -> list[str]:
     return said
 
 
+def covered(series: Series) -> str:
+    """Of which share of the run a verdict speaks: ``decided 40 % of the run, did not apply in 60 %``.
+
+    Empty when that is all of it, or when there is no verdict.
+    """
+    times = series.times()
+    if series.verdict is None or times.decided > 1 - 1e-12:
+        return ""
+    said = [f"decided {percent(times.decided)} of the run"]
+    for share, what in (
+        (times.undecided, "undecided in"),
+        (times.open, "not asked in"),
+        (times.muted, "did not apply in"),
+        (times.nothing, "nothing to judge in"),
+    ):
+        if share > 1e-12:
+            said.append(f"{what} {percent(share)}")
+    return ", ".join(said)
+
+
 def about(series: Series) -> list[str]:
     """What the paragraph of one criterion says."""
     if not series.known:
@@ -144,9 +164,14 @@ def about(series: Series) -> list[str]:
             f"In {percent(share)} of the evaluated ticks nothing can be said, "
             f"{_stretches(series, Verdict.UNDECIDED)}. {_reasons(series)}"
         )
+    if gap := series.gap():
+        said.append(f"{gap[0].upper()}{gap[1:]}.")
+    if part := covered(series):
+        said.append(f"{part[0].upper()}{part[1:]}.")
     if series.verdict is Verdict.WITHIN:
+        when = "whenever it applied" if part else "throughout"
         said.append(
-            f"Within the limit throughout. Closest to it at {worst.t:.2f} s: {reached(worst, series)}"
+            f"Within the limit {when}. Closest to it at {worst.t:.2f} s: {reached(worst, series)}"
             f"{_against(series)}."
         )
     if series.verdict is None:

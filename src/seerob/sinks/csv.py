@@ -155,7 +155,7 @@ class CsvWriter(WholeFolder):
         scene = self._scene
         found: list[tuple[str, Value]] = [
             ("workstation", scene.title),
-            ("edition of the limits", scene.edition),
+            ("editions of the figures", scene.edition),
             ("inputs, SHA-256", scene.workstation_hash),
             ("seerob", scene.version),
             ("period of the ticks [s]", scene.period),

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from seerob.errors import InputError
+from seerob.norms.editions import editions
 from seerob.results.result_log import result_named
 from seerob.results.series import CODES, Series
 from seerob.samples import Sample
@@ -137,7 +138,7 @@ class ExcelWriter(AtEndWithResults):
             basis = self._bases.get(series.name)
             formula, source = ("", "") if basis is None else (basis.formula, basis.source)
             verdict = "no limit" if series.verdict is None else series.verdict.value
-            tail: list[Cell] = [formula, source, self._scene.edition]
+            tail: list[Cell] = [formula, source, ", ".join(editions([basis]))]
             if not series.known:
                 yield [
                     series.name,

@@ -4,10 +4,10 @@ import { useSignal } from "@preact/signals";
 import { Fragment } from "preact";
 import { against, between, gap, percent, steady, withUnit } from "../figures";
 import { formatTime } from "../format";
-import { mutedCriteria, type Row, scene, select, selection, stale, toggleMuted } from "../page_state";
+import { mutedCriteria, type Row, scene, select, selection, soFar, stale, toggleMuted } from "../page_state";
 import { worstOf } from "../posture/instants";
 import { orderedRows } from "../row_order";
-import { margin } from "../verdicts";
+import { margin, STATE_WORDS } from "../verdicts";
 import type { CriterionInfo, Result } from "../wire";
 import { BasisView } from "./BasisView";
 import { Icon } from "./Icon";
@@ -180,6 +180,26 @@ function hint({ info }: Row): string {
   return basis ? `${info.title}\n${basis.formula}\n${basis.source}` : info.title;
 }
 
+/** What the whole run came to, and of which share of it that speaks. */
+function RunSoFar({ info }: { info: CriterionInfo }) {
+  const told = soFar.value?.criteria[info.name];
+  if (!told) return null;
+  const shares: [number, string][] = [
+    [told.decided, "decided"],
+    [told.undecided, "undecided"],
+    [told.open, "not asked"],
+    [told.muted, "did not apply"],
+    [told.nothing, "nothing to judge"],
+  ];
+  const parts = shares.filter(([share]) => share > 0).map(([share, what]) => `${what} ${percent(share)}`);
+  return (
+    <p class="run-so-far">
+      Run{soFar.value?.whole ? "" : " so far"}: {told.verdict ? STATE_WORDS[told.verdict] : "no verdict"};{" "}
+      {parts.join(", ")} of the time{told.reason !== "" && `; ${told.reason}`}
+    </p>
+  );
+}
+
 function Details({ row }: { row: Row }) {
   const { info, result } = row;
   return (
@@ -188,6 +208,7 @@ function Details({ row }: { row: Row }) {
       {result?.interval && (
         <p>True value between {between(result.interval, result.unit)}, given the tolerances of the inputs.</p>
       )}
+      <RunSoFar info={info} />
       <WorstInstants info={info} />
       {result && result.parts.length > 0 && <Parts parts={result.parts} />}
       {info.basis ? <BasisView basis={info.basis} /> : <p class="unknown">No basis was stated.</p>}

@@ -44,7 +44,6 @@ export function ElsewhereNote({ other }: { other: Elsewhere }) {
       aria-live="off"
       onClick={visit}
     >
-      {!following && <span class="pill-instant">at this instant; </span>}
       <span aria-hidden="true">{STATE_ICONS[verdict]} </span>
       {STATE_WORDS[verdict]} {following ? ago(now.value - latest.end) : "elsewhere"}: {name}
       {more}

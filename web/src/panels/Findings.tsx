@@ -15,6 +15,7 @@ export function allFindings(): Finding[] {
     level: "warning",
     subject,
     text: "its mesh could not be fetched: it is evaluated but not drawn",
+    holds: [],
   }));
   const found = [...(scene.value?.findings ?? []), ...missing];
   return found.sort((a, b) => rank(a) - rank(b));

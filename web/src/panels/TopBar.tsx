@@ -1,9 +1,22 @@
-// What is shown, from where, and the worst that is said about it.
+// What is shown, from where, and what the run came to.
 
-import { against, withUnit } from "../figures";
-import { elsewhere, frame, hello, isLive, link, lookingAt, overall, rows, scene, stale } from "../page_state";
+import { against, percent, withUnit } from "../figures";
+import {
+  elsewhere,
+  frame,
+  hello,
+  isLive,
+  link,
+  lookingAt,
+  overall,
+  rows,
+  runState,
+  scene,
+  soFar,
+  stale,
+} from "../page_state";
 import { orderedRows } from "../row_order";
-import { STATE_ICONS, type State } from "../verdicts";
+import { STATE_ICONS, STATE_WORDS, type State } from "../verdicts";
 import type { Result } from "../wire";
 import { ElsewhereNote } from "./ElsewhereNote";
 import { HeadsetOffer } from "./HeadsetOffer";
@@ -56,11 +69,10 @@ const HEADLINES: Record<State, string> = {
 };
 
 /**
- * The worst verdict, and the criterion that gives it. Grey as soon as it may be out of date; it speaks of
- * the instant on screen, and says so where a recording is, or a live run was, worse at another.
+ * The verdict of the run, so far; beside it that of the instant on screen, and the criterion that gives it.
+ * Grey as soon as it may be out of date.
  */
 function StatusPill() {
-  const state = overall.value;
   if (stale.value || !frame.value) {
     return (
       <output class="pill state-off" aria-live="polite">
@@ -71,37 +83,51 @@ function StatusPill() {
       </output>
     );
   }
-  const there = orderedRows.value.filter((row) => row.state === state);
-  const worst = there[0];
-  const others = there.length - 1;
+  const run = runState.value;
   const other = elsewhere.value;
-  const detail = worst && state !== "within" && state !== "none" ? ` ${worst.info.name}` : "";
+  const told = soFar.value;
   return (
-    <output class={`pill state-${state}`} aria-live="polite">
+    <output class={`pill state-${run}`} aria-live="polite">
       <span class="badge-icon" aria-hidden="true">
-        {STATE_ICONS[state]}
+        {STATE_ICONS[run]}
       </span>
       <strong>
-        {HEADLINES[state]}
-        {other && isLive.value && lookingAt.value === null && " NOW"}
+        {HEADLINES[run]}
+        {told?.whole !== true && " SO FAR"}
       </strong>
-      {detail && (
-        <span class="pill-detail" title={worst?.info.name}>
-          {detail}
-        </span>
+      {run === "within" && <span class="pill-more">all {judgedCount()} with a limit</span>}
+      {run === "within" && told?.decided != null && told.decided < 1 && (
+        <span class="pill-more">decided {percent(told.decided)}</span>
       )}
-      {worst?.result && detail && worst.result.value !== null && (
-        <span class="pill-value" aria-hidden="true">
-          {pillFigure(worst.result)}
-        </span>
-      )}
+      <AtInstant />
       {other && <ElsewhereNote other={other} />}
-      {!detail && !other && state !== "none" && (
-        <span class="pill-more">all {judgedCount()} with a limit</span>
-      )}
-      {detail && others > 0 && <span class="pill-more">+{others}</span>}
       {lookingAt.value !== null && <span class="pill-more">looking back</span>}
     </output>
+  );
+}
+
+/** What holds at the instant on screen. */
+function AtInstant() {
+  const state = overall.value;
+  const there = orderedRows.value.filter((row) => row.state === state);
+  const worst = there[0];
+  const named = worst && state !== "within" && state !== "none";
+  const when = isLive.value && lookingAt.value === null ? "now" : "here";
+  return (
+    <span class={`pill-now now-${state}`}>
+      {when} <span aria-hidden="true">{STATE_ICONS[state]}</span> {STATE_WORDS[state]}
+      {named && (
+        <span class="pill-detail" title={worst.info.name}>
+          {` ${worst.info.name}`}
+        </span>
+      )}
+      {named && worst.result && worst.result.value !== null && (
+        <span class="pill-value" aria-hidden="true">
+          {` ${pillFigure(worst.result)}`}
+        </span>
+      )}
+      {named && there.length > 1 && <span class="pill-more"> +{there.length - 1}</span>}
+    </span>
   );
 }
 

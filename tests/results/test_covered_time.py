@@ -1,0 +1,156 @@
+"""The verdict of a run covers the time that was asked, bounded or accepted; nothing else is within."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, two_r
+from seerob.judging import UNBOUNDED
+from seerob.results.result_log import ResultLog
+from seerob.results.series import STILL
+from seerob.snapshot import CriterionInfo, Result, Snapshot, Verdict
+
+W, E, U = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+EXAMPLES = Path(__file__).parent.parent.parent / "examples"
+
+
+def told(rows, between="", limit=2.0):
+    """A log of (t, verdict); ``muted`` and ``absent`` stand for those."""
+    log = ResultLog([CriterionInfo(name="v", kind="k", group="safety", title="", between=between)])
+    for k, (t, verdict) in enumerate(rows):
+        muted = verdict == "muted"
+        said = Result(
+            name="v",
+            value=None if muted else 1.0,
+            limit=None if muted else limit,
+            verdict=None if muted else verdict,
+            muted=muted,
+        )
+        log.add(Snapshot(seq=k, t=t, poses=b"", results=() if verdict == "absent" else (said,)))
+    return log
+
+
+@pytest.mark.parametrize(
+    ("rows", "between", "verdict"),
+    [
+        ([(0, W), (4, W)], "", W),
+        ([(0, W), (4, W)], "accepted: slow", W),
+        ([(0, W), (4, W)], UNBOUNDED, U),  # nobody knows what was in these four seconds
+        ([(0, W), (4, E)], UNBOUNDED, E),
+        ([(0, W)], "", U),  # one instant of something that moves is no run
+        ([(0, W)], STILL, W),
+        ([(0, E)], "", E),
+        ([(0, "muted"), (4, "muted")], "", U),  # it never decided
+        ([(0, "muted"), (3, "muted"), (4, W)], "", W),
+        ([(0, None), (4, None)], "", U),  # it has a limit, and never judged by it
+        ([(0, W), (1, "absent"), (4, W)], "", U),
+        ([], "", U),
+    ],
+)
+def test_a_run_is_within_only_where_it_was_asked_bounded_or_accepted(rows, between, verdict):
+    log = told(rows, between)
+    assert (log.verdict, log["v"].verdict) == (verdict, verdict)
+    if rows and "muted" not in dict(rows).values():
+        worst = log["v"].worst()
+        assert worst.verdict is verdict
+        assert (log["v"].gap() in worst.reason) or verdict is E
+
+
+def test_what_has_no_limit_informs_and_holds_nobody():
+    log = told([(0, None), (4, None)], UNBOUNDED, limit=None)
+    assert (log.verdict, log["v"].times().nothing) == (None, 1.0)
+
+
+def test_shares_of_time_are_of_time():
+    rows = [(0, W), (1, W), (3, U), (3.5, "muted"), (4, E), (10, "absent")]
+    times = told(rows).get("v").times()
+    assert times == pytest.approx((0.1, 0.05, 0.2, 0.05, 0.0, 0.6))
+    assert times.decided == pytest.approx(0.15)
+    assert sum(times) == pytest.approx(1.0)
+    assert told([(0, W)], STILL)["v"].times().decided == 1.0
+    # Of a run that nobody announced its instants are all there is.
+    plain = ResultLog()
+    for k, verdict in enumerate((W, E, U, None)):
+        plain.add(Snapshot(seq=k, t=0.0, poses=b"", results=(Result(name="v", verdict=verdict),)))
+    assert plain["v"].times() == (0.25, 0.25, 0.25, 0.0, 0.25, 0.0)
+
+
+ROWS = "t [s],J1 [rad],J2 [rad]\n" + "".join(f"{k / 10:.1f},{0.01 * k:.2f},0\n" for k in range(41))
+OWN = """
+from acme.work_height import WorkHeight as _WorkHeight
+
+class Height(_WorkHeight, frozen=True, kw_only=True):
+    '''Height of which nothing is known between two instants.'''
+    def falls(self, model, points): return None
+"""
+HEIGHT = '[[safety]]\nkind = "heights.unbounded"\nname = "height"\nat = "arm"\nlimit = 9\n'
+ARM = '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "m.csv"\n'
+
+
+@pytest.fixture(scope="module")
+def heights(tmp_path_factory):
+    """Folder of a package with a criterion of which nothing is known between two instants."""
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "heights").mkdir()
+    (folder / "heights" / "__init__.py").touch()
+    (folder / "heights" / "unbounded.py").write_text(OWN)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("more", "verdict", "decided"),
+    [
+        ("every = 4\n", U, 0.0),
+        ("", U, 0.0),
+        ('every = 4\nbetween_samples = "accepted: it goes along a rail"\n', W, 1.0),
+        ('between_samples = "accepted: it goes along a rail"\n', W, 1.0),
+    ],
+)
+def test_what_is_asked_once_in_four_seconds_is_not_within_throughout(
+    tmp_path, monkeypatch, heights, more, verdict, decided
+):
+    """Nothing bounds a criterion of one's own between its instants, unless it says what does."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    monkeypatch.syspath_prepend(str(heights))
+    cell = FLOATING + TWO_R + ARM + HEIGHT + more
+    found = made(tmp_path, cell, {"m.csv": ROWS, "arm.urdf": two_r()}).run().results["height"]
+    assert (found.verdict, found.times().decided) == (verdict, decided)
+    worst = found.worst()
+    assert (worst.value, worst.verdict) == (0.0, verdict)
+    assert ("nothing bounds it between" in worst.reason) is (verdict is U)
+
+
+def test_a_bound_covers_what_is_not_asked(tmp_path):
+    """A speed is bounded from instant to instant, so that a long period decides all of it."""
+    speed = '[[safety]]\nkind = "velocity"\nname = "v"\nat = "arm"\nlimit = 9\nevery = 4\n'
+    found = made(tmp_path, FLOATING + TWO_R + ARM + speed, {"m.csv": ROWS, "arm.urdf": two_r()}).run()
+    assert (found.verdict, found.results["v"].times().decided) == (W, 1.0)
+
+
+def test_the_share_is_told_to_people_and_to_machines_and_the_exit_code_follows(tmp_path, heights):
+    for name, text in (
+        ("workstation.toml", FLOATING + TWO_R + ARM + HEIGHT + "every = 4\n"),
+        ("m.csv", ROWS),
+        ("arm.urdf", two_r()),
+    ):
+        (tmp_path / name).write_text(text)
+    env = {"PYTHONPATH": f"{EXAMPLES}:{heights}", "PATH": "/usr/bin:/bin"}
+    asked = [sys.executable, "-m", "seerob", "assess", str(tmp_path), "-o", str(tmp_path / "out"), "--json"]
+    done = subprocess.run(asked, capture_output=True, text=True, check=False, env=env)
+    assert done.returncode == 2, done.stderr
+    told = json.loads(done.stdout)
+    (criterion,) = told["criteria"]
+    assert (told["verdict"], told["decided"]) == ("undecided", 0.0)
+    assert (criterion["verdict"], criterion["times"]["open"], criterion["times"]["within"]) == (
+        "undecided",
+        1,
+        0,
+    )
+    page = next((tmp_path / "out").rglob("*.html")).read_text()
+    assert "nothing bounds it between" in page
+    assert "Decided 0 % of the run, not asked in 100 %" in page

@@ -148,7 +148,7 @@ def test_the_integrator_of_a_run_changes_free_energy_in_proportion_to_its_step(t
 
 @pytest.mark.parametrize(("velocities", "within"), [(True, 2e-5), (False, 5e-4)])
 def test_the_energy_of_a_run_is_that_of_the_motion_it_follows(ur10, velocities, within):
-    """Pulled as in every run, with 100 Hz samples: of the largest energy, which is that of a pinned motion."""
+    """Pulled as in every run, with 100 Hz samples; the truth is that of a twin put on the motion."""
     robot, mj = ur10.model.robot("arm"), ur10.model.mj
     data, M = mujoco.MjData(mj), np.zeros((mj.nv, mj.nv))
     off, largest = 0.0, 0.0

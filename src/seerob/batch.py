@@ -248,6 +248,8 @@ def _able(
             notes[criterion.name] = "asked instant by instant: with these options it is not made for batches"
         elif held(criterion, model, findings) or unmentioned(criterion, model):
             notes[criterion.name] = "asked instant by instant: a finding holds what it is about"
+        elif criterion.heavier_is_worse and any(m.unknown_masses for m in model.mechanisms.values()):
+            notes[criterion.name] = "asked instant by instant: masses are not known"
         elif criterion.variables():
             notes[criterion.name] = "asked instant by instant: it follows variables"
         else:

@@ -46,6 +46,8 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     by_shape: ClassVar[bool] = True
     """Whether it is about the shapes of its subjects, so that what no shape shows of a robot could make it
     worse; False only where no distance, area, volume or point of a surface is in it."""
+    heavier_is_worse: ClassVar[bool] = False
+    """Whether more mass of a robot is never better, so that what the known masses exceed is exceeded."""
     whole: ClassVar[bool] = True
     """Whether all that it depends on must be where the twin shows it before it is asked. One that judges
     people bone by bone, or for which what is known may suffice, says False: what it asks of must be still."""

@@ -57,6 +57,10 @@ class Undecided(SeerobError):
     """
 
 
+class Unweighed(Undecided):
+    """A mass that nobody gave; what is known of the others may be enough to exceed a limit."""
+
+
 class NotAsked(SeerobError):
     """A criterion read what does not say whether it may be relied on, instead of asking `State`."""
 

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from seerob.between_ticks import Asking, BetweenTicks, Watch
 from seerob.criterion import Criterion, Evaluate
-from seerob.errors import SeerobError, Undecided, UnknownName
+from seerob.errors import SeerobError, Undecided, UnknownName, Unweighed
 from seerob.model import Model
 from seerob.plugin import PluginError
 from seerob.snapshot import Basis, Finding, Result, Row, Verdict
@@ -303,6 +303,19 @@ class Judge:
             self._kept[i] = _Kept(result, state.t, due, muted, asked)
         return result
 
+    def _at_least(self, i: int, evaluate: Evaluate, state: State, reason: str) -> Result:
+        """What the known masses of a robot exceed, when others are not known; else undecided."""
+        criterion = self._bound[i].criterion
+        if criterion.heavier_is_worse:
+            try:
+                with state.asking(), state.known_masses_alone():
+                    result = self._asked(i, evaluate, state)
+                if result.verdict is _EXCEEDED:
+                    return undecided(replace(result, reason=f"{result.reason}; at least: {reason}"), reason)
+            except Exception as error:
+                _log.debug("%s: %s", criterion.name, error)
+        return _unknown(criterion, reason)
+
     def _now(self, i: int, evaluate: Evaluate, state: State) -> tuple[Result, bool]:
         """What a criterion says of a state, and whether it did not apply there."""
         bound = self._bound[i]
@@ -311,6 +324,8 @@ class Judge:
             with state.asking():
                 muted = self._muted(bound.criterion, state)
                 result = muted or self._asked(i, evaluate, state)
+        except Unweighed as reason:
+            result = self._at_least(i, evaluate, state, str(reason))
         except Undecided as reason:
             result = _unknown(bound.criterion, str(reason))
         except Exception as error:

@@ -114,6 +114,8 @@ class Mechanism:
     """Every `mujoco` body that its joints move, tools and workpieces included."""
     masses: tuple[LinkMass, ...]
     """What each of its links weighs, and each thing on it."""
+    unweighed: tuple[int, ...]
+    """Bodies of `mujoco` that have another mass than nobody gave: what moves the twin in its place."""
     load: frozenset[int]
     """Bodies of `mujoco` that count as its load: what is mounted on it, by its own file too."""
     unknown_masses: tuple[str, ...]

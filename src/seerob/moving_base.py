@@ -83,6 +83,8 @@ def energy_of(state: State, robot: Mechanism) -> float:
     state.mass_matrix(robot)  # raises for the reasons that it has
     found = 0.0
     for body in robot.mj_bodies:
+        if body in robot.unweighed:
+            continue
         spin, at_root = data.cvel[body][:3], data.cvel[body][3:]
         v_c = at_root + np.cross(spin, data.xipos[body] - data.subtree_com[mj.body_rootid[body]])
         local = data.ximat[body].reshape(3, 3).T @ spin

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from seerob.bearers import Bearers
 from seerob.distances.least import Closest, Closests, Per, Query
 from seerob.distances.surveying import Surveyor
-from seerob.errors import NotAsked, Undecided
+from seerob.errors import NotAsked, Undecided, Unweighed
 from seerob.joint_columns import Columns
 from seerob.kernels.chain import along
 from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
@@ -58,6 +58,7 @@ class State:
         self._data, self._hearings = data, hearings
         self._signals = signals or Signals(model.dictionary, {})
         self._closed = False
+        self._at_least = False
         self.path: Path | None = None
         """How everybody came here from the last tick, whoever was heard: for bounds; None where there was
         none."""
@@ -551,8 +552,31 @@ class State:
         self.require(mechanism.name, *mechanism.holders)
         if lost := self.bearers.unknown.keys() & set(mechanism.carried):
             raise Undecided(self.bearers.unknown[min(lost)])
-        if mechanism.unknown_masses:
-            raise Undecided("; ".join(mechanism.unknown_masses))
+        if mechanism.unknown_masses and not self._at_least:
+            raise Unweighed("; ".join(mechanism.unknown_masses))
+
+    @contextmanager
+    def known_masses_alone(self) -> Iterator[None]:
+        """While only what would be exceeded by less is asked: what nobody weighed weighs nothing meanwhile.
+
+        Of a mass matrix, and of what grows with it, that is a bound from below.
+        """
+        kept, self._cache, self._at_least = self._cache, {}, True
+        try:
+            yield
+        finally:
+            self._cache, self._at_least = kept, False
+
+    def _known(self, mechanism: Mechanism, M: Array) -> Array:
+        """A mass matrix without the bodies that nobody weighed, and with what keeps it invertible."""
+        mj, rows = self.model.mj, np.zeros((6, self.model.mj.nv))
+        for body in mechanism.unweighed:
+            mujoco.mj_jacBodyCom(mj, self._data, rows[:3], rows[3:], body)
+            moved = self.columns[mechanism.name].of_rows(rows)
+            turn = self._data.ximat[body].reshape(3, 3)
+            inertia = turn @ np.diag(mj.body_inertia[body]) @ turn.T
+            M = M - mj.body_mass[body] * moved[:3].T @ moved[:3] - moved[3:].T @ inertia @ moved[3:]
+        return np.asarray(M + (1e-9 * np.trace(M) + 1e-15) * np.eye(len(M)))
 
     def mass_matrix(self, mechanism: Mechanism) -> Array:
         """Joint-space mass matrix M(q) with tools and workpieces [kg·m², kg·m or kg], shape (n, n).
@@ -569,7 +593,8 @@ class State:
                 mujoco.mj_makeM(self.model.mj, self._data)
                 mujoco.mj_fullM(self.model.mj, self._data, self._full_mass_matrix)
                 self._cache["M"] = self._full_mass_matrix
-            self._cache[key] = self.columns[mechanism.name].of_matrix(self._full_mass_matrix)
+            M = self.columns[mechanism.name].of_matrix(self._full_mass_matrix)
+            self._cache[key] = self._known(mechanism, M) if mechanism.unknown_masses else M
         return np.asarray(self._cache[key])
 
     # -- kinematics -------------------------------------------------------------------------

@@ -67,6 +67,7 @@ def test_what_nobody_weighed_behind_a_fixed_joint_leaves_it_undecided(tmp_path, 
     cell = station(tmp_path, gripper(inside))
     found = results_at(cell, arm=FAST)
     assert re.search(said, rows(cell)["arm/tip"].note or cell.model.robot("arm").unknown_masses[0])
+    found[CONTACT] = results_at(cell, arm=((0.0, 0.0), (0.05, 0.0)))[CONTACT]
     for name in (ENERGY, EFFECTIVE, CONTACT):
         assert (name, found[name].verdict) == (name, "undecided")
         assert re.search(said, found[name].reason)
@@ -212,3 +213,47 @@ def test_a_volume_that_is_known_within_bounds_leaves_the_mass_within_them(tmp_pa
     assert energy.value - low == pytest.approx(body.mass.error * carried, rel=1e-9)
     heaviest = MassTolerances(cell.model, cell.model.robot("arm")).heaviest_load()
     assert heaviest == pytest.approx(body.mass.value * (1 + body.mass.error))
+
+
+def test_what_the_known_masses_exceed_is_exceeded_whatever_else_weighs(tmp_path):
+    """2.5 J of the two known links and 11.5 J with a gripper of 3 kg, which nobody weighed."""
+    six = SIX.format(0.01)
+    for limit, known, unknown in ((2.0, "exceeded", "exceeded"), (5.0, "exceeded", "undecided")):
+        for inside, verdict in ((f'<inertial><mass value="3"/>{six}</inertial>', known), ("", unknown)):
+            text = CRITERIA.replace("limit = 100", f"limit = {limit}", 1)
+            folder = tmp_path / f"{limit}{bool(inside)}"
+            urdf = gripper(inside + BOX.format(0.1))
+            cell = made(folder, FLOATING + TWO_R + text, {"arm.urdf": urdf})
+            result = results_at(cell, arm=FAST)[ENERGY]
+            assert (limit, result.verdict) == (limit, verdict)
+            if not inside and verdict == "exceeded":
+                assert result.value == pytest.approx(2.5)
+                assert "nobody gave the mass of arm/tip" in result.reason
+            motion = {"arm": np.zeros((1, 2))}
+            batch = cell.batch(motion, {"arm": np.array([[1.0, 0.0]])})
+            assert batch[ENERGY].verdict == verdict
+
+
+@pytest.mark.parametrize("last", [0, 1])
+def test_a_placeholder_that_moves_the_twin_is_no_mass_that_exceeds_anything(tmp_path, last):
+    """Of a link without a mass: the energy is that of the other one alone."""
+    urdf = re.sub(rf'(<link name="l{1 + last}">)<inertial>.*?</inertial>', r"\1", two_r())
+    text = CRITERIA.replace("limit = 100", "limit = 0.4", 1)
+    cell = made(tmp_path, FLOATING + TWO_R + text, {"arm.urdf": urdf})
+    result = results_at(cell, arm=FAST)[ENERGY]
+    assert result.verdict == "exceeded"
+    assert result.value == pytest.approx(0.5 if last else 2.0)
+
+
+def test_contact_and_effective_mass_exceed_by_what_is_known(tmp_path):
+    known = station(tmp_path / "known", gripper(INERTIAL + BOX.format(0.1)))
+    unknown = station(tmp_path / "unknown", gripper(BOX.format(0.1)))
+    fast = ((0.0, 0.1), (4.0, 0.0))
+    for cell in (known, unknown):
+        assert results_at(cell, arm=fast)[CONTACT].verdict == "exceeded"
+    text = CRITERIA.replace('at = "arm"\nlimit = 100', 'at = "arm/l2"\nlimit = 0.5')
+    for folder, inside in (("k", INERTIAL), ("u", "")):
+        cell = made(
+            tmp_path / folder, FLOATING + TWO_R + text, {"arm.urdf": gripper(inside + BOX.format(0.1))}
+        )
+        assert results_at(cell, arm=fast)[EFFECTIVE].verdict == "exceeded"

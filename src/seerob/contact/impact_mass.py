@@ -20,7 +20,7 @@ from seerob.transforms import Array
 def simplified_mass(model: Model, robot: Mechanism) -> float:
     """M/2 + m_L of ISO/TS 15066:2016 A.4 [kg]: links by half, tools and workpieces in full.
 
-    Means nothing where `Mechanism.unknown_masses` names any.
+    Where `Mechanism.unknown_masses` names any, of the known masses alone.
     """
     return float(collision.robot_mass(*moving_masses(model, robot)))
 
@@ -29,10 +29,10 @@ def moving_masses(model: Model, robot: Mechanism) -> tuple[float, float]:
     """M and m_L: mass of the links that the joints move, and of what is mounted beyond the flange [kg].
 
     A gripper counts as load, whether the robot's own file has it or the workstation file.
-    Mean nothing where `Mechanism.unknown_masses` names any.
+    Where `Mechanism.unknown_masses` names any, of the known masses alone.
     """
-    masses = {int(i): float(model.mj.body_mass[i]) for i in robot.mj_bodies}
-    load = sum(masses[i] for i in sorted(robot.load))
+    masses = {int(i): float(model.mj.body_mass[i]) for i in robot.mj_bodies if i not in robot.unweighed}
+    load = sum(mass for i, mass in masses.items() if i in robot.load)
     return sum(masses.values()) - load, load
 
 

@@ -145,6 +145,11 @@ def mechanism(
         moving=tuple(b.index for b in own_bodies if b.mj in moving_ids),
         mj_bodies=mj_bodies,
         masses=masses,
+        unweighed=tuple(
+            i
+            for row in masses
+            if row.mass is None and (i := own.get(row.name, 0)) in moving_ids and mj.body_mass[i] > 0
+        ),
         load=frozenset(
             i for full, i in own.items() if i in moving_ids and (full not in links or full in beyond)
         ),

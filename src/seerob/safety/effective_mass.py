@@ -84,6 +84,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
     """Mass that somebody hit by a point of the robot would feel, along its motion or toward a person."""
 
     unit: ClassVar[str] = "kg"
+    heavier_is_worse: ClassVar[bool] = True
     whole: ClassVar[bool] = False
 
     at: str

@@ -42,6 +42,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
     """Kinetic energy of a whole robot or machine with everything mounted on it."""
 
     unit: ClassVar[str] = "J"
+    heavier_is_worse: ClassVar[bool] = True
     by_shape: ClassVar[bool] = False
 
     robot: str

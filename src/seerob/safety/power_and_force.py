@@ -60,6 +60,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     """Power and force limiting: speed of every moving part against what each body region may be hit with."""
 
     unit: ClassVar[str] = "m/s"
+    heavier_is_worse: ClassVar[bool] = True
     whole: ClassVar[bool] = False
 
     robot: str

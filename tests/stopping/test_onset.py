@@ -11,6 +11,7 @@ from made_separation import KNOWN, TABLE, K, V, part, separation, station, terms
 from seerob.engine import Engine
 from seerob.judging import Judge
 from seerob.run import looks_ahead
+from seerob.safety.separation import MORE
 from seerob.source import Opened, Pump
 from seerob.stopping.onset import Levers, accelerated, by_joints, from_torques, held
 from seerob.stopping.terms import braking, course
@@ -78,6 +79,7 @@ def test_a_recorded_motion_counts_with_what_it_does_next(tmp_path):
     # Past its end nobody knows, and what is known is not enough for more than exceeded.
     assert {result.verdict for result in found[-9:]} == {Verdict.UNDECIDED}
     assert "its motion ends" in found[-1].reason
+    assert (part(found[-1], MORE).value, MORE in {p.name for p in now.parts}) == (None, False)
     close = station(tmp_path / "close", OPEN, WALKS, x=3.0)
     assert {r.verdict for r in recorded(close, lambda t: (3 * t * t, 6 * t), 0.5)[-9:]} == {Verdict.EXCEEDED}
 
@@ -102,6 +104,7 @@ def test_of_a_live_robot_the_limits_of_its_joints_count_and_else_its_torques_lea
     assert unsure.limit == pytest.approx(V_H * (T_R + T_S) + K)
     assert unsure.verdict is Verdict.UNDECIDED
     assert "give stop.acceleration" in unsure.reason
+    assert part(unsure, MORE).value == pytest.approx(unsure.value - unsure.interval[0], rel=0.5)
     (far, *_) = recorded(station(tmp_path / "c", OPEN, WALKS, x=9.0, urdf=weak), still, 0.02, live=["arm"])
     (near, *_) = recorded(station(tmp_path / "d", OPEN, WALKS, x=2.5, urdf=weak), still, 0.02, live=["arm"])
     assert (far.verdict, near.verdict) == (Verdict.WITHIN, Verdict.EXCEEDED)

@@ -39,6 +39,10 @@ from seerob.whereabouts.tracking_error import tracking
 __all__ = ["Detection", "Separation", "Stop", "separation_bound"]
 
 
+MORE = "S_p may be larger by"
+"""Name of the part of a result that says so; there is none where S_p is known."""
+
+
 class Required(NamedTuple):
     """S_p of each moving part."""
 
@@ -320,12 +324,21 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 parts=(
                     *parts,
                     *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r), seen),
+                    *self._more(most - S_p, doubt),
                     *self._permissible(stop, state, course, now, found.distance, K),
                 ),
                 markers=(segment,),
             )
 
         return evaluate
+
+    @staticmethod
+    def _more(more: Array, doubt: str) -> tuple[Result, ...]:
+        """By how much S_p of some part may be larger than shown; no value where that has no bound."""
+        if doubt:
+            return (Result(name=MORE, unit="m", reason=doubt),)
+        most = float(more.max())
+        return (Result(name=MORE, value=most, unit="m"),) if most > 0 else ()
 
     def _shown(
         self, now: Course, k: int, S_p: float, rest: tuple[float, float, float], seen: float

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from seerob.errors import Undecided
+from seerob.live.listening import LiveSource
 from seerob.model import Gap, Mechanism, Model
 from seerob.snapshot import Input, Origin
 from seerob.state import State
@@ -95,21 +96,23 @@ def bind_reaction(
             return most, None
         return (lambda scale: held(scale * v, T_r, scale * qd)), most
 
-    if limits is not None:
-        value, origin, source = ", ".join(f"{x:g}" for x in limits), Origin.GIVEN, "acceleration_limits"
-        source = f"workstation file ({source} of {robot.name}), where the motion is not known ahead"
-    else:
-        value, origin = "from torque limits and masses", Origin.ESTIMATED
-        source = "where the motion is not known ahead"
-        if np.isnan(torques).any() or robot.role != "robot":
-            value, origin = "not known", Origin.MISSING
-    what = Input(
-        name=NAME,
-        value=value,
-        unit="rad/s² or m/s²" if limits is not None else "",
-        origin=origin,
-        source=source,
+    named = {limit.source for limit in robot.effort_limits if limit is not None}
+    value, origin, source, unit = (
+        "by torque limits and masses",
+        Origin.ESTIMATED,
+        "; ".join(sorted(named)),
+        "",
     )
+    driving = [source for source in model.workstation.sources if source.target() == robot.name]
+    if robot.role == "robot" and not carriers and not any(isinstance(each, LiveSource) for each in driving):
+        # Whom nothing drives stands.
+        value, origin, source = "as its motion goes on", Origin.COMPUTED, "what drives it, known ahead"
+    elif limits is not None and not carriers:
+        value, origin, unit = ", ".join(f"{x:g}" for x in limits), Origin.GIVEN, "rad/s² or m/s²"
+        source = f"workstation file (acceleration_limits of {robot.name})"
+    elif np.isnan(torques).any() or robot.role != "robot" or carriers:
+        value, origin, source = "not known", Origin.MISSING, ""
+    what = Input(name=NAME, value=value, unit=unit, origin=origin, source=source)
     left_out = tuple(f"an acceleration of {name}, which {robot.name} carries" for name in robot.riders)
     return reactions, what, left_out
 

@@ -17,6 +17,7 @@ from seerob.model import Model
 from seerob.mounting.compilation import Progress
 from seerob.mounting.things import MadeArea
 from seerob.run import Bound
+from seerob.safety.separation import MORE
 from seerob.samples import Sample
 from seerob.sink import Closing, Writer
 from seerob.snapshot import Finding, Origin, Result, Snapshot
@@ -277,8 +278,13 @@ class _Maker:
             why = "it is no separation" if result is None or not result.reason else result.reason
             what = f"{name!r} gives no S_p at {record.instants[k]:.2f} s: {why}"
             raise InputError.at("swept", "separation", what, "mend the criterion, or take another part")
+        more = next((part for part in result.parts if part.name == MORE), None)
+        if more is not None and more.value is None:
+            what = f"S_p of {name!r} is not known at {record.instants[k]:.2f} s: {more.reason}"
+            raise InputError.at("swept", "separation", what, "mend the criterion, or take another part")
+        beyond = 0.0 if more is None or more.value is None else more.value
         own = {body.name for body in self.model.bodies}
-        return {p.name: p.limit for p in result.parts if p.name in own and p.limit is not None}
+        return {p.name: p.limit + beyond for p in result.parts if p.name in own and p.limit is not None}
 
     def _swept(
         self,

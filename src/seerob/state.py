@@ -328,6 +328,11 @@ class State:
         reason = self.whole_doubt(name)
         return reason if hearing.lost <= self.t - 2 * self._period else ""
 
+    def strays(self, bodies: tuple[int, ...]) -> str:
+        """`stray` of any of the people to whom bodies belong."""
+        _, people = self._bones(bodies)
+        return next(filter(None, map(self.stray, people)), "")
+
     def captured(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
         """Where bones of a person were captured, wherever the physics lets the twin be.
 

@@ -16,6 +16,8 @@ from seerob.human.skeleton import BONES, bone_poses
 from seerob.postures.ergonomic_posture import bind_posture
 from seerob.run import Judge
 from seerob.safety.minimum_distance import MinimumDistance
+from seerob.safety.separation import Separation, Stop
+from seerob.samples import JointSample
 from seerob.snapshot import Verdict
 from seerob.station import Station
 from seerob.whereabouts.tracking_error import TrackingError
@@ -108,3 +110,34 @@ def test_what_knows_no_bound_stays_undecided(stopped):
     ):
         with pytest.raises(Undecided, match="the twin is off"):
             ask()
+
+
+ROBOT = {"name": "arm", "model": "library:ur5", "base": {"position": [0.9, -0.6, 0.9]}}
+
+
+def test_a_robot_too_near_a_stopped_hand_is_exceeded_and_never_within():
+    """What is known is enough: the twin and the capture are both nearer than S_p of a person who walks."""
+    t, q = pressing()
+    tables = desk() | {"robots": [ROBOT]}
+    station = workstation(source(captured(frames_of(t, q))), **tables)
+    stop = Stop(model="bound", stopping=0.3, reaction=0.1, acceleration=1.0)
+    near, far = (
+        Separation(
+            name=name, between=("arm", "operator"), stop=stop, human_uncertainty=0.0,
+            robot_uncertainty=0.0, intrusion=intrusion,
+        )
+        for name, intrusion in (("near", 3.0), ("far", 0.0))
+    )  # fmt: skip
+    stage = Station(replace(station, safety=(near, far)))
+    engine, judge = Engine(stage.model, driven={"operator": 0.2, "arm": 9.0}), Judge(stage.bound)
+    home = tuple(stage.model.mechanisms["arm"].home.tolist())
+    seen = set()
+    for seq, samples in enumerate(road.pump(stage.sources, 0.01)):
+        still = JointSample(source="arm", target="arm", seq=seq, t=0.01 * seq, q=home)
+        engine.take((*samples, still))
+        state = engine.tick() if seq else engine.start()
+        results = judge(state)
+        if state.stray("operator"):
+            seen.add(tuple(r.verdict for r in results))
+            assert results[1].verdict is not Verdict.WITHIN
+    assert seen == {(Verdict.EXCEEDED, Verdict.UNDECIDED)} or seen == {(Verdict.EXCEEDED, Verdict.EXCEEDED)}

@@ -216,7 +216,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
     @staticmethod
     def _seen(state: State, gap: Gap) -> float:
-        """Speed of the person's fastest point that may be relied on [m/s]."""
+        """Speed of the person's fastest point that may be relied on [m/s]; 0 of a twin that is stopped."""
+        if state.strays(gap.a):
+            return 0.0
         lost = state.lost_bodies(gap.a)
         people = tuple(i for i in gap.a if i not in lost)
         return float(state.fastest_points(people, estimates=True)[0].max(initial=0.0))
@@ -258,14 +260,16 @@ class Separation(Criterion, frozen=True, kw_only=True):
         ends_of_distance = DistanceEnds(model, gap)
 
         def evaluate(state: State) -> Result:
-            found = state.closest_per_body(gap, estimates=True)
+            found = state.closest_per_body(gap, estimates=True, strayed=True)
+            stray = state.strays(gap.a)
             course = stop.courses(state)
             now = course(1.0)
             seen = self._seen(state, gap)
             S_p, most, doubt = self._required(now, K, seen)
             if self.mode == "fixed":
                 S_p, most = (each.including(state, x) for each, x in zip(largest, (S_p, most), strict=True))
-            unknown = "; ".join(filter(None, (unknown_ever, doubt)))
+            slower = f"{stray}: how fast the person is nobody knows" if stray else ""
+            unknown = "; ".join(filter(None, (unknown_ever, doubt, slower)))
             unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
             near, far = ends_of_distance.of_bodies(state, found.distance)
             span = ends.at(state) if ends.tolerances else None
@@ -294,9 +298,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
             open_ = unknown
             if verdict is Verdict.UNDECIDED and not unknown:
                 widths = np.zeros(0) if span is None else span.widths[:, k]
-                seen = float(far[k] - near[k])
-                open_ = deciding((*ends.tolerances, tracking(seen / 2)), np.append(widths, seen))
-                if most[k] > S_p[k] and bool((most - S_p)[k] >= max(seen, *widths.tolist(), 0.0)):
+                wide = float(far[k] - near[k])
+                open_ = deciding((*ends.tolerances, tracking(wide / 2)), np.append(widths, wide))
+                if most[k] > S_p[k] and bool((most - S_p)[k] >= max(wide, *widths.tolist(), 0.0)):
                     open_ = (
                         f"S_p is up to {most[k]:.3f} m if the robot gets faster during the reaction time as "
                         "its torques allow: give stop.acceleration"
@@ -471,7 +475,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 raise Undecided(required.doubt)
             return required.most
 
-        if now.doubt or (now.most is not None and now.most.doubt):
+        if state.strays(self._gap(state.model).a) or now.doubt or (now.most is not None and now.most.doubt):
             reason = "S_p is at least what is shown: no speed follows"
         elif stop.inverse is not None:
             given = self.human_speed

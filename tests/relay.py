@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import queue
 import random
 import socket
 import threading
 import time
+from collections import deque
 from contextlib import suppress
 from enum import StrEnum
 
 HERE = "127.0.0.1"
 MERGING = 0.03
 """[s]"""
+LOOP = 120
+"""Pieces that are played again and again, or among those that come."""
 LENGTHS = (b"\xff\xff\xff\xff", b"\x7f\xff\xff\xff", b"\xff\xff\xff\x7f", b"\0\0\0\0")
 
 
@@ -27,6 +31,8 @@ class Garbled(StrEnum):
     CUT = "cut"
     LENGTHS = "lengths"
     NOISE = "noise"
+    AGAIN = "again"
+    AMONG = "among"
 
 
 class Wire:
@@ -39,6 +45,7 @@ class Wire:
     def __init__(self, seed: int) -> None:
         self._random = random.Random(seed)
         self._held: list[bytes] = []
+        self._last: deque[bytes] = deque(maxlen=LOOP)
         self.how = Garbled.NOT
         self.passed = 0
         """Pieces that went in."""
@@ -52,6 +59,10 @@ class Wire:
         """
         rng, how = self._random, self.how
         self.passed += 1
+        if how in (Garbled.AGAIN, Garbled.AMONG) and self._last:
+            self._last.rotate(-1)
+            return [self._last[-1], data][: 1 + (how is Garbled.AMONG)]
+        self._last.append(data)
         some, at = rng.random() < 0.3, rng.randrange(len(data) + 1)
         match how:
             case Garbled.SPLIT if not whole:
@@ -97,6 +108,8 @@ class Stream(Wire):
         self._open: set[socket.socket] = set()
         self.deaf = False
         """Whether nobody who connects is let through."""
+        self.late = 0.0
+        """How much later than it was said all arrives that the device says from now on [s]."""
         threading.Thread(target=self._accept, daemon=True).start()
 
     def cut(self) -> None:
@@ -127,15 +140,27 @@ class Stream(Wire):
                 threading.Thread(target=self._carry, args=(a, b, said), daemon=True).start()
 
     def _carry(self, a: socket.socket, b: socket.socket, said: bool) -> None:
+        pieces = queue.SimpleQueue()
+        threading.Thread(target=self._deliver, args=(pieces, b), daemon=True).start()
         with suppress(OSError):
             while data := self._read(a, said):
                 for piece in self.pass_on(data, whole=False) if said else [data]:
                     if not piece:
                         raise OSError
-                    b.sendall(piece)
+                    if said and self.late:
+                        pieces.put((time.monotonic() + self.late, piece))
+                    else:
+                        b.sendall(piece)
+        pieces.put((0.0, b""))
         for each in (a, b):
             self._open.discard(each)
             _shut(each)
+
+    def _deliver(self, pieces: queue.SimpleQueue[tuple[float, bytes]], b: socket.socket) -> None:
+        with suppress(OSError):
+            while (item := pieces.get())[1]:
+                time.sleep(max(0.0, item[0] - time.monotonic()))
+                b.sendall(item[1])
 
     def _read(self, a: socket.socket, said: bool) -> bytes:
         if said and self.how is Garbled.MERGED:

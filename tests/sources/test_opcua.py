@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import datetime
 import math
+import time
 from uuid import UUID
 
 import numpy as np
@@ -14,6 +15,7 @@ pytest.importorskip("asyncua")
 
 from live_story import Story, listening, lived, wait_for
 from made_cell import made
+from relay import Stream
 from seerob.emulators.opcua import URI, Emulated, OpcuaServer
 from seerob.errors import InputError, SeerobError
 from seerob.live.listening import Listener
@@ -84,6 +86,23 @@ def test_variables_are_subscribed_and_stand_until_they_change(server):
         wait_for(lambda: "BadSensorFailure" in heard[-1].doubts.get("belt/speed", ""))
         server.bad.clear()
         wait_for(lambda: good(heard))
+
+
+def test_what_arrives_late_is_as_old_as_the_newest_question_that_was_answered(server):
+    """The server says that something changed, and nobody would see that it said so half a second ago."""
+    wire = Stream(server.port)
+    try:
+        with listening(Opcua(name="plc", url=f"opc.tcp://127.0.0.1:{wire.port}"), target(SPEED)) as heard:
+            wait_for(lambda: good(heard) and heard[-1].ages.get("belt/speed", 0.0) < 0.3)
+            wire.late = 0.5
+            wait_for(lambda: time.monotonic() - heard[-1].t + heard[-1].ages["belt/speed"] > 0.5)
+            end = time.monotonic() + 1.0
+            while time.monotonic() < end:
+                picture = heard[-1]
+                assert time.monotonic() - picture.t + picture.ages["belt/speed"] > 0.49
+                time.sleep(0.01)
+    finally:
+        wire.close()
 
 
 def test_a_server_that_is_killed_is_found_again(monkeypatch):

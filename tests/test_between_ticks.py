@@ -191,18 +191,18 @@ of = ["a", "b"]
 kind = "velocity"
 name = "fastest"
 of = "a"
-limit = 99
+limit = 10
 [[safety]]
 kind = "velocity"
 name = "point"
 at = "a"
 offset = [0.1, 0.2, 0.3]
-limit = 99
+limit = 10
 [[safety]]
 kind = "kinetic_energy"
 name = "energy"
 robot = "a"
-limit = 9999
+limit = 2000
 [[safety]]
 kind = "manipulability"
 name = "singularity"

@@ -20,7 +20,7 @@ from msgspec.structs import replace
 from seerob.criterion import Criterion, Evaluate
 from seerob.model import Model
 from seerob.snapshot import Result, Verdict
-from seerob.spans import Fall, Falls, Indices, Margin, Path, Points
+from seerob.spans import Fall, Falls, Indices, Margin, Path, Points, Span
 from seerob.state import State
 from seerob.transforms import Array
 
@@ -99,6 +99,8 @@ class BetweenTicks:
         self._ids: Indices | None = None
         self._speeds: Array | None = None
         self._shadow: State | None = None
+        self._whole: Span | None = None
+        """Of the way from tick to tick, which all criteria ask for."""
         self._again: dict[int, Evaluate] = {}
 
     def __call__(
@@ -120,7 +122,7 @@ class BetweenTicks:
         speeds, ids, path = state.largest_speeds(), state.bearers.ids, state.path
         if path is None or self._ids is None or self._speeds is None:
             path, self._before = None, [None] * len(found)
-        self._way, self._asking = path, asking
+        self._way, self._asking, self._whole = path, asking, None
         for i, watch in enumerate(self._watches):
             if watch is None:
                 continue
@@ -162,20 +164,27 @@ class BetweenTicks:
         low = self._low(watch, self._way, ends, state)
         if low >= 0:
             return Told()
-        if self._way.broken and not np.isfinite(low):
-            # Before a source is heard again nobody knew anything anyway.
-            who = ", ".join(self._way.broken)
-            known = before.margin is not None
-            return Told(open=f"{who} jumped: its way between two ticks is not known" if known else "")
+        if not np.isfinite(low) and not (before.margin and now.margin):
+            # Nothing was known at one end, which is said there, and from the other nothing follows.
+            return Told()
+        if not np.isfinite(low) and self._way.broken:
+            return Told(open=f"{', '.join(self._way.broken)} jumped: its way between two ticks is not known")
         return self._search(i, watch, ends, low, state)
 
     def _fall(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Fall:
         a, b = ends
         assert self._ids is not None
-        span = watch.points.span(path, a.t, b.t, self._ids, state.model.mj)
-        span.between_speeds(a.speeds, b.speeds)
+        whole = a.t == path.t[0] and b.t == path.t[-1]
+        span = self._whole if whole else None
+        if span is None:
+            span = watch.points.span(path, a.t, b.t, self._ids, state.model.mj)
+            span.between_speeds(a.speeds, b.speeds)
+            self._whole = span if whole else self._whole
         least = [end.margin[0] - end.margin[1] for end in ends if end.margin is not None]
-        return watch.falls(span, least[0] if len(least) == 1 else np.minimum(least[0], least[1]))
+        if len(least) == 1:
+            return watch.falls(span, least[0])
+        m, other = least
+        return watch.falls(span, min(m, other) if type(m) is float is type(other) else np.minimum(m, other))
 
     def _low(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> float:
         """Bound on the margin everywhere between two ends, of which one is within at least."""
@@ -184,6 +193,8 @@ class BetweenTicks:
         if not rest:
             return float(np.min(m - fall - off))
         ((other, also),) = rest
+        if all(type(x) is float for x in (m, other, fall, bend)):
+            return float(max((m + other - fall) / 2, min(m, other) - bend) - max(off, also))
         low = np.maximum((m + other - fall) / 2, np.minimum(m, other) - bend)
         return float(np.min(low - np.maximum(off, also)))
 

@@ -74,7 +74,7 @@ def test_what_is_passed_between_two_ticks_is_exceeded(tmp_path, what, physics):
     assert summary.verdict is Verdict.EXCEEDED
 
 
-UNBOUNDED = '[[safety]]\nkind = "effective_mass"\nname = "c"\nat = "arm"\nalong = "motion"\nlimit = 1e6\n'
+UNBOUNDED = '[[safety]]\nkind = "effective_mass"\nname = "c"\nat = "arm"\nalong = "motion"\nlimit = 60\n'
 
 
 @pytest.mark.parametrize("accepted", ["", 'between_samples = "accepted: it changes slowly"\n'])

@@ -14,7 +14,7 @@ from seerob.model import Model
 from seerob.mounting.compilation import pose_matrix
 from seerob.plausibility.in_place import implausible_motion
 from seerob.plausibility.of_file import findings as implausible
-from seerob.plausibility.of_motion import quantities
+from seerob.plausibility.of_motion import noise_of_speeds, quantities
 from seerob.plausibility.own_words import compared, said_by
 from seerob.samples import JointSample
 from seerob.snapshot import Finding
@@ -121,6 +121,10 @@ def _compared(model: Model, i: int, source: Source, opened: Opened) -> Opened:
         limits = [None if v is None else v.value for v in model.mechanisms[name].velocity_limits]
         every = quantities(opened.samples.trajectory, limits, key=f"sources[{i}]", about=name)
         found += implausible(every, model.workstation.confirmed)
+        motion = opened.samples.trajectory
+        if motion.qd is None or opened.samples.qd is not motion.qd:
+            noise = noise_of_speeds(motion, model.mechanisms[name].description, name)
+            found += [] if noise is None else [noise]
     said = said_by(opened.samples, getattr(source, "file", source.name))
     if said is not None:
         found += compared(model, name, said)

@@ -3,6 +3,7 @@ Denavit–Hartenberg parameters of their maker, and Pinocchio's dynamics."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from oracles.pinocchio_oracle import pinocchio_model
 from seerob.engine import Engine
 from seerob.model_io import library
+from seerob.plausibility.of_motion import position_noise
 from seerob.plausibility.own_words import fixed_offset, rigid_error, sign_or_unit
 from seerob.run import Judge, bind
 from seerob.samples import JointSample
@@ -226,6 +228,25 @@ def test_what_fits_exactly_is_found_exactly() -> None:
     mirrored = positions * [1, 1, -1]
     assert rigid_error(positions, positions @ rotations[0].T + 2) < 1e-12
     assert rigid_error(positions, mirrored) > 0.1
+
+
+def test_a_standing_robot_that_seems_to_move_is_told(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    t = 0.008 * np.arange(500)
+    q = np.tile(MOVING[0], (500, 1)) + rng.normal(0, 1e-4, (500, 6))
+    smooth = np.sin(np.outer(t, np.arange(1, 7)))
+    np.testing.assert_allclose(position_noise(q), 1e-4, rtol=0.2)
+    np.testing.assert_allclose(position_noise(q + smooth), 1e-4, rtol=0.25)
+    assert position_noise(smooth).max() < 3e-5
+    names = ["timestamp", *(f"actual_q_{i}" for i in range(6))]
+    # The rate of change of the noise of two samples 16 ms apart, at levers of some decimetres.
+    for positions, low, high in ((q, 15, 60), (np.tile(MOVING[0], (500, 1)), None, None)):
+        np.savetxt(tmp_path / "log.csv", np.column_stack([t, positions]), header=" ".join(names), comments="")
+        texts = [
+            f.text for _, o in station(tmp_path).sources for f in o.findings if "seems to move" in f.text
+        ]
+        assert len(texts) == (low is not None)
+        assert all(low < float(re.findall(r"at up to (\d+) mm/s", text)[0]) < high for text in texts)
 
 
 def test_small_torques_tell_no_sign() -> None:

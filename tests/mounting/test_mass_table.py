@@ -9,9 +9,11 @@ import pytest
 import trimesh
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
+from seerob import cli
 from seerob.contact.impact_mass import moving_masses
 from seerob.errors import Undecided
 from seerob.mounting.mass_tolerances import MassTolerances
+from seerob.sinks._masses import masses
 
 BOX = '<collision><geometry><box size="{0} {0} {0}"/></geometry></collision>'
 SIX = '<inertia ixx="{0}" iyy="{0}" izz="{0}" ixy="0" ixz="0" iyz="0"/>'
@@ -257,3 +259,19 @@ def test_contact_and_effective_mass_exceed_by_what_is_known(tmp_path):
             tmp_path / folder, FLOATING + TWO_R + text, {"arm.urdf": gripper(inside + BOX.format(0.1))}
         )
         assert results_at(cell, arm=fast)[EFFECTIVE].verdict == "exceeded"
+
+
+def test_the_table_is_told_and_reported(tmp_path, capsys):
+    cell = station(tmp_path, gripper(BOX.format(0.1)))
+    assert cli.main(["check-file", str(tmp_path)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    for words in (
+        "mass arm: at least 2 kg, of which 2 kg move; unknown: arm/tip",
+        "arm/l1: 1 kg, stated by its source (arm.urdf: link l1)",
+        "arm/tip: unknown, missing, moves with arm/l2",
+        "weigh nothing: arm/base",
+    ):
+        assert words in said
+    html = str(masses(cell.scene()))
+    assert html.count("<tr>") == 1 + 4
+    assert "unknown: arm/tip" in html

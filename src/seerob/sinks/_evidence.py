@@ -7,6 +7,7 @@ import hashlib
 from seerob.figures import figure
 from seerob.sinks._bone_errors import bones_told
 from seerob.sinks._html import Html, joined, table, tag, whole
+from seerob.sinks._masses import masses
 from seerob.sinks._report import DOUBTFUL, WHO, Report, input_row
 from seerob.sinks._sentences import number
 from seerob.sinks._setup import UNKNOWN, Setup
@@ -112,6 +113,7 @@ def evaluated(report: Report) -> Html:
             table(["file", "size", "SHA-256"], files) if files else None,
             tag("h4", "Bodies of the twin"),
             table(["body", "role", "mass", "mass is", "geometry"], bodies),
+            masses(scene),
         ]
     )
 

@@ -53,6 +53,7 @@ export function Properties() {
         {mechanism && <Lateness mechanism={mechanism} />}
       </dl>
       {mechanism && <Joints mechanism={mechanism} />}
+      {mechanism && <Masses mechanism={mechanism} />}
       {findings.length > 0 && <FindingList findings={findings} />}
     </div>
   );
@@ -146,6 +147,38 @@ function Joints({ mechanism }: { mechanism: MechanismInfo }) {
             <td>{q?.[i] === undefined ? "–" : formatJoint(q[i], joint.unit)}</td>
             <td>
               <JointBar joint={joint} q={q?.[i]} />
+            </td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+function Masses({ mechanism }: { mechanism: MechanismInfo }) {
+  const rows = mechanism.masses.filter((row) => row.mass !== 0);
+  if (rows.length === 0) return null;
+  const sum = rows.reduce((total, row) => total + (row.mass ?? 0), 0);
+  const unknown = rows.some((row) => row.mass === null);
+  return (
+    <table class="joints masses">
+      <caption>
+        Masses: {unknown ? "at least " : ""}
+        {formatQuantity(sum, "kg")}
+      </caption>
+      <tbody>
+        {rows.map((row) => (
+          <tr key={row.name} title={[row.note, row.source].filter(Boolean).join("; ")}>
+            <th scope="row">{row.name}</th>
+            <td>
+              {row.mass === null ? <span class="unknown">unknown</span> : formatQuantity(row.mass, "kg")}
+            </td>
+            <td>
+              <span class="origin">
+                {row.origin}
+                {row.merged && `, with ${row.merged}`}
+                {!row.moves && ", stands still"}
+              </span>
             </td>
           </tr>
         ))}

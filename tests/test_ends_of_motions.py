@@ -110,3 +110,18 @@ def test_no_velocity_is_derived_across_a_jump_or_a_row_that_is_not_known():
     right = np.column_stack([2 * t, np.full(12, -1.0)])
     np.testing.assert_allclose(found[known], right[known], atol=1e-9)
     np.testing.assert_array_equal(found[8], 0.0)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.1, 0.3, 1 / 3, 1234.567])
+@pytest.mark.parametrize("rate", [100.0, 125.0])
+def test_no_start_time_changes_what_a_motion_is_at_its_ticks(cells, start, rate):
+    """A file on a clock of its own: t - t[0] is off by rounding, and no tick falls between two samples."""
+    clock = [start + k / rate for k in range(int(0.4 * rate) + 1)]
+    times = [t - start for t in clock]
+    motion = tuple(heard("arm", t, (np.sin(3 * t), 0.0), (3 * np.cos(3 * t), 0.0)) for t in times)
+    found = run(cells[False], motion, 0.4)
+    wanted = 3 * np.cos(3 * TICK * np.arange(41))
+    known = [k for k, speed in enumerate(found) if speed is not None]
+    # A clock of large numbers ends up to 1e-12 s early, which is no end.
+    assert known == list(range(41))
+    np.testing.assert_allclose([found[k] for k in known], wanted, atol=2e-4)

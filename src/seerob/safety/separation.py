@@ -475,14 +475,14 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 raise Undecided(required.doubt)
             return required.most
 
+        least, most = stop.reactions(state)
+        onset = least if most is None else most
         if state.strays(self._gap(state.model).a) or now.doubt or (now.most is not None and now.most.doubt):
             reason = "S_p is at least what is shown: no speed follows"
-        elif stop.inverse is not None:
+        elif stop.inverse is not None and onset(1.0).linear:
             given = self.human_speed
             assumed = iso_13855.speed_at(distance) if given is None else np.full(len(distance), given)
             v_h = np.maximum(assumed, seen)
-            least, most = stop.reactions(state)
-            onset = least if most is None else most
             speed, factor = stop.inverse(onset(0.0), onset(1.0), distance, v_h, K)
         elif now.v_r.max() > MOVING:
             factor = factor_by_search(S_p, distance, stop.costly)

@@ -61,6 +61,8 @@ class Onset:
     """How fast they are there [rad/s or m/s], likewise."""
     doubt: str = ""
     """Why it may be more than this."""
+    linear: bool = True
+    """Whether way and speed grow linearly with the factor on the present speeds."""
 
 
 At = Callable[[float], Onset]
@@ -87,11 +89,6 @@ def accelerated(v: Array, T_r: float, a: float, qd: Array) -> Onset:
     if a == 0.0:
         return held(v, T_r, qd)
     return Onset(v, v * T_r + a * T_r**2 / 2, v + a * T_r, None, None)
-
-
-def steady(robot: Mechanism, gap: Gap, T_r: float, doubt: str = "") -> Reaction:
-    """The present speeds held."""
-    return constant(robot, gap, T_r, 0.0, doubt)
 
 
 def constant(robot: Mechanism, gap: Gap, T_r: float, a: float, doubt: str = "") -> Reaction:
@@ -344,7 +341,7 @@ def by_joints(
         A = float((aj * weight + uj * np.where(turns, 2 * before * weight + onward, 2 * before)).sum())
         v_s[i] = max(min(v[i] + A * T, float((uj * weight).sum())), v[i])
         S_r[i] = max(min(v[i] * T_r + A * gained, way), v[i] * T_r)
-    return Onset(v, S_r, v_s, ways, u)
+    return Onset(v, S_r, v_s, ways, u, linear=False)
 
 
 def from_torques(M: Array, bias: Array, torques: Array) -> Array:

@@ -189,7 +189,7 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         InputError: Options that do not fit the robot.
         UnknownName: No such table.
     """
-    if robot.role == "machine" and stop.model not in SHARES:
+    if stop.model not in SHARES and robot.role == "machine":
         what = f"{stop.model}, but {robot.name} is a machine, whose stop only a time or a deceleration tells"
         raise InputError.at("stop", "model", what, "bound or constant_deceleration")
     bind = {"table": _tabulated, "simulated": _simulated}.get(stop.model, _timed)

@@ -16,6 +16,7 @@ import argparse
 import os
 import sys
 import time
+from dataclasses import replace as plain
 from pathlib import Path
 
 # One core per process: the figures must not borrow another one from a library's threads.
@@ -143,6 +144,25 @@ def per_tick(ticks: int) -> tuple[dict[str, float], float, float, float]:
     return median, float(np.median(whole)), float(np.percentile(whole, 99)), other
 
 
+def between_ticks(ticks: int) -> tuple[float, float, float]:
+    """Processor time per tick of the demo with and without what decides between ticks [s], looks per tick."""
+    spent, looks = [], 0
+    for watched in (True, False):
+        station = Station(read(FOLDER), cache=cache_folder())
+        bound = [one if watched else plain(one, watch=None) for one in station.bound]
+        engine, judge = road.engine_of(station.model), road.Judge(bound)
+        times = []
+        with road.settled():
+            for seq, samples in zip(range(ticks), pump(station), strict=False):
+                begin = time.process_time()
+                engine.take(samples)
+                judge(engine.tick() if seq else engine.start())
+                times.append(time.process_time() - begin)
+        spent.append(float(np.mean(times[20:])))
+        looks += judge.looks
+    return spent[0], spent[1], looks / ticks
+
+
 def batched(samples: int, criteria: tuple[Criterion, ...]) -> tuple[float, float, float]:
     """Processor time per sample: to follow a recording, to judge it with two threads, and on the road [s]."""
     station = made(criteria, physics=False)
@@ -205,6 +225,11 @@ def main() -> int:
     print(
         f"four of them in a tick, with verdicts, markers and what all share: {four:.0f} µs, "
         f"Pinocchio with numpy {alone:.0f} µs for the bare figures, ratio {alone / four:.2f}"
+    )
+    watched, unwatched, looks = between_ticks(ticks)
+    print(
+        f"a tick of the demo {1e3 * watched:.2f} ms, {1e3 * unwatched:.2f} ms without what decides between ticks: "
+        f"ratio {watched / unwatched:.2f}, {looks:.2f} instants looked at per tick"
     )
     own, other = beside(samples // 4)
     print(

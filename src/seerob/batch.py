@@ -203,6 +203,8 @@ def _uncleared(
         within, exceeded = verdict == WITHIN, verdict == CODES[Verdict.EXCEEDED]
         either = (within[1:] | within[:-1]) & ~(exceeded[1:] | exceeded[:-1])
         open_[name][1:] = either & ~(within[1:] & within[:-1])
+    # A figure without a limit, or one that is never within, has nothing to lose on the way.
+    watches = {name: one for name, one in watches.items() if (said[name][0].verdict == WITHIN).any()}
     points = next((one.watch.points for one in watches.values() if one.watch is not None), None)
     ids = np.array([body.mj for body in model.bodies], np.int64)
     for k, way in enumerate(motion.ways if points is not None else ()):

@@ -102,6 +102,8 @@ class BetweenTicks:
         self._whole: Span | None = None
         """Of the way from tick to tick, which all criteria ask for."""
         self._again: dict[int, Evaluate] = {}
+        self.looks = 0
+        """Instants between ticks that were looked at so far."""
 
     def __call__(
         self,
@@ -233,6 +235,7 @@ class BetweenTicks:
 
     def _look(self, i: int, watch: Watch, path: Path, t: float, state: State) -> tuple[Result, End]:
         """A criterion at an instant between two ticks; what is in doubt at the tick is in doubt there."""
+        self.looks += 1
         if i not in self._again:
             self._again[i] = watch.again()
         if self._shadow is None:

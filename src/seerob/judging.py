@@ -290,6 +290,11 @@ class Judge:
             for result, why in zip(found, self._why, strict=True)
         )
 
+    @property
+    def looks(self) -> int:
+        """How many instants between ticks were looked at so far."""
+        return self._between.looks
+
     def _one(self, i: int, bound: Bound, state: State) -> Result:
         kept = self._kept.get(i)
         criterion = bound.criterion

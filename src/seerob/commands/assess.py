@@ -44,7 +44,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
     add_workstation(sub)
     add_output(sub)
-    text = "also bounds on distances and speeds that hold at every instant between the samples"
+    text = "also least distances and largest speeds of the whole motion as bounds, in a section of the report"
     sub.add_argument("--between-samples", action="store_true", help=text)
     add_permissible(sub)
 

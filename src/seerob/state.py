@@ -29,6 +29,7 @@ from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
 from seerob.model import Frame, Gap, Mechanism, Model
 from seerob.spans import Path
 from seerob.transforms import Array
+from seerob.variables.dictionary import VARIABLE as VARIABLE  # noqa: PLC0414
 from seerob.variables.dictionary import Value
 from seerob.variables.signals import Signals
 from seerob.whereabouts.hearing import SLACK, nobody_says
@@ -42,8 +43,6 @@ and why they may be others; None where nobody knows what it will do."""
 
 MOST_PLACES = 512
 """Sets of bodies of which places are kept from tick to tick."""
-VARIABLE = "variable "
-"""Before the name of a variable among the names that answers depend on: robots have no blank in theirs."""
 
 
 class State:

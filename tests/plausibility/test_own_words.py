@@ -18,6 +18,7 @@ from seerob.plausibility.own_words import fixed_offset, rigid_error, sign_or_uni
 from seerob.run import Judge, bind
 from seerob.samples import JointSample
 from seerob.snapshot import Finding, Verdict
+from seerob.sources.rtde import joint_sample as rtde_sample
 from seerob.station import Station, load
 from seerob.transforms import rotation_from_rpy
 
@@ -186,6 +187,13 @@ def test_a_table_may_speak_of_any_frame_but_not_of_another_robot(tmp_path: Path)
         assert found == []
     csv_of(tmp_path, dh_tcp("ur10e", MOVING) @ turned.T)
     assert about_tool(station(tmp_path, source="csv")).holds == ("arm",)
+
+
+def test_a_live_controller_says_where_its_tool_is() -> None:
+    values = {"timestamp": 1.0, "actual_q": (0.0,) * 6, "actual_TCP_pose": (0.1, 0.2, 0.3, 1.0, 2.0, 3.0)}
+    assert rtde_sample(values, target="arm", arrived=0.0).tcp == (0.1, 0.2, 0.3)
+    del values["actual_TCP_pose"]
+    assert rtde_sample(values, target="arm", arrived=0.0).tcp is None
 
 
 def test_each_live_sample_is_compared(tmp_path: Path) -> None:

@@ -291,6 +291,27 @@ def test_a_confirmation_may_have_the_unit_of_the_file(tmp_path: Path) -> None:
     assert doubted(station) == []
 
 
+VARIABLES = """
+[[variables]]
+name = "muted"
+source = "plc"
+address = "ns=2;s=muted"
+type = "bool"
+timeout = {timeout}
+"""
+PLC = '[[sources]]\nkind = "opcua"\nname = "plc"\nurl = "opc.tcp://127.0.0.1:1"\n'
+
+
+@pytest.mark.parametrize(("timeout", "holds"), [(0.5, []), (10.0, [("variable muted",)])])
+def test_a_time_out_of_a_variable_is_looked_at(
+    tmp_path: Path, timeout: float, holds: list[tuple[str, ...]]
+) -> None:
+    (tmp_path / "variables.toml").write_text(VARIABLES.format(timeout=timeout))
+    text = cell(limit='limit = 1.0\nactive = "muted"', more=PLC)
+    station = station_of(tmp_path, 'variables = "variables.toml"\n' + text)
+    assert [f.holds for f in doubted(station)] == holds
+
+
 @pytest.mark.parametrize(
     "key", ["robots[1].base.rpy", "safety[0].limits", "humans[0].inside.nobody", "x", ""]
 )

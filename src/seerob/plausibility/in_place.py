@@ -16,9 +16,10 @@ from seerob.distances.least import Query
 from seerob.model import Body, Mechanism, Model
 from seerob.model_io.lint import box
 from seerob.plausibility.of_file import entries_of, findings, listed
-from seerob.plausibility.ranges import Quantity, data
+from seerob.plausibility.ranges import Quantity, data, quantities
 from seerob.snapshot import Finding
 from seerob.transforms import Array
+from seerob.variables.dictionary import VARIABLE
 
 SUPPORTED = ("foot", "toes", "pelvis", "thigh", "shank")
 """Bones that a person stands, sits or kneels with."""
@@ -31,8 +32,16 @@ SIGHT = 50.0
 def implausible(model: Model) -> tuple[Finding, ...]:
     """Everything that is implausible of a workstation, and what its file confirms of that."""
     station = model.workstation
-    every = [*listed(entries_of(station), station.engine), *_following(model)]
+    every = [*listed(entries_of(station), station.engine), *_variables(model), *_following(model)]
     return tuple(findings(every, station.confirmed))
+
+
+def _variables(model: Model) -> Iterator[Quantity]:
+    """What the dictionary says of variables: what asks them, and what moves by them, rests on it."""
+    for name, variable in model.dictionary.items():
+        moved = [m.name for m in model.workstation.machines if name in m.motion.variables()]
+        about = (VARIABLE + name, *moved)
+        yield from quantities(variable, key=f"variables.{name}", kind="variables", about=about)
 
 
 def _following(model: Model) -> Iterator[Quantity]:

@@ -121,6 +121,8 @@ def unknown(confirmed: Mapping[int, Confirmed], entries: Entries, engine: Engine
 
 def _follows(key: str, entries: Entries) -> bool:
     """Whether a key is of what follows from an entry that is there."""
+    if key.startswith("variables."):
+        return True  # of the dictionary, which is another file
     match = KEY.fullmatch(key)
     if match is None or int(match[2]) not in entries.get(match[1], {}):
         return False

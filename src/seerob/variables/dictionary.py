@@ -22,6 +22,8 @@ from seerob.quantities import PathName, Seconds, Table
 from seerob.toml_file import read_toml
 from seerob.variables.units import UNITS, unit
 
+VARIABLE = "variable "
+"""Before the name of a variable among the names that answers depend on: robots have no blank in theirs."""
 MOST_VARIABLES = 10_000
 WHOLE = re.compile(r"0|-?[1-9][0-9]{0,18}")
 """As a number is written: another spelling would never be heard."""

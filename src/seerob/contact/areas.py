@@ -18,6 +18,7 @@ NOT_MODELLED = (
     "free or clamped is decided by gaps that are not verified (M), unless thickness is given",
     "whether a moving part in a gap comes nearer to the surface or passes it: it counts as clamping",
     "surfaces that no part of the workstation shows, but for the floor",
+    "parts of a tool that move without a joint of the model, as the fingers of a gripper that is one shape",
     "duration of the contact: what is free counts as transient, what is clamped as quasi-static",
     "forces that drives keep up after the impact, detection and stop of the robot",
 )

@@ -488,6 +488,8 @@ class Engine:
             self._hearings[name].bones = following.errors(self.state.t, q)
         if not (self.controllers and self.physics and self._tick):
             return
+        if self.model.workstation.contacts and self.model.workstation.humans:
+            self.state.touches = self._touches()
         off = np.abs(self._data.qpos - self._course.q[-1])
         self._force[self._dof] = np.abs(self._data.actuator_force)
         reached = self._force >= self._almost
@@ -497,6 +499,17 @@ class Engine:
             hearing.saturated = bool(reached[mechanism.v_address].any())
             if mechanism.role == "human" and self.controllers:
                 self._note_captured(mechanism, hearing)
+
+    def _touches(self) -> list[tuple[int, int, float]]:
+        """Every contact now: two of MuJoCo's bodies and the normal force [N]."""
+        mj, data, force = self._mj, self._data, np.zeros(6)
+        found = []
+        for k in range(data.ncon):
+            mujoco.mj_contactForce(mj, data, k, force)
+            one, other = (int(mj.geom_bodyid[geom]) for geom in data.contact[k].geom)
+            if force[0] > 0:
+                found.append((one, other, float(force[0])))
+        return found
 
     def _note_captured(self, person: Mechanism, hearing: Hearing) -> None:
         """Where a person was captured, and how well that is what devices saw, where the twin is elsewhere."""

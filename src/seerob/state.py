@@ -63,6 +63,8 @@ class State:
         none."""
         self.foresee: Foresee = lambda name, t: None
         """What a motion that is known ahead will do."""
+        self.touches: list[tuple[int, int, float]] | None = None
+        """Of every contact two of MuJoCo's bodies and the normal force [N]; None where none is calculated."""
         self.asked: set[str] = set()
         """Robots and humans that answers have depended on since the set was last cleared."""
         self.bearers = Bearers(model)
@@ -369,6 +371,32 @@ class State:
         R, x = self._cache[key]
         ids = self.bearers.ids[rows]
         return R[ids], x[ids]
+
+    def contact_forces(self, name: str) -> dict[int, tuple[float, str]]:
+        """Bones of a person that something touches in the twin: the normal force [N], and who presses most.
+
+        By index of the bone. Soft contacts and controllers make them: an estimate.
+
+        Raises:
+            Undecided: What was heard of the person may not be relied on, or no contact is calculated.
+        """
+        self.asked.add(name)
+        if reason := self.heard_doubt(name):
+            raise Undecided(reason)
+        if self.touches is None:
+            raise Undecided(f"{name}: no contacts are calculated (engine.physics, [[contacts]])")
+        if self._hearings[name].lost > self.t - 2 * self._period:
+            raise Undecided(f"{name}: the twin had to be put back to what was heard")
+        own = {body.mj: body.index for body in self.model.bodies if body.owner == name}
+        others = {body.mj: body.name for body in self.model.bodies}
+        pressing: dict[int, dict[str, float]] = {}
+        for one, other, force in self.touches:
+            for mine, its in ((one, other), (other, one)):
+                if mine in own and its not in own:
+                    by = pressing.setdefault(own[mine], {})
+                    who = others.get(its, "the floor")
+                    by[who] = by.get(who, 0.0) + force
+        return {i: (sum(by.values()), max(by, key=lambda who: by[who])) for i, by in pressing.items()}
 
     def strayed(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
         """How far bones of the twin of a person are from where they were captured.

@@ -261,6 +261,48 @@ def test_contact_and_effective_mass_exceed_by_what_is_known(tmp_path):
         assert results_at(cell, arm=fast)[EFFECTIVE].verdict == "exceeded"
 
 
+def test_a_point_mass_on_a_frame_counts(tmp_path):
+    """3 kg at 2 m without an inertia, as a payload frame has it."""
+    point = f'<inertial><mass value="3"/>{SIX.format(0)}</inertial>'
+    cell = station(tmp_path, gripper(point))
+    assert rows(cell)["arm/tip"].mass == 3
+    assert results_at(cell, arm=FAST)[ENERGY].value == pytest.approx(8.5, abs=1e-6)
+
+
+MJCF = """
+<mujoco><compiler angle="radian" {}/><worldbody><body name="base"><body name="l1">
+<joint name="j1" axis="0 0 1"/>{}<body name="g" pos="1 0 0">{}</body></body></body></worldbody></mujoco>
+"""
+GEOM = '<geom type="box" size="0.5 0.05 0.05" pos="0.5 0 0" {}/>'
+
+
+@pytest.mark.parametrize(
+    ("compiler", "first", "second", "unknown"),
+    [
+        ("", GEOM.format('mass="2"'), GEOM.format('density="300"'), ()),
+        ("", GEOM.format(""), GEOM.format('mass="2"'), ("arm/l1",)),
+        ("", GEOM.format('mass="2"'), GEOM.format('mass="0"'), ("arm/g",)),
+        (
+            'inertiagrouprange="0 0"',
+            GEOM.format('mass="2"') * 2,
+            GEOM.format('mass="3" group="3"'),
+            ("arm/g",),
+        ),
+        (
+            'inertiagrouprange="0 0"',
+            GEOM.format('mass="2"') + GEOM.format('mass="3" group="3"'),
+            GEOM.format('mass="2"'),
+            ("arm/l1",),
+        ),
+    ],
+    ids=["given", "default density", "massless", "left out", "partly left out"],
+)
+def test_what_a_mjcf_does_not_weigh_is_unknown(tmp_path, compiler, first, second, unknown):
+    text = '[[robots]]\nname = "arm"\nmodel = "arm.xml"\n'
+    cell = made(tmp_path, text, {"arm.xml": MJCF.format(compiler, first, second)})
+    assert tuple(row.name for row in cell.model.robot("arm").masses if row.mass is None) == unknown
+
+
 def test_the_table_is_told_and_reported(tmp_path, capsys):
     cell = station(tmp_path, gripper(BOX.format(0.1)))
     assert cli.main(["check-file", str(tmp_path)]) == 0

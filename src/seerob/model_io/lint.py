@@ -180,8 +180,8 @@ def odd_density(density: float) -> str:
 
 def too_light(link: Link) -> str:
     """Why a body of a link's shape weighs more than is said; empty when it may not, or has no volume."""
-    if link.inertial is None or not link.solids:
-        return ""
+    if link.inertial is None or not link.solids or link.inertial.origin is Origin.GIVEN:
+        return ""  # what the user writes is looked at where the workstation file is
     volume = sum(filled(solid) for solid in link.solids)
     if link.inertial.mass >= DENSITIES[0] * volume * (1 - 1e-9):
         return ""

@@ -210,7 +210,13 @@ def _inertial(
     inertia = rotation @ np.diag(model.body_inertia[body].astype(float)) @ rotation.T
     origin, source = Origin.STATED, f"{reader.file}: body {name}"
     given = spec.bodies[body]
+    low, high = spec.compiler.inertiagrouprange
     if not given.explicitinertial or int(spec.compiler.inertiafromgeom) == 1:
+        left_out = [geom.mass for geom in given.geoms if not low <= geom.group <= high and geom.mass > 0]
+        if left_out:
+            text = f"{sum(left_out):.4g} kg of its shapes are outside inertiagrouprange and count nowhere"
+            reader.finding("warning", name, f"{text}: mass and inertia unknown")
+            return None, text
         weighed = [geom for geom in given.geoms if np.isnan(geom.mass)]
         if any(geom.density == DEFAULT_DENSITY for geom in weighed):
             origin, source = Origin.ASSUMED, f"{source}: shapes at MuJoCo's default of 1000 kg/m³"

@@ -107,6 +107,9 @@ class Mounting:
         body.mass = inertial.mass
         body.ipos = inertial.com
         i = inertial.inertia
+        if not i.any():
+            body.inertia = [TINY] * 3  # MuJoCo knows no point masses
+            return
         body.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
 
     def massless(self, body: Any) -> None:

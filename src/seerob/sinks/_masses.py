@@ -18,6 +18,8 @@ def total(rows: Sequence[LinkMass]) -> str:
     whole_of_it = sum(row.mass or 0.0 for row in known)
     moving = sum(row.mass or 0.0 for row in known if row.moves)
     unknown = [row.name for row in rows if row.mass is None]
+    if unknown and not whole_of_it:
+        return "unknown"
     text = f"{number(whole_of_it, 'kg')}, of which {number(moving, 'kg')} move"
     return f"at least {text}; unknown: {', '.join(unknown)}" if unknown else text
 

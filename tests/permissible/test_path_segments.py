@@ -97,6 +97,7 @@ def test_a_run_is_watched_against_the_map(mapped, tmp_path):
     _, _, found = mapped
     data = csv_bytes(map_head(found.map), map_rows(found.map))
     watch = '[[safety]]\nkind = "path_speed"\nname = "P"\nrobot = "arm"\nmap = "map.csv"\n'
+    watch += 'between_samples = "accepted: the speed is asked at every tick"\n'
     text = FLOATING.replace("}", ", physics = false }") + TWO_R + LIMITS + SOURCE + watch
     files = {"arm.urdf": two_r(), "map.csv": data, "motion.csv": turn()}
     results = made(tmp_path, text, files).run().results["P"]

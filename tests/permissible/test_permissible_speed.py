@@ -27,7 +27,8 @@ SSM = (
 KNOWN = SSM.format(Z_r="robot_uncertainty = 0.01\n")
 KEPT_OUT = 'excluded = ["Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"]\n'
 AREAS = 'contact_area = { "arm/l1" = 1e-4, "arm/l2" = 1e-4 }\nmass = "simplified"\n'
-PFL = f'[[safety]]\nkind = "power_and_force"\nname = "F"\nrobot = "arm"\nfloor = false\n{AREAS}'
+ACCEPTED = 'between_samples = "accepted: contact is asked at ticks, and by the plan between them"\n'
+PFL = f'[[safety]]\nkind = "power_and_force"\nname = "F"\nrobot = "arm"\nfloor = false\n{ACCEPTED}{AREAS}'
 SOURCE = '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "motion.csv"\n'
 
 

@@ -30,6 +30,7 @@ from seerob.opening import open_sources, source_target
 from seerob.permissible import evaluation
 from seerob.permissible.evaluation import PermissibleSpeed, Say, Wish
 from seerob.permissible.joint_limits import Given, joint_limits
+from seerob.plausibility.in_place import implausible
 from seerob.plausibility.own_words import said_by
 from seerob.reading import read
 from seerob.recordings.filing import source_files
@@ -117,7 +118,9 @@ class Station:
         other.workstation = replace(self.workstation, safety=(*self.workstation.safety, *criteria))
         from dataclasses import replace as replaced
 
-        other.model = replaced(self.model, workstation=other.workstation)
+        model = replaced(self.model, workstation=other.workstation)
+        findings = tuple(dict.fromkeys((*model.findings, *implausible(model))))
+        other.model = replaced(model, findings=findings)
         return other
 
     def open_sinks(self, sinks: Sequence[Sink], folder: Path, scene: Scene) -> list[Writer]:

@@ -23,6 +23,7 @@ from seerob.plausibility.in_place import implausible
 from seerob.plausibility.of_file import FOLLOWS, LISTS, PLUGINS, entries_of, unknown
 from seerob.plausibility.ranges import data
 from seerob.reading import BASES
+from seerob.safety.velocity import Velocity
 from seerob.snapshot import Finding, Verdict
 from seerob.station import Station, load
 from seerob.workstation import TABLES, Confirmed, Engine
@@ -348,6 +349,17 @@ def test_a_quantity_of_somebody_elses_criterion_is_looked_at(
     station = station_of(tmp_path, cell(more=more))
     assert [f.holds for f in doubted(station)] == [("own",)]
     assert verdicts(station)["own"] is Verdict.UNDECIDED
+
+
+def test_a_criterion_that_is_added_in_python_is_looked_at(tmp_path: Path) -> None:
+    station = station_of(tmp_path, cell())
+    added = [
+        Velocity(name=name, at="ur5", limit=limit) for name, limit in (("sensible", 0.25), ("in mm/s", 250.0))
+    ]
+    other = station.with_criteria(*added)
+    assert [f.holds for f in doubted(other)] == [("in mm/s",)]
+    assert verdicts(other)["in mm/s"] is Verdict.UNDECIDED
+    assert verdicts(other)["sensible"] is Verdict.WITHIN
 
 
 SHIPPED = sorted(p.parent for p in ROOT.glob("workstations/*/workstation.toml"))

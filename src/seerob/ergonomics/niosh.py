@@ -112,6 +112,10 @@ class Niosh(Criterion, frozen=True, kw_only=True):
         """The person."""
         return (self.human,)
 
+    def depends(self, model: Model) -> tuple[str, ...]:
+        """Nobody: lifts are entered."""
+        return ()
+
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`.
 

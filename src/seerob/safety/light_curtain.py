@@ -52,6 +52,10 @@ class LightCurtain(Criterion, frozen=True, kw_only=True):
     def _curtain(self, model: Model) -> _Curtain:
         return _Curtain(model, sensor_of(model, self.sensor, "light_curtain"), bodies_of(model, self.of))
 
+    def depends(self, model: Model) -> tuple[str, ...]:
+        """Whoever may stand in a beam."""
+        return (*self.subjects(), *model.mechanisms)
+
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         curtain = self._curtain(model)

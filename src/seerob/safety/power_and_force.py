@@ -123,6 +123,12 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         """The robot and the human."""
         return (self.robot,) if self.human is None else (self.robot, self.human)
 
+    def depends(self, model: Model) -> tuple[str, ...]:
+        """Everybody who can be hit, or who carries a surface that clamps."""
+        people = [name for name, m in model.mechanisms.items() if m.role == "human"]
+        spared = [] if self.human is None else [name for name in people if name != self.human]
+        return tuple(name for name in model.mechanisms if name not in spared)
+
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         contacts = Contacts(self, model)
@@ -318,9 +324,11 @@ class Contacts:
             else None
         )  # fmt: skip
 
-    def without(self, lost: tuple[int, ...]) -> Evaluate:
-        """The same about the other bones of the person."""
+    def without(self, lost: tuple[int, ...]) -> Evaluate | None:
+        """The same about the other bones of the person; None when there are none."""
         spec, human = self.spec, self.spec.human or ""
+        if set(self.model.human(human).bodies) <= set(lost):
+            return None
         rest = Person(self.model, self.robot, human, horizon=spec.horizon, without=lost)
         return lambda state: self.evaluate(state, rest)
 

@@ -67,6 +67,10 @@ class ScannerField(Criterion, frozen=True, kw_only=True):
             raise InputError.at(self.name, "field", str(error)) from None
         return _Scan(model, sensor, chosen, bodies_of(model, self.of), self.redraw)
 
+    def depends(self, model: Model) -> tuple[str, ...]:
+        """Whoever may stand in a beam."""
+        return (*self.subjects(), *model.mechanisms)
+
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         scan = self._scan(model)

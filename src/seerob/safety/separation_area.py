@@ -52,6 +52,10 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         """See `Criterion.judged`."""
         return super().judged(model) | set(self._criterion(model).moving(model))
 
+    def depends(self, model: Model) -> tuple[str, ...]:
+        """Them, and the robot that the separation is of."""
+        return (*self.subjects(), *self._criterion(model).depends(model))
+
     def _criterion(self, model: Model) -> Any:
         known = {c.name: c for c in model.workstation.safety if hasattr(c, "required")}
         if self.separation not in known:

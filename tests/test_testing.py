@@ -1,0 +1,203 @@
+"""The harness for criteria: all that ship pass it, and one that forgets does not."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from made_cell import FLOATING, made, person, two_r
+from seerob import plugin
+from seerob.errors import SeerobError
+from seerob.testing import never_within
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+ARM = '[[robots]]\nname = "arm"\nmodel = "arm.urdf"\nq = [0.3, 0.4]\n'
+PLACES = """
+[[areas]]
+name = "zone"
+shape = { box = [0.5, 0.5, 0.5] }
+at = { position = [20, 0, 0] }
+[[sensors]]
+name = "scanner"
+response = 0.1
+capability = 0.07
+source = "data sheet"
+at = { position = [20, 0, 0.2] }
+[sensors.laser_scanner]
+range = 5
+angle = 3
+resolution = 0.01
+fields = [{ name = "warn", corners = [[0, -1], [1, -1], [1, 1], [0, 1]] }]
+[[sensors]]
+name = "curtain"
+response = 0.02
+capability = 0.014
+source = "data sheet"
+at = { position = [20, 5, 0] }
+light_curtain = { ends = [[-0.5, 0, 0], [0.5, 0, 0]], height = 1, pitch = 0.1 }
+[[sensors]]
+name = "mat"
+response = 0.1
+source = "data sheet"
+at = { position = [20, 9, 0] }
+pressure_mat = { corners = [[0, 0], [1, 0], [1, 1], [0, 1]] }
+"""
+VARIABLES = '[[variables]]\nname = "free"\nsource = "plc"\naddress = "x"\ntype = "bool"\n'
+PLC = '[[sources]]\nkind = "signals_csv"\nname = "plc"\nfile = "s.csv"\ntime = "t"\ntime_unit = "s"\n'
+TERMS = "intrusion = 0\nhuman_uncertainty = 0\nrobot_uncertainty = 0\n"
+STOP = "stop = { reaction = 0.01, stopping = 0.01 }\n"
+SAFETY = {
+    "device_distance": 'sensor = "curtain"\nhazard = "arm"\nstopping = 0.1\nreach_over = 0\nreach_under = 0\n'
+    "supplement = 0\n",
+    "effective_mass": 'at = "arm"\nlimit = 100\n',
+    "force_polytope": 'at = "arm"\n',
+    "kinetic_energy": 'robot = "arm"\nlimit = 100\n',
+    "light_curtain": 'sensor = "curtain"\nof = ["arm", "op"]\n',
+    "manipulability": 'at = "arm"\n',
+    "minimum_distance": 'between = ["arm", "op"]\nlimit = 0.01\n',
+    "power_and_force": 'robot = "arm"\nhuman = "op"\n',
+    "pressure_mat": 'sensor = "mat"\nof = "op"\n',
+    "safety_area": 'area = "zone"\nof = ["arm", "op"]\n',
+    "scanner_field": 'sensor = "scanner"\nfield = "warn"\nof = ["arm", "op"]\n',
+    "sensor_agreement": 'field = "zone"\nof = "op"\nvariable = "free"\nlimit = 1\n',
+    "separation": f'between = ["arm", "op"]\n{STOP}{TERMS}',
+    "separation_area": 'separation = "separation"\nof = "op"\n',
+    "swept_volume": 'of = "arm"\nvoxel = 0.1\nlimit = 9\n',
+    "variable": 'variable = "free"\nexpected = true\n',
+    "tool_force": 'at = "arm"\n',
+    "joint_torque": 'robot = "arm"\n',
+    "velocity": 'of = "arm"\nlimit = 9\n',
+    "acme.work_height": 'at = "arm"\nlimit = 9\n',
+}
+PHASE = """
+[[phases]]
+title = "stands"
+start = 0
+load = 0
+muscle_arms = false
+muscle_body = false
+supported_arms = "none"
+back_supported = false
+legs = "posture"
+static = false
+repeated = false
+rapid = false
+"""
+LEFT_OUT = {
+    "niosh": "depends on nobody: lifts are entered",
+    "path_speed": "needs a map of a motion",
+    "waypoints": "draws, and has no limit",
+    "posture_table": "is iso_11226 with a table of one's own",
+}
+ERGONOMICS = {
+    "rula": "action_level = 4\n",
+    "reba": "action_level = 4\n",
+    "owas": "action_category = 4\n",
+    "eaws_posture": "cycle = 60\n",
+    "iso_11226": "",
+    "en_1005_4": "",
+    "acme.bending": "limit = 10\n",
+}
+
+
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(EXAMPLES))
+        text = 'variables = "v.toml"\n' + FLOATING + ARM + person("op", 6, 0, 0) + PLACES + PLC + PHASE
+        for kind, rest in SAFETY.items():
+            text += f'[[safety]]\nkind = "{kind}"\nname = "{kind}"\n{rest}'
+        for kind, rest in ERGONOMICS.items():
+            text += f'[[ergonomics]]\nkind = "{kind}"\nname = "{kind}"\nhuman = "op"\n{rest}'
+        files = {"arm.urdf": two_r(), "v.toml": VARIABLES, "s.csv": "t,x\n0,1\n1,1\n"}
+        yield made(tmp_path_factory.mktemp("everything"), text, files)
+
+
+def test_whatever_ships_is_never_within_where_nothing_is_known(everything):
+    never_within(everything, {"free": True})
+
+
+def test_whatever_ships_is_asked(everything):
+    for group, kinds in (("safety", SAFETY), ("ergonomics", ERGONOMICS)):
+        assert set(plugin.kinds(group)) - set(LEFT_OUT) <= set(kinds)
+
+
+# -- criteria that forget --------------------------------------------------------------------------
+
+HEAD = """
+import numpy as np
+from seerob.criterion import Criterion, judge
+from seerob.snapshot import Basis, Label, Result, Verdict
+
+class Own(Criterion, frozen=True, kw_only=True):
+    '''A rule of one's own.'''
+    def basis(self, model): return Basis(formula="as below", source="ACME")
+    def subjects(self): return ("arm",)
+    def bind(self, model):
+        arm, other = model.mechanisms["arm"], model.mechanisms["other"]
+        kept = []
+        def evaluate(state):
+            {}
+            return Result(name=self.name, value=value, limit=9.0, verdict=judge(value, 9.0), markers=markers)
+        return evaluate
+"""
+GOOD = "value, markers = float(state.q(arm)[0]), ()"
+FORGETS = {
+    "peeks": ("value, markers = float(state._data.qpos[-1]), ()", "it changes when other moves"),
+    "undeclared": ("value, markers = float(state.q(arm)[0] + state.q(other)[0]), ()", "it depends on other"),
+    "raw": ("value, markers = float(state.data.qpos[0]), ()", "State.data does not say whether"),
+    "fails": ("value = kept[3]", "failed: IndexError"),
+    "not a number": ("value, markers = float('nan'), ()", "not a finite number|it is undecided"),
+}
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    def write(line, more=""):
+        package = f"forgets_{tmp_path.name}"
+        (tmp_path / package).mkdir()
+        (tmp_path / package / "__init__.py").touch()
+        (tmp_path / package / "rule.py").write_text(HEAD.format(line) + more)
+        other = ARM.replace('"arm"', '"other"') + "base = { position = [0, 9, 0] }\n"
+        criterion = f'[[safety]]\nkind = "{package}.rule"\nname = "own"\n'
+        return made(tmp_path / "cell", FLOATING + ARM + other + criterion, {"arm.urdf": two_r()})
+
+    return write
+
+
+def test_one_that_asks_what_it_declares_passes(own):
+    never_within(own(GOOD))
+
+
+@pytest.mark.parametrize("how", FORGETS)
+def test_one_that_forgets_fails(own, how):
+    line, words = FORGETS[how]
+    with pytest.raises(AssertionError, match=words):
+        never_within(own(line))
+
+
+def test_one_that_says_that_it_judges_parts_and_asks_nothing_fails(own):
+    """What it found when it could is worth nothing once nobody is heard."""
+    line = "kept.append(1.0) if kept else kept.append(float(state.q(arm)[0])); value, markers = kept[0], ()"
+    with pytest.raises(AssertionError, match=r"it is within at tick \d+ although arm is stale"):
+        never_within(own(line, "    whole = False\n"))
+
+
+def test_a_basis_that_is_missing_fails(own):
+    with pytest.raises(SeerobError, match="has no basis"):
+        never_within(own(GOOD, "Own.basis = Criterion.basis\n"))
+
+
+def test_a_workstation_is_enough_for_pytest(own, tmp_path):
+    """``pytest -p seerob.testing my_cell/workstation.toml``."""
+    own(GOOD)
+    asked = [sys.executable, "-m", "pytest", "-q", "-p", "seerob.testing", "-p", "no:cacheprovider"]
+    env = {"PYTHONPATH": str(tmp_path), "PATH": "/usr/bin:/bin"}
+    file = str(tmp_path / "cell" / "workstation.toml")
+    done = subprocess.run([*asked, file], capture_output=True, text=True, check=False, env=env, cwd=tmp_path)
+    assert (done.returncode, "1 passed" in done.stdout) == (0, True), done.stdout

@@ -9,7 +9,14 @@ from seerob.snapshot import Origin
 from seerob.stopping.inputs import approach_speed, intrusion
 from seerob.stopping.models import MOVING, SHARE, Stop, StopTolerance, bind_stop
 from seerob.stopping.onset import accelerated
-from seerob.stopping.terms import BOUND, CONSTANT, largest_speed_decelerating, largest_speed_in_time
+from seerob.stopping.terms import (
+    BOUND,
+    CONSTANT,
+    braking,
+    largest_speed_decelerating,
+    largest_speed_in_time,
+    separation_distance,
+)
 from seerob.stopping.tolerances import shifted, tolerances
 from seerob.tolerances import Tolerance
 
@@ -133,9 +140,9 @@ def test_a_stop_at_the_ends_of_its_tolerances():
         found = shifted(times, (side, -side))
         assert (found.reaction, found.stopping) == pytest.approx((0.1 + side * 0.02, 0.3 - side * 0.05))
         assert found.tolerance is None
-    braking = Stop(**BRAKING, tolerance=OFF(deceleration=0.5))
-    assert tolerances(braking) == (Tolerance("stop.deceleration", 0.5, "m/s²"),)
-    assert [shifted(braking, (side,)).deceleration for side in (-1, 1)] == [2.5, 1.5]
+    brakes = Stop(**BRAKING, tolerance=OFF(deceleration=0.5))
+    assert tolerances(brakes) == (Tolerance("stop.deceleration", 0.5, "m/s²"),)
+    assert [shifted(brakes, (side,)).deceleration for side in (-1, 1)] == [2.5, 1.5]
     assert tolerances(Stop(**KNOWN)) == tolerances(Stop(**KNOWN, tolerance=OFF())) == ()
 
 
@@ -146,3 +153,48 @@ def test_the_approach_speed_says_where_it_is_from():
     assert (given.value, given.unit, given.origin) == (1.5, "m/s", Origin.GIVEN)
     assert (norm.value, norm.origin) == ("1.6 m/s, 2 m/s up to S_p = 0.5 m", Origin.STATED)
     assert [intrusion(C).origin for C in (None, 0.0, 0.2)] == [Origin.MISSING, Origin.GIVEN, Origin.GIVEN]
+
+
+# -- with an acceleration while it reacts ---------------------------------------------------------
+
+
+def needed(options, v, a):
+    """S_p of each part at speeds [m/s] and an acceleration [m/s²]."""
+    onset, deceleration = accelerated(v, T_R, a, np.zeros(0)), options.get("deceleration")
+    T_s = options.get("stopping") if deceleration is None else float(onset.v_s.max()) / deceleration
+    return separation_distance(braking(onset, T_s, 0.5 if options.get("model") else 1.0), V_H, T_R, K)
+
+
+@pytest.mark.parametrize("options", [KNOWN, HALF, BRAKING])
+@pytest.mark.parametrize("v", [(1.0, 2.5), (0.7, 0.4), (0.0, 0.0)])
+@pytest.mark.parametrize("a", [0.5, 3.0])
+def test_at_the_largest_speed_with_an_acceleration_the_worst_part_is_as_near_as_it_may_be(options, v, a):
+    v, inverse = np.array(v), bind_stop(Stop(**{**options, "acceleration": a}), None, None, None).inverse
+    speed, factor = inverse(*onsets(v, a), D, V_H, K)
+    if factor is None:
+        # At rest each part may be the fastest.
+        room = (D - needed(options, np.full(2, speed), a)).min()
+    else:
+        room = (D - needed(options, factor * v, a)).min()
+        assert speed == pytest.approx(factor * v.max())
+    assert room == pytest.approx(0, abs=1e-9) if speed > 0 else room <= 1e-9
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_worse_never_needs_less(seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(200):
+        v, a, T_r, T_s, v_h, dec, share = rng.uniform(0.01, 3, 7)
+        share = 0.5 + 0.5 * (share > 1.5)
+
+        def S_p(v=v, a=a, T_r=T_r, T_s=T_s, v_h=v_h, dec=dec, by_time=True, share=share):
+            onset = accelerated(np.array([v, v / 2]), T_r, a, np.zeros(0))
+            time = T_s if by_time else float(onset.v_s.max()) / dec
+            return separation_distance(braking(onset, time, share), v_h, T_r, K)
+
+        for by_time in (True, False):
+            now = S_p(by_time=by_time)
+            more = {"v": v, "a": a, "T_r": T_r, "v_h": v_h, **({"T_s": T_s} if by_time else {})}
+            worse = [S_p(by_time=by_time, **{key: x + rng.uniform(0, 1)}) for key, x in more.items()]
+            worse += [] if by_time else [S_p(by_time=False, dec=dec * rng.uniform(0.1, 1))]
+            assert all((found >= now - 1e-12).all() for found in worse)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import TWO_R, made, two_r
+from made_cell import TWO_R, UR10, made, two_r
 from seerob.between_ticks import Told
 from seerob.run import Judge, engine_of, looks_ahead, pump, ticks
 from seerob.snapshot import Verdict
@@ -284,3 +284,44 @@ def test_nothing_that_is_met_between_two_ticks_is_worse_than_the_bound(tmp_path,
     assert set(room) >= {"distance", "area", "fastest", "point", "energy", "singularity", "bound", "braking"}
     for name, found in room.items():
         assert min(found) >= -1e-9, name
+
+
+# -- and none is so wide that what nears its limits is open --------------------------------------
+
+POLE = '[[parts]]\nname = "pole"\nshape = { box = [0.05, 0.05, 2] }\nat = { position = [1.6, 0, 0.5] }\n'
+NEAR = """
+[[safety]]
+kind = "velocity"
+name = "speed"
+of = "arm"
+limit = {speed}
+[[safety]]
+kind = "minimum_distance"
+name = "distance"
+between = ["arm", "pole"]
+limit = {distance}
+[[safety]]
+kind = "kinetic_energy"
+name = "energy"
+robot = "arm"
+limit = {energy}
+"""
+
+
+def reaching(folder, **limits):
+    """A UR10 that swings past a pole at nearly 1 m/s, told at 125 Hz and asked at 100 Hz."""
+    t = np.arange(0, 0.6, 0.008)
+    q = np.tile([-0.4, -1.2, 1.4, -1.5, -1.5, 0.0], (len(t), 1))
+    q[:, 0] += t
+    q[:, 3] += 0.2 * np.sin(3 * t)
+    lines = ["t [s]," + ",".join(f"j{k} [rad]" for k in range(6))]
+    lines += [",".join(f"{x:.9f}" for x in row) for row in np.column_stack([t, q])]
+    return made(folder, UR10 + POLE + SOURCE + NEAR.format(**limits), {"motion.csv": "\n".join(lines) + "\n"})
+
+
+def test_a_ur10_that_nears_its_limits_by_a_thousandth_is_within_throughout(tmp_path):
+    far = reaching(tmp_path / "far", speed=9, distance=0, energy=900).run().results
+    near = {"speed": far["speed"].max() * 1.001, "energy": far["energy"].max() * 1.001}
+    assert near["speed"] > 0.9
+    summary = reaching(tmp_path / "near", distance=far["distance"].min() - 0.001, **near).run()
+    assert {series.verdict for series in summary.results.values()} == {Verdict.WITHIN}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from made_cell import FLOATING, made, results_at, state_at, two_r
+from made_cell import FLOATING, Q0, UR10, made, results_at, state_at, two_r
 from seerob.contact.clamped_regions import Clamping
 from seerob.contact.joint_gaps import closing, places
 from seerob.geometry import Mesh, Solid, capsule
@@ -187,6 +187,19 @@ def test_wider_fingers_never_relieve(tmp_path: Path) -> None:
         found = [bool(clamped(s, (HAND,), arm=((0, gap / 2), (0, -0.1)))[HAND]) for s in stations]
         assert found == sorted(found)
         assert found[-1]
+
+
+def test_a_slide_without_ends_clamps_wherever_it_is_near(tmp_path: Path) -> None:
+    """Two fingers that nobody gave a stroke: nobody knows what gets between."""
+    tool = UR10.replace("tcp = { position = [0, 0, 0.1] }\n", "")
+    grip = (
+        '[[machines]]\nname = "hand"\non = "arm/tool0"\nat = {{ position = [0, 0, 0.2] }}\n'
+        "shape = {{ box = [0.02, 0.01, 0.1] }}\nmass = 0.2\ngrip = {{ {} }}\n"
+    )
+    for options, q, expected in (("upper = 0.9", 0.2, False), ("", 0.2, False), ("", 0.03, True)):
+        station = made(tmp_path / f"{options}{q}", FLOATING + tool + grip.format(options))
+        found = clamped(station, (HAND,), arm=(Q0, np.zeros(6)), hand=([q], [-0.05]))[HAND]
+        assert ({"hand/left", "hand/right"} <= found) == expected
 
 
 # -- the mathematics ----------------------------------------------------------------------------

@@ -244,6 +244,13 @@ class OwnJoints:
         low = home - some if not np.isfinite(low) else low
         return low, max(home + some, low) if not np.isfinite(high) else high
 
+    def endless(self, coordinate: Coordinate) -> bool:
+        """Whether it slides without ends: then no range of it says what gets between two parts."""
+        name, column = coordinate
+        m = self._model.mechanisms[name]
+        ends = np.isfinite([m.lower[column], m.upper[column]])
+        return m.joints[column].kind != "revolute" and not bool(ends.all())
+
     def poses(self, positions: Mapping[Coordinate, Array]) -> tuple[Array, Array]:
         """Poses of all bodies with some joints there and all others at home.
 
@@ -289,8 +296,9 @@ def robot_pinch_pairs(
     others = [b.index for b in around if b.mover]
     joints = OwnJoints(model)
     between = {(i, j): joints.between(i, j) for i in own for j in own if i < j}
-    one = [(i, j, next(iter(of))) for (i, j), of in between.items() if len(of) == 1]
-    apart = frozenset(pair for pair, of in between.items() if len(of) < 2)
+    endless = {pair for pair, of in between.items() if any(map(joints.endless, of))}
+    one = [(i, j, next(iter(of))) for (i, j), of in between.items() if len(of) == 1 and (i, j) not in endless]
+    apart = frozenset(pair for pair, of in between.items() if len(of) < 2 and pair not in endless)
     pairs = pinch_pairs(model.shapes, robot.moving, surfaces, apart, others=others, still=still, cap=cap)
     inner = pairs.inner
     widest = np.full(len(pairs.first), np.inf)
@@ -303,4 +311,9 @@ def robot_pinch_pairs(
         )
         own_pairs = [query for query, per in pairs.queries if per is Per.PAIR and query.a[0] in own]
         widest[inner] = np.concatenate([q.batch(*poses, Per.PAIR).distance.max(axis=0) for q in own_pairs])
+        # Without ends anything may get between, and may be clamped wherever they are near.
+        ends_of = zip(np.array(pairs.moving)[pairs.first[inner]], pairs.across[inner], strict=True)
+        widest[inner] = np.where(
+            [tuple(sorted((int(a), int(b)))) in endless for a, b in ends_of], np.inf, widest[inner]
+        )
     return pairs, widest, one

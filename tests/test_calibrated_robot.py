@@ -62,7 +62,9 @@ def test_what_is_off_is_written_used_and_then_right(tmp_path, capsys):
 def test_that_of_the_type_and_none_are_said(tmp_path):
     with RtdeServer(MOTION, kinematics=TYPE) as server:
         assert "the model's tool is where" in said(cell(tmp_path, server))["note"]
-        assert "not of this type of robot" in said(cell(tmp_path, server, model="ur5"))["warning"]
+        other = cell(tmp_path, server, model="ur5")
+        assert "not of this type of robot" in said(other)["warning"]
+        assert ("arm",) in {f.holds for f in other.scene().findings if "its kinematics" in f.text}
     with RtdeServer(MOTION) as server:
         assert "could not be read (port 1: Connection refused)" in said(cell(tmp_path, server))["assumed"]
 

@@ -50,6 +50,9 @@ SIGNAL_PERIOD = 0.1
 """Signals are repeated after this time, or when a state changes [s]."""
 SAME_TOOL = 2e-4
 """A tool that is nearer to where it should be is there [m]: a fraction of what such arms repeat to."""
+ANOTHER = 0.010
+"""A tool that is farther from where it should be leaves what rests on the robot undecided [m]: as far as a
+tool centre point may be from the twin's by default, see `seerob.plausibility.own_words`."""
 PRIMARY_WITHIN = 1.4
 """The primary interface says everything at least once a second [s]."""
 LEVELS = {Level.EXCEPTION: logging.ERROR, Level.ERROR: logging.ERROR, Level.WARNING: logging.WARNING}
@@ -180,13 +183,14 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
 
     def _kinematics(self, target: Target) -> Finding:
         """Whether the model has the kinematics of this very robot."""
+        other = False
         try:
             found = at_start(self.calibration())
             if target.description is None:
                 raise ProtocolError("there is no model to compare it with")
             off = off_by(target.description, found, f"rtde {self.host}")
         except InputError as error:
-            level, text = "warning", f"its kinematics are {error.problems[0].what}"
+            level, text, other = "warning", f"its kinematics are {error.problems[0].what}", True
         except (OSError, EOFError, ProtocolError) as error:
             level = "assumed"
             text = (
@@ -202,7 +206,8 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
                     f"seerob probe rtde {self.host} --calibration FILE, and name it in the robot's table: "
                     'calibration = "FILE"'
                 )
-        return Finding(level=level, subject=self.robot, text=text)
+            other = off > ANOTHER
+        return Finding(level=level, subject=self.robot, text=text, holds=(self.robot,) * other)
 
     async def calibration(self) -> Calibration:
         """The kinematics of this very robot, from the primary interface.

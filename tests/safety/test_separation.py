@@ -108,7 +108,7 @@ def test_person_inside_the_robot_is_exceeded(tmp_path):
 
 
 def test_it_takes_one_robot_and_one_human(tmp_path):
-    with pytest.raises(InputError, match="not a robot and a human"):
+    with pytest.raises(InputError, match="not a robot or machine and a human"):
         separation(tmp_path, between='["arm", "arm"]')
 
 

@@ -134,6 +134,18 @@ def test_what_is_fixed_to_a_shape_is_in_it_or_not_shown(tmp_path, urdf, shown):
     )
 
 
+WITHOUT_BOTH = re.sub(r'(<link name="l1">).*?</collision>', r"\1", two_r())
+REFUSED = lump(x=0.0).replace('<mass value="5.0"/>', "")
+
+
+@pytest.mark.parametrize("urdf", [WITHOUT_BOTH, REFUSED], ids=["said nothing of", "refused"])
+def test_a_body_whose_mass_nobody_knows_either_is_not_shown(tmp_path, urdf):
+    """A link of 1 m between two joints of which the file says nothing, and a mass that it does not tell."""
+    result = results_at(cell(tmp_path, urdf), arm=((0.0, 0.0), (1.0, 0.0)))["minimum_distance"]
+    assert result.verdict == "undecided"
+    assert "no shape shows" in result.reason
+
+
 @given(
     st.lists(st.tuples(st.floats(-1, 1), st.floats(0.1, 9)), min_size=1, max_size=9),
     st.floats(-2, 2),

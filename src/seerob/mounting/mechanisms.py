@@ -187,7 +187,8 @@ def stands_out(a: float, b: float, variance: float) -> float:
 def _unseen(mj: Any, masses: Iterable[LinkMass], bodies: Sequence[Body]) -> Iterable[str]:
     """Bodies with a mass of which some lies, by centre of mass and inertia, where nothing has a shape.
 
-    The shapes of all that moves as one with a body count, and all its mass must go into them.
+    The shapes of all that moves as one with a body count, and all its mass must go into them. A body whose
+    mass nobody knows is shown by a shape of its own; by that of another only where its file says nothing.
     """
     data = mujoco.MjData(mj)
     mujoco.mj_kinematics(mj, data)
@@ -195,7 +196,11 @@ def _unseen(mj: Any, masses: Iterable[LinkMass], bodies: Sequence[Body]) -> Iter
     groups: dict[int, list[tuple[int, str, float]]] = {}
     for row in masses:
         i = _body_id(mj, row.name)
-        if i > 0 and (row.mass or 0.0) > LIGHT:
+        if i > 0 and row.mass is None:
+            near = [body.mj for body in bodies if mj.body_weldid[body.mj] == mj.body_weldid[i]]
+            if i not in near and (row.note or not near):
+                yield row.name
+        elif i > 0 and (row.mass or 0.0) > LIGHT:
             groups.setdefault(int(mj.body_weldid[i]), []).append((i, row.name, float(mj.body_mass[i])))
     for weld, heavy in groups.items():
         shown = [body for body in bodies if int(mj.body_weldid[body.mj]) == weld and len(body.corners)]

@@ -251,3 +251,20 @@ def test_of_every_device_lost_places_leave_nobody_placed_and_nothing_of_it_is_wi
     assert known
     assert set(hearing.unplaced(t[-1])) == known
     assert "no device says where" in hearing.displaced(t[-1])
+
+
+@pytest.mark.parametrize(("apart", "doubt"), [(0.1, False), (0.6, True)])
+def test_what_two_devices_see_apart_widens_distances_or_is_in_doubt(apart, doubt):
+    t, q = walking(0.3)
+    one, other = frames_of(t, q, turned=False), frames_of(t, q, turned=False)
+    for frame in other:
+        frame.positions[BONES.index("right_hand")] += [0.0, 0.0, apart]
+    weaker = source(captured(other), name="other", weights=Weights(position=0.25))
+    told = watched(source(captured(one)), weaker, criteria=CRITERIA[1:])
+    for instant, (result,), _ in told[1:]:
+        if doubt:
+            assert result.verdict is Verdict.UNDECIDED, instant
+            assert "apart" in result.reason
+        else:
+            assert result.value - result.interval[0] >= apart - 0.01
+            assert result.interval[1] - result.value >= apart - 0.01

@@ -24,9 +24,11 @@ _EXITS = {
     Exit.ERROR: "a mistake in a file or on the command line, or it was stopped; the message says which",
 }
 _JSON = (
-    "\n**With `--json`** `assess` and `report` print one object: `verdict`, `duration` [s], `ticks`, "
-    "`workstation_hash`, `criteria`, `bones`, `findings`, `folder`.\n"
-    "Each of `criteria` has `name`, `unit`, `verdict` and its `worst` instant: `t` [s], `value`, `limit`, "
+    "\n**With `--json`** `assess` and `report` print one object: `verdict`, `decided`, `duration` [s], "
+    "`ticks`, `workstation_hash`, `criteria`, `bones`, `findings`, `folder`.\n"
+    "Each of `criteria` has `name`, `unit`, `verdict`, `times` (shares of the run: `within`, `exceeded`, "
+    "`undecided`, `muted`, `nothing` to judge, `open` where it was not asked), `between` (why nothing is known "
+    "between its instants, or why that is accepted), and its `worst` instant: `t` [s], `value`, `limit`, "
     "`interval`, `reason`; null is what is not known.\n"
 )
 

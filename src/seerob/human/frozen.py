@@ -7,12 +7,12 @@ never had noise (made motions, values rounded to millimetres) may stand still.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
+import numpy as np
 from msgspec.structs import replace
+from numpy.typing import NDArray
 
 from seerob.samples import BodyPoint
+from seerob.transforms import Array
 
 STEPS = 30
 """Changes that are seen before anything is said of a point's noise."""
@@ -22,49 +22,8 @@ REPEATED = 0.05
 """Share of repeated values up to which a point is one that never repeats."""
 LEAST = 1e-12
 """Square of a change that is more than the rounding of made values [m² or quaternions' units]."""
-MOST_KEPT = 4096
-"""Points that are remembered."""
-
-
-@dataclass
-class _Value:
-    """One position or orientation over time."""
-
-    value: tuple[float, ...]
-    step: tuple[float, ...] = ()
-    """The last change."""
-    bend: tuple[float, ...] = ()
-    """By how much it differed from the one before."""
-    jerk: tuple[float, ...] = ()
-    """And that from the one before."""
-    steps: int = 0
-    back: int = 0
-    """How often that turned round: of a smooth motion hardly ever."""
-    repeats: int = 0
-    """Values that were repeated and changed again."""
-    same: int = 0
-    """How often the newest was repeated."""
-
-    def add(self, value: tuple[float, ...]) -> None:
-        if value == self.value:
-            self.same += 1
-            return
-        step = tuple(b - a for a, b in zip(self.value, value, strict=True))
-        if sum(x * x for x in step) > LEAST:
-            self.steps += 1
-            bend = tuple(b - a for a, b in zip(self.step, step, strict=False))
-            jerk = tuple(b - a for a, b in zip(self.bend, bend, strict=False))
-            self.back += sum(a * b for a, b in zip(self.jerk, jerk, strict=False)) < 0
-            self.repeats += self.same > 0
-            if self.steps >= 4 * STEPS:  # what was long ago counts less
-                self.steps, self.back, self.repeats = self.steps // 2, self.back // 2, self.repeats // 2
-            self.step, self.bend, self.jerk = step, bend, jerk
-        self.value, self.same = value, 0
-
-    @property
-    def frozen(self) -> bool:
-        noisy = self.steps >= STEPS and self.back >= TO_AND_FRO * self.steps
-        return self.same > 0 and noisy and self.repeats <= REPEATED * self.steps
+NOTHING = (np.nan,) * 4
+"""What was not said."""
 
 
 class Frozen:
@@ -75,32 +34,55 @@ class Frozen:
     """
 
     def __init__(self) -> None:
-        self._values: dict[tuple[str, bool], _Value] = {}
         self.bones: set[str] = set()
+        self._names: tuple[str, ...] = ()
 
-    def __call__(self, points: Sequence[BodyPoint]) -> tuple[BodyPoint, ...]:
+    def _begin(self, names: tuple[str, ...]) -> None:
+        """Names of the device's points; others than before begin without a past."""
+        n = 2 * len(names)
+        self._names = names
+        # Positions, then orientations; what was not said last stays.
+        self._value, self._step, self._bend, self._jerk = np.full((4, n, 4), np.nan)
+        self._steps, self._back, self._repeats, self._same = np.zeros((4, n), np.int64)
+
+    def __call__(self, points: tuple[BodyPoint, ...]) -> tuple[BodyPoint, ...]:
         """The points of one sample without positions and orientations that only repeat those before."""
-        found = []
+        names = tuple(point.name for point in points)
+        if names != self._names:
+            self._begin(names)
+        said = [(0.0, *point.position) if point.position else NOTHING for point in points]
+        said += [point.wxyz or NOTHING for point in points]
+        with np.errstate(invalid="ignore", over="ignore"):  # numbers that cannot be are for others
+            frozen = self._add(np.array(said, float).reshape(-1, 4))
         self.bones.clear()
-        for point in points:
-            lost = [
-                value is not None and self._is_frozen((point.name, turned), value)
-                for turned, value in ((False, point.position), (True, point.wxyz))
-            ]
-            if any(lost):
-                self.bones.add(point.bone)
-                position, wxyz = (
-                    None if gone else x for gone, x in zip(lost, (point.position, point.wxyz), strict=True)
-                )
-                point = replace(point, position=position, wxyz=wxyz)  # noqa: PLW2901
-            found.append(point)
+        if not frozen.any():
+            return points
+        found = list(points)
+        for k in np.flatnonzero(frozen).tolist():
+            i, turned = k % len(points), k >= len(points)
+            self.bones.add(points[i].bone)
+            found[i] = replace(found[i], wxyz=None) if turned else replace(found[i], position=None)
         return tuple(found)
 
-    def _is_frozen(self, key: tuple[str, bool], value: tuple[float, ...]) -> bool:
-        known = self._values.get(key)
-        if known is None:
-            if len(self._values) < MOST_KEPT:
-                self._values[key] = _Value(value)
-            return False
-        known.add(value)
-        return known.frozen
+    def _add(self, value: Array) -> NDArray[np.bool_]:
+        """Which values only repeat the ones before, shape (2n,)."""
+        known = ~np.isnan(value).any(axis=1)
+        same = known & (value == self._value).all(axis=1)
+        self._same[same] += 1
+        step = value - self._value
+        # Not a number where nothing was before: no comparison with it holds.
+        moved = known & (np.einsum("ij,ij->i", step, step) > LEAST)
+        bend = step - self._step
+        jerk = bend - self._bend
+        self._steps += moved
+        self._back += moved & (np.einsum("ij,ij->i", self._jerk, jerk) < 0)
+        self._repeats += moved & (self._same > 0)
+        long = self._steps >= 4 * STEPS  # what was long ago counts less
+        for count in (self._steps, self._back, self._repeats):
+            count[long] //= 2
+        self._step[moved], self._bend[moved], self._jerk[moved] = step[moved], bend[moved], jerk[moved]
+        new = known & ~same
+        self._value[new] = value[new]
+        self._same[new] = 0
+        noisy = (self._steps >= STEPS) & (self._back >= TO_AND_FRO * self._steps)
+        return np.asarray(same & noisy & (self._repeats <= REPEATED * self._steps))

@@ -118,7 +118,7 @@ tcp = { position = [0, 0, 0.075] }
 
 
 @pytest.mark.parametrize("q", [MOVING, STANDING], ids=["moving", "standing"])
-@pytest.mark.parametrize("model", ["ur5e", "ur10e", "ur10"])
+@pytest.mark.parametrize("model", ["ur5e", "ur10e"])
 def test_the_log_of_another_robot_is_not_within_and_its_robot_is_named(
     tmp_path: Path, model: str, q: np.ndarray
 ) -> None:

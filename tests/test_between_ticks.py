@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -104,6 +106,20 @@ def test_a_period_is_covered_without_being_asked_while_nothing_comes_near(tmp_pa
     summary = station.run()
     assert summary.verdict is Verdict.WITHIN
     assert len(summary.results["c"]) == 3
+
+
+def test_a_bound_of_ones_own_that_fails_leaves_it_undecided_and_the_run_goes_on(tmp_path):
+    station = passing(tmp_path, THROUGH["post"][1], POST.replace("{x}", "5"))
+
+    def failing(span, least):
+        raise ZeroDivisionError("division by zero")
+
+    (bound,) = station.bound
+    judge = Judge([replace(bound, watch=replace(bound.watch, falls=failing))])
+    feed = pump(station.sources, station.workstation.engine.tick)
+    results = [out.results[0] for out, _ in ticks(engine_of(station.model), judge, feed)]
+    assert {result.verdict for result in results[1:]} == {Verdict.UNDECIDED}
+    assert all("failed: ZeroDivisionError: division by zero" in result.reason for result in results[1:])
 
 
 # -- no bound is ever beaten --------------------------------------------------------------------

@@ -102,6 +102,8 @@ class BetweenTicks:
         self._whole: Span | None = None
         """Of the way from tick to tick, which all criteria ask for."""
         self._again: dict[int, Evaluate] = {}
+        self._failed: dict[int, str] = {}
+        """Why nothing bounds a criterion any more in this run."""
         self.looks = 0
         """Instants between ticks that were looked at so far."""
 
@@ -128,22 +130,34 @@ class BetweenTicks:
         for i, watch in enumerate(self._watches):
             if watch is None:
                 continue
-            before = self._before[i]
-            if found[i].t is not None and found[i].t != state.t and before is not None:
-                self._before[i] = self._falling(watch, before, state, speeds)
-                if self._before[i] is not None:
-                    continue
-                found[i] = asking.now(i)
-            now = _end(watch.criterion, found[i], state.t, speeds)
-            if path is not None and before is not None:
-                told = self._judge(i, watch, (before, now), state)
-                if told.exceeded is not None:
-                    found[i] = told.exceeded
-                elif told.open and now.verdict is _WITHIN:
-                    found[i] = asking.take_back(found[i], told.open)
-            self._before[i] = now
+            try:
+                if i not in self._failed:
+                    found[i] = self._one(i, watch, found[i], state, speeds)
+            except Exception as error:
+                # One's own bound that fails must not end a run that others are judged in.
+                self._failed[i] = f"what bounds it between two ticks failed: {type(error).__name__}: {error}"
+            if i in self._failed:
+                found[i] = asking.take_back(found[i], self._failed[i])
         self._ids, self._speeds = ids.copy(), speeds
         return tuple(found)
+
+    def _one(self, i: int, watch: Watch, result: Result, state: State, speeds: Array) -> Result:
+        """What a criterion says of a tick, with what happened since the last one."""
+        before = self._before[i]
+        if result.t is not None and result.t != state.t and before is not None:
+            self._before[i] = self._falling(watch, before, state, speeds)
+            if self._before[i] is not None:
+                return result
+            result = self._asking.now(i)
+        now = _end(watch.criterion, result, state.t, speeds)
+        if self._way is not None and before is not None:
+            told = self._judge(i, watch, (before, now), state)
+            if told.exceeded is not None:
+                result = told.exceeded
+            elif told.open and now.verdict is _WITHIN:
+                result = self._asking.take_back(result, told.open)
+        self._before[i] = now
+        return result
 
     def _falling(self, watch: Watch, before: End, state: State, speeds: Array) -> End | None:
         """What is left at this tick of a margin that was not asked for; None when that is not enough."""

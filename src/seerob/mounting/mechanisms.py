@@ -24,7 +24,7 @@ SLIP = 0.1
 """How far the centre of mass of what has a shape of its own may lie outside it [m]: makers' files put those
 of wrists up to 0.07 m outside their meshes (UR3, UR5 and UR10 of example-robot-data)."""
 LUMP = 0.02
-"""How far a mass without a shape of its own may at least reach out of that of what it is fixed to [m]."""
+"""The same of what has none, and is in the shape of what it is fixed to: by its inertia, `SLIP`."""
 
 
 @dataclass
@@ -207,9 +207,13 @@ def _unseen(mj: Any, masses: Iterable[LinkMass], bodies: Sequence[Body]) -> Iter
         room = sum(map(_room, shown))
         dense = sum(mass for *_, mass in heavy) > DENSITIES[1] * room
         for i, name, _ in heavy:
+            if dense:  # also where there is no shape at all
+                yield name
+                continue
             own = any(body.mj == i for body in shown)
             # A shape of its own is believed before an inertia: that of many files is a guess.
-            if dense or _out_of(mj, data, i, shown, spread=not own) > (SLIP if own else LUMP):
+            centre, whole = (_out_of(mj, data, i, shown, spread=spread) for spread in (False, True))
+            if centre > (SLIP if own else LUMP) or (not own and whole > SLIP):
                 yield name
 
 

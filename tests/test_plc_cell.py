@@ -23,7 +23,7 @@ def here(folder, robot, plc):
     text = text.replace('kind = "rtde"\n', f'kind = "rtde"\nport = {robot}\n')
     text = text.replace("127.0.0.1:4840", f"127.0.0.1:{plc}")
     # A loaded machine may be late by more than what a cell would allow.
-    file.write_text(text.replace("timeout = 0.3 ", "timeout = 3 "), encoding="utf-8")
+    file.write_text(text.replace("timeout = 0.3 ", "timeout = 2.4 "), encoding="utf-8")
     return load(folder)
 
 

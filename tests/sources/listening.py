@@ -8,7 +8,7 @@ PATIENCE = 120.0
 
 
 def heard(source, enough):
-    """Samples until there are enough of them whose time is known: on a busy machine the first ones are late."""
+    """Samples until there are enough of them whose time is known: on a busy machine the first are late."""
     samples = []
     listener = Listener(source, None, lambda s: "its clock" in s.reason or samples.append(s))
     listener.start()

@@ -13,7 +13,7 @@ from seerob.samples import Quality
 from seerob.source import Opened, Source
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
-ENERGY = '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = 1e9\n'
+ENERGY = '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = 2000.0\n'
 
 
 def judged_run(station, name, opened, *, timeout=0.2):

@@ -87,6 +87,7 @@ repeated = false
 rapid = false
 """
 LEFT_OUT = {
+    "contact_force": "is never within, and wants contacts that act",
     "niosh": "depends on nobody: lifts are entered",
     "path_speed": "needs a map of a motion",
     "waypoints": "draws, and has no limit",

@@ -121,6 +121,7 @@ class Engine:
         following = {machine.name for machine in model.workstation.machines if machine.motion.variables()}
         self._stands = self._ahead | following
         """Who stands when nothing more is said, and may not when it was in motion."""
+        self._live = {*live, *following}
         self._unread = coasting  # what a file says was looked at when it was read
         self._references = {
             m.name: Reference(m.home, largest_speed(m), coast=driven[m.name] if m.name in coasting else 0.0)
@@ -239,7 +240,9 @@ class Engine:
         """
         reference, now = self._references[name], self._tick * self._period
         anew = anew or self._silent(name)
-        before = reference.at(now)[0] if self._tick > 0 and reference.until < now and not anew else None
+        # A file is heard ahead; only what is heard live can be late.
+        late = name in self._live and self._tick > 0 and reference.until < now
+        before = reference.at(now)[0] if late and not anew else None
         taken = reference.take(t, q, qd, anew=anew)
         if taken and before is not None:
             off = float(np.abs(reference.at(now)[0] - before).max(initial=0.0))

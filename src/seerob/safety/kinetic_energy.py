@@ -134,6 +134,8 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         rotors = mj.dof_armature[dofs]
 
         def falls(span: Span, least: Array | float) -> Fall:
+            if not (np.isfinite(span.quick[rows]).all() and np.isfinite(span.qdd[dofs]).all()):
+                return Fall(np.inf, np.inf)  # who jumps
             turned = rotors @ (span.qdd[dofs] * span.T) ** 2
             change = np.sqrt(masses @ (span.quick[rows] * span.T) ** 2 + turned)
             bend = np.sqrt(masses @ span.bend[rows] ** 2 + turned / 4)

@@ -14,6 +14,14 @@ STATION = """
 variables = "variables.toml"
 [engine]
 physics = false
+[[confirmed]]
+key = "sources[0].timeout"
+value = 3.0
+why = "of a server that shares a busy machine with its client"
+[[confirmed]]
+key = "safety[7].limit"
+value = 1000.0
+why = "how long they disagree is not what is asked"
 [[sources]]
 kind = "opcua"
 name = "plc"

@@ -263,15 +263,17 @@ mass = 0.2
 grip = { upper = 0.1 }
 """
 WEIGHED = "".join(
-    f'[[safety]]\nkind = "{kind}"\nname = "{kind}"\n{key} = "arm"\nlimit = 1e6\n'
+    f'[[safety]]\nkind = "{kind}"\nname = "{kind}"\n{key} = "arm"\nlimit = 100\n'
     for kind, key in (("kinetic_energy", "robot"), ("effective_mass", "at"), ("force_polytope", "at"))
 )
 
 
 def weighed(folder):
+    # What a cube of 4 cm may weigh.
+    nut = NUT.replace('on = "hand"', 'on = "hand"\nat = { position = [0, 0, 0.5] }').replace("2.0", "1.2")
     return made(
         folder,
-        ARM + NUT.replace('on = "hand"', 'on = "hand"\nat = { position = [0, 0, 0.5] }') + WEIGHED,
+        ARM + nut + WEIGHED,
         {"arm.urdf": two_r()},
     )
 

@@ -27,9 +27,9 @@ _JSON = (
     "\n**With `--json`** `assess` and `report` print one object: `verdict`, `decided`, `duration` [s], "
     "`ticks`, `workstation_hash`, `criteria`, `bones`, `findings`, `folder`.\n"
     "Each of `criteria` has `name`, `unit`, `verdict`, `times` (shares of the run: `within`, `exceeded`, "
-    "`undecided`, `muted`, `nothing` to judge, `open` where it was not asked), `between` (why nothing is known "
-    "between its instants, or why that is accepted), and its `worst` instant: `t` [s], `value`, `limit`, "
-    "`interval`, `reason`; null is what is not known.\n"
+    "`undecided`, `muted`, `nothing` to judge, `open` where it was not asked), `between` (why nothing is "
+    "known between its instants, or why that is accepted), and its `worst` instant: `t` [s], `value`, "
+    "`limit`, `interval`, `reason`; null is what is not known.\n"
 )
 
 

@@ -42,7 +42,7 @@ def test_torque_limit_makes_the_twin_lag_and_verdicts_undecided(tmp_path):
     wide = made(
         tmp_path / "wide",
         "engine = { gravity = [0, 0, 0], tracking_limit = 10 }\n"
-        '[[confirmed]]\nkey = "engine.tracking_limit"\nvalue = 10.0\nwhy = "how far it lags is what is asked"\n'
+        '[[confirmed]]\nkey = "engine.tracking_limit"\nvalue = 10.0\nwhy = "its lag is what is asked"\n'
         + TWO_R
         + ENERGY,
         {"arm.urdf": two_r(effort=5)},

@@ -105,7 +105,7 @@ def payload(folder, mass, its, *, name="t", **options):
     tool = f'[[tools]]\nname = "{name}"\non = "arm/tip"\nshape = {{ sphere = 0.05 }}\nmass = {mass}\n'
     text = FLOATING + TWO_R + tool
     text += (
-        '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [20, 0, 0] }\n'
+        '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [9, 0, 0] }\n'
     )
     text += '[[safety]]\nkind = "separation"\nname = "S"\nbetween = ["arm", "op"]\nintrusion = 0\n'
     text += "human_uncertainty = 0\nrobot_uncertainty = 0\n"

@@ -59,7 +59,9 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What results are called; made from the kind and the subject when not given."""
     every: Seconds | None = None
     """Period [s]; each tick when not given."""
-    between_samples: Annotated[str, Meta(pattern="^accepted: .*[^ ]")] | None = None
+    between_samples: (
+        Annotated[str, Meta(pattern="^accepted: .*[^ ]", description="`accepted: ` and why")] | None
+    ) = None
     """``accepted: why``: that nobody knows what happens between the instants at which it is asked, where
     nothing bounds it, is accepted for the verdict of a run; it stays undecided there when not given."""
     active: str | None = None

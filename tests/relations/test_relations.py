@@ -18,7 +18,7 @@ from seerob.recordings.recording import Recording
 from seerob.results.result_log import ResultLog
 from seerob.snapshot import Verdict
 
-EACH = 20
+EACH = 18
 """Random cells that each relation is asked of."""
 WITHIN = 0
 RANK = {Verdict.WITHIN: 0, None: 0, Verdict.UNDECIDED: 1, Verdict.EXCEEDED: 2}

@@ -162,8 +162,8 @@ class BetweenTicks:
     def _falling(self, watch: Watch, before: End, state: State, speeds: Array) -> End | None:
         """What is left at this tick of a margin that was not asked for; None when that is not enough."""
         path = self._way
-        if path is None:
-            return None
+        if path is None or self._ids is None or not np.array_equal(self._ids, state.bearers.ids):
+            return None  # what was picked up has the speed of the hand at once
         if before.margin is None:
             return End(state.t, before.verdict, None, speeds)
         fall = self._fall(watch, path, (before, before._replace(t=state.t, speeds=speeds)), state)

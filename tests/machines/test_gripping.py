@@ -11,6 +11,7 @@ from seerob.engine import Engine
 from seerob.errors import InputError, Undecided
 from seerob.run import Judge
 from seerob.samples import JointSample
+from seerob.snapshot import Verdict
 
 AXIS = """
 [[machines]]
@@ -298,3 +299,23 @@ def test_nor_while_its_gripper_is_silent(tmp_path):
         assert before.verdict in ("within", "exceeded")
         assert after.verdict == "undecided"
         assert "hand: not heard" in after.reason
+
+
+@pytest.mark.parametrize("every", ["", "every = 1.0\n"])
+def test_what_is_picked_up_in_motion_is_as_fast_as_the_hand_at_once(tmp_path, every):
+    t = np.arange(81) * TICK
+    speed = np.clip(0.6 - 4 * (t - 0.2), 0, 0.6)
+    angle = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * TICK)]) - 0.12
+    opening = np.clip(WIDE - 0.3 * t, 0.04, WIDE)
+    files = {"axis.csv": ("rad", angle), "hand.csv": ("m", opening / 2)}
+    tables = {
+        name: f"time [s],J1 [{unit}]\n" + "".join(f"{a!r},{b!r}\n" for a, b in zip(*pair, strict=True))
+        for name, (unit, q) in files.items()
+        for pair in ((t.tolist(), q.tolist()),)
+    }
+    sources = "".join(
+        f'[[sources]]\nkind = "csv"\nrobot = "{name}"\nfile = "{name}.csv"\n' for name in ("axis", "hand")
+    )
+    limit = f'[[safety]]\nkind = "velocity"\nname = "v"\nof = "nut"\nlimit = 0.5\n{every}'
+    light = STATION.replace("mass = 2.0", "mass = 0.2")
+    assert made(tmp_path, light + sources + limit, tables).run().verdict is Verdict.EXCEEDED

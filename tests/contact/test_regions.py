@@ -96,15 +96,19 @@ def test_own_links_that_fold_clamp_a_hand_whatever_was_before(tmp_path: Path) ->
     assert found == [True, False, True, True]
 
 
+@pytest.mark.parametrize("named", [True, False])
 @pytest.mark.parametrize("touched", [True, False])
-def test_who_is_touched_all_the_same_was_not_kept_from_contact(tmp_path: Path, touched: bool) -> None:
+def test_who_is_touched_all_the_same_was_not_kept_from_contact(
+    tmp_path: Path, touched: bool, named: bool
+) -> None:
     """The arm at the height of a pelvis that the file keeps from contact: in it, or 0.1 m before it."""
     text = (
         f"{FLOATING}{TWO_R}base = {{ position = [0, 0, 1] }}\n"
         '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
         f"at = {{ position = [{1.0 if touched else 2.3}, 0, 0] }}\n"
-        '[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\nhuman = "op"\n'
-        'contact_area = { arm = 1e-4 }\nexcluded = ["Pelvis"]\n'
+        '[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\n'
+        + ('human = "op"\n' if named else "")
+        + 'contact_area = { arm = 1e-4 }\nexcluded = ["Pelvis"]\n'
     )
     station = made(tmp_path, text, {"arm.urdf": two_r()})
     home = station.model.mechanisms["op"].home

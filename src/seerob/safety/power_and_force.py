@@ -312,6 +312,12 @@ class Contacts:
             if spec.human is None or not self.moving
             else Person(model, self.robot, spec.human, horizon=spec.horizon)
         )
+        # Where anyone can be, everybody of the twin is somebody.
+        self.everybody = tuple(
+            Person(model, self.robot, name, horizon=spec.horizon)
+            for name, one in model.mechanisms.items()
+            if spec.human is None and spec.excluded and self.moving and one.role == "human"
+        )
         hand = {human.name: human.hand for human in model.workstation.humans}.get(spec.human or "")
         self.rows = ContactRows(self, hand=hand)
         self.measured = spec.measured(model)
@@ -374,12 +380,12 @@ class Contacts:
         found: list[tuple[Result, int]] = []
         measured: dict[str, tuple[Result, ...]] = {}
         # Who is touched all the same was not kept from contact.
-        touched = people.touched(state) & near if spec.excluded and people is not None else None
+        touched, doubt = self._touched(state, people, near) if spec.excluded else (None, "")
         for k in np.flatnonzero(near.any(axis=0)).tolist():
             part, row = self._region(k, judged)
             if touched is not None and REGIONS[k] in spec.excluded and touched[:, k].any():
                 row = int(touched[:, k].argmax())
-                reason = f"{part.reason}, and touched by {self.names[row]} here"
+                reason = f"{part.reason}, and {doubt or f'touched by {self.names[row]} here'}"
                 part = replace(part, verdict=Verdict.UNDECIDED, reason=reason)
             if told := self._measured(k, judged):
                 part, measured[part.name] = with_measured(part, told), told
@@ -416,6 +422,18 @@ class Contacts:
                 found, judged, (lambda _: ()) if people is None else people.hit, measured=measured
             ),
         )
+
+    def _touched(
+        self, state: State, people: Person | None, near: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.bool_], str]:
+        """Which moving body touches which region of a person, and why that is not known; then all are."""
+        found = np.zeros_like(near)
+        try:
+            for person in self.everybody if people is None else (people,):
+                found |= person.touched(state)
+        except Undecided as reason:
+            return near, f"whether it is touched is open: {reason}"
+        return found & near, ""
 
     def _governing(
         self, v: Array, near: NDArray[np.bool_], speeds: contact_limits.Speeds, ends: Spread | None

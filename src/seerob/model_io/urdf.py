@@ -25,6 +25,13 @@ from seerob.transforms import Array
 
 KINDS = {"revolute": JointKind.REVOLUTE, "continuous": JointKind.REVOLUTE, "prismatic": JointKind.PRISMATIC}
 
+ONCE = {
+    "link": ("inertial",),
+    "inertial": ("origin", "mass", "inertia"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
+}
+"""What a link, its mass properties or a joint has one of."""
+
 
 def from_text(content: bytes, *, resolver: Resolver, name: str = "robot") -> Description:
     """A robot from the text of a URDF file.
@@ -51,6 +58,7 @@ def from_text(content: bytes, *, resolver: Resolver, name: str = "robot") -> Des
         reader.problem("", "has no <link>", "a robot has at least one")
     parents = _parents(reader, links, joints)
     order = in_order(reader, tuple(links), {child: parent for child, (parent, _) in parents.items()})
+    _refuse_repeated(reader, links, joints)
     reader.raise_problems()
 
     geometry = Shapes(reader, resolver)
@@ -96,6 +104,19 @@ def _named(reader: Reader, root: Element, tag: str) -> dict[str, Element]:
         if count > 1:
             reader.problem(f"{tag}[{repeated}]", f"{count} {tag}s carry this name", "rename all but one")
     return {e.attrib["name"]: e for e in elements if e.get("name")}
+
+
+def _refuse_repeated(reader: Reader, links: dict[str, Element], joints: dict[str, Element]) -> None:
+    """Of what a link or a joint has one of, two say two things: neither is taken for the other."""
+    every = [(f"joint[{name}]", joint, ONCE["joint"]) for name, joint in joints.items()]
+    for name, link in links.items():
+        every.append((f"link[{name}]", link, ONCE["link"]))
+        every += [(f"link[{name}].inertial", one, ONCE["inertial"]) for one in link.findall("inertial")]
+    for key, element, tags in every:
+        for tag in tags:
+            count = len(element.findall(tag))
+            if count > 1:
+                reader.problem(f"{key}.{tag}", f"is there {count} times", "keep the one that holds")
 
 
 def _parents(

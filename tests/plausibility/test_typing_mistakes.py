@@ -15,6 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from made_cell import FLOATING, TWO_R, made, results_at, two_r
 from seerob import plugin
 from seerob.errors import InputError
 from seerob.expectations import is_struct, members, unit_of
@@ -460,3 +461,17 @@ def test_every_row_of_the_data_is_of_something() -> None:
     units = {unit for _, unit in kinds}
     fallbacks = {row.unit for row in data().ranges if row.key == "*"}
     assert {"m", "rad", "s", "kg", "N", "m/s"} <= fallbacks <= units | {"N·m", "m³", "m²", "m/s²", "rad/s²"}
+
+
+@pytest.mark.parametrize("sure", [True, False])
+def test_a_link_that_its_table_makes_lighter_than_a_frame_of_rods(tmp_path: Path, sure: bool) -> None:
+    """2 g in the box of 10 litres around a link, as 2 kg come out in tonnes: nothing is within by that."""
+    word = '[[confirmed]]\nkey = "robots[0].masses.l1.bulk_density"\nvalue = 0.2\nwhy = "a balloon"\n'
+    text = (
+        f"{FLOATING}{TWO_R}[robots.masses]\nl1 = {{ mass = 0.002 }}\n"
+        '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = 5\n'
+    )
+    station = made(tmp_path, text + word * sure, {"arm.urdf": two_r()})
+    found = results_at(station, arm=((0, 0), (0.5, 0)))["energy"]
+    assert found.verdict is (Verdict.WITHIN if sure else Verdict.UNDECIDED)
+    assert ("robots[0].masses.l1.bulk_density" in found.reason) is not sure

@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 import mujoco
+import numpy as np
 
 from seerob.distances.depth import Depths
 from seerob.distances.least import Query
@@ -46,6 +47,7 @@ def _variables(model: Model) -> Iterator[Quantity]:
 
 def _following(model: Model) -> Iterator[Quantity]:
     yield from _sizes(model)
+    yield from _links(model)
     yield from _payloads(model)
     yield from _people(model)
     place = _Home(model)
@@ -100,6 +102,20 @@ def _sizes(model: Model) -> Iterator[Quantity]:
                 figures.append(("bulk_density", "kg/m³", mass / volume, said))
             for name, unit, value, said in figures:
                 yield Quantity(f"{group}[{i}].{name}", f"{group}.{name}", unit, (value,), (thing.name,), said)
+
+
+def _links(model: Model) -> Iterator[Quantity]:
+    """Density of every link whose mass the workstation file gives, in the box around its shape."""
+    for i, robot in enumerate(model.workstation.robots):
+        for link, given in robot.masses.items():
+            name, what = f"{robot.name}/{link}", f"masses.{link}.bulk_density"
+            solids = [solid for body in model.bodies if body.name == name for solid in body.solids]
+            low, high = box(solids) if solids else (0.0, 0.0)
+            volume = float(np.prod(np.subtract(high, low)))
+            if volume > 0:
+                said, density = f"{given.mass:g} kg in a box of {volume:.3g} m³", (given.mass / volume,)
+                key, kind = f"robots[{i}].{what}", f"robots.{what}"
+                yield Quantity(key, kind, "kg/m³", density, (robot.name,), said)
 
 
 def _payloads(model: Model) -> Iterator[Quantity]:

@@ -126,6 +126,9 @@ def _follows(key: str, entries: Entries) -> bool:
     match = KEY.fullmatch(key)
     if match is None or int(match[2]) not in entries.get(match[1], {}):
         return False
+    if match[1] == "robots" and match[3].endswith(".bulk_density"):
+        masses = entries["robots"][int(match[2])].masses
+        return match[3].removeprefix("masses.").removesuffix(".bulk_density") in masses
     names = {entry.name for group in LISTS[:-1] for entry in entries.get(group, {}).values()}
     return any(
         match[3].removeprefix(what) in names if what.endswith(".") else match[3] == what

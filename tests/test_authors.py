@@ -12,6 +12,7 @@ from seerob.engine import Engine
 from seerob.errors import InputError, NotAsked, Undecided
 from seerob.judging import Judge, contradiction
 from seerob.run import bind
+from seerob.safety.velocity import Velocity
 from seerob.snapshot import Result, Row, Verdict
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -209,6 +210,26 @@ def test_what_is_no_result_or_contradicts_itself_is_undecided(own, returned, wor
     found = unheard(own(BIND.format(returned), q="q = [0, 0]\n"))
     assert found.verdict is UNDECIDED
     assert words in found.reason
+
+
+@pytest.mark.parametrize("more", ["t=0.0", "muted=True", "t=state.t, muted=state.t > 0.05"])
+def test_no_author_says_when_a_criterion_was_asked_or_that_it_did_not_apply(own, more):
+    """An instant that is told again is counted once: what is exceeded later must not pass for the first."""
+    value = f"value=state.t, limit=0.2, verdict=judge(state.t, 0.2), {more}"
+    station = own(BIND.format(f"return Result(name='own', {value})"), q="q = [0, 0]\n")
+    found = station.run(feed=iter([()] * 40)).results["own"]
+    assert (found.verdict, len(found), found.times().muted) == (EXCEEDED, 40, 0.0)
+    early = station.run(feed=iter([()] * 10)).results["own"]
+    assert (early.verdict, early.times().open) == (UNDECIDED, 1.0)
+
+
+@pytest.mark.parametrize("name", ["", "v"])
+def test_two_criteria_of_one_name_are_refused(own, name):
+    """The second would pass for the first, shown again."""
+    lax, strict = (Velocity(name=name, at="arm", limit=limit, every=0.05) for limit in (9.0, 0.01))
+    with pytest.raises(InputError, match=f"two criteria {'are called .v.' if name else 'have no name'}"):
+        own(GOOD).with_criteria(lax, strict).run()
+    assert own(GOOD).with_criteria(lax).run().ticks == 1
 
 
 def test_a_whole_is_no_greener_than_its_parts(own):

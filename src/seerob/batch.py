@@ -23,7 +23,7 @@ from seerob.criterion import Criterion, EvaluateMany
 from seerob.errors import Undecided, UnknownName
 from seerob.judging import Judge, held, held_names, unmentioned
 from seerob.model import Model
-from seerob.results.series import CODES
+from seerob.results.series import CODES, ONE_INSTANT
 from seerob.run import Bound, Feed, engine_of, settled
 from seerob.snapshot import Finding, Result, Verdict
 from seerob.spans import Path
@@ -170,6 +170,8 @@ def judged(
         name = one.criterion.name
         said, reasons = walked[name]
         criterion, between = one.criterion, one.between if motion.ways is not None else ""
+        if n == 1 and motion.foreseen and model.workstation.sources:
+            between = ONE_INSTANT
         columns[name] = Column(
             name, criterion.unit, criterion.at_most, said, reasons, notes.get(name, ""), between
         )

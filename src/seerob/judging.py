@@ -355,6 +355,9 @@ class Judge:
             what = f"{_where(bound)} returns {type(result).__name__}, not a Result"
             self._warn(bound, what)
             raise Undecided(what)
+        if result.t is not None or result.muted:
+            # When it was asked and whether it applied is for who asks to say: a log counts no instant twice.
+            result = replace(result, t=None, muted=False)
         reason = contradiction(result, bound.criterion)
         if reason:
             reason = f"{_where(bound)} contradicts itself: {reason}"

@@ -62,6 +62,14 @@ def bind(model: Model) -> tuple[Bound, ...]:
                 # Many messages begin with the name of the criterion, which the key already says.
                 text = str(error).removeprefix(f"{criterion.name}: ")
                 problems.append(Problem(file, f"{group}[{i}] ({criterion.name})", text))
+    named: set[str] = set()
+    for one in bound:
+        name = one.criterion.name
+        if name in named:
+            # What is said under one name is one criterion to whoever keeps results.
+            what = f"two criteria are called {name!r}" if name else "two criteria have no name"
+            problems.append(Problem(file, one.group, f"{what}: give each a name of its own"))
+        named.add(name)
     if problems:
         raise InputError(problems)
     return tuple(bound)

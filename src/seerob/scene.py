@@ -15,9 +15,22 @@ from seerob.workstation import Workstation, content_hash
 
 
 def scene_of(
-    model: Model, bound: Sequence[Bound], findings: Iterable[Finding] = (), *, files: dict[str, bytes]
+    model: Model,
+    bound: Sequence[Bound],
+    findings: Iterable[Finding] = (),
+    *,
+    files: dict[str, bytes],
+    fed: bool = False,
 ) -> Scene:
-    """What sinks and the page need to know once; ``files`` are what the hash is of."""
+    """What sinks and the page need to know once.
+
+    Args:
+        model: The compiled workstation.
+        bound: Its criteria.
+        findings: Of sources, besides those of the model.
+        files: What the hash is of.
+        fed: Whether samples come that are of no source of the workstation: then somebody may move.
+    """
     station = model.workstation
     too_coarse = coarse(model)
     return Scene(
@@ -66,7 +79,7 @@ def scene_of(
                 at_most=b.criterion.at_most,
                 basis=b.basis,
                 levels=getattr(b.criterion, "levels", ()),
-                between=_between(b, station),
+                between=_between(b, station, fed=fed),
             )
             for b in bound
         ),
@@ -74,10 +87,10 @@ def scene_of(
     )
 
 
-def _between(bound: Bound, station: Workstation) -> str:
+def _between(bound: Bound, station: Workstation, *, fed: bool) -> str:
     """See `CriterionInfo.between`; what lies in a method is of instants as dense as the ticks."""
     criterion, tick = bound.criterion, station.engine.tick
-    if not station.sources:
+    if not station.sources and not fed:
         return STILL
     sparse = criterion.every is not None and criterion.every > 1.5 * tick
     if bound.watch is None and sparse and criterion.between_samples is None:

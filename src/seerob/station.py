@@ -95,7 +95,13 @@ class Station:
     def scene(self, *, with_sources: bool = True) -> Scene:
         """What sinks and the page need to know once."""
         opened = self.sources if with_sources else ()
-        return scene_of(self.model, self.bound, [f for _, o in opened for f in o.findings], files=self.files)
+        return scene_of(
+            self.model,
+            self.bound,
+            [f for _, o in opened for f in o.findings],
+            files=self.files,
+            fed=not with_sources,
+        )
 
     @cached_property
     def files(self) -> dict[str, bytes]:
@@ -357,7 +363,8 @@ class Station:
     def replay_scene(self, recording: Recording) -> Scene:
         """The scene of a recording that is computed again, with what was found when it was made."""
         findings = [f for f in recording.scene.findings if f not in self.model.findings]
-        return scene_of(self.model, self.bound, findings, files=self.files)
+        fed = not self.workstation.sources and any(tick.samples for tick in recording.ticks())
+        return scene_of(self.model, self.bound, findings, files=self.files, fed=fed)
 
     def replay(
         self,

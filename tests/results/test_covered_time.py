@@ -11,8 +11,10 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.judging import UNBOUNDED
+from seerob.recordings.recording import Recording
 from seerob.results.result_log import ResultLog
 from seerob.results.series import STILL
+from seerob.run import pump
 from seerob.snapshot import CriterionInfo, Result, Snapshot, Verdict
 
 W, E, U = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
@@ -89,6 +91,7 @@ class Height(_WorkHeight, frozen=True, kw_only=True):
     def falls(self, model, points): return None
 """
 HEIGHT = '[[safety]]\nkind = "heights.unbounded"\nname = "height"\nat = "arm"\nlimit = 9\n'
+RECORD = '[[sinks]]\nkind = "recorder"\n'
 ARM = '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "m.csv"\n'
 
 
@@ -123,6 +126,36 @@ def test_what_is_asked_once_in_four_seconds_is_not_within_throughout(
     worst = found.worst()
     assert (worst.value, worst.verdict) == (0.0, verdict)
     assert ("nothing bounds it between" in worst.reason) is (verdict is U)
+
+
+def test_samples_of_no_source_of_the_workstation_move_somebody(tmp_path, monkeypatch, heights):
+    """A recording judged by a workstation without sources: nobody knows what was between its instants."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    monkeypatch.syspath_prepend(str(heights))
+    files = {"m.csv": ROWS, "arm.urdf": two_r()}
+    driven = made(tmp_path / "a", FLOATING + TWO_R + ARM + HEIGHT + RECORD, files)
+    bare = made(tmp_path / "b", FLOATING + TWO_R + HEIGHT, files)
+    fed = bare.run(feed=pump(driven.sources, 0.01))
+    assert (fed.verdict, fed.results["height"].times().open) == (U, 1.0)
+    driven.run(folder=tmp_path / "out", sinks=driven.workstation.sinks)
+    (file,) = (tmp_path / "out").glob("*.mcap")
+    again = bare.replay(Recording.open(file))
+    assert (again.verdict, again.results["height"].times().open) == (U, 1.0)
+
+
+def test_a_batch_of_one_instant_of_what_moves_is_undecided_as_the_run_is(tmp_path):
+    rows = "t [s],J1 [rad],J2 [rad]\n0,0,0\n0.005,0.001,0\n"
+    speed = '[[safety]]\nkind = "velocity"\nname = "v"\nat = "arm"\nlimit = 9\n'
+    station = made(tmp_path, FLOATING + TWO_R + ARM + speed, {"m.csv": rows, "arm.urdf": two_r()})
+    assert (station.run().verdict, station.batch(threads=1)["v"].verdict) == (U, U)
+
+
+def test_what_is_taken_back_while_it_is_shown_again_counts():
+    log = ResultLog()
+    for k, verdict in enumerate((W, W, U, W)):
+        said = Result(name="v", value=1.0, limit=2.0, verdict=verdict, t=0.0)
+        log.add(Snapshot(seq=k, t=0.01 * k, poses=b"", results=(said,)))
+    assert log.verdict is U
 
 
 def test_a_bound_covers_what_is_not_asked(tmp_path):

@@ -36,6 +36,8 @@ MAX_REASONS = 4096
 STILL = "accepted: no source moves anybody"
 """Of `CriterionInfo.between`: one instant then is all of a run."""
 
+ONE_INSTANT = "the run is one instant, and sources say that something moves"
+
 _RANK = {Verdict.EXCEEDED: 0, Verdict.UNDECIDED: 1, Verdict.WITHIN: 2, None: 3}
 
 
@@ -187,6 +189,7 @@ class Series:
         self._reason_of: dict[str, int] = {"": 0}
         self._parts: dict[str, Series] = {}
         self._last_t: float | None = None
+        self._last_verdict: Verdict | None = None
         self._said: set[int] = set()
         self._has_limit = False
         # Appended last at each tick: its length is how many ticks are whole.
@@ -198,8 +201,9 @@ class Series:
         return len(self._verdicts) > 0
 
     def repeats(self, result: Result) -> bool:
-        """Whether this is the last result of a criterion with a period, shown again."""
-        return result.t is not None and result.t == self._last_t
+        """Whether this is the last result of a criterion with a period, shown again, and no worse since."""
+        again = result.t is not None and result.t == self._last_t
+        return again and _RANK[result.verdict] >= _RANK[self._last_verdict]
 
     def pass_time(self, result: Result | None, dt: float) -> None:
         """Count the time since the snapshot before [s] for what the criterion says in this one.
@@ -247,12 +251,12 @@ class Series:
             why = self.open or "it was not asked"
             return f"not known in {self._seconds[_OPEN]:.4g} s of the run: {why}"
         if self._is_one_instant:
-            return "the run is one instant, and sources say that something moves"
+            return ONE_INSTANT
         return ""
 
     def append(self, result: Result, t: float) -> None:
         """Add what the criterion said in the snapshot at run time ``t`` [s]."""
-        self._last_t = result.t
+        self._last_t, self._last_verdict = result.t, result.verdict
         self._t.append(t)
         self._values.append(math.nan if result.value is None else result.value)
         self._limits.append(math.nan if result.limit is None else result.limit)

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from made_cell import TWO_R, UR10, made, two_r
+from made_cell import TWO_R, UR10, heard, made, person, two_r
 from seerob.between_ticks import Told
+from seerob.engine import Engine
+from seerob.human.skeleton import BONES
 from seerob.run import Judge, engine_of, looks_ahead, pump, ticks
 from seerob.snapshot import Verdict
 
@@ -106,6 +108,22 @@ def test_a_period_is_covered_without_being_asked_while_nothing_comes_near(tmp_pa
     summary = station.run()
     assert summary.verdict is Verdict.WITHIN
     assert len(summary.results["c"]) == 3
+
+
+@pytest.mark.parametrize("every", ["", "every = 1.0\n"])
+def test_a_period_hides_no_tick_at_which_devices_know_less_of_a_person(tmp_path, every):
+    box = '[[parts]]\nname = "box"\nshape = { box = [0.2, 0.2, 2] }\nat = { position = [1, 0, 1] }\n'
+    near = '[[safety]]\nkind = "minimum_distance"\nname = "d"\nbetween = ["op", "box"]\nlimit = 0.5\n'
+    station = made(tmp_path, "engine = { physics = false }\n" + person() + box + near + every)
+    home = station.model.mechanisms["op"].home
+    engine, judge = Engine(station.model, driven={"op": 0.2}), Judge(station.bound)
+    verdicts = []
+    for k in range(10):
+        engine.take([heard("op", 0.01 * k, home, np.zeros(len(home)))])
+        state = engine.tick() if k else engine.start()
+        state.hearings["op"].bones = dict.fromkeys(BONES, (0.4 if 3 < k < 6 else 0.001, 0.0))
+        verdicts.append(judge(state)[0].verdict)
+    assert [k for k, verdict in enumerate(verdicts) if verdict is Verdict.UNDECIDED] == [4, 5]
 
 
 def test_a_bound_of_ones_own_that_fails_leaves_it_undecided_and_the_run_goes_on(tmp_path):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from seerob.criterion import Criterion, Evaluate
+from seerob.errors import UnknownName
 from seerob.model import Model
 from seerob.snapshot import Result, Verdict
 from seerob.spans import Fall, Falls, Indices, Margin, Path, Points, Span
@@ -43,16 +45,25 @@ class Watch:
     """Whether it is asked in the order of time only."""
     again: Callable[[], Evaluate]
     """Makes another one of it, which is asked of instants in any order."""
+    people: tuple[str, ...]
+    """Whose place it depends on: how well devices know that changes from tick to tick."""
 
 
 def watched(criterion: Criterion, model: Model, points: Points) -> Watch | None:
     """How a criterion is judged between two ticks; None when nothing bounds it."""
     falls = criterion.falls(model, points)
-    return (
-        None
-        if falls is None
-        else Watch(criterion, points, falls, criterion.remembers(model), lambda: criterion.bind(model))
-    )
+    if falls is None:
+        return None
+    remembers, people = criterion.remembers(model), _people(criterion, model)
+    return Watch(criterion, points, falls, remembers, lambda: criterion.bind(model), people)
+
+
+def _people(criterion: Criterion, model: Model) -> tuple[str, ...]:
+    found = set(criterion.depends(model))
+    for name in tuple(found):
+        with suppress(UnknownName):
+            found |= {model.bodies[i].mover for i in model.select(name)}
+    return tuple(h.name for h in model.workstation.humans if h.name in found)
 
 
 class End(NamedTuple):
@@ -164,6 +175,8 @@ class BetweenTicks:
         path = self._way
         if path is None or self._ids is None or not np.array_equal(self._ids, state.bearers.ids):
             return None  # what was picked up has the speed of the hand at once
+        if any(state.hearings[person].bones for person in watch.people):
+            return None  # how far devices are off now is not known from then
         if before.margin is None:
             return End(state.t, before.verdict, None, speeds)
         fall = self._fall(watch, path, (before, before._replace(t=state.t, speeds=speeds)), state)

@@ -186,9 +186,10 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
         return ask
 
     def falls(self, model: Model, points: Points) -> Falls | None:
-        """See `Criterion.falls`; none of a field that moves, whose border turns with it."""
-        _, plane, corners = self._device(model)
-        if corners is not None and model.bodies[plane].mover:
+        """See `Criterion.falls`; none of a device that moves where its border turns, or S with its height."""
+        sensor, plane, corners = self._device(model)
+        rises = self._way(sensor) is Approach.PARALLEL
+        if model.bodies[plane].mover and (corners is not None or rises):
             return None
         return approaching((plane,), bodies_of(model, self.hazard))
 

@@ -244,5 +244,9 @@ def test_a_whole_is_no_greener_than_its_parts(own):
     assert "2.5  lies above its limit" in contradiction(wide, criterion)
     low = Result(name="own", value=3.0, limit=2.0, at_most=False, interval=(1.5, 4.0), verdict=WITHIN)
     assert "1.5  lies below its limit" in contradiction(low, criterion)
+    other = Result(name="own", value=3.0, limit=2.0, at_most=False, verdict=WITHIN)
+    assert "from the other side" in contradiction(other, criterion)
+    nested = Result(name="a", parts=(Result(name="b", verdict=EXCEEDED),))
+    assert "its part b" in contradiction(Result(name="own", parts=(nested,), **within), criterion)
     assert contradiction(Result(name="own", parts=(Result(name="a"),), **within), criterion) == ""
     assert contradiction(Result(name="own", value=9.0, limit=2.0, verdict=EXCEEDED), criterion) == ""

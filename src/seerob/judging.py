@@ -118,11 +118,16 @@ def contradiction(result: Result, criterion: Criterion) -> str:
         if not (end <= limit if result.at_most else end >= limit):
             side = "above" if result.at_most else "below"
             return f"it is within, and {end:g} {result.unit} lies {side} its limit of {limit:g} {result.unit}"
-    inner: tuple[Result | Row, ...] = (*result.parts, *result.rows)
-    for part in inner:
-        if part.verdict is _EXCEEDED or part.verdict is _UNDECIDED:
-            return f"it is within, and its part {part.name} is {part.verdict}"
-    return ""
+    if result.at_most is not criterion.at_most:
+        return "it bounds from the other side than its kind says (at_most)"
+    return _worse_part(result)
+
+
+def _worse_part(result: Result) -> str:
+    for row in (*result.parts, *result.rows):
+        if row.verdict is _EXCEEDED or row.verdict is _UNDECIDED:
+            return f"it is within, and its part {row.name} is {row.verdict}"
+    return next(filter(None, map(_worse_part, result.parts)), "")
 
 
 def _unknown(criterion: Criterion, reason: str) -> Result:

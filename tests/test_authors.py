@@ -12,6 +12,7 @@ from seerob.engine import Engine
 from seerob.errors import InputError, NotAsked, Undecided
 from seerob.judging import Judge, contradiction
 from seerob.run import bind
+from seerob.safety.minimum_distance import MinimumDistance
 from seerob.safety.velocity import Velocity
 from seerob.snapshot import Result, Row, Verdict
 
@@ -244,8 +245,8 @@ def test_a_whole_is_no_greener_than_its_parts(own):
     assert "2.5  lies above its limit" in contradiction(wide, criterion)
     low = Result(name="own", value=3.0, limit=2.0, at_most=False, interval=(1.5, 4.0), verdict=WITHIN)
     assert "1.5  lies below its limit" in contradiction(low, criterion)
-    other = Result(name="own", value=3.0, limit=2.0, at_most=False, verdict=WITHIN)
-    assert "from the other side" in contradiction(other, criterion)
+    least = MinimumDistance(name="own", between=("arm", "op"), limit=2.0)
+    assert "from the other side" in contradiction(Result(name="own", **within), least)
     nested = Result(name="a", parts=(Result(name="b", verdict=EXCEEDED),))
     assert "its part b" in contradiction(Result(name="own", parts=(nested,), **within), criterion)
     assert contradiction(Result(name="own", parts=(Result(name="a"),), **within), criterion) == ""

@@ -118,13 +118,14 @@ def contradiction(result: Result, criterion: Criterion) -> str:
         if not (end <= limit if result.at_most else end >= limit):
             side = "above" if result.at_most else "below"
             return f"it is within, and {end:g} {result.unit} lies {side} its limit of {limit:g} {result.unit}"
-    if result.at_most is not criterion.at_most:
+    if result.at_most and not criterion.at_most:
         return "it bounds from the other side than its kind says (at_most)"
     return _worse_part(result)
 
 
 def _worse_part(result: Result) -> str:
-    for row in (*result.parts, *result.rows):
+    inner: tuple[Result | Row, ...] = (*result.parts, *result.rows)
+    for row in inner:
         if row.verdict is _EXCEEDED or row.verdict is _UNDECIDED:
             return f"it is within, and its part {row.name} is {row.verdict}"
     return next(filter(None, map(_worse_part, result.parts)), "")

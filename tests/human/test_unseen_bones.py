@@ -57,7 +57,7 @@ def seen_only(bones, *, ticks=2, person=None, weights=None, physics=True, criter
 
 
 def distance(to="operator", limit=0.3):
-    return MinimumDistance(name="d", between=("post", to), limit=limit)
+    return MinimumDistance(name=f"distance to {to}", between=("post", to), limit=limit)
 
 
 def test_a_bone_is_told_by_neighbours_on_both_sides_only():

@@ -349,6 +349,22 @@ def test_run_replay_is_replay(capsys, recorded):
     assert said[0] == said[1]
 
 
+def test_replay_ends_with_the_verdict_that_was_recorded(capsys, recorded, tmp_path):
+    def replayed(file):
+        code, out, err = seerob(capsys, "replay", file, "--port", "0", "--seconds", "0.01")
+        return code, out.splitlines()[-1], err
+
+    cell = make_cell(tmp_path / "fast", limit=1e-6)
+    assert seerob(capsys, "assess", cell, "-o", tmp_path / "out", "--json")[0] == 1
+    assert replayed(tmp_path / "out" / "run.mcap")[0] == 1
+    assert replayed(recorded[1] / "run.mcap")[0] == 0
+    # Of what was cut off nobody knows the rest.
+    whole = (recorded[1] / "run.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) * 4 // 5])
+    code, last, _ = replayed(tmp_path / "cut.mcap")
+    assert (code, "cut off" in last) == (2, True)
+
+
 def test_a_taken_port_moves_on_and_says_so(capsys, recorded):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

@@ -68,6 +68,8 @@ class Player:
         self._log = ResultLog(recording.scene.criteria)
         self._history = self._log.history(POINTS)
         self._so_far = self._log.so_far(whole=False)
+        self.reading = True
+        """Whether what the recorded run came to is still read; then `so_far` is ``whole``, or reading failed."""
 
     @property
     def duration(self) -> float:
@@ -177,10 +179,13 @@ class Player:
         """Fill the history; a long recording comes in parts, which all begin at its start."""
         snapshots = self._recording.snapshots()
         more = True
-        while more:
-            more = await asyncio.to_thread(self._read_some, snapshots, monotonic() + _TELL_EVERY)
-            audience.tell(self._history)
-            audience.tell(self._so_far)
+        try:
+            while more:
+                more = await asyncio.to_thread(self._read_some, snapshots, monotonic() + _TELL_EVERY)
+                audience.tell(self._history)
+                audience.tell(self._so_far)
+        finally:
+            self.reading = False
 
     def _read_some(self, snapshots: Iterator[Snapshot], until: float) -> bool:
         more = False

@@ -69,7 +69,7 @@ class Player:
         self._history = self._log.history(POINTS)
         self._so_far = self._log.so_far(whole=False)
         self.reading = True
-        """Whether what the recorded run came to is still read; then `so_far` is ``whole``, or reading failed."""
+        """Whether the recording is still read through; then `so_far` is ``whole``, or reading failed."""
 
     @property
     def duration(self) -> float:

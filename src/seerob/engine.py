@@ -24,7 +24,7 @@ from seerob.errors import InputError, SimulationDiverged
 from seerob.human.following import Following
 from seerob.inverse_kinematics import solve_pose
 from seerob.kernels import pull as kernel
-from seerob.machines.following import Machines, Moved
+from seerob.machines.following import HOLD, Machines, Moved
 from seerob.machines.gripping import Grips, own_masses
 from seerob.model import Mechanism, Model
 from seerob.mounting.compilation import pose_matrix
@@ -122,6 +122,8 @@ class Engine:
         self._stands = self._ahead | following
         """Who stands when nothing more is said, and may not when it was in motion."""
         self._live = {*live, *following}
+        self._leapt = dict.fromkeys(following, (-np.inf, ""))
+        """Of what follows variables, until when its last jump counts [s], and what is said of it."""
         self._unread = coasting  # what a file says was looked at when it was read
         self._references = {
             m.name: Reference(m.home, largest_speed(m), coast=driven[m.name] if m.name in coasting else 0.0)
@@ -264,6 +266,11 @@ class Engine:
         hearing.driven = self.controllers
         if taken and (not hearing.heard or t > hearing.heard[-1][0]):
             jump = f"its samples jump at {t:.3f} s" if self._references[name].jumped else ""
+            if name in self._leapt:
+                if jump:
+                    self._leapt[name] = t + HOLD, jump
+                until, said = self._leapt[name]
+                jump = said if t <= until else ""
             hearing.heard.append((t, reason or jump))
             hearing.torques.append(torques)
             hearing.leaves_at = self._references[name].leaves_at if name in self._stands else 0.0

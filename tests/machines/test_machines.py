@@ -143,9 +143,33 @@ def test_a_counter_that_begins_again_makes_no_speed():
     told = [at(0.1 * k, {"x": x, "v": 0.25}) for k, x in enumerate((1.0, 1.025, 3.0, 3.025))]
     assert [place.anew for place in told] == [False, False, True, False]
     assert [float(place.qd[0]) for place in told] == [0.25] * 4
+    assert ["leapt by 1.95 m" in place.doubt for place in told] == [False, False, True, True]
+    assert not at(0.8, {"x": 3.15, "v": 0.25}).doubt
     # Without a speed beside it nobody knows better than the counter.
     alone = follow(Belt(length=5.0, position="x"))
     assert not any(alone(0.1 * k, {"x": x}).anew for k, x in enumerate((1.0, 3.0)))
+
+
+def test_a_count_of_one_round_that_begins_again_is_no_leap():
+    at = follow(Belt(length=2.0, position="x", speed="v", at_end=AtEnd.LOOP))
+    places = [at(0.1 * k, {"x": 0.025 * k % 2.0, "v": 0.25}) for k in range(200)]
+    assert not any(place.doubt for place in places)
+    np.testing.assert_allclose([p.q[0] for p in places], [0.025 * k % 2.0 for k in range(200)], atol=1e-9)
+
+
+def test_a_machine_that_teleports_is_not_relied_on_for_a_while(tmp_path):
+    """Each sample alone can be; between two of them it went 1 m in 10 ms, and nobody knows which was wrong."""
+    station = made(tmp_path, PERSON + GATE, POSITION, table("t,x", [(0, 0), (1, 0)]))
+    engine = Engine(station.model, driven={"gate": 0.5}, live={"gate"}, signals={"plc": 0.5})
+    undecided = []
+    for k in range(120):
+        x = 1.0 if k == 30 else 0.0
+        engine.take([SignalSample(source="plc", seq=k, t=0.01 * k, values={"gate/position": x})])
+        state = engine.tick() if k else engine.start()
+        undecided += [k] * ("jump" in state.doubt("gate"))
+    # There and back are two leaps.
+    assert undecided == list(range(30, undecided[-1] + 1))
+    assert undecided[-1] in (80, 81)
 
 
 def test_with_its_speed_an_uneven_network_does_not_make_a_belt_jerk():

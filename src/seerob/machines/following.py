@@ -22,6 +22,10 @@ FAR = 0.1
 LONGEST_STEP = 0.5
 """Between two pictures that a belt's speed is summed up over [s]; longer is a silence."""
 
+HOLD = 0.5
+"""After a place that nothing brought it to, nothing is relied on for so long [s]: as of live robots, see
+`seerob.live.device_clock.HOLD`. What is wrong once may be wrong again."""
+
 ON_ITS_WAY = "on its way since"
 """Begin of the doubt about a machine that is between the two ends that it tells of."""
 
@@ -233,6 +237,7 @@ class _Carried:
         self._speed = 0.0
         """Of the belt, told last [m/s]."""
         self._placed = False
+        self._leapt, self._until = "", -math.inf
         self.jumped = False
         """Whether it was put elsewhere just now, once around not counted."""
         self._lost = ""
@@ -249,7 +254,13 @@ class _Carried:
             self._zero = run - m.start if anew else self._zero
             told = run - self._zero
             # A place that the speed cannot have brought about is no motion: a counter that began again.
-            self.jumped = anew or (summed is not None and abs(told - summed) > FAR)
+            off = 0.0 if summed is None else told - summed
+            self.jumped = anew or abs(off) > FAR
+            if self._at_end is AtEnd.LOOP:
+                off -= self._length * round(off / self._length)  # a count of one round begins again
+            if abs(off) > FAR and not anew:
+                self._leapt = f"its position leapt by {off:.3g} m at {t:.3f} s, which its speed does not explain"
+                self._until = t + HOLD
             self._way = nearing(told, summed, t - self._t)
         elif anew:
             self._way, self._lost = m.start, ""
@@ -262,7 +273,9 @@ class _Carried:
             self._zero += self._way - q
             self._way, speed = q, None if speed is None else np.zeros(1)
         around = self._way // self._length != last // self._length and self._at_end is AtEnd.LOOP
-        return Place(np.array([q]), speed, self._lost, self.jumped or around)
+        self._until = -math.inf if anew else self._until
+        doubt = self._lost or (self._leapt if t <= self._until else "")
+        return Place(np.array([q]), speed, doubt, self.jumped or around)
 
     def _sum(self, t: float, speed: float) -> float | None:
         """How far it was carried since it was heard last; None when that is too long ago."""

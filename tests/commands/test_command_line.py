@@ -210,7 +210,10 @@ def test_a_wait_for_the_compiler_is_announced_once(capsys, tmp_path, monkeypatch
     assert capsys.readouterr() == ("", "compiling the inner loops (once)\n")
     (folder,) = loops.cache_folders()
     folder.mkdir()
-    (folder / "tree.build-1.py311.nbi").write_bytes(b"")
+    (folder / "tree.build-1-0123456789abcdef.py311.nbi").write_bytes(b"")  # of another source
+    loops.tell_compiling()
+    assert capsys.readouterr() == ("", "compiling the inner loops (once)\n")
+    (folder / f"tree.build-1-{loops.key_of('tree')}.py311.nbi").write_bytes(b"")
     loops.tell_compiling()
     assert capsys.readouterr() == ("", "")
 

@@ -158,7 +158,7 @@ def test_a_count_of_one_round_that_begins_again_is_no_leap():
 
 
 def test_a_machine_that_teleports_is_not_relied_on_for_a_while(tmp_path):
-    """Each sample alone can be; between two of them it went 1 m in 10 ms, and nobody knows which was wrong."""
+    """Each sample alone can be; it went 1 m in 10 ms, and nobody knows which of both was wrong."""
     station = made(tmp_path, PERSON + GATE, POSITION, table("t,x", [(0, 0), (1, 0)]))
     engine = Engine(station.model, driven={"gate": 0.5}, live={"gate"}, signals={"plc": 0.5})
     undecided = []

@@ -259,7 +259,9 @@ class _Carried:
             if self._at_end is AtEnd.LOOP:
                 off -= self._length * round(off / self._length)  # a count of one round begins again
             if abs(off) > FAR and not anew:
-                self._leapt = f"its position leapt by {off:.3g} m at {t:.3f} s, which its speed does not explain"
+                self._leapt = (
+                    f"its position leapt by {off:.3g} m at {t:.3f} s, which its speed does not explain"
+                )
                 self._until = t + HOLD
             self._way = nearing(told, summed, t - self._t)
         elif anew:

@@ -599,34 +599,43 @@ class State:
         finally:
             self._cache, self._at_least = kept, False
 
-    def _known(self, mechanism: Mechanism, M: Array) -> Array:
+    def _known(self, mechanisms: tuple[Mechanism, ...], M: Array) -> Array:
         """A mass matrix without the bodies that nobody weighed, and with what keeps it invertible."""
         mj, rows = self.model.mj, np.zeros((6, self.model.mj.nv))
-        for body in mechanism.unweighed:
+        for body in dict.fromkeys(i for mechanism in mechanisms for i in mechanism.unweighed):
             mujoco.mj_jacBodyCom(mj, self._data, rows[:3], rows[3:], body)
-            moved = self.columns[mechanism.name].of_rows(rows)
+            moved = np.hstack([self.columns[mechanism.name].of_rows(rows) for mechanism in mechanisms])
             turn = self._data.ximat[body].reshape(3, 3)
             inertia = turn @ np.diag(mj.body_inertia[body]) @ turn.T
             M = M - mj.body_mass[body] * moved[:3].T @ moved[:3] - moved[3:].T @ inertia @ moved[3:]
         return np.asarray(M + (1e-9 * np.trace(M) + 1e-15) * np.eye(len(M)))
 
-    def mass_matrix(self, mechanism: Mechanism) -> Array:
+    def mass_matrix(self, *mechanisms: Mechanism) -> Array:
         """Joint-space mass matrix M(q) with tools and workpieces [kg·m², kg·m or kg], shape (n, n).
+
+        Of several mechanisms, one on another, that of the joints of all in turn.
 
         Raises:
             Undecided: A mass that nobody gave, or what drives it is too coarse for what a mass is asked for.
         """
-        self.weigh(mechanism)
-        if why := self._hearings[mechanism.name].coarse:
-            raise Undecided(f"{mechanism.name}: {why}")
-        key = ("M", mechanism.name)
+        for mechanism in mechanisms:
+            self.weigh(mechanism)
+            if why := self._hearings[mechanism.name].coarse:
+                raise Undecided(f"{mechanism.name}: {why}")
+        key = ("M", *(mechanism.name for mechanism in mechanisms))
         if key not in self._cache:
             if "M" not in self._cache:
                 mujoco.mj_makeM(self.model.mj, self._data)
                 mujoco.mj_fullM(self.model.mj, self._data, self._full_mass_matrix)
                 self._cache["M"] = self._full_mass_matrix
-            M = self.columns[mechanism.name].of_matrix(self._full_mass_matrix)
-            self._cache[key] = self._known(mechanism, M) if mechanism.unknown_masses else M
+            if len(mechanisms) == 1:
+                M = self.columns[mechanisms[0].name].of_matrix(self._full_mass_matrix)
+            else:
+                every = np.eye(self.model.mj.nv)
+                C = np.hstack([self.columns[mechanism.name].of_rows(every) for mechanism in mechanisms])
+                M = C.T @ self._full_mass_matrix @ C
+            unknown = any(mechanism.unknown_masses for mechanism in mechanisms)
+            self._cache[key] = self._known(mechanisms, M) if unknown else M
         return np.asarray(self._cache[key])
 
     # -- kinematics -------------------------------------------------------------------------

@@ -111,7 +111,7 @@ def state_of(station, **motion):
 
 @pytest.mark.parametrize(
     ("axis", "joint", "verdict"),
-    [(0.0, 0.01, "within"), (0.05, 0.01, "undecided"), (0.05, 5.0, "exceeded")],
+    [(0.0, 0.01, "within"), (0.01, 0.01, "undecided"), (0.05, 0.01, "exceeded"), (0.01, 5.0, "exceeded")],
 )
 def test_half_a_tonne_that_carries_the_arm_counts_while_it_moves(tmp_path, axis, joint, verdict):
     station = made(tmp_path, FLOATING + AXIS + TWO_R + 'on = "axis"\n' + PFL, {"arm.urdf": two_r()})

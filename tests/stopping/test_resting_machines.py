@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
-from seerob.contact.impact_mass import while_carriers_rest
-from seerob.errors import Undecided
+from seerob.contact.impact_mass import Behind
 from seerob.moving_base import RESTS
-from seerob.snapshot import Result, Verdict
 from seerob.stopping.models import Stop, bind_stop
 from seerob.stopping.simulated import StopSimulation
 
@@ -64,14 +62,9 @@ def test_a_simulated_stop_is_that_of_the_robot_alone(tmp_path):
 
 
 @pytest.mark.parametrize(("speed", "rests"), SPEEDS)
-def test_nothing_is_within_or_open_by_a_mass_that_leaves_out_what_carries_it(tmp_path, speed, rests):
+def test_all_that_moves_is_behind_an_arm_that_is_carried_about(tmp_path, speed, rests):
     cell = made(tmp_path, FLOATING + AXIS + TWO_R + 'on = "axis"\n', {"arm.urdf": two_r()})
-    state, robot = moving(cell, speed), cell.model.robot("arm")
-    for verdict in (None, Verdict.EXCEEDED, Verdict.WITHIN, Verdict.UNDECIDED):
-        result = Result(name="F", verdict=verdict)
-        judge = while_carriers_rest(cell.model, robot, lambda _, result=result: result)
-        if rests or verdict in (None, Verdict.EXCEEDED):
-            assert judge(state) is result
-            continue
-        with pytest.raises(Undecided, match="axis moves and carries arm"):
-            judge(state)
+    state, behind = moving(cell, speed), Behind(cell.model, cell.model.robot("arm"))
+    mover = behind.mover(state)
+    assert (mover is None) is rests
+    assert behind.simplified(mover) == pytest.approx(1.0 if rests else 4.0)

@@ -153,6 +153,10 @@ class Judged:
     """Which of ``clamped`` are against the floor, shape (b, r)."""
     closing: Array | None = None
     """How fast surfaces come against others that move too, where these clamp [m/s], shape (b, k)."""
+    simplified: float = math.nan
+    """Mass behind the surfaces by the norm, or the whole mass of what moves them as one [kg]."""
+    pushed: str = ""
+    """Which drive may press on after the impact, in words; empty where joints of a robot alone move."""
 
     @property
     def least(self) -> Array:

@@ -93,6 +93,7 @@ class ContactEnds:
         simplified: float,
         clamped: NDArray[np.bool_],
         still: float,
+        given: Array | None = None,
     ) -> Spread:
         """Ends of the permissible speeds [m/s], shape (b, r).
 
@@ -103,6 +104,7 @@ class ContactEnds:
             simplified: M/2 + m_L as given [kg].
             clamped: Whether the body part cannot recoil, shape (b, r).
             still: Speed below which a motion has no direction [m/s].
+            given: Mass behind each surface [kg], shape (b,), instead of one that tolerances of masses change.
         """
         matrices, n = self.masses.matrices(state), len(self.masses)
         own = [tolerance.name for tolerance in self.tolerances[n:]]
@@ -110,9 +112,11 @@ class ContactEnds:
         def speeds(shifts: Shifts) -> Array:
             # A lighter robot may be faster.
             lighter = tuple(-shift for shift in shifts[:n])
-            M = matrices.at(lighter)
-            projected = masses_along_motion(state, self._robot, bodies, standstill=still, M=M)
-            m_R = robot_masses(which, self.masses.simplified(simplified, lighter), projected)
+            m_R = given
+            if m_R is None:
+                M = matrices.at(lighter)
+                projected = masses_along_motion(state, (self._robot,), bodies, standstill=still, M=M)
+                m_R = robot_masses(which, self.masses.simplified(simplified, lighter), projected)
             sides = dict(zip(own, shifts[n:], strict=True))
             arrays, forces = self._changed(
                 sides.get("stiffness_tolerance", 0), sides.get("area_tolerance", 0)

@@ -12,30 +12,31 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from seerob import provenance
-from seerob.contact import collision, impact_mass
+from seerob.contact import collision
 from seerob.contact import limits as contact_limits
 from seerob.contact import shape as contact_shape
 from seerob.contact.areas import NOT_MODELLED, area_results, margin
 from seerob.contact.clamped_regions import Clamping, floor_input
 from seerob.contact.drawn import ContactMarkers
 from seerob.contact.given import given_contacts
-from seerob.contact.impact_mass import masses_along_motion, moving_masses, simplified_mass
+from seerob.contact.impact_mass import Behind, moving_masses, train
 from seerob.contact.limits import Judged
 from seerob.contact.measured import Measurements, with_measured
+from seerob.contact.pushing import NOT_GIVEN, pushed
 from seerob.contact.reach import HeightReach, reach_inputs
 from seerob.contact.regions import REGIONS, Person, without_limit
 from seerob.contact.rows import ContactRows
 from seerob.contact.tolerances import ContactEnds, ranks, robot_masses
 from seerob.criterion import Criterion, Evaluate, worst
-from seerob.errors import Undecided, UnknownName
+from seerob.errors import InputError, Undecided, UnknownName
 from seerob.human.anthropometry import STATURE_RANGE
 from seerob.kernels.contact_speeds import governing
-from seerob.model import Model
+from seerob.model import Mechanism, Model
 from seerob.norms import body_limits
 from seerob.norms.crushing_gaps import NOT_VERIFIED, gap_inputs
 from seerob.norms.limit_inputs import excluded_input, limit_inputs, table_input
 from seerob.quantities import Coordinate, Tolerance
-from seerob.snapshot import Basis, Input, Result, Verdict
+from seerob.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.state import State
 from seerob.tolerances import Spread, deciding
 from seerob.transforms import Array
@@ -64,7 +65,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     whole: ClassVar[bool] = False
 
     robot: str
-    """The robot, with its tools and workpieces."""
+    """A robot or a machine, with its tools and workpieces."""
     human: str | None = None
     """A person: regions within ``horizon`` of a part can be hit by it. Without one, anyone could stand
     anywhere."""
@@ -79,7 +80,11 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     multiplier: Annotated[float, Meta(ge=1, le=2)] | None = None
     """Transient over quasi-static limits; lowers the table's, which is 2."""
     mass: Literal["larger", "simplified", "projected"] = "larger"
-    """Mass of the robot: M/2 + m_L, the effective mass along the motion, or the larger of both."""
+    """Mass of the robot: M/2 + m_L, the effective mass along the motion, or the larger of both. A machine,
+    and what it carries while it moves, has its whole mass instead of M/2 + m_L."""
+    drive_force: Annotated[float, Meta(ge=0, extra={"unit": "N"})] | None = None
+    """Of a machine, or of what carries the robot: largest force with which its drive keeps pushing whoever it
+    touches, at any place that can touch [N]; 0 of what rolls freely. Undecided without it."""
     contact_radius: dict[str, _Positive] = field(default_factory=dict)
     """Radius of the sharpest edge of parts by name [m], instead of what their meshes tell; the robot's name
     means its links up to the flange, not what is mounted there."""
@@ -133,8 +138,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         """See `Criterion.bind`."""
         contacts = Contacts(self, model)
         bones = () if contacts.people is None else contacts.people.bodies
-        judge = seen_first(bones, contacts.evaluate, contacts.without)
-        return impact_mass.while_carriers_rest(model, contacts.robot, judge)
+        return seen_first(bones, contacts.evaluate, contacts.without)
 
     def table(self, model: Model) -> body_limits.BodyLimits:
         """The limits that apply."""
@@ -150,7 +154,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         Raises:
             UnknownName: A part that the robot does not move.
         """
-        moving = model.robot(self.robot).moving
+        moving = model.mover(self.robot).moving
         radii, _, _ = self._contacts(model)
         known = contact_shape.body_shape
         return [
@@ -163,7 +167,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
 
         Free and clamped; see `contact_limits.RegionArrays.pressure_force`.
         """
-        moving = model.robot(self.robot).moving
+        moving = model.mover(self.robot).moving
         _, given, _ = self._contacts(model)
         found = [arrays.pressure_force(shape, self.largest_area) for shape in self.shapes(model)]
         for row, body in enumerate(moving):
@@ -178,25 +182,30 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     def measured(self, model: Model) -> Measurements:
         """What was measured at the robot."""
         arrays = contact_limits.RegionArrays.of(self.table(model), multiplier=self.multiplier)
-        return Measurements(model, model.robot(self.robot), arrays, self.measurements)
+        return Measurements(model, model.mover(self.robot), arrays, self.measurements)
 
     def _contacts(self, model: Model) -> tuple[dict[int, float], dict[int, float], dict[int, str]]:
         """Radii [m] and areas [m²] that the file gives, by moving body, and by which name."""
-        return given_contacts(model, model.robot(self.robot), self.contact_radius, self.contact_area)
+        return given_contacts(model, model.mover(self.robot), self.contact_radius, self.contact_area)
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
-        robot, limits = model.robot(self.robot), self.table(model)
+        robot, limits = model.mover(self.robot), self.table(model)
         names = (self.robot,) if self.human is None else (self.robot, self.human)
         table, doubts = table_input(limits, model.workstation.edition)
         return Basis(
-            formula="v = min(F/√(μk), pA/√(μk), √(2E/μ)), μ = 1/(1/m_H + 1/m_R), m_R = M/2 + m_L; "
-            "clamped: m_H → ∞ and quasi-static limits; "
+            formula="v = min(F/√(μk), pA/√(μk), √(2E/μ)), μ = 1/(1/m_H + 1/m_R), "
+            f"m_R = {self._whole(robot)}; clamped: m_H → ∞ and quasi-static limits; "
             + {
                 "larger": "m_R at least the effective mass along the motion",
                 "simplified": "the effective mass along the motion is shown, not used",
                 "projected": "m_R replaced by the effective mass along the motion (chosen in the file)",
-            }[self.mass],
+            }[self.mass]
+            + (
+                "; a drive that keeps pushing with F_d: F(F − 2F_d) for F²"
+                if Behind(model, robot).pushed
+                else ""
+            ),
             source="ISO/TS 15066:2016 Annex A.3, A.1 to A.6 (public sources that agree, 2S; A.1, A.2: M)",
             inputs=(
                 *provenance.motion(model, *names),
@@ -224,9 +233,24 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
                     else ("rotor inertia: the effective mass along the motion is link side only",)
                 ),
                 *self._motion_left_out(),
+                *(
+                    (
+                        "limits that other standards set for doors, gates and vehicles",
+                        "a drive that presses for longer, or harder than drive_force before it is limited",
+                    )
+                    if Behind(model, robot).pushed
+                    else ()
+                ),
                 *(("people in other postures than those that are named",) if self.postures else ()),
             ),
         )
+
+    @staticmethod
+    def _whole(robot: Mechanism) -> str:
+        """The mass that counts beside the effective one, in words."""
+        if robot.role == "machine":
+            return "all that moves of it, with what is on it"
+        return "M/2 + m_L" + (", all that moves while it is carried about" if robot.on else "")
 
     def _motion_left_out(self) -> tuple[str, ...]:
         if self.person_speed is not None:
@@ -236,11 +260,19 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
 
     def _given(self, model: Model) -> tuple[Input, ...]:
         """What the file says of the contact, and what the robot and its surfaces are."""
-        robot = model.robot(self.robot)
+        robot = model.mover(self.robot)
         M = None if robot.unknown_masses else moving_masses(model, robot)[0]
         links, *carried = provenance.masses(model, robot)
         links = replace(links, name=f"M, moving links of {self.robot}", value=M)
         found = [links, *carried]
+        roots = [*model.carriers_of(robot.name), *([robot.name] if robot.role == "machine" else [])]
+        movers = train(model, model.mechanisms[roots[-1]]) if roots else ()
+        for each in movers:
+            found += () if each is robot else provenance.masses(model, each)
+        if self.drive_force is not None:
+            found.append(provenance.given("drive_force", self.drive_force, "N"))
+        elif roots:
+            found.append(Input(name="drive_force", origin=Origin.MISSING, source=NOT_GIVEN))
         if self.human is not None:
             found.append(provenance.given("horizon", self.horizon, "m"))
         tolerances = {key: getattr(self, key) for key in ("stiffness_tolerance", "area_tolerance")}
@@ -268,7 +300,7 @@ class Contacts:
 
     def __init__(self, spec: PowerAndForce, model: Model) -> None:
         self.spec, self.model = spec, model
-        self.robot = model.robot(spec.robot)
+        self.robot = model.mover(spec.robot)
         self.robot.require_masses(spec.name)
         self.moving = self.robot.moving
         self.names = [model.bodies[i].name for i in self.moving]
@@ -292,7 +324,10 @@ class Contacts:
             shape.unknown if np.isnan(force).any() else ""
             for shape, force in zip(shapes, self.forces, strict=True)
         ]
-        self.simplified = simplified_mass(model, self.robot)
+        self.behind = Behind(model, self.robot)
+        if spec.drive_force is not None and not self.behind.pushed:
+            what = f"{self.robot.name} is a robot that nothing carries: forces of its drives are not modelled"
+            raise InputError.at(spec.name, "drive_force", what, "leave it out, or name a machine")
         self.ends = ContactEnds(
             model,
             self.robot,
@@ -347,9 +382,11 @@ class Contacts:
         spec, robot = self.spec, self.robot
         if not self.moving:
             raise Undecided(f"{robot.name} has no moving part with a shape")
-        projected = masses_along_motion(state, robot, self.moving, standstill=STANDSTILL)
+        mover = self.behind.mover(state)
+        simplified = self.behind.simplified(mover)
+        projected = self.behind.along_motion(state, mover, self.moving, standstill=STANDSTILL)
         v_r = state.fastest_points(self.moving)[0]
-        masses = robot_masses(spec.mass, self.simplified, projected)
+        masses = robot_masses(spec.mass, simplified, projected)
         people = people or self.people
         if people is None:
             near: NDArray[np.bool_] = np.ones((len(v_r), len(REGIONS)), bool)
@@ -367,10 +404,25 @@ class Contacts:
         speeds = self.arrays.speeds(masses, self.least, clamped)
         ends = None
         if self.ends.tolerances:
-            ends = self.ends.at(state, self.moving, spec.mass, self.simplified, clamped, STANDSTILL)
+            given = None if mover is None else masses
+            ends = self.ends.at(state, self.moving, spec.mass, simplified, clamped, STANDSTILL, given)
+        doubt = ""
+        if mover is not None:
+            k, F_d = self.arrays.stiffness * (1 - spec.stiffness_tolerance), spec.drive_force
+            if len(self.ends.masses):
+                doubt = f"mass_tolerance is not followed on what moves {robot.name}: leave it out here"
+                F_d = None
+            else:
+                doubt = NOT_GIVEN if F_d is None else f"the drive keeps pushing with {F_d:g} N"
+                doubt += (
+                    f" ({mover.name} moves" + ("" if mover is robot else f" and carries {robot.name}") + ")"
+                )
+            ends = pushed(speeds, ends, k, self.arrays.force, clamped, F_d)
         v = contact_limits.relative(v_r, v_h, closing)
         governing = self._governing(v, near, speeds, ends)
-        return Judged(v_r, v_h, near, projected, speeds, clamped, *governing, ends, on_floor, closing)
+        return Judged(
+            v_r, v_h, near, projected, speeds, clamped, *governing, ends, on_floor, closing, simplified, doubt
+        )
 
     def evaluate(self, state: State, people: Person | None = None) -> Result:
         """The result at a state; see `judge`."""
@@ -394,7 +446,7 @@ class Contacts:
         known = projected[np.isfinite(projected)]
         heaviest, still = (float(known.max()), "") if len(known) else (None, "no part moves")
         mass_parts: tuple[Result, ...] = (
-            Result(name="M/2 + m_L", value=self.simplified, unit="kg"),
+            Result(name="whole mass" if judged.pushed else "M/2 + m_L", value=judged.simplified, unit="kg"),
             Result(name="m_u along the motion, heaviest part", value=heaviest, unit="kg", reason=still),
         )
         if people is not None and found:
@@ -477,7 +529,8 @@ class Contacts:
             low, high = float(ends.low[row, column]), float(ends.high[row, column])
             interval = value - (high - limit), value + (limit - low)
         if verdict is Verdict.UNDECIDED and ends is not None and not math.isnan(speeds.pressure[row, column]):
-            reason += f"; {deciding(self.ends.tolerances, ends.widths[:, row, column])}"
+            why = deciding(self.ends.tolerances, ends.widths[:, row, column]) if self.ends.tolerances else ""
+            reason += f"; {judged.pushed or why}"
         elif verdict is Verdict.UNDECIDED:
             reason = f"contact pressure of {body} ({how}): {self.unknown[row]}"
         return Result(

@@ -3,8 +3,9 @@
 import { ConeGeometry, Group, Mesh, Quaternion, Vector3 } from "three";
 import { markerMaterial } from "../scene/materials";
 import type { Arrow } from "../wire";
-import type { Drawn, View } from "./drawn";
+import type { Drawn } from "./drawn";
 import { pixelAt, Stroke } from "./stroke";
+import type { View } from "./view";
 
 const HEAD = new ConeGeometry(1, 2.6, 16).translate(0, -1.3, 0);
 const UP = new Vector3(0, 1, 0);

@@ -5,7 +5,7 @@ import { CanvasTexture, LinearFilter, Sprite, SpriteMaterial, SRGBColorSpace, Ve
 import { shortened } from "../format";
 import { NEUTRAL_TEXT, STATE_ICONS, VERDICT_TEXT } from "../verdicts";
 import type { Verdict } from "../wire";
-import type { View } from "./drawn";
+import type { View } from "./view";
 
 const PAD_PX = 6;
 const SHARPNESS = 2;

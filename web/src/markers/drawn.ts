@@ -1,14 +1,8 @@
 // What every kind of marker is once it is on the screen.
 
-import type { Object3D, PerspectiveCamera, Vector3 } from "three";
+import type { Object3D, Vector3 } from "three";
 import type { Caption } from "./caption";
-
-/** How the screen sees the world, for what keeps its size in pixels. */
-export interface View {
-  camera: PerspectiveCamera;
-  /** World size of a pixel at one metre from the eye [m]. */
-  pixel: number;
-}
+import type { View } from "./view";
 
 export interface Drawn<M> {
   /** In world coordinates: z up, metres. */

@@ -3,7 +3,8 @@
 import { Group, Vector3 } from "three";
 import type { Label } from "../wire";
 import { Caption } from "./caption";
-import type { Drawn, View } from "./drawn";
+import type { Drawn } from "./drawn";
+import type { View } from "./view";
 
 export class LabelDrawn implements Drawn<Label> {
   readonly object = new Group();

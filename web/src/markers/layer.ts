@@ -5,10 +5,11 @@ import { Group } from "three";
 import { STATE_ORDER, stateOf } from "../verdicts";
 import type { Marker, Result, Verdict } from "../wire";
 import { Caption } from "./caption";
-import type { Drawn, View } from "./drawn";
+import type { Drawn } from "./drawn";
 import { makeDrawn } from "./index";
 import { Leaders } from "./leaders";
 import { stackCaptions } from "./stacking";
+import type { View } from "./view";
 
 interface Slot {
   type: Marker["type"];

@@ -10,7 +10,7 @@ import {
 } from "three";
 import { NEUTRAL_COLOR } from "../verdicts";
 import type { Caption } from "./caption";
-import type { View } from "./drawn";
+import type { View } from "./view";
 
 /** Captions nearer to their point than this need none [px]. */
 const LEAST_PX = 16;

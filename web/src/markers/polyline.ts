@@ -2,8 +2,9 @@
 
 import { Group, Vector3 } from "three";
 import type { Polyline } from "../wire";
-import type { Drawn, View } from "./drawn";
+import type { Drawn } from "./drawn";
 import { Stroke } from "./stroke";
+import type { View } from "./view";
 
 const WIDTH_PX = 3;
 

@@ -3,8 +3,9 @@
 import { Group, Mesh, SphereGeometry, Vector3 } from "three";
 import { markerMaterial } from "../scene/materials";
 import type { Segment } from "../wire";
-import type { Drawn, View } from "./drawn";
+import type { Drawn } from "./drawn";
 import { pixelAt, Stroke } from "./stroke";
+import type { View } from "./view";
 
 const DOT = new SphereGeometry(1, 16, 12);
 const WIDTH_PX = 3.5;

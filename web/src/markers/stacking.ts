@@ -3,7 +3,7 @@
 
 import { Vector3 } from "three";
 import type { Caption } from "./caption";
-import type { View } from "./drawn";
+import type { View } from "./view";
 
 const GAP_PX = 2;
 /** Height of the tools at the upper edge of the room, and how far captions are above their points [px]. */

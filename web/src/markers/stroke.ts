@@ -3,7 +3,7 @@
 import { CylinderGeometry, Group, Mesh, Quaternion, Vector3 } from "three";
 import { markerMaterial } from "../scene/materials";
 import type { Vec3, Verdict } from "../wire";
-import type { View } from "./drawn";
+import type { View } from "./view";
 
 const SHAFT = new CylinderGeometry(1, 1, 1, 8, 1, true);
 const UP = new Vector3(0, 1, 0);

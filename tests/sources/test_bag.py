@@ -12,8 +12,8 @@ from seerob.motion_io.ros_bag import TimeBase
 from seerob.protocols.ros_messages import Content, Joints, Plan, Point, Transform
 from seerob.protocols.ros_serialised import Edition, encode, store
 from seerob.source import Target
+from seerob.sources._pose_frame import PoseFrame
 from seerob.sources.bag import Bag
-from seerob.sources.tool_path import PoseFrame
 
 NAMES = ("j1", "j2")
 INF = (math.inf, math.inf)

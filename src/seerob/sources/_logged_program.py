@@ -6,10 +6,9 @@ import re
 from pathlib import Path
 
 from seerob.errors import InputError
+from seerob.plugin import load
 from seerob.source import Target
 from seerob.sources._trajectory_file import TrajectoryFile
-from seerob.sources.kuka_log import KukaLog
-from seerob.sources.robodk import Robodk
 from seerob.waypoints.reduction import reduced
 from seerob.waypoints.waypoint import Program
 
@@ -17,21 +16,19 @@ HEAD = 16 << 10
 """Of a file in which its header is looked for [bytes]."""
 
 
-def log_kind(path: Path) -> type[TrajectoryFile] | None:
-    """Which log a file is, told by its header; None for another file."""
+def log_kind(path: Path) -> str | None:
+    """The kind of source that plays a file, told by its header; None for what is no log."""
     if path.suffix.lower() not in (".log", ".csv", ".tsv", ".txt") or not path.is_file():
         return None
     with path.open("rb") as file:
         head = file.read(HEAD).decode("latin-1")
     if "ZeitInSec" in head:
-        return KukaLog
+        return "kuka_log"
     lines = (set(re.split(r"[^A-Z0-9_]+", line.upper())) for line in head.splitlines()[:20])
-    return Robodk if any({"J1", "ERROR"} <= words for words in lines) else None
+    return "robodk" if any({"J1", "ERROR"} <= words for words in lines) else None
 
 
-def logged_program(
-    kind: type[TrajectoryFile], path: Path, file: str, robot: str, tolerance: float | None
-) -> Program:
+def logged_program(kind: str, path: Path, file: str, robot: str, tolerance: float | None) -> Program:
     """The waypoints that a log is reduced to.
 
     Args:
@@ -46,8 +43,9 @@ def logged_program(
     """
     if tolerance is None:
         what = "is a log of a motion: how far waypoints may leave it, nobody said"
-        remedy = f'give tolerance [rad or m], or play it as it is with kind = "{kind.__module__[15:]}"'
+        remedy = f'give tolerance [rad or m], or play it as it is with kind = "{kind}"'
         raise InputError.at(file, "tolerance", what, remedy)
-    motion, findings = kind(robot=robot, file=file).read(path, Target(name=robot))
+    log = load("sources", kind, TrajectoryFile)
+    motion, findings = log(robot=robot, file=file).read(path, Target(name=robot))
     program = reduced(motion, tolerance)
     return Program(file, program.waypoints, (*(f.text for f in findings), *program.remarks))

@@ -21,9 +21,9 @@ from seerob.protocols.rosbridge_client import SILENCE, Heard
 from seerob.samples import JointSample, PoseSample, Quality, Sample
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
+from seerob.sources._pose_frame import PoseFrame
 from seerob.sources._ros_frames import STATIC, FrameTree, driven, world_from_parent
 from seerob.sources._ros_joints import JointGather, PlayedPlan
-from seerob.sources.tool_path import PoseFrame
 from seerob.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.transforms import Array, wxyz_from_rotation
 

@@ -9,7 +9,7 @@ import numpy as np
 from seerob.errors import InputError, suggestion
 from seerob.protocols.ros_messages import Transform
 from seerob.source import Target
-from seerob.sources.tool_path import PoseFrame, fixed_links
+from seerob.sources._pose_frame import PoseFrame, fixed_links
 from seerob.transforms import Array, rotation_from_wxyz, transform
 
 STATIC = "/tf_static"

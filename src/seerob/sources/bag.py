@@ -17,10 +17,10 @@ from seerob.protocols.ros_messages import Content, Joints, Plan
 from seerob.samples import JointSample, Quality
 from seerob.snapshot import Finding
 from seerob.source import Opened, Target
+from seerob.sources._pose_frame import PoseFrame
 from seerob.sources._ros_frames import STATIC, FrameTree, driven, world_from_parent
 from seerob.sources._ros_joints import JointGather
 from seerob.sources._trajectory_file import TrajectoryFile
-from seerob.sources.tool_path import PoseFrame
 from seerob.trajectories.checks import sampling_findings
 from seerob.trajectories.tool_trajectory import PoseSamples, ToolTrajectory, plausible
 from seerob.trajectories.trajectory import MAX_SAMPLES, Trajectory, origin_finding

@@ -6,7 +6,6 @@ pose it takes those nearest to where the robot is, which need not be the control
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from seerob.errors import InputError, Problem, suggestion
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
+from seerob.sources._pose_frame import PoseFrame, fixed_links
 from seerob.tables.mapping import Mapping
 from seerob.tables.motion import read_tool_motion
 from seerob.trajectories.checks import sampling_findings
@@ -25,15 +25,6 @@ FARTHEST = 30.0
 """A pose farther than this from the robot's base is a wrong unit or frame [m]."""
 SAME = 1e-9
 """Frames that differ by less are the same [m or rad]."""
-
-
-class PoseFrame(StrEnum):
-    """What the poses of a file are relative to."""
-
-    BASE = "base"
-    """The robot's base, as controllers log them."""
-    WORLD = "world"
-    """The workstation."""
 
 
 class ToolPath(Source, frozen=True, kw_only=True):
@@ -146,16 +137,3 @@ class ToolPath(Source, frozen=True, kw_only=True):
             remedy = f'write base = "{other}" (by convention the frame of the controller) or base = "{root}"'
             raise InputError(Problem(self.file, "base", what, remedy))
         return world_from_base @ fixed[root], f"the frame of {root}"
-
-
-def fixed_links(target: Target) -> dict[str, Array]:
-    """Links that the robot's joints do not move, root first: base from link, (4, 4), by full name."""
-    found: dict[str, Array] = {}
-    if target.description is None:
-        return found
-    for link in target.description.links:
-        parent = None if link.parent is None else found.get(f"{target.name}/{link.parent}")
-        if not link.joints and (link.parent is None or parent is not None):
-            above = np.eye(4) if parent is None else parent
-            found[f"{target.name}/{link.name}"] = above @ link.parent_from_link
-    return found

@@ -25,7 +25,7 @@ from seerob.opening import target
 from seerob.samples import PoseSample, Quality, Sample
 from seerob.sink import Closing
 from seerob.snapshot import Snapshot
-from seerob.sources.tool_path import fixed_links
+from seerob.sources._pose_frame import fixed_links
 from seerob.transforms import Array, inverse, rotation_from_wxyz, transform, wxyz_from_rotation
 from seerob.writing.target_table import CartesianTarget, TargetMessage
 from seerob.writing.target_wires import Wire, wired

@@ -12,10 +12,9 @@ from seerob.scoring import reba as method
 from seerob.scoring.bands import reba_edges
 from seerob.scoring.held_work import Watch, activity
 from seerob.scoring.judgement import Method
-from seerob.scoring.measured import Accuracy, Measured
+from seerob.scoring.measured import Accuracy, Measured, one_foot_up
 from seerob.scoring.phases import Kilograms, Phase, Sides, Stance, TaskPhase, on_sides
 from seerob.scoring.published import Ints, published
-from seerob.scoring.rula import one_foot_up
 from seerob.scoring.spans import Span, answer, between, exactly
 from seerob.snapshot import Basis
 

@@ -12,7 +12,7 @@ from seerob.human.angles import Angles
 from seerob.scoring.edges import ROUNDING
 from seerob.scoring.published import Ints
 from seerob.scoring.spans import Span, beyond, graded
-from seerob.scoring.thresholds import Angle
+from seerob.scoring.thresholds import Angle, Thresholds
 from seerob.transforms import Array
 
 Accuracy = float | Mapping[str, float]
@@ -146,3 +146,10 @@ def turned(accuracy: float, lever: Array) -> Array | float:
         return 0.0
     sine = np.minimum(np.sin(min(accuracy, np.pi / 2)) / np.maximum(np.abs(lever), 1e-12), 1.0)
     return np.where(np.isnan(sine) | (sine < 1.0), np.arcsin(sine), np.pi)
+
+
+def one_foot_up(measured: Measured, thresholds: Thresholds) -> Span:
+    """1 where one foot is raised: an estimate of standing on one leg."""
+    # Not fmax: what is not assessed on one side is not known of both.
+    higher = measured.angles.foot_rise.max(axis=-1)
+    return beyond(higher, thresholds.foot_rise, accuracy=measured.error("foot_rise"))

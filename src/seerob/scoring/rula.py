@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from seerob.domains import number, whole
 from seerob.human.angles import Angles
 from seerob.scoring.edges import fallen, reached
-from seerob.scoring.measured import Accuracy, Measured
+from seerob.scoring.measured import Accuracy, Measured, one_foot_up
 from seerob.scoring.published import Ints, cells
 from seerob.scoring.shoulder import ArmPolicy, arm_score
 from seerob.scoring.spans import Span, between, beyond, either, exactly
@@ -253,10 +253,3 @@ def uneven(measured: Measured, thresholds: Thresholds) -> Span:
         accuracy=2 * measured.error("knee_flexion"),
     )
     return either(apart, one_foot_up(measured, thresholds))
-
-
-def one_foot_up(measured: Measured, thresholds: Thresholds) -> Span:
-    """1 where one foot is raised: an estimate of standing on one leg."""
-    # Not fmax: what is not assessed on one side is not known of both.
-    higher = measured.angles.foot_rise.max(axis=-1)
-    return beyond(higher, thresholds.foot_rise, accuracy=measured.error("foot_rise"))

@@ -13,6 +13,8 @@ from msgspec import Struct, field
 Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
 
+LARGEST = 1e6
+"""A value beyond it is no motion of a robot [rad, m, and per second; N·m or N]."""
 LARGEST_SPEED = {"rad": 30.0, "m": 10.0}
 """Above it two samples are a jump [rad/s or m/s]: no arm and no person at work moves like that."""
 

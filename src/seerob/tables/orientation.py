@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from seerob.trajectories.trajectory import LARGEST
+from seerob.samples import LARGEST
 from seerob.transforms import Array
 
 EULER = re.compile(r"[XYZ]{3}|[xyz]{3}")

@@ -15,14 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.errors import InputError, Problem
-from seerob.samples import JointSample, Quality
+from seerob.samples import LARGEST, JointSample, Quality
 from seerob.snapshot import Finding
 from seerob.transforms import Array
 
 MAX_SAMPLES = 5_000_000
 """More rows than this are refused: 80 minutes at 1 kHz."""
-LARGEST = 1e6
-"""A value beyond it is no motion of a robot [rad, m, and per second; N·m or N]."""
 LATEST = 1e12
 """A time beyond it is no time in seconds, but a stamp in another unit [s]."""
 

@@ -76,6 +76,8 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Whether several sources of its sort may drive the same target."""
     captured: ClassVar[str] = ""
     """How it captured a person's motion, ``live`` from a device or from a ``file``; empty when it did not."""
+    live: ClassVar[bool] = False
+    """Whether nobody knows its future: a controller, a machine, a tracker."""
     reads_variables: ClassVar[bool] = False
     """Whether it reads variables of the workstation's dictionary."""
 

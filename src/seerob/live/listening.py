@@ -73,6 +73,7 @@ class LiveSource(Source, frozen=True, kw_only=True):
     """How far the twin is behind the world [s]; one period of the source and 5 ms when not given. Of
     what is sent without a time also how late it is at most."""
 
+    live: ClassVar[bool] = True
     apart: ClassVar[bool] = True
     """Whether it may listen in another process: not who takes what this one has."""
     loads: ClassVar[tuple[str, ...]] = ()

@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 
 from seerob.errors import Undecided
-from seerob.live.listening import LiveSource
 from seerob.model import Gap, Mechanism, Model
 from seerob.snapshot import Input, Origin
 from seerob.state import State
@@ -104,7 +103,7 @@ def bind_reaction(
         "",
     )
     driving = [source for source in model.workstation.sources if source.target() == robot.name]
-    if robot.role == "robot" and not carriers and not any(isinstance(each, LiveSource) for each in driving):
+    if robot.role == "robot" and not carriers and not any(each.live for each in driving):
         # Whom nothing drives stands.
         value, origin, source = "as its motion goes on", Origin.COMPUTED, "what drives it, known ahead"
     elif limits is not None and not carriers:

@@ -16,7 +16,7 @@ from seerob.between_ticks import Asking, BetweenTicks, Watch
 from seerob.criterion import Criterion, Evaluate
 from seerob.errors import SeerobError, Undecided, UnknownName, Unweighed
 from seerob.model import Model
-from seerob.plugin import PluginError
+from seerob.plugin import PluginError, kind_of
 from seerob.snapshot import Basis, Finding, Result, Row, Verdict
 from seerob.state import State
 from seerob.whereabouts.hearing import SLACK
@@ -144,7 +144,7 @@ def _unknown(criterion: Criterion, reason: str) -> Result:
 
 
 def _where(bound: Bound) -> str:
-    return type(bound.criterion).__module__.removeprefix(f"seerob.{bound.group}.")
+    return kind_of(bound.group, bound.criterion)
 
 
 def _told(error: Exception) -> str:

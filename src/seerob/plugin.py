@@ -20,9 +20,19 @@ class PluginError(SeerobError):
     """A module that a kind names cannot be used; says what is wrong with it."""
 
 
+def home(package: str) -> str:
+    """The package of the modules that are the kinds of a table which ship."""
+    return f"seerob.{package}"
+
+
+def kind_of(package: str, plugin: object) -> str:
+    """The kind that a plug-in is of, as the workstation file says it: dotted where it is one's own."""
+    return type(plugin).__module__.removeprefix(f"{home(package)}.")
+
+
 def kinds(package: str) -> tuple[str, ...]:
-    """Kinds that ship in ``seerob.<package>``, sorted."""
-    found = importlib.import_module(f"seerob.{package}")
+    """Kinds of a table that ship, sorted."""
+    found = importlib.import_module(home(package))
     return tuple(sorted(m.name for m in pkgutil.iter_modules(found.__path__) if not m.name.startswith("_")))
 
 
@@ -43,7 +53,7 @@ def load(package: str, kind: str, base: type[T]) -> type[T]:
     if "." in kind:
         name = kind
     elif kind in kinds(package):
-        name = f"seerob.{package}.{kind}"
+        name = f"{home(package)}.{kind}"
     else:
         raise UnknownName(f"kind of [[{package}]]", kind, kinds(package))
     try:

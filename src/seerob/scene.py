@@ -9,6 +9,7 @@ from seerob.judging import UNBOUNDED, Bound
 from seerob.model import Model
 from seerob.norms.editions import headline
 from seerob.opening import coarse
+from seerob.plugin import kind_of
 from seerob.results.series import STILL
 from seerob.snapshot import CriterionInfo, Finding, JointInfo, MechanismInfo, Node, Scene
 from seerob.workstation import Workstation, content_hash
@@ -70,7 +71,7 @@ def scene_of(
         criteria=tuple(
             CriterionInfo(
                 name=b.criterion.name,
-                kind=type(b.criterion).__module__.removeprefix(f"seerob.{b.group}."),
+                kind=kind_of(b.group, b.criterion),
                 group=b.group,
                 title=(type(b.criterion).__doc__ or "").strip().split("\n")[0],
                 subjects=b.criterion.subjects(),

@@ -13,7 +13,7 @@ from seerob.commands import Exit, line, seconds
 from seerob.commands.interruption import Stopped
 from seerob.errors import InputError
 from seerob.host_name import check_host
-from seerob.plugin import kinds
+from seerob.plugin import home, kinds
 
 HELP = "be a controller or a device without the hardware: a real server that plays a motion"
 EXAMPLE = "seerob emulate rtde --robot ur10 --file motion.csv"
@@ -24,7 +24,7 @@ def add(sub: argparse.ArgumentParser) -> None:
     """Arguments, those of each kind below it."""
     each = sub.add_subparsers(dest="kind", required=True, metavar="kind")
     for kind in kinds(PACKAGE):
-        module = import_module(f"seerob.{PACKAGE}.{kind}")
+        module = import_module(f"{home(PACKAGE)}.{kind}")
         own = each.add_parser(kind, help=module.HELP, description=module.HELP)
         module.add(own)
         own.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine)")
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
                 check_host(f"--{key}", host)
             except ValueError as error:
                 raise InputError.at("seerob emulate", f"--{key}", str(error)) from None
-    made = import_module(f"seerob.{PACKAGE}.{options.kind}").emulated(options)
+    made = import_module(f"{home(PACKAGE)}.{options.kind}").emulated(options)
     server, where = made.server, made.where
     stopped = Stopped()
     try:

@@ -10,7 +10,6 @@ from seerob.commands import (
     OUT,
     add_output,
     add_workstation,
-    compiled,
     describe,
     exit_code,
     line,
@@ -19,6 +18,7 @@ from seerob.commands import (
     tell,
     tell_results,
 )
+from seerob.commands.loading import compiled
 from seerob.commands.permissible_result import (
     add_permissible,
     add_sections,

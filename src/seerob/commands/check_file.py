@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from seerob.commands import Exit, add_workstation, compiled, describe, line
+from seerob.commands import Exit, add_workstation, describe, line
+from seerob.commands.loading import compiled
 
 if TYPE_CHECKING:
     from seerob.station import Station

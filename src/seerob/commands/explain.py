@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from seerob.commands import OUT, Exit, add_workstation, compiled, line
+from seerob.commands import OUT, Exit, add_workstation, line
+from seerob.commands.loading import compiled
 from seerob.errors import InputError
 
 if TYPE_CHECKING:

@@ -13,7 +13,6 @@ from seerob.commands import (
     OUT,
     add_output,
     add_workstation,
-    compiled,
     describe,
     exit_code,
     line,
@@ -21,6 +20,7 @@ from seerob.commands import (
     seconds,
     tell,
 )
+from seerob.commands.loading import compiled
 from seerob.commands.permissible_result import (
     BY,
     CHOICES,

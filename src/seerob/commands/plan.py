@@ -7,7 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from seerob.commands import Exit, add_workstation, compiled, describe, line, seconds
+from seerob.commands import Exit, add_workstation, describe, line, seconds
+from seerob.commands.loading import compiled
 from seerob.commands.planned_around import OTHERS, STILL, around, others
 from seerob.commands.progress import spinner
 from seerob.errors import InputError

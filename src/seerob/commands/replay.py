@@ -7,9 +7,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from seerob.commands import WORDS, Exit, exit_code, line, seconds
+from seerob.commands import WORDS, Exit, add_page, exit_code, line, seconds
 from seerob.commands.interruption import Stopped
-from seerob.commands.run import add_page
 from seerob.snapshot import Verdict
 
 if TYPE_CHECKING:

@@ -12,7 +12,6 @@ from seerob.commands import (
     WORDS,
     add_output,
     cache_folder,
-    compiled,
     exit_code,
     extreme,
     line,
@@ -20,6 +19,7 @@ from seerob.commands import (
     run_folder,
     tell_results,
 )
+from seerob.commands.loading import compiled
 from seerob.commands.loops import tell_compiling
 from seerob.commands.permissible_result import (
     add_permissible,

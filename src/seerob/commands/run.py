@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from seerob.commands import (
-    compiled,
+    add_page,
     describe,
     exit_code,
     line,
-    port,
     run_folder,
     seconds,
     tell,
     tell_results,
 )
 from seerob.commands.interruption import Stopped
+from seerob.commands.loading import compiled
 from seerob.commands.progress import announced, spinner
 from seerob.commands.sinks import file_of, opened_sinks, refuse_existing, sinks_of, tell_files
 from seerob.errors import InputError
@@ -49,13 +49,6 @@ def add(sub: argparse.ArgumentParser) -> None:
     )
     sub.add_argument("--seconds", type=seconds, help="end the run after this time")
     sub.add_argument("--replay", type=Path, metavar="FILE", help="show this recording, as seerob replay does")
-
-
-def add_page(sub: argparse.ArgumentParser) -> None:
-    """Arguments of commands that serve the page."""
-    sub.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine only)")
-    sub.add_argument("--port", type=port, default=8080, help="port of the page; 0 is any free one")
-    sub.add_argument("--token", help="what visitors must know; needed when not only this machine may visit")
 
 
 def run(options: argparse.Namespace) -> int:

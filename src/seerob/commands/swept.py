@@ -7,7 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from seerob.commands import Exit, add_workstation, compiled, describe, line, tell
+from seerob.commands import Exit, add_workstation, describe, line, tell
+from seerob.commands.loading import compiled
 from seerob.commands.progress import progress
 from seerob.errors import InputError
 

@@ -7,8 +7,9 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from seerob.commands import OUT, Exit, add_workstation, compiled, line, seconds, tell
+from seerob.commands import OUT, Exit, add_workstation, line, seconds, tell
 from seerob.commands.interruption import Stopped
+from seerob.commands.loading import compiled
 from seerob.errors import InputError, SeerobError
 
 if TYPE_CHECKING:

@@ -7,7 +7,10 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, heard, made, two_r
 from seerob.engine import Engine
+from seerob.recordings.recording import Recording
 from seerob.reference import Reference
+from seerob.run import engine_of, pump, ticks
+from seerob.snapshot import Verdict
 from seerob.source import Opened, Pump
 from seerob.trajectories.trajectory import derive_velocities
 
@@ -125,3 +128,60 @@ def test_no_start_time_changes_what_a_motion_is_at_its_ticks(cells, start, rate)
     # A clock of large numbers ends up to 1e-12 s early, which is no end.
     assert known == list(range(41))
     np.testing.assert_allclose([found[k] for k in known], wanted, atol=2e-4)
+
+
+# -- a motion that ends within a tick ------------------------------------------------------------
+
+
+def log(end, rate=250):
+    """A file of what accelerates at 4 rad/s² until an instant: 1 m out it is at 4 · end m/s then."""
+    times = np.append(np.arange(0.0, end - 0.5 / rate, 1 / rate), end)
+    rows = [f"{t:.6f},{2 * t * t:.12g},0,{4 * t:.12g},0" for t in times]
+    return "\n".join(["t [s],j1 [rad],j2 [rad],qd_j1 [rad/s],qd_j2 [rad/s]", *rows]) + "\n"
+
+
+def until(folder, end, limit, physics):
+    text = (FLOATING if physics else PLACED) + TWO_R + WATCHED.replace("0.5", f"{limit:g}")
+    text += '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "log.csv"\n[[sinks]]\nkind = "recorder"\n'
+    return made(folder, text, {"arm.urdf": two_r(), "log.csv": log(end)})
+
+
+@pytest.mark.parametrize("physics", [True, False])
+@pytest.mark.parametrize("end", [0.499, 0.4942, 0.4906])
+def test_a_motion_is_judged_to_its_end_wherever_that_lies_in_a_tick(tmp_path, end, physics):
+    exceeded, within = (
+        until(tmp_path / str(k), end, 4 * end - off, physics) for k, off in enumerate((0.003, -0.03))
+    )
+    for station, verdict in ((exceeded, Verdict.EXCEEDED), (within, Verdict.WITHIN)):
+        summary = station.run(folder=tmp_path / verdict, sinks=station.workstation.sinks)
+        found = summary.results["v"]
+        assert (summary.verdict, summary.duration) == (verdict, pytest.approx(end, abs=1e-9))
+        assert found.max() == pytest.approx(4 * end, abs=2e-3)
+        again = station.replay(Recording.open(tmp_path / verdict / "run.mcap"))
+        assert again.verdict is verdict
+        np.testing.assert_array_equal(again.results["v"].values, found.values)
+        np.testing.assert_array_equal(again.results["v"].t, found.t)
+        batch = station.batch()
+        assert batch["v"].verdict is verdict
+        assert batch.t[-1] == pytest.approx(end, abs=1e-9)
+        *others, length = np.diff(batch.t).tolist()
+        assert others == pytest.approx([TICK] * len(others))
+        assert 0.5 <= length / TICK <= 1.5
+
+
+@pytest.mark.parametrize("end", [0.4955, 0.0952, 0.003])
+def test_a_last_tick_of_another_length_moves_no_twin_away(tmp_path, end):
+    """The steps of the physics are shorter there; the twin stays on what was heard."""
+    station = until(tmp_path, end, 3, True)
+    engine = engine_of(station.model)
+    for out, _ in ticks(engine, lambda _: (), pump(station.sources, TICK), station.duration):
+        t = out.t
+    assert t == pytest.approx(end, abs=1e-12)
+    found = engine.state.qd(station.model.robot("arm"))[0], engine.state.q(station.model.robot("arm"))[0]
+    assert found == pytest.approx((4 * end, 2 * end * end), abs=1e-3)
+
+
+def test_who_does_not_say_when_a_motion_ends_gets_no_verdict_past_it(tmp_path):
+    station = until(tmp_path, 0.499, 3, False)
+    assert station.run().verdict is Verdict.WITHIN
+    assert station.run(feed=pump(station.sources, TICK)).verdict is Verdict.UNDECIDED

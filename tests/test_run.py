@@ -15,7 +15,7 @@ import trimesh
 import seerob as sr
 from kept_run import Kept
 from made_cell import FLOATING, TWO_R, heard, made, two_r
-from seerob.engine import Engine
+from seerob.engine import Engine, last_tick
 from seerob.errors import InputError
 from seerob.recorded_station import load_recorded
 from seerob.recordings.recording import Recording
@@ -228,7 +228,12 @@ def test_pump_hands_out_every_sample_once_and_reaches_ahead():
 def test_run_ends_with_the_last_tick_that_was_heard(duration):
     samples = (heard("arm", 0.0, (0.0,)), heard("arm", max(duration, 1e-3), (1.0,)))
     feed = list(pump([(Source(), Opened(samples=samples, duration=duration))], 0.01))
-    assert len(feed) == int(duration / 0.01 + 1e-9) + 1
+    assert (
+        len(feed)
+        == last_tick(duration, 0.01) + 1
+        == {0.0: 1, 0.005: 2, 0.01: 2, 0.999: 101, 1.0: 101}[duration]
+    )
+    assert [s for tick in feed for s in tick] == list(samples)
 
 
 def cell(folder, *, every="0.05", effort=1000.0):

@@ -95,16 +95,18 @@ class _Whereabouts(State):
         self.t = t
 
 
-def recorded(model: Model, feed: Feed) -> Motion:
+def recorded(model: Model, feed: Feed, end: float) -> Motion:
     """Where everybody is at every tick of a feed, without physics: where the samples say.
 
     Args:
         model: The compiled workstation, whose sources drive it.
         feed: Samples per tick.
+        end: When the motion ends, and the last tick with it [s].
     """
     station = model.workstation
     placed = changed(station, engine=changed(station.engine, physics=False))
     engine = engine_of(replace(model, workstation=placed))
+    engine.end = end
     engine.state = _Whereabouts(model, engine.state.data, engine.state.hearings, engine.state.signals)
     t, q, v = [], [], []
     ways: list[Path] = []

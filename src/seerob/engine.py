@@ -14,6 +14,7 @@ gains as applied forces diverge at a floating root. Torque limits clamp the whol
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 
 import mujoco
@@ -55,12 +56,23 @@ POSE_TOLERANCE = 1e-4
 """Largest error of a solved Cartesian target [m or rad] that still counts as reached."""
 
 
+def last_tick(duration: float, period: float) -> int:
+    """Number of the last tick of a motion, which ends with it: from half to one and a half as long as others.
+
+    Args:
+        duration: Of the motion [s].
+        period: Of a tick [s].
+    """
+    return 0 if duration <= kernel.SLACK else max(1, math.floor(duration / period + 0.5))
+
+
 class Engine:
     """The twin in motion.
 
     Attributes:
         state: The twin at the last tick; the same object throughout.
         signals: What machines say, by variable.
+        end: When the motion ends, and the last tick with it [s]; inf while nobody knows.
     """
 
     def __init__(
@@ -153,12 +165,7 @@ class Engine:
         self._feedforward = np.zeros(self._mj.nv)
         self._before = np.zeros(self._mj.nv)
         self._courses: dict[str, tuple[Array, Array, Array]] = {}
-        rows = self._steps + 1
-        self._course = Course(
-            np.tile(self._mj.qpos0, (rows, 1)), np.zeros((rows, self._mj.nv)), np.zeros((rows, self._mj.nv))
-        )
-        self._way = np.empty((rows, self._mj.nq)), np.empty((rows, self._mj.nv))
-        """Positions and velocities at each step of a tick."""
+        self._divide(self._steps)
         self._broken: set[str] = set()
         """Who was put elsewhere during a tick."""
         self._force = np.zeros(self._mj.nv)
@@ -173,7 +180,19 @@ class Engine:
         self.state.foresee = self._foresee
         self._grips = Grips(self.state, self._mj)
         self._tick = 0
+        self._now = 0.0
+        """Instant of the last tick [s]."""
+        self.end = math.inf
         self._place(0.0)
+
+    def _divide(self, steps: int) -> None:
+        """Make room for each step of a tick."""
+        self._steps, rows = steps, steps + 1
+        self._course = Course(
+            np.tile(self._mj.qpos0, (rows, 1)), np.zeros((rows, self._mj.nv)), np.zeros((rows, self._mj.nv))
+        )
+        self._way = np.empty((rows, self._mj.nq)), np.empty((rows, self._mj.nv))
+        """Positions and velocities at each step of a tick."""
 
     # -- what comes in ----------------------------------------------------------------------
 
@@ -215,7 +234,7 @@ class Engine:
         for name, following in self._followings.items():
             hearing = self._hearings[name]
             hearing.driven = self.controllers
-            for found in following.until((self._tick + 1) * self._period):
+            for found in following.until(self._next()):
                 self._references[name].take(found.t, found.q, None, anew=found.anew and self._tick > 0)
                 hearing.follow(found)
                 hearing.leaves_at = self._references[name].leaves_at if name in self._ahead else 0.0
@@ -231,7 +250,7 @@ class Engine:
 
     def _silent(self, name: str) -> bool:
         """Whether what drives it was silent: of a live source only the newest sample is ever this old."""
-        age = self._tick * self._period - self._references[name].until
+        age = self._now - self._references[name].until
         return self._tick > 0 and age > self._hearings[name].timeout
 
     def _take_one(self, name: str, t: float, q: Array, qd: Array | None, *, anew: bool = False) -> bool:
@@ -240,7 +259,7 @@ class Engine:
         What comes late finds the twin where it was taken to be meanwhile. It is put where it is found to be:
         if it were pulled there, it would show a speed that nobody had.
         """
-        reference, now = self._references[name], self._tick * self._period
+        reference, now = self._references[name], self._now
         anew = anew or self._silent(name)
         # A file is heard ahead; only what is heard live can be late.
         late = name in self._live and self._tick > 0 and reference.until < now
@@ -336,6 +355,21 @@ class Engine:
 
     # -- time -------------------------------------------------------------------------------
 
+    def _next(self) -> float:
+        """When the tick that comes next ends [s]."""
+        whole = (self._tick + 1) * self._period
+        ends = self.end < math.inf and self._tick + 1 == last_tick(self.end, self._period)
+        return self.end if ends and abs(self.end - whole) > kernel.SLACK else whole
+
+    def _stretch(self, length: float) -> None:
+        """Cut a tick that is not as long as others [s] into equal steps, no longer than those of others."""
+        steps, before = max(1, math.ceil(length / self._dt - 1e-6)), self._dt
+        self._dt = self._mj.opt.timestep = length / steps
+        if self._centred:
+            # Velocities of mj_step belong half a step earlier than its positions: of another step now.
+            self._data.qvel += 0.5 * (1 - self._dt / before) * (self._data.qvel - self._before)
+        self._divide(steps)
+
     def start(self) -> State:
         """The twin at t = 0, placed on the first samples without being pulled there."""
         self._place(0.0)
@@ -348,13 +382,15 @@ class Engine:
         Raises:
             SimulationDiverged: A position that is not finite.
         """
-        start = self._tick * self._period
+        start, t = self._now, self._next()
+        if abs(t - start - self._period) > kernel.SLACK:
+            self._stretch(t - start)
         for reference in self._references.values():
             reference.forget(start)
         for hearing in self._hearings.values():
             hearing.forget(start)
         self.signals.forget(start)
-        self._aim(start)
+        self._aim(start, t)
         self._broken.clear()
         qpos, qvel = self._data.qpos, self._data.qvel
         q_way, v_way = self._way
@@ -370,7 +406,7 @@ class Engine:
             if self._centred:
                 v_way[step + 1] += 0.5 * (qvel - self._before)
         self._tick += 1
-        t = self._tick * self._period
+        self._now = t
         if self.physics:
             self._land(self._steps, t)
         else:
@@ -418,12 +454,12 @@ class Engine:
                 self._broken.add(mechanism.name)
             self._put(mechanism, *self._references[mechanism.name].at(t))
 
-    def _aim(self, start: float) -> None:
-        """Where every joint is to be at each step of the tick that begins, and at its end."""
+    def _aim(self, start: float, end: float) -> None:
+        """Where every joint is to be at each step of the tick that begins, and at its end [s]."""
         if not (self.controllers and self.physics):
             return
         t = np.array([start + step * self._dt for step in range(self._steps + 1)])
-        t[-1] = (self._tick + 1) * self._period
+        t[-1] = end
         q_all, v_all, a_all = self._course
         for mechanism in self._mechanisms:
             q, v, a = self._courses[mechanism.name] = self._references[mechanism.name].course(t)
@@ -537,7 +573,7 @@ class Engine:
                 names = [j.name for link in mechanism.description.links for j in link.joints]
                 joint = names[int(bad.argmax())]
                 raise SimulationDiverged(
-                    f"{mechanism.name}/{joint} is not finite after {self._tick * self._period:.3f} s; "
+                    f"{mechanism.name}/{joint} is not finite after {self._now:.3f} s; "
                     "lower engine.bandwidth or check masses and samples"
                 )
-        raise SimulationDiverged(f"a velocity is not finite after {self._tick * self._period:.3f} s")
+        raise SimulationDiverged(f"a velocity is not finite after {self._now:.3f} s")

@@ -6,13 +6,14 @@ Live, replayed and as-fast-as-possible runs are this same loop with another cloc
 from __future__ import annotations
 
 import gc
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 
 from seerob.between_ticks import watched
-from seerob.engine import Engine
+from seerob.engine import Engine, last_tick
 from seerob.errors import InputError, Problem, SeerobError
 from seerob.judging import Bound as Bound  # noqa: PLC0414
 from seerob.judging import Judge as Judge  # noqa: PLC0414
@@ -87,6 +88,11 @@ def looks_ahead(model: Model) -> Mapping[str, float]:
     return found
 
 
+def ends_at(opened: Sequence[tuple[Source, Opened]]) -> float:
+    """When the last of some recorded sources ends [s]."""
+    return max((one.duration for _, one in opened), default=0.0)
+
+
 def pump(
     opened: Sequence[tuple[Source, Opened]],
     period: float,
@@ -96,20 +102,22 @@ def pump(
 ) -> Feed:
     """Samples of recorded sources as run time passes; of some targets so much ahead [s].
 
-    Ends with the last sample of the last source; a source that loops does not keep a run going
-    on its own unless ``endless``. Without sources there is one tick.
+    The last tick ends with the last sample of the last source (`last_tick`): who steps the twin has to be
+    told that instant, `ends_at`. A source that loops does not keep a run going on its own unless
+    ``endless``. Without sources there is one tick.
     """
     pumps = [
         (Pump(o, loop=source.loop, pause=source.loop_pause), (ahead or {}).get(source.target(), 0.0))
         for source, o in opened
     ]
-    duration = max((o.duration for _, o in opened), default=0.0)
-    last = round(duration / period - 0.5 + 1e-9)
+    end = ends_at(opened)
+    last = last_tick(end, period)
     k = 0
     while endless or k <= last:
         # Every sample, not only the newest: the run starts on the first one, and a source that is
         # faster than the ticks is followed exactly. One ahead, so that references reach to the tick's end.
-        yield tuple(sample for each, more in pumps for sample in each.until(k * period + more))
+        t = k * period if endless or k < last else max(end, k * period)
+        yield tuple(sample for each, more in pumps for sample in each.until(t + more))
         k += 1
 
 
@@ -199,9 +207,10 @@ def engine_of(model: Model) -> Engine:
 
 
 def ticks(
-    engine: Engine, judge: Callable[[State], tuple[Result, ...]], feed: Feed
+    engine: Engine, judge: Callable[[State], tuple[Result, ...]], feed: Feed, end: float = math.inf
 ) -> Iterator[tuple[Snapshot, tuple[Sample, ...]]]:
-    """The road: for each tick what goes out, and the samples it was made from."""
+    """The road: for each tick what goes out, and the samples it was made from; ``end`` of `Engine` [s]."""
+    engine.end = end
     looks, lateness = Looks(engine.model), Lateness(engine.model)
     for seq, samples in enumerate(feed):
         engine.take(samples)
@@ -249,6 +258,7 @@ def run(
     *,
     bound: Sequence[Bound],
     scene: Scene,
+    end: float = math.inf,
     writers: Sequence[Writer] = (),
     clock: Clock | None = None,
     stop: Callable[[], bool] = lambda: False,
@@ -261,6 +271,7 @@ def run(
         feed: Samples per tick.
         bound: Criteria, from `bind`.
         scene: The same that the writers were opened with.
+        end: When the motion ends, and the last tick with it [s]; inf while nobody knows.
         writers: Open sinks; they are closed at the end, whatever happens.
         clock: Real time; as fast as possible when None.
         stop: Asked once per tick.
@@ -276,7 +287,7 @@ def run(
             if isinstance(writer, KeepsResults):
                 writer.share(log)
         engine = engine_of(model)
-        for out, samples in ticks(engine, Judge(bound, scene.findings), feed):
+        for out, samples in ticks(engine, Judge(bound, scene.findings), feed, end):
             count, t = count + 1, out.t
             for writer in writers:
                 writer.write(out, samples)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -90,7 +91,7 @@ class Station:
     @property
     def duration(self) -> float:
         """Length of its longest source [s]."""
-        return max((opened.duration for _, opened in self.sources), default=0.0)
+        return road.ends_at(self.sources)
 
     def scene(self, *, with_sources: bool = True) -> Scene:
         """What sinks and the page need to know once."""
@@ -163,6 +164,7 @@ class Station:
         writers: Sequence[Writer] = (),
         live: bool = False,
         feed: Feed | None = None,
+        end: float = math.inf,
         scene: Scene | None = None,
         stop: Callable[[], bool] = lambda: False,
         progress: Callable[[float], None] = lambda _: None,
@@ -175,6 +177,8 @@ class Station:
             writers: Sinks that are open already; closed after the run too.
             live: In real time and without end (until ``stop``), instead of as fast as possible.
             feed: What is heard, instead of the workstation's sources.
+            end: When that ends, and the last tick with it [s]; a motion that ends within a tick is
+                undecided there when not given.
             scene: The one that ``writers`` were opened with.
             stop: Asked once per tick.
             progress: Told the run time once per tick [s].
@@ -197,6 +201,7 @@ class Station:
         clock = Clock() if live else None
         scene = scene or self.scene(with_sources=feed is None)
         if feed is None:
+            end = math.inf if live else self.duration
             feed = road.pump(
                 self.sources,
                 self.workstation.engine.tick,
@@ -216,6 +221,7 @@ class Station:
                 feed,
                 bound=bound,
                 scene=scene,
+                end=end,
                 writers=[*opened, *writers],
                 clock=clock,
                 stop=stop,
@@ -254,7 +260,8 @@ class Station:
             if qd is not None or t is not None:
                 raise InputError.at("batch", "q", "missing", "give positions with qd and t, or none of them")
             require_recorded(self.workstation)
-            motion = batch.recorded(self.model, road.pump(self.sources, self.workstation.engine.tick))
+            feed = road.pump(self.sources, self.workstation.engine.tick)
+            motion = batch.recorded(self.model, feed, self.duration)
             findings = [found for _, opened in self.sources for found in opened.findings]
         else:
             motion = motion_of(self.model, q, qd or {}, t)
@@ -344,7 +351,13 @@ class Station:
                 say("the rescaled motion", min(1.0, t / duration))
 
             return self.run(
-                folder=folder, sinks=sinks, writers=writers, feed=feed, scene=scene, progress=told
+                folder=folder,
+                sinks=sinks,
+                writers=writers,
+                feed=feed,
+                end=duration,
+                scene=scene,
+                progress=told,
             )
 
         return evaluation.evaluation(
@@ -395,6 +408,7 @@ class Station:
             sinks=sinks,
             writers=writers,
             feed=feed,
+            end=recording.end,
             scene=scene,
             stop=stop,
             progress=progress,

@@ -143,11 +143,14 @@ def test_samples_of_no_source_of_the_workstation_move_somebody(tmp_path, monkeyp
     assert (again.verdict, again.results["height"].times().open) == (U, 1.0)
 
 
-def test_a_batch_of_one_instant_of_what_moves_is_undecided_as_the_run_is(tmp_path):
-    rows = "t [s],J1 [rad],J2 [rad]\n0,0,0\n0.005,0.001,0\n"
+@pytest.mark.parametrize(("last", "verdict"), [("0.005,0.001", W), ("0.0000000005,0", U)])
+def test_a_batch_of_one_instant_of_what_moves_is_undecided_as_the_run_is(tmp_path, last, verdict):
+    """A motion that is shorter than a tick is judged to its end; one that has no length is an instant."""
+    rows = f"t [s],J1 [rad],J2 [rad]\n0,0,0\n{last},0\n"
     speed = '[[safety]]\nkind = "velocity"\nname = "v"\nat = "arm"\nlimit = 9\n'
     station = made(tmp_path, FLOATING + TWO_R + ARM + speed, {"m.csv": rows, "arm.urdf": two_r()})
-    assert (station.run().verdict, station.batch(threads=1)["v"].verdict) == (U, U)
+    assert (station.run().verdict, station.batch(threads=1)["v"].verdict) == (verdict, verdict)
+    assert station.run(stop=lambda: True).verdict is U
 
 
 def test_what_is_taken_back_while_it_is_shown_again_counts():

@@ -22,7 +22,7 @@ from seerob.permissible.verification import Verified, verify
 from seerob.permissible.witness import Clock, Witness
 from seerob.results.result_log import ResultLog
 from seerob.results.series import worst_verdict
-from seerob.run import Bound, Feed, Judge, Summary, engine_of, looks_ahead, pump, ticks
+from seerob.run import Bound, Feed, Judge, Summary, ends_at, engine_of, looks_ahead, pump, ticks
 from seerob.samples import JointSample, PoseSample, Sample
 from seerob.snapshot import CriterionInfo, Finding, Snapshot, Verdict
 from seerob.source import HOLD, Opened, Source
@@ -134,11 +134,10 @@ def witness(
     """Run the given motion once: where everybody is, what the criteria say of it, and its first tick."""
     findings = [found for _, opened in sources for found in opened.findings]
     seen, log = Witness(Judge(bound, findings)), ResultLog(infos)
-    duration = max((opened.duration for _, opened in sources), default=0.0)
+    duration = ends_at(sources)
     first: Snapshot | None = None
-    for out, _ in ticks(
-        engine_of(model), seen, pump(sources, model.workstation.engine.tick, ahead=looks_ahead(model))
-    ):
+    feed = pump(sources, model.workstation.engine.tick, ahead=looks_ahead(model))
+    for out, _ in ticks(engine_of(model), seen, feed, duration):
         first = first or out
         log.add(out)
         say("the given motion", min(1.0, out.t / duration) if duration else 1.0)
@@ -257,7 +256,7 @@ def evaluation(
     ready(answer)
     if not whole:
         return answer
-    duration = max(opened.duration for _, opened in whole)
+    duration = ends_at(whole)
     return replace(
         answer, after=again(pump(whole, model.workstation.engine.tick, ahead=looks_ahead(model)), duration)
     )

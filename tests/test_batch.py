@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from made_cell import TWO_R, UR10, heard, made, two_r, wave
+from seerob.answers import Answers
+from seerob.criterion import Criterion
 from seerob.engine import Engine
 from seerob.errors import InputError, UnknownName
 from seerob.results.series import CODES
 from seerob.run import Judge
-from seerob.snapshot import Verdict
+from seerob.snapshot import Basis, Result, Verdict
+from seerob.states import States
 
 N = 70
 T = 0.01 * np.arange(N)
@@ -235,6 +242,77 @@ def test_sources_are_followed_tick_by_tick_with_what_is_not_heard(tmp_path):
         np.testing.assert_allclose(column.value, log[name].values, rtol=1e-12)
         assert column.verdict is log[name].verdict
         assert sum("not heard for" in reason for reason in column.reasons) > 50
+
+
+class Own(Criterion, frozen=True, kw_only=True):
+    """Arrays of one's own that forget what they should look at."""
+
+    of: str = "arm"
+    limit: float = 2.0
+    says: Callable[[States], object]
+
+    def subjects(self):
+        return (self.of,)
+
+    def bind(self, model):
+        return lambda state: Result(name=self.name, value=1.0, limit=self.limit, verdict=Verdict.WITHIN)
+
+    def basis(self, model):
+        return Basis(formula="1", source="own")
+
+    def batch(self, model):
+        return self.says
+
+
+def within(value, limit=2.0, interval=None, n=N):
+    rows = (np.broadcast_to(np.asarray(x, float), n).copy() for x in (value, limit))
+    ends = None if interval is None else tuple(np.full(n, float(end)) for end in interval)
+    return Answers(*rows, np.full(n, CODES[Verdict.WITHIN], np.uint8), ends)
+
+
+@pytest.mark.parametrize(
+    ("says", "told"),
+    [
+        (lambda states: within(np.nan), "own contradicts itself: it is within, and has no value"),
+        (lambda states: within(-np.inf), "it is within, and has no value"),
+        (lambda states: within(1, np.nan), "it is within, and has no limit"),
+        (lambda states: within(3), "it is within, beyond its limit"),
+        (lambda states: within(1, 2, (0.5, 2.5)), "it is within, beyond its limit"),
+        (lambda states: within(1, 2, (np.nan, np.nan)), "it is within, beyond its limit"),
+        (lambda states: within(1, n=N - 1), f"of {N} instants, not"),
+        (lambda states: replace(within(1), verdict=np.full(N, 7, np.uint8)), "its verdicts \\[7\\] are none"),
+        (lambda states: np.ones(N), "returns ndarray, not seerob.answers.Answers"),
+        (lambda states: 1 / 0, "own failed: ZeroDivisionError: division by zero"),
+    ],
+)
+def test_arrays_of_ones_own_that_contradict_themselves_are_undecided(cell, motion, says, told):
+    found = cell.with_criteria(Own(name="own", says=says)).batch(*motion, t=T, threads=1)
+    assert found["own"].verdict is Verdict.UNDECIDED
+    assert set(found["own"].answers.verdict.tolist()) == {CODES[Verdict.UNDECIDED]}
+    assert all(re.search(told, reason) for reason in found["own"].reasons)
+
+
+@pytest.mark.parametrize("of", ["arm", "load", "arm/forearm_link"])
+def test_arrays_of_ones_own_that_ask_nobody_are_undecided_where_what_they_name_is_not_known(cell, motion, of):
+    q, qd = motion[0]["arm"].copy(), motion[1]["arm"]
+    q[5, 2] = np.nan
+    own = Own(name="own", of=of, says=lambda states: within(1))
+    found = cell.with_criteria(own).batch({"arm": q}, {"arm": qd})["own"]
+    assert np.flatnonzero(found.answers.verdict != CODES[Verdict.WITHIN]).tolist() == [5]
+    assert "not finite" in found.reasons[5]
+
+
+def test_where_bodies_are_is_said_of_those_that_are_asked_for(cell, motion):
+    def says(states):
+        _, positions = states.placed(arm)
+        assert np.isfinite(positions[:, list(arm)]).all()
+        assert np.isnan(positions).any()
+        assert states.asked == {"arm"}
+        return within(1)
+
+    arm = cell.model.select("arm")
+    own = Own(name="own", of="wall", says=says)
+    assert cell.with_criteria(own).batch(*motion)["own"].verdict is Verdict.WITHIN
 
 
 def test_names_that_do_not_exist_are_told(cell, batch):

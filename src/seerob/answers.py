@@ -61,6 +61,18 @@ class Answers:
         verdict = np.where(self.verdict == WITHIN, UNDECIDED, self.verdict)
         return replace(self, verdict=verdict.astype(np.uint8))
 
+    def contradictions(self, *, at_most: bool) -> NDArray[np.object_]:
+        """Why each instant cannot be what it says, shape (N,); empty where it can."""
+        low, high = (self.value, self.value) if self.interval is None else self.interval
+        ends = np.array([self.value, low, high], float)
+        kept = (ends <= self.limit if at_most else ends >= self.limit).all(axis=0)
+        words = np.where(
+            np.isnan(self.limit), "it is within, and has no limit", "it is within, beyond its limit"
+        )
+        words = np.where(np.isfinite(self.value), words, "it is within, and has no value")
+        wrong = (self.verdict == WITHIN) & ~(kept & np.isfinite(self.value))
+        return np.where(wrong, words, "").astype(object)
+
 
 def judge_many(value: Array, limit: Array | float | None, *, at_most: bool) -> Codes:
     """Verdicts of values against a limit or limits; the rule is `seerob.criterion.judge`."""

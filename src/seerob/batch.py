@@ -21,14 +21,14 @@ from msgspec.structs import replace as changed
 from seerob.answers import UNDECIDED, WITHIN, Answers, Flags
 from seerob.criterion import Criterion, EvaluateMany
 from seerob.errors import Undecided, UnknownName
-from seerob.judging import Judge, held, held_names, unmentioned
+from seerob.judging import Judge, held, held_names, needed, told, unmentioned
 from seerob.model import Model
 from seerob.results.series import CODES, ONE_INSTANT
 from seerob.run import Bound, Feed, engine_of, settled
 from seerob.snapshot import Finding, Result, Verdict
 from seerob.spans import Path
 from seerob.state import Hearing, State
-from seerob.states import Bench, Motion, Questions, Reasons
+from seerob.states import Bench, Motion, Questions, Reasons, States
 from seerob.transforms import Array
 from seerob.whereabouts.hearing import SLACK, STANDS
 
@@ -259,7 +259,7 @@ def _able(
         elif criterion.variables():
             notes[criterion.name] = "asked instant by instant: it follows variables"
         else:
-            able[criterion.name] = _Able(criterion, many, names)
+            able[criterion.name] = _Able(criterion, many, names, _movers(criterion, model))
     return able, notes
 
 
@@ -271,6 +271,15 @@ class _Able:
     many: EvaluateMany
     held: Mapping[str, str]
     """By name that findings hold, why nothing that depends on it is within."""
+    needs: tuple[str, ...]
+    """Who must be where the motion says, whatever it asks (`seerob.judging.needed`)."""
+
+
+def _movers(criterion: Criterion, model: Model) -> tuple[str, ...]:
+    """Robots, people and machines that a criterion needs, and whoever moves the bodies that it needs."""
+    names, bodies = needed(criterion, model)
+    movers = (model.bodies[i].mover for i in bodies if model.bodies[i].mover)
+    return tuple(dict.fromkeys((*names, *movers)))
 
 
 Stretch = dict[str, tuple[Answers, Reasons]]
@@ -292,11 +301,7 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Str
     found: Stretch = {}
     for name, one in asked.items():
         states.asked.clear()
-        reasons = np.full(len(states), "", object)
-        try:
-            answers = one.many(states)
-        except Undecided as reason:
-            answers, reasons[:] = _nothing(one.criterion, len(states)), str(reason)
+        answers, reasons = _said(one, states)
         for who in sorted(states.asked):
             reasons = np.where(motion.doubts[who] != "", motion.doubts[who], reasons)
         answers = _doubted(answers, one.criterion, reasons)
@@ -305,6 +310,41 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Str
             answers = answers.open()
         found[name] = answers, reasons
     return found, states.largest_speeds() if motion.ways is not None else np.zeros((len(states), 0))
+
+
+def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:
+    """What a criterion says, as far as it may be green, and why it is not: by the rules of `Judge`."""
+    criterion, n = one.criterion, len(states)
+    states.require(*one.needs)
+    reasons = np.full(n, "", object)
+    try:
+        answers = one.many(states)
+        why = _misshapen(answers, n)
+    except Undecided as reason:
+        why = str(reason)
+    except Exception as error:
+        # One's own criterion that fails must not end a batch that others are judged in.
+        why = f"{criterion.name} failed: {told(error)}"
+    if why:
+        reasons[:] = why
+        return _nothing(criterion, n), reasons
+    found = answers.contradictions(at_most=criterion.at_most)
+    reasons = np.where(found == "", reasons, criterion.name + " contradicts itself: " + found)
+    verdict = np.where(found == "", answers.verdict, UNDECIDED).astype(np.uint8)
+    return replace(answers, verdict=verdict), reasons
+
+
+def _misshapen(answers: Answers, n: int) -> str:
+    """Why what a criterion returned cannot be read; empty where it can."""
+    if type(answers) is not Answers:
+        return f"it returns {type(answers).__name__}, not seerob.answers.Answers"
+    ends = () if answers.interval is None else answers.interval
+    shapes = {np.shape(column) for column in (answers.value, answers.limit, answers.verdict, *ends)}
+    if shapes != {(n,)}:
+        return f"it returns shapes {sorted(shapes)} of {n} instants, not ({n},) each"
+    if unknown := set(np.unique(answers.verdict).tolist()) - set(CODES.values()):
+        return f"its verdicts {sorted(unknown)} are none of seerob.results.series.CODES"
+    return ""
 
 
 def _doubted(answers: Answers, criterion: Criterion, reasons: Reasons) -> Answers:

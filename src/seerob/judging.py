@@ -69,7 +69,7 @@ def bound_to(model: Model, criterion: Criterion, group: str) -> Bound:
     except SeerobError:
         raise
     except Exception as error:
-        raise PluginError(f"{method} of {kind.__module__} fails: {_told(error)}") from error
+        raise PluginError(f"{method} of {kind.__module__} fails: {told(error)}") from error
     for what, returned, right in (
         ("bind", evaluate, callable(evaluate)),
         ("basis", basis, isinstance(basis, Basis)),
@@ -147,7 +147,7 @@ def _where(bound: Bound) -> str:
     return kind_of(bound.group, bound.criterion)
 
 
-def _told(error: Exception) -> str:
+def told(error: Exception) -> str:
     """An error in a sentence, with the place in the code where it came from."""
     last = traceback.extract_tb(error.__traceback__)[-1:]
     place = "".join(f" ({Path(frame.filename).name}, line {frame.lineno})" for frame in last)
@@ -375,7 +375,7 @@ class Judge:
         return undecided(result, reason) if reason else result
 
     def _failed(self, bound: Bound, error: Exception) -> str:
-        what = f"{_where(bound)} failed: {_told(error)}"
+        what = f"{_where(bound)} failed: {told(error)}"
         self._warn(bound, what)
         return what
 

@@ -128,29 +128,42 @@ class States:
     def __init__(
         self, bench: Bench, motion: Motion, moved: dict[str, Array], masses: dict[str, Array]
     ) -> None:
-        self.model, self.motion, self.doubts = bench.model, motion, motion.doubts
+        self.model, self._motion, self.doubts = bench.model, motion, motion.doubts
         self.asked: set[str] = set()
         """Robots and humans that answers have depended on since the set was last cleared."""
         self._bench, self._moved, self._masses = bench, moved, masses
         n = len(motion.t)
-        self.rotations = np.ascontiguousarray(moved["xmat"][:, bench.ids]).reshape(n, -1, 3, 3)
+        self._rotations = np.ascontiguousarray(moved["xmat"][:, bench.ids]).reshape(n, -1, 3, 3)
         """World from body, in the order of `Model.bodies`, shape (N, n, 3, 3)."""
-        self.positions = np.ascontiguousarray(moved["xpos"][:, bench.ids])
+        self._positions = np.ascontiguousarray(moved["xpos"][:, bench.ids])
         """World position of the bodies' origins [m], shape (N, n, 3)."""
         self._cache: dict[Any, Any] = {}
         self._answers: dict[tuple[Query, Per], Closests] = {}
 
     def __len__(self) -> int:
-        return len(self.motion.t)
+        return len(self._motion.t)
 
     def require(self, *names: str) -> None:
         """Say that what follows depends on robots or humans."""
         self.asked.update(names)
 
+    def placed(self, bodies: Sequence[int]) -> tuple[Array, Array]:
+        """World from body, and the origins in the world [m], of these bodies; of others NaN.
+
+        Returns:
+            Shapes (N, n, 3, 3) and (N, n, 3), in the order of `Model.bodies`.
+        """
+        self.require(*filter(None, (self.model.bodies[i].carrier for i in bodies)))
+        self._settled(bodies)
+        rotations, positions = np.full_like(self._rotations, np.nan), np.full_like(self._positions, np.nan)
+        rows = list(bodies)
+        rotations[:, rows], positions[:, rows] = self._rotations[:, rows], self._positions[:, rows]
+        return rotations, positions
+
     def qd(self, mechanism: Mechanism) -> Array:
         """Joint velocities [rad/s or m/s], shape (N, n)."""
         self.require(mechanism.name)
-        return self.motion.v[:, self._bench.columns[mechanism.name].own_v]
+        return self._motion.v[:, self._bench.columns[mechanism.name].own_v]
 
     def mass_matrix(self, mechanism: Mechanism) -> Array:
         """Joint-space mass matrices [kg·m², kg·m or kg], shape (N, n, n).
@@ -218,14 +231,14 @@ class States:
 
     def _fastest(self) -> tuple[Array, Array, Array]:
         if "fastest" not in self._cache:
-            bench, moved, shape = self._bench, self._moved, self.positions.shape
+            bench, moved, shape = self._bench, self._moved, self._positions.shape
             twists = np.empty((2, *shape))
             velocities_many(
-                moved["cvel"], moved["subtree_com"], self.positions, bench.ids, bench.roots, twists
+                moved["cvel"], moved["subtree_com"], self._positions, bench.ids, bench.roots, twists
             )
             speed, point, velocity = np.zeros(shape[:2]), np.zeros(shape), np.zeros(shape)
             fastest_many(
-                self.rotations, self.positions, twists[0], twists[1], *bench.corners, bench.reach,
+                self._rotations, self._positions, twists[0], twists[1], *bench.corners, bench.reach,
                 speed, point, velocity,
             )  # fmt: skip
             self._cache["fastest"] = speed, point, velocity
@@ -251,5 +264,5 @@ class States:
         self._settled((*gap.a, *gap.b))
         question = gap.query, per
         if question not in self._answers:
-            self._answers |= self._bench.questions.ask(question, self.rotations, self.positions)
+            self._answers |= self._bench.questions.ask(question, self._rotations, self._positions)
         return self._answers[question]

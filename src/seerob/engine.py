@@ -170,8 +170,8 @@ class Engine:
         """Who was put elsewhere during a tick."""
         self._force = np.zeros(self._mj.nv)
         self._almost = 0.999 * self._limits
-        self._said: dict[str, own_words.SaidTool | None] = {}
-        """By robot, where its own tool centre point may be."""
+        self._said: dict[str, own_words.LiveWords] = {}
+        """By robot, what its live source says of itself."""
         self._followings: dict[str, Following] = {}
         """By person that devices see."""
         self.signals = Signals(model.dictionary, signals or {}, untimed)
@@ -241,12 +241,14 @@ class Engine:
 
     def _contradicted(self, sample: JointSample) -> str:
         """Why what a source says of itself is not the twin; empty when it may be."""
-        if sample.tcp is None:
+        if sample.tcp is None and sample.tcp_speed is None and sample.tau is None:
             return ""
         if sample.target not in self._said:
-            self._said[sample.target] = own_words.bound(self.model, sample.target)
+            self._said[sample.target] = own_words.LiveWords(self.model, sample.target)
         said = self._said[sample.target]
-        return "" if said is None else said.doubt(sample)
+        found = said.doubt(sample)
+        self._hearings[sample.target].torque_doubt = said.torque_doubt
+        return found
 
     def _silent(self, name: str) -> bool:
         """Whether what drives it was silent: of a live source only the newest sample is ever this old."""

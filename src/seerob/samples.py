@@ -79,6 +79,8 @@ class JointSample(SampleBase, frozen=True, kw_only=True, tag="joint"):
     """Measured joint torques [N·m or N]."""
     tcp: Vec3 | None = None
     """Where the source itself has the tool's working point, in the base frame of its controller [m]."""
+    tcp_speed: float | None = None
+    """How fast the source itself has that point [m/s]."""
     placed: bool = True
     """Whether it says where a person stands; if not, it is of the posture alone."""
 

@@ -563,7 +563,7 @@ class State:
         """Joint torques that its source measured, between samples as positions are [N·m or N], shape (n,).
 
         Raises:
-            Undecided: Not heard, or heard without torques.
+            Undecided: Not heard, heard without torques, or with torques of another sign or unit.
         """
         self.require(mechanism.name)
         hearing = self._hearings[mechanism.name]
@@ -574,6 +574,8 @@ class State:
         around = [torques for torques in hearing.torques[max(k - 1, 0) : k + 1] if torques is not None]
         if not around or len(around) < len(times):
             raise Undecided(f"{mechanism.name}: its source measures no joint torques")
+        if hearing.torque_doubt:
+            raise Undecided(f"{mechanism.name}: {hearing.torque_doubt}")
         # Outside its range np.interp holds the last value, as the reference does.
         return np.array([np.interp(self.t, times, joint) for joint in np.transpose(around)])
 

@@ -52,7 +52,13 @@ MOVING = np.array([0.3, -1.2, 1.1, -1.4, -1.5, 0.2]) + 0.4 * np.sin(np.outer(T, 
 STANDING = np.tile(MOVING[0], (len(T), 1))
 
 
-def log_of(folder: Path, q: np.ndarray, tcp: np.ndarray | None, tau: np.ndarray | None = None) -> None:
+def log_of(
+    folder: Path,
+    q: np.ndarray,
+    tcp: np.ndarray | None,
+    tau: np.ndarray | None = None,
+    speed: np.ndarray | None = None,
+) -> None:
     """As ``record.py`` of Universal Robots writes it."""
     names = ["timestamp", *(f"actual_q_{i}" for i in range(6))]
     table = [T[:, None], q]
@@ -62,6 +68,9 @@ def log_of(folder: Path, q: np.ndarray, tcp: np.ndarray | None, tau: np.ndarray 
     if tau is not None:
         names += [f"actual_current_as_torque_{i}" for i in range(6)]
         table.append(tau)
+    if speed is not None:
+        names += [f"actual_TCP_speed_{i}" for i in range(6)]
+        table.append(np.hstack([speed, np.zeros((len(T), 3))]))
     np.savetxt(folder / "log.csv", np.hstack(table), header=" ".join(names), comments="")
 
 
@@ -165,6 +174,80 @@ def test_calibration_of_an_arm_has_a_tolerance_that_the_file_can_give(
 ) -> None:
     log_of(tmp_path, MOVING, dh_tcp("ur5e", MOVING) + np.array([0, 0, off]))
     assert about_tool(station(tmp_path, robot=robot)).holds == holds
+
+
+TOOL_VELOCITY = np.gradient(dh_tcp("ur5e", MOVING, (0, 0, 0.15)), T, axis=0, edge_order=2)
+"""Of the tool [m/s]: differences of places that the maker's parameters say."""
+
+
+@pytest.mark.parametrize(
+    ("factor", "holds"), [(1.0, ()), (0.85, ()), (0.5, ("arm",)), (2.0, ("arm",)), (0, ("arm",))]
+)
+def test_the_speed_that_a_log_says_of_its_tool_must_be_that_of_its_joints(
+    tmp_path: Path, factor: float, holds: tuple[str, ...]
+) -> None:
+    """As when the file's times are in another unit than they seem, or its joints stand still in it."""
+    log_of(tmp_path, MOVING, None, speed=factor * TOOL_VELOCITY)
+    found = [
+        f
+        for _, o in station(tmp_path, tools=TOOL).sources
+        for f in o.findings
+        if "centre point moves" in f.text
+    ]
+    assert [f.holds for f in found] == [holds] * bool(holds)
+
+
+def live(made: Station, samples: list[JointSample]) -> list[str]:
+    """What is said of each when it is heard live."""
+    engine, found = Engine(made.model, driven={"arm": 0.2}, live={"arm"}), []
+    for sample in samples:
+        engine.take([sample])
+        found.append(engine.state.hearings["arm"].heard[-1][1])
+    return found
+
+
+@pytest.mark.parametrize(("factor", "doubt"), [(1.0, False), (0.85, False), (0.5, True), (0.0, True)])
+def test_the_speed_of_the_tool_that_a_live_source_says_is_compared(
+    tmp_path: Path, factor: float, doubt: bool
+) -> None:
+    log_of(tmp_path, MOVING, None)
+    made = station(tmp_path, tools=TOOL)
+    qd = np.gradient(MOVING, T, axis=0, edge_order=2)
+    said = factor * np.linalg.norm(TOOL_VELOCITY, axis=1)
+    found = live(made, [
+        JointSample(source="s", seq=i, t=t, target="arm", q=tuple(MOVING[i]), qd=tuple(qd[i]),
+                    tcp_speed=said[i])
+        for i, t in enumerate(T.tolist())
+    ])  # fmt: skip
+    assert ["of no one motion" in text for text in found[6:]] == [doubt] * (len(T) - 6)
+    assert not any(found[:1])
+
+
+def test_a_live_source_with_another_tool_says_which_would_fit(tmp_path: Path) -> None:
+    log_of(tmp_path, MOVING, None)
+    said = dh_tcp("ur5e", MOVING, (0, 0, 0.15))
+    found = live(station(tmp_path), [
+        JointSample(source="s", seq=i, t=0.2 * i, target="arm", q=tuple(MOVING[i]), tcp=tuple(said[i]))
+        for i in range(len(T))
+    ])  # fmt: skip
+    assert found[0].endswith("another robot, tool or calibration")
+    assert "a tool centre point at [0, 0, 150] mm of the flange would fit to 0.0 mm" in found[-1]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_live_torques_of_the_opposite_sign_are_not_relied_on(tmp_path: Path, sign: int) -> None:
+    log_of(tmp_path, STANDING, None)
+    oracle = pinocchio_model(library.load("ur5e"))
+    tau = sign * pin.computeGeneralizedGravity(oracle, oracle.createData(), STANDING[0])
+    made = station(tmp_path)
+    engine, judge = Engine(made.model, driven={"arm": 0.2}, live={"arm"}), Judge(bind(made.model))
+    for i in range(60):
+        engine.take([JointSample(source="s", seq=i, t=0.01 * i, target="arm", q=tuple(STANDING[0]),
+                                 qd=(0.0,) * 6, tau=tuple(tau))])  # fmt: skip
+        state = engine.tick() if i else engine.start()
+    reasons = {r.name: r.reason for r in judge(state)}
+    assert ("opposite sign" in reasons["force"]) == (sign < 0)
+    assert "opposite" not in reasons["distance"]
 
 
 def csv_of(folder: Path, tcp: np.ndarray) -> None:

@@ -8,6 +8,7 @@ Nothing is written to the robot: no inputs are registered.
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import AsyncGenerator, Mapping
 from contextlib import aclosing
 from pathlib import Path
@@ -80,6 +81,7 @@ def joint_sample(values: Mapping[str, Value], *, target: str, arrived: float) ->
         qd=_vector(values["actual_qd"]) if "actual_qd" in values else None,
         tau=_vector(values["actual_current_as_torque"]) if "actual_current_as_torque" in values else None,
         tcp=_place(values["actual_TCP_pose"]) if "actual_TCP_pose" in values else None,
+        tcp_speed=math.hypot(*_place(values["actual_TCP_speed"])) if "actual_TCP_speed" in values else None,
         quality=quality(_whole(values.get("robot_mode")), _safety(values)),
     )
 

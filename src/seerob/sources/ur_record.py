@@ -52,9 +52,9 @@ class UrRecord(TrajectoryFile, frozen=True, kw_only=True):
         # actual_current is in ampere, and its factor to a torque is not published.
         tau = _vector(log, "actual_current_as_torque")
         # The rotation vector behind it tells nothing that the joints do not.
-        tcp = _vector(log, f"{prefix}_TCP_pose")[:3]
+        tcp, speed = (_vector(log, f"{prefix}_TCP_{what}")[:3] for what in ("pose", "speed"))
         status: list[str] = [c for c in ("robot_mode", "safety_status", "safety_mode") if c in log.names]
-        values = log.read(["timestamp", *q, *qd, *tau, *tcp, *status])
+        values = log.read(["timestamp", *q, *qd, *tau, *tcp, *speed, *status])
         invalid, warnings = _status(values, status)
         trajectory = Trajectory(
             file=self.file,
@@ -63,6 +63,7 @@ class UrRecord(TrajectoryFile, frozen=True, kw_only=True):
             qd=values.table(qd) if len(qd) == len(q) else None,
             tau=values.table(tau) if len(tau) == len(q) else None,
             tcp_position=values.table(tcp) if tcp else None,
+            tcp_speed=np.linalg.norm(values.table(speed), axis=1) if speed else None,
             tcp_in_base=True,
             invalid=invalid,
             rows=values.rows,

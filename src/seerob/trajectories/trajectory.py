@@ -169,6 +169,8 @@ class Trajectory(Timed):
     """Tool centre point in whatever frame the file uses [m], shape (n, 3)."""
     tcp_wxyz: Array | None = None
     """Orientation of the tool in whatever frame the file uses, unit quaternions, shape (n, 4)."""
+    tcp_speed: Array | None = None
+    """Speed of that point as the file gives it [m/s], shape (n,)."""
     tcp_in_base: bool = False
     """Whether that frame is the base of the robot's controller."""
     degrees: bool = False
@@ -277,4 +279,5 @@ class TrajectorySamples:
                 qd=None if self.qd is None else tuple(self.qd[i].tolist()),
                 tau=None if motion.tau is None else tuple(motion.tau[i].tolist()),
                 tcp=None if tcp is None else tuple(tcp[i].tolist()),
+                tcp_speed=None if motion.tcp_speed is None else float(motion.tcp_speed[i]),
             )

@@ -51,6 +51,8 @@ class Hearing:
     some may lie ahead of the tick."""
     torques: list[Array | None] = field(default_factory=list)
     """Measured joint torques of the same samples [N·m or N], each (n,); None where there were none."""
+    torque_doubt: str = ""
+    """Why those torques may not be relied on; empty when they may."""
     error: float = 0.0
     """Largest joint error between twin and reference [rad or m]."""
     bones: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)

@@ -9,6 +9,7 @@ from made_cell import state_at, two_r
 from made_separation import ROTOR, SIMULATED, K, V, part, separation, station, terms
 from seerob.stopping import models as stop_models
 from seerob.stopping.simulated import StopSimulation
+from seerob.verdict import Verdict
 
 
 def test_simulated_stop_of_one_joint_is_the_constant_deceleration(tmp_path):
@@ -148,3 +149,38 @@ def test_permissible_speed_by_simulation_is_one_that_holds(tmp_path):
     then = separation(tmp_path / "then", SIMULATED, x=3.1, qd=(factor, 0.0))
     beyond = separation(tmp_path / "beyond", SIMULATED, x=3.1, qd=(factor + 1 / 64, 0.0))
     assert (then.verdict, beyond.verdict) == ("within", "exceeded")
+
+
+MASSES_OFF = ROTOR + "mass_tolerance = 0.25\n"
+
+
+def test_the_simulated_stop_is_that_of_masses_at_the_ends_of_their_tolerance(tmp_path):
+    """The way while braking goes with the masses: T_s = I/B, and S_p is only known between the two."""
+    heavy, light, plain = (
+        separation(tmp_path / name, SIMULATED, urdf=two_r(masses=(m, m)))
+        for name, m in (("heavy", 1.25), ("light", 0.75), ("plain", 1.0))
+    )
+    S = separation(tmp_path / "off", SIMULATED, arm=MASSES_OFF)
+    assert S.limit == pytest.approx(light.limit, abs=1e-6)
+    assert part(S, "S_p may be larger by").value == pytest.approx(heavy.limit - light.limit, abs=1e-6)
+    assert light.limit < plain.limit < heavy.limit
+    # Far enough for the masses as given, and not for those that may be.
+    x = 6.0 - S.value + (plain.limit + heavy.limit) / 2
+    assert separation(tmp_path / "at", SIMULATED, x=x).verdict is Verdict.WITHIN
+    near = separation(tmp_path / "near", SIMULATED, arm=MASSES_OFF, x=x)
+    assert near.verdict is Verdict.UNDECIDED
+    assert "mass_tolerance of arm ± 25 %" in near.reason
+    moved = separation(tmp_path / "com", SIMULATED, arm=ROTOR + "com_tolerance = 0.01\n")
+    assert moved.verdict is Verdict.UNDECIDED
+    assert "com_tolerance of arm ± 10 mm not followed" in moved.reason
+
+
+def test_what_torques_allow_a_lighter_arm_is_not_taken_for_known(tmp_path):
+    by_torque = SIMULATED.replace("acceleration = 0, ", "").replace("simulated", "bound").replace(
+        "brakes = [40.0, 20.0]", "stopping = 0.2"
+    )  # fmt: skip
+    plain = separation(tmp_path / "plain", by_torque, x=9.0, urdf=two_r(effort=5.0))
+    assert plain.verdict is Verdict.WITHIN
+    S = separation(tmp_path / "off", by_torque, arm=MASSES_OFF, x=9.0, urdf=two_r(effort=5.0))
+    assert S.verdict is Verdict.UNDECIDED
+    assert "mass_tolerance of arm" in S.reason

@@ -27,7 +27,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -97,6 +97,28 @@ class MassTolerances:
             shifts: Of each tolerance.
         """
         return nominal + float(self._simplified @ np.array(shifts, float)) if shifts else nominal
+
+    def weighed(self, mj: Any, shifts: Shifts) -> Any:
+        """A `mujoco.MjModel` with shifted masses, and moments of inertia with them.
+
+        Centres of mass stay where they are: `moved` names those that may be off.
+
+        Args:
+            mj: With masses as given.
+            shifts: Of each tolerance.
+        """
+        found, factors = mj.__copy__(), np.ones(mj.nbody)
+        for off, shift in zip(self._offs, shifts, strict=True):
+            factors[list(off.bodies)] += shift * off.share
+        found.body_mass *= factors
+        found.body_inertia *= factors[:, None]
+        mujoco.mj_setConst(found, mujoco.MjData(found))
+        return found
+
+    @property
+    def moved(self) -> tuple[str, ...]:
+        """Tolerances of centres of mass, in words."""
+        return tuple(str(off.tolerance) for off in self._offs if off.way)
 
     def matrices(self, state: State) -> Matrices:
         """Mass matrices of a state, to be asked at shifted masses.

@@ -301,10 +301,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 wide = float(far[k] - near[k])
                 open_ = deciding((*ends.tolerances, tracking(wide / 2)), np.append(widths, wide))
                 if most[k] > S_p[k] and bool((most - S_p)[k] >= max(wide, *widths.tolist(), 0.0)):
-                    open_ = (
-                        f"S_p is up to {most[k]:.3f} m if the robot gets faster during the reaction time as "
-                        "its torques allow: give stop.acceleration"
-                    )
+                    faster = "if the robot gets faster during the reaction time as its torques allow: give "
+                    open_ = f"S_p is up to {most[k]:.3f} m {stop.more or faster + 'stop.acceleration'}"
             nearest = places.named(state, int(found.body_a[k]), found.point_a[k])
             where = f"{parts[k].name} ↔ {nearest}"
             if seen > (self.human_speed or WALKING):

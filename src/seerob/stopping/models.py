@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from itertools import product
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -34,8 +35,11 @@ from seerob.stopping.terms import (
     largest_speed_decelerating,
     largest_speed_in_time,
 )
+from seerob.tolerances import Shifts
 from seerob.transforms import Array
 
+MOST_OFF = 3
+"""So many masses may be off in a simulated stop: every corner of their tolerances is one more."""
 SHARE = 0.8
 """Of the torque limits, unless the file says otherwise."""
 SHARES = {"bound": BOUND, "constant_deceleration": CONSTANT}
@@ -159,6 +163,8 @@ class StopModel:
     """Whether what is known ahead is in a course: then it is that of the whole tick that begins with it."""
     costly: bool = False
     """Takes milliseconds: searches ask it seldom."""
+    more: str = ""
+    """When ways are up to those of `Course.most`, in words; empty for the reaction time's."""
 
 
 @dataclass(frozen=True)
@@ -174,6 +180,7 @@ class _Brakes:
     """The same, where nothing but that counts."""
     timed: bool = False
     costly: bool = False
+    more: str = ""
 
 
 def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel:
@@ -245,6 +252,7 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         None if by_onset is None else lambda v: by_onset(accelerated(v, T_r, a, np.zeros(0))),
         stop.acceleration is None,
         found.costly,
+        found.more,
     )
 
 
@@ -367,13 +375,16 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
     brakes, origin, source = _brakes(stop, robot)
     unknown = [joint.name for joint, torque in zip(robot.joints, brakes, strict=True) if np.isnan(torque)]
     simulation = StopSimulation(model, robot, brakes, gap.b)
+    masses = simulation.masses
+    followed = not masses.moved and len(masses) <= MOST_OFF
+    corners = [*product((-1, 1), repeat=len(masses))] if followed and len(masses) else []
 
     def bound(state: State) -> Callable[[Onset, float], Course]:
         if unknown:
             raise Undecided(f"{robot.name}: nobody gave the torque limit of {', '.join(unknown)}")
 
-        def once(onset: Onset, scale: float, known: tuple[Array, Array] | None) -> Course:
-            stopped = simulation.stop(state, stop.reaction, scale, known)
+        def once(onset: Onset, scale: float, known: tuple[Array, Array] | None, shifts: Shifts) -> Course:
+            stopped = simulation.stop(state, stop.reaction, scale, known, shifts)
             found = stopped.course()
             S_r = np.maximum(found.S_r, onset.S_r)
             if stop.direction == "path":
@@ -383,12 +394,12 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
             S_r = np.minimum(S_r, nearer)
             return Course(found.v_r, S_r, nearer - S_r, found.T_s, onset.doubt)
 
-        def at(onset: Onset, scale: float) -> Course:
-            held = once(onset, scale, None)
+        def weighing(onset: Onset, scale: float, shifts: Shifts) -> Course:
+            held = once(onset, scale, None, shifts)
             if onset.q is None or onset.qd is None or not np.abs(onset.qd - state.qd(robot)).max() > STEADY:
                 return held
             # A stop that begins sooner begins at the present speeds.
-            later = once(onset, scale, (onset.q, onset.qd))
+            later = once(onset, scale, (onset.q, onset.qd), shifts)
             return Course(
                 held.v_r,
                 np.maximum(held.S_r, later.S_r),
@@ -396,6 +407,13 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
                 max(held.T_s, later.T_s),
                 onset.doubt,
             )
+
+        def at(onset: Onset, scale: float) -> Course:
+            every = [weighing(onset, scale, shifts) for shifts in ((), *corners)]
+            if not corners:
+                return every[0]
+            least, most = (_each(ends, every) for ends in (np.min, np.max))
+            return replace(least, most=most)
 
         return at
 
@@ -406,15 +424,32 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
         bound,
         f"S_r + S_s: {way} from M q̈ + c + g = τ, |τ_j| ≤ B_j against q̇_j, until standstill",
         inputs,
-        doubts=()
-        if robot.rotor_inertia_known
-        else (f"{robot.name}: rotor inertia is not given, so the simulated stop may be too short",),
+        doubts=(
+            *(
+                ()
+                if robot.rotor_inertia_known
+                else (f"{robot.name}: rotor inertia is not given, so the simulated stop may be too short",)
+            ),
+            *(
+                (f"{', '.join(map(str, masses.tolerances))} not followed in a simulated stop",)
+                * (not followed)
+            ),
+        ),
         not_modelled=(
+            *(("masses between the ends of their tolerances: only the ends are asked",) * bool(corners)),
             "joint friction, damping and mechanical stops, which would shorten the stop",
             "brakes that act late or one after the other: their delay belongs into the reaction time",
         ),
         costly=True,
+        more=f"if masses are off: {', '.join(map(str, masses.tolerances))}" if corners else "",
     )
+
+
+def _each(ends: Callable[..., Any], courses: Sequence[Course]) -> Course:
+    """The least or the largest of every term of courses that begin alike, each by itself."""
+    terms = ([getattr(course, name) for course in courses] for name in ("S_r", "S_s"))
+    S_r, S_s = (np.asarray(ends(term, axis=0)) for term in terms)
+    return Course(courses[0].v_r, S_r, S_s, float(ends([c.T_s for c in courses])), courses[0].doubt)
 
 
 def _brakes(stop: Stop, robot: Mechanism) -> tuple[Array, Origin, str]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from seerob.errors import Undecided
 from seerob.model import Gap, Mechanism, Model
+from seerob.mounting.mass_tolerances import MassTolerances
 from seerob.snapshot import Input, Origin
 from seerob.state import State
 from seerob.stopping.onset import (
@@ -60,6 +61,7 @@ def bind_reaction(
     levers = Levers(model, robot, gap)
     largest = np.array([np.inf if limit is None else limit.value for limit in robot.velocity_limits])
     carriers, now = model.carriers_of(robot.name), np.zeros(0)
+    off = ", ".join(map(str, MassTolerances(model, robot).tolerances))
     bias, lead = _Bias(model, robot), model.workstation.engine.tick
 
     def reactions(state: State) -> tuple[At, At | None]:
@@ -73,6 +75,8 @@ def bind_reaction(
             why = f"{robot.name} is carried by {robot.on}, and nobody says how fast both get faster: {GIVE}"
         elif not points:
             why = f"what {robot.name} does during the reaction time is not known: {GIVE} = 0 where it may not"
+        elif limits is None and off:
+            why = f"what torques allow where {off} is not known: {GIVE}, or acceleration_limits"
         elif limits is None and np.isnan(torques).any():
             names = ", ".join(j.name for j, x in zip(robot.joints, torques, strict=True) if np.isnan(x))
             why = f"{robot.name}: neither acceleration_limits nor the torque limit of {names}: {GIVE}"

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -19,14 +20,18 @@ import numpy as np
 from seerob.errors import Undecided
 from seerob.kernels.braking import braked
 from seerob.model import Mechanism, Model
+from seerob.mounting.mass_tolerances import MassTolerances
 from seerob.state import State
 from seerob.stopping.terms import Course
+from seerob.tolerances import Shifts
 from seerob.transforms import Array
 
 STEP = 2e-3
 """Time step of braking [s]."""
 COASTING_STEP = 1e-2
 """Time step of the reaction time [s]."""
+MOST_WEIGHED = 32
+"""Models with other masses that are kept: as many as a gripper with something in it and without asks for."""
 LONGEST = 5.0
 """A stop that takes longer is none [s]."""
 
@@ -84,6 +89,8 @@ class StopSimulation:
             bodies: Whose ways are wanted, by index.
         """
         self.robot = robot
+        self.masses = MassTolerances(model, robot)
+        self._weighed: dict[tuple[Shifts, bytes], Any] = {}
         self.bodies = [model.bodies[i] for i in bodies]
         self.brakes = np.ascontiguousarray(brakes, float)
         self._model = model
@@ -99,6 +106,7 @@ class StopSimulation:
         reaction: float,
         scale: float = 1.0,
         known: tuple[Array, Array] | None = None,
+        shifts: Shifts = (),
     ) -> Stopped:
         """Stop from where the robot is.
 
@@ -108,13 +116,14 @@ class StopSimulation:
             scale: Factor on the joint velocities.
             known: Where its joints are and how fast at even instants of that time, the last at its end;
                 at their present velocities throughout when not given, shape (m, j) each.
+            shifts: Of the tolerances of ``masses``; as given without.
 
         Raises:
             Undecided: Not heard, a mass that nobody gave, or brakes that do not bring it to a stand.
         """
         state.weigh(self.robot)
         # What a gripper holds is where it was taken, and weighs while it is held.
-        self._mj = state.model.mj
+        self._mj = self._at_masses(state.model.mj, shifts)
         self._data.qpos[:] = state.data_of(self.robot.name).qpos
         self._data.qvel[:] = 0.0
         trace = _Trace(self)
@@ -142,6 +151,16 @@ class StopSimulation:
             self._place(q + STEP / 4 * (v + first), (v + first) / 2)
             after = self._braked(v)
             q, v, t = q + STEP / 2 * (v + after), after, t + STEP
+
+    def _at_masses(self, mj: Any, shifts: Shifts) -> Any:
+        if not any(shifts):
+            return mj
+        key = shifts, mj.body_mass.tobytes()
+        if key not in self._weighed:
+            if len(self._weighed) == MOST_WEIGHED:
+                self._weighed.clear()
+            self._weighed[key] = self.masses.weighed(mj, shifts)
+        return self._weighed[key]
 
     def _place(self, q: Array, v: Array) -> None:
         robot, data = self.robot, self._data

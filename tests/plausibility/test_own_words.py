@@ -14,10 +14,15 @@ from oracles.pinocchio_oracle import pinocchio_model
 from seerob.engine import Engine
 from seerob.model_io import library
 from seerob.plausibility.of_motion import position_noise
-from seerob.plausibility.own_words import fixed_offset, rigid_error, sign_or_unit
+from seerob.plausibility.own_words import LiveWords, fixed_offset, rigid_error, sign_or_unit
+from seerob.protocols.fri import Edition, Monitoring, decode_monitoring, encode_monitoring
+from seerob.protocols.modbus_map import load as load_map
 from seerob.run import Judge, bind
 from seerob.samples import JointSample
 from seerob.snapshot import Finding, Verdict
+from seerob.sources.fri import joint_sample as fri_sample
+from seerob.sources.modbus_robot import joint_sample as modbus_sample
+from seerob.sources.modbus_robot import standing
 from seerob.sources.rtde import joint_sample as rtde_sample
 from seerob.station import Station, load
 from seerob.transforms import rotation_from_rpy
@@ -221,6 +226,51 @@ def test_the_speed_of_the_tool_that_a_live_source_says_is_compared(
     ])  # fmt: skip
     assert ["of no one motion" in text for text in found[6:]] == [doubt] * (len(T) - 6)
     assert not any(found[:1])
+
+
+def lbr_flange(lengths: tuple[float, ...], q: np.ndarray) -> np.ndarray:
+    """Flange of an LBR in its base [m]: its maker's lengths between seven axes that meet in three points."""
+    place, turn = np.zeros(3), np.eye(3)
+    for k, angle in enumerate(q):
+        place = place + turn @ [0, 0, lengths[k]]
+        about_y = (0, (-1) ** (k // 2) * angle, 0)
+        turn = turn @ rotation_from_rpy(about_y if k % 2 else (0, 0, angle))
+    return place + turn @ [0, 0, lengths[7]]
+
+
+IIWA_14 = (0.36, 0.0, 0.42, 0.0, 0.4, 0.0, 0.0, 0.126)
+IIWA_7 = (0.34, 0.0, 0.4, 0.0, 0.4, 0.0, 0.0, 0.126)
+
+
+@pytest.mark.parametrize(("lengths", "doubt"), [(IIWA_14, False), (IIWA_7, True)])
+def test_the_pose_that_fri_says_is_compared(tmp_path: Path, lengths: tuple[float, ...], doubt: bool) -> None:
+    """In millimetres on the wire."""
+    model = station(tmp_path, "iiwa14").model  # the file is not opened
+    q = (0.3, 0.7, -0.4, -1.2, 0.5, 0.9, 0.2)
+    said = 1e3 * lbr_flange(lengths, np.array(q))
+    message = Monitoring(edition=Edition.V2_7, sequence=0, q=q, tcp=(*said.tolist(), 1.0, 0.0, 0.0, 0.0))
+    heard = decode_monitoring(encode_monitoring(message))
+    sample = fri_sample(heard, target="arm", arrived=0.0, device=0.0, qd=None)
+    assert bool(LiveWords(model, "arm").doubt(sample)) == doubt
+
+
+def test_modbus_says_where_the_tool_is_while_the_robot_stands() -> None:
+    doosan = load_map("doosan", Path())
+    values = {f"q{k}": 100 * k for k in range(6)} | {f"qd{k}": 0 for k in range(6)}
+    values |= {"tcp0": 1234, "tcp1": -5000, "tcp2": 10}
+
+    def said(**more: int) -> JointSample:
+        return modbus_sample(doosan, values | more, {"robot_state": "moving"}, target="arm", arrived=0.0)
+
+    assert said().tcp == pytest.approx((0.1234, -0.5, 0.001))
+    assert standing(said(), said()).tcp == said().tcp
+    for before, now in (
+        (None, said()),
+        (said(q1=101), said()),
+        (said(tcp0=1), said()),
+        (said(), said(qd2=1)),
+    ):
+        assert standing(before, now).tcp is None
 
 
 def test_a_live_source_with_another_tool_says_which_would_fit(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from seerob.protocols.fri import (
 from seerob.protocols.protobuf_wire import doubles, fields, message, varint, whole
 
 Q = (0.1, 0.2, 0.3, -1.2, 0.5, 0.6, 0.7)
+POSE = (512.5, -3.0, 640.25, 0.5, -0.5, 0.5, 0.5)
 GOLDEN = [
     (
         Answer(Edition.V1, 0, 0, Q),
@@ -57,7 +58,7 @@ numbers = st.tuples(*[st.floats(-3.2, 3.2)] * 7)
 
 
 def full(edition, **more):
-    commanded = {"commanded_q": Q} if edition is Edition.V1 else {}
+    commanded = {"commanded_q": Q} if edition is Edition.V1 else {"tcp": POSE}
     return Monitoring(edition=edition, **(FULL | commanded | more))
 
 
@@ -83,6 +84,16 @@ def test_packed_joints_are_the_same_joints():
     header = message(1, whole(1, 0x245142) + whole(2, 0) + whole(3, 0))
     one_by_one = header + message(3, message(1, doubles(1, Q)))
     assert decode_monitoring(header + message(3, packed)) == decode_monitoring(one_by_one)
+
+
+@pytest.mark.parametrize(
+    ("pose", "heard"),
+    [(struct.pack("<7d", *POSE), POSE), (struct.pack("<6d", *POSE[:6]), ()), (b"", ())],
+)
+def test_a_packed_pose_is_the_same_pose_and_half_of_one_is_none(pose, heard):
+    measured = message(1, doubles(1, Q)) + message(9, message(1, b"any name") + message(2, pose))
+    header = message(1, whole(1, 0x245142) + whole(2, 0) + whole(3, 0))
+    assert decode_monitoring(header + message(3, measured)).tcp == heard
 
 
 @pytest.mark.parametrize("edition", Edition)

@@ -25,6 +25,8 @@ MONITORING, COMMAND = 0x245142, 0x34001
 _DOUBLE = bytes([1 << 3 | Wire.FIXED64])
 """Tag of field 1 with a number of eight bytes."""
 MOST_JOINTS = 16
+POSE = 7
+"""Elements of a pose: three of a place and four of a quaternion."""
 
 
 class Edition(StrEnum):
@@ -120,6 +122,9 @@ class Monitoring:
     """Estimated, without those of the arm's own motion [N·m]."""
     ipo_q: tuple[float, ...] = ()
     """What the controller's own interpolator wants [rad]; while commanding."""
+    tcp: tuple[float, ...] = ()
+    """Pose of the robot's tool centre point in its base frame: x, y, z [mm], then a quaternion, w first; FRI
+    2.x only. The maker's client library says so (``getMeasuredCartesianPose``, 2.5)."""
     time: float | None = None
     """Of the controller, since 1970 [s]."""
     io: tuple[tuple[str, float], ...] = ()
@@ -229,6 +234,8 @@ def _measured(field: Field | None, found: dict[str, object]) -> None:
             found[names[f.number]] = _joint_values(f)
         elif f.number == 8:
             io.append(_io_value(f))
+        elif f.number == 9:
+            found["tcp"] = _pose(f)
         elif f.number == 15:
             stamp = {part.number: part.whole() for part in fields(f.bytes())}
             found["time"] = stamp.get(1, 0) + 1e-9 * stamp.get(2, 0)
@@ -248,6 +255,12 @@ def _joint_values(field: Field) -> tuple[float, ...]:
         # One by one, as controllers send them: most of the time of a message goes into these.
         return struct.unpack("<" + count * "xd", data)
     return tuple(x for f in fields(field.bytes()) if f.number == 1 for x in f.doubles())
+
+
+def _pose(field: Field) -> tuple[float, ...]:
+    """Its seven elements; none unless all are there."""
+    said = tuple(x for f in fields(field.bytes()) if f.number == 2 for x in f.doubles())
+    return said if len(said) == POSE else ()
 
 
 def _io_value(field: Field) -> tuple[str, float]:
@@ -277,6 +290,8 @@ def encode_monitoring(m: Monitoring) -> bytes:
         message(8, message(1, name.encode()) + whole(2, 2) + whole(3, 1) + double(5, value))
         for name, value in m.io
     )
+    if m.tcp:
+        measured += message(9, message(1, b"measuredCartesianPose") + doubles(2, m.tcp))
     measured += message(15, stamp)
     connection = whole(1, m.session) + whole(2, m.quality) + whole(3, m.send_period)
     connection += whole(4, m.receive_multiplier)

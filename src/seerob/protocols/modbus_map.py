@@ -130,6 +130,8 @@ class RegisterMap(msgspec.Struct, frozen=True, kw_only=True):
     position: Joints
     velocity: Joints | None = None
     torque: Joints | None = None
+    tool: Joints | None = None
+    """x, y and z of the tool centre point in the base frame of the controller."""
     state: States | None = None
     blocks: Annotated[tuple[Together, ...], Meta(max_length=20)] = ()
     signals: Annotated[tuple[SignalEntry, ...], Meta(max_length=MOST_SIGNALS)] = ()
@@ -139,6 +141,7 @@ class RegisterMap(msgspec.Struct, frozen=True, kw_only=True):
             ("position", self.position, ("rad", "m")),
             ("velocity", self.velocity, ("rad/s", "m/s")),
             ("torque", self.torque, ("N·m", "N")),
+            ("tool", self.tool, ("m",)),
         ):
             known = None if joints is None else unit(joints.unit)
             if joints is not None and (known is None or known.si not in si):
@@ -158,10 +161,12 @@ class RegisterMap(msgspec.Struct, frozen=True, kw_only=True):
                 raise ValueError(f"state: no signal with choices has {what}")
 
     def places(self) -> dict[str, Place]:
-        """Everything that it has, by ``q0`` …, ``qd0`` …, ``tau0`` … and ``signal <name>``."""
+        """Everything that it has: ``q0`` …, ``qd0`` …, ``tau0`` …, ``tcp0`` … and ``signal <name>``."""
         found: dict[str, Place] = {}
-        for key, joints in (("q", self.position), ("qd", self.velocity), ("tau", self.torque)):
-            for k, place in enumerate(() if joints is None else joints.places(self.joints)):
+        groups = (("q", self.position), ("qd", self.velocity), ("tau", self.torque), ("tcp", self.tool))
+        for key, joints in groups:
+            count = 3 if joints is self.tool else self.joints
+            for k, place in enumerate(() if joints is None else joints.places(count)):
                 found[f"{key}{k}"] = place
         return found | {f"signal {s.name}": s.place for s in self.signals}
 

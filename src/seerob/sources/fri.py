@@ -62,6 +62,7 @@ def joint_sample(
         q=m.q,
         qd=qd,
         tau=m.tau if len(m.tau) == n else None,
+        tcp=(1e-3 * m.tcp[0], 1e-3 * m.tcp[1], 1e-3 * m.tcp[2]) if m.tcp else None,
     )
 
 

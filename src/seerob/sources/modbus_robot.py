@@ -118,7 +118,7 @@ class ModbusRobot(LiveSource, frozen=True, kw_only=True):
         async with connect(self.host, self.port, self.device) as device:
             answers = await _understood(device, found)
             questions = tuple(block for block, said in answers if not isinstance(said, Refused))
-            due = clock.time()
+            due, before = clock.time(), None
             while True:
                 asked = time.monotonic()
                 values: dict[str, int | float | bool] = {}
@@ -127,6 +127,7 @@ class ModbusRobot(LiveSource, frozen=True, kw_only=True):
                 states, doubts = signals(found, values)
                 # As old as the question: when in between it was so, nobody says.
                 sample = joint_sample(found, values, states, target=self.robot, arrived=asked)
+                before, sample = sample, standing(before, sample)
                 yield SignalSample(source="", seq=0, t=asked, values=states, doubts=doubts)
                 yield sample
                 # What was asked late is not made up for.
@@ -162,6 +163,16 @@ async def _read(device: Device, found: RegisterMap, block: Block) -> dict[str, i
     return take(block, await device.patient_block(block), wanted)
 
 
+def standing(before: JointSample | None, sample: JointSample) -> JointSample:
+    """The sample, with where it has its tool only while it stands.
+
+    Joints and tool are asked for one after the other, and renewed in between: in motion they are of two
+    instants.
+    """
+    stands = before is not None and (before.q, before.tcp) == (sample.q, sample.tcp)
+    return sample if stands and not any(sample.qd or ()) else replace(sample, tcp=None)
+
+
 def joint_sample(
     found: RegisterMap,
     values: Values,
@@ -185,6 +196,10 @@ def joint_sample(
     q = _joints(found, "q", found.position, values)
     if q is None:
         raise ProtocolError("the controller has no joint positions")
+    tool = _numbers(values, "tcp", 3)
+    tcp = None
+    if tool is not None and found.tool is not None:
+        tcp = tool[0] * found.tool.factor, tool[1] * found.tool.factor, tool[2] * found.tool.factor
     quality = Quality.GOOD
     if found.state is not None:
         state = states.get(found.state.signal)
@@ -200,15 +215,21 @@ def joint_sample(
         q=q,
         qd=_joints(found, "qd", found.velocity, values),
         tau=_joints(found, "tau", found.torque, values),
+        tcp=tcp,
         quality=quality,
     )
 
 
 def _joints(found: RegisterMap, key: str, joints: Joints | None, values: Values) -> tuple[float, ...] | None:
-    raw = [values.get(f"{key}{k}") for k in range(found.joints)]
-    if joints is None or any(x is None for x in raw):
-        return None
-    return tuple(joints.factor * float(x) for x in raw if x is not None)
+    raw = _numbers(values, key, found.joints)
+    return None if joints is None or raw is None else tuple(joints.factor * x for x in raw)
+
+
+def _numbers(values: Values, key: str, count: int) -> tuple[float, ...] | None:
+    """Raw numbers ``key0`` … ; None unless all are there."""
+    raw = [values.get(f"{key}{k}") for k in range(count)]
+    numbers = tuple(float(x) for x in raw if x is not None)
+    return numbers if len(numbers) == count else None
 
 
 def signals(found: RegisterMap, values: Values) -> tuple[dict[str, float | bool | str], dict[str, str]]:

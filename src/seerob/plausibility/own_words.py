@@ -16,12 +16,11 @@ import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
-from seerob.criterion import Criterion
 from seerob.errors import SeerobError
 from seerob.model import Mechanism, Model
 from seerob.model_io import library
@@ -534,7 +533,7 @@ def _of(model: Model, subjects: Sequence[str], mechanism: Mechanism) -> bool:
     return not subjects or mechanism.name in subjects or moved
 
 
-def _of_torques(model: Model) -> list[Criterion]:
+def _of_torques(model: Model) -> list[Any]:
     return [c for c in (*model.workstation.safety, *model.workstation.ergonomics) if c.by_torque]
 
 

@@ -221,7 +221,13 @@ def ticks(
 
 @contextmanager
 def settled() -> Iterator[None]:
-    """Spare the garbage collector what was made before the loop: it all lives as long as the loop does."""
+    """Spare the garbage collector what was made before the loop: it all lives as long as the loop does.
+
+    Who has done so already, around many loops, is left to it: it took longer than short loops do.
+    """
+    if gc.get_freeze_count():
+        yield
+        return
     gc.collect()
     gc.freeze()
     try:

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from seerob.geometry import Mesh, Solid, capsule, dilated_rectangle
-from seerob.model_io.glb import glb_bytes, mesh_hash, solid_mesh
+from seerob.model_io.glb import glb_bytes, mesh_hash, shown, solid_mesh
 from seerob.model_io.moments import of_closed_mesh, of_solid
 from seerob.model_io.shading import shaded
 
@@ -48,6 +48,27 @@ def test_equal_meshes_give_equal_bytes_and_the_hash_names_them():
     assert one == two
     assert mesh_hash(one) == hashlib.sha256(one).hexdigest()
     assert mesh_hash(glb_bytes([mesh_of(body, (0, 0, 0, 1))])) != mesh_hash(one)
+
+
+def test_what_is_kept_is_the_file_of_bodies_that_are_equal_and_of_no_other():
+    corners = np.eye(3)
+    flat = Mesh(corners, np.array([[0, 1, 2]], np.int32))
+    solids = [
+        Solid(mesh=flat),
+        Solid(mesh=Mesh(2 * corners, flat.faces)),
+        Solid(mesh=Mesh(corners, np.array([[0, 2, 1]], np.int32))),
+        Solid(mesh=Mesh(corners, flat.faces, (1.0, 0.0, 0.0, 1.0))),
+        Solid(mesh=flat, radius=0.1),
+        Solid(points=corners, radius=0.1),
+        Solid(points=corners, radius=0.2),
+        capsule(corners[0], corners[1], 0.1),
+    ]
+    for solid in [*solids, *solids]:
+        told = shown([solid], [])
+        assert told.content == glb_bytes([solid_mesh(solid)])
+        assert told.digest == mesh_hash(told.content)
+        assert told.triangles == len(solid_mesh(solid).faces)
+        assert shown([solid], [flat]).content == glb_bytes([flat])
 
 
 def test_the_file_states_what_a_viewer_needs():

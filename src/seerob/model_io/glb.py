@@ -10,19 +10,70 @@ import hashlib
 import json
 import struct
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.geometry import Mesh
+from seerob.geometry import Mesh, Solid
 from seerob.model_io.shading import CREASE, shaded
 from seerob.model_io.tessellation import solid_mesh
 
-__all__ = ["glb_bytes", "mesh_hash", "solid_mesh"]
+__all__ = ["Shown", "glb_bytes", "mesh_hash", "shown", "solid_mesh"]
 
 _FLOAT, _USHORT, _UINT = 5126, 5123, 5125
 _ARRAY, _ELEMENTS = 34962, 34963
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the page and recordings show of a body."""
+
+    content: bytes
+    """Binary glTF."""
+    digest: str
+    """`mesh_hash` of it."""
+    triangles: int
+
+
+KEPT = 500
+"""Bodies whose file is kept for as long as the process lives."""
+_kept: dict[bytes, Shown] = {}
+
+
+def shown(solids: Sequence[Solid], visual: Sequence[Mesh]) -> Shown:
+    """The display meshes of a body, or without any its solids; made once for bodies that are equal."""
+    key = _content(solids, visual)
+    found = _kept.get(key)
+    if found is None:
+        display = list(visual) or [solid_mesh(solid) for solid in solids]
+        content = glb_bytes(display)
+        found = Shown(content, mesh_hash(content), sum(len(mesh.faces) for mesh in display))
+        if len(_kept) >= KEPT:
+            _kept.clear()
+        _kept[key] = found
+    return found
+
+
+def _content(solids: Sequence[Solid], visual: Sequence[Mesh]) -> bytes:
+    """Hash of all that `shown` looks at."""
+    content = hashlib.sha256()
+    for each in visual or solids:
+        solid = None if isinstance(each, Mesh) else each
+        mesh = each if isinstance(each, Mesh) else each.mesh
+        arrays: tuple[NDArray[Any] | None, ...] = (
+            None if mesh is None else mesh.vertices,
+            None if mesh is None else mesh.faces,
+            None if solid is None else solid.points,
+        )
+        told = [None if array is None else (array.shape, array.dtype.str) for array in arrays]
+        plain = None if solid is None else solid.radius, None if mesh is None else mesh.color
+        content.update(repr((plain, told)).encode())
+        for array in arrays:
+            if array is not None:
+                content.update(array.tobytes())
+    return content.digest()
 
 
 def mesh_hash(glb: bytes) -> str:

@@ -18,8 +18,7 @@ def shaded(mesh: Mesh, crease: float = CREASE) -> tuple[Array, Array, NDArray[np
     Returns:
         Vertices (k, 3) [m], unit normals (k, 3) and faces (m, 3) that index them.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
+    from seerob.kernels.tree import component_of
 
     faces = mesh.faces.astype(np.int64)
     count = len(faces)
@@ -41,23 +40,24 @@ def shaded(mesh: Mesh, crease: float = CREASE) -> tuple[Array, Array, NDArray[np
     first, second = order[:-1][same], order[1:][same]
     smooth = np.einsum("ij,ij->i", normal[first // 3], normal[second // 3]) > np.cos(crease)
     first, second = first[smooth], second[smooth]
-    rows = np.concatenate([corner_low[first], corner_high[first]])
-    columns = np.concatenate([corner_low[second], corner_high[second]])
-    graph = coo_matrix((np.ones(len(rows), bool), (rows, columns)), shape=(3 * count, 3 * count))
-    _, group = connected_components(graph, directed=False)
-    # Number the groups by their first corner, so that the order is the mesh's own.
-    _, first_corner, group = np.unique(group, return_index=True, return_inverse=True)
-    order = np.argsort(first_corner)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    group = rank[group.ravel()]
-    vertices = mesh.vertices[faces.ravel()[first_corner[order]]]
+    # Twice the second: an edge is a triangle without area.
+    joined = np.concatenate(
+        [
+            np.column_stack([corner[first], corner[second], corner[second]])
+            for corner in (corner_low, corner_high)
+        ]
+    )
+    root = component_of(joined, 3 * count)
+    # A root is the first corner of its group: numbered in that order, the order is the mesh's own.
+    is_root = root == np.arange(3 * count)
+    group = (np.cumsum(is_root) - 1)[root]
+    vertices = mesh.vertices[faces.ravel()[is_root]]
 
     edges = corners[:, [1, 2, 0]] - corners
     edges /= np.maximum(np.linalg.norm(edges, axis=2, keepdims=True), 1e-300)
     cosine = -np.einsum("fci,fci->fc", edges, edges[:, [2, 0, 1]])
     weighted = (np.arccos(np.clip(cosine, -1, 1))[:, :, None] * normal[:, None, :]).reshape(-1, 3)
-    summed = np.stack([np.bincount(group, weighted[:, i], len(order)) for i in range(3)], axis=1)
+    summed = np.stack([np.bincount(group, weighted[:, i], len(vertices)) for i in range(3)], axis=1)
     size = np.linalg.norm(summed, axis=1, keepdims=True)
     normals = np.where(size > 1e-12, summed / np.maximum(size, 1e-300), [0.0, 0.0, 1.0])
     return vertices, normals, group.reshape(-1, 3)

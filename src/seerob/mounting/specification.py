@@ -49,7 +49,6 @@ class Mounting:
     findings: list[Finding] = field(default_factory=list)
     files: dict[str, bytes] = field(default_factory=dict)
     _bodies: dict[str, Any] = field(default_factory=dict)
-    _displays: dict[bytes, tuple[str, int]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.spec.compiler.degree = False
@@ -130,12 +129,11 @@ class Mounting:
         mass: Quantity | None,
     ) -> None:
         """Note that a body has a shape: it becomes a node of the scene and an item of distances."""
-        display = list(visual) or [glb.solid_mesh(solid) for solid in solids]
-        content = glb.glb_bytes(display)
-        digest = glb.mesh_hash(content)
-        self.meshes[digest] = content
-        triangles = sum(len(mesh.faces) for mesh in display)
-        self.entries.append(Entry(name, role, owner, carrier, tuple(solids), mass, digest, triangles))
+        shown = glb.shown(solids, visual)
+        self.meshes[shown.digest] = shown.content
+        self.entries.append(
+            Entry(name, role, owner, carrier, tuple(solids), mass, shown.digest, shown.triangles)
+        )
 
 
 def pose_matrix(pose: Pose) -> Array:

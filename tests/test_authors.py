@@ -205,12 +205,30 @@ def test_subjects_are_a_tuple_of_names(own):
         ("return Result(name='own', value=3.0, verdict=Verdict.WITHIN)", "it is within, and has no limit"),
         ("return Result(name='own', limit=2.0, verdict=Verdict.WITHIN)", "it is within, and has no value"),
         ("return self.result(float('inf'))", "is inf, not a finite number"),
+        (
+            "return Result(name='own')",
+            "says nothing, neither a figure nor a verdict: where there is nothing to",
+        ),
+        ("return Result(name='own', reason='no device')", "say nothing=True with a reason; no device"),
+        ("return Result(name='own', limit=2.0)", "says nothing, neither a figure nor a verdict"),
+        ("return Result(name='own', value=3.0, limit=2.0)", "it has a limit and no verdict"),
+        ("return Result(name='own', nothing=True)", "there is nothing to judge, and not why"),
+        (
+            "return Result(name='own', value=1.0, limit=2.0, verdict=Verdict.WITHIN, nothing=True)",
+            "within, and says",
+        ),
     ],
 )
 def test_what_is_no_result_or_contradicts_itself_is_undecided(own, returned, words):
     found = unheard(own(BIND.format(returned), q="q = [0, 0]\n"))
     assert found.verdict is UNDECIDED
     assert words in found.reason
+
+
+@pytest.mark.parametrize("words", ["nothing=True, reason='nobody is near'", "value=3.0"])
+def test_nothing_to_judge_is_said_with_its_reason_and_a_figure_without_a_limit_informs(own, words):
+    found = unheard(own(BIND.format(f"return Result(name='own', {words})"), q="q = [0, 0]\n"))
+    assert (found.verdict, found.nothing) == (None, "nothing" in words)
 
 
 @pytest.mark.parametrize("more", ["t=0.0", "muted=True", "t=state.t, muted=state.t > 0.05"])

@@ -14,7 +14,7 @@ from seerob.answers import Answers
 from seerob.criterion import Criterion
 from seerob.engine import Engine
 from seerob.errors import InputError, UnknownName
-from seerob.results.series import CODES
+from seerob.results.series import CODES, NO_VERDICT
 from seerob.run import Judge
 from seerob.snapshot import Basis, Result, Verdict
 from seerob.states import States
@@ -264,6 +264,9 @@ class Own(Criterion, frozen=True, kw_only=True):
         return self.says
 
 
+NOTHING = np.full(N, NO_VERDICT, np.uint8)
+
+
 def within(value, limit=2.0, interval=None, n=N):
     rows = (np.broadcast_to(np.asarray(x, float), n).copy() for x in (value, limit))
     ends = None if interval is None else tuple(np.full(n, float(end)) for end in interval)
@@ -273,12 +276,15 @@ def within(value, limit=2.0, interval=None, n=N):
 @pytest.mark.parametrize(
     ("says", "told"),
     [
-        (lambda states: within(np.nan), "own contradicts itself: it is within, and has no value"),
+        (lambda states: within(np.nan), "own: it is within, and has no value"),
         (lambda states: within(-np.inf), "it is within, and has no value"),
         (lambda states: within(1, np.nan), "it is within, and has no limit"),
         (lambda states: within(3), "it is within, beyond its limit"),
         (lambda states: within(1, 2, (0.5, 2.5)), "it is within, beyond its limit"),
         (lambda states: within(1, 2, (np.nan, np.nan)), "it is within, beyond its limit"),
+        (lambda states: replace(within(np.nan, np.nan), verdict=NOTHING), "it says nothing, neither"),
+        (lambda states: replace(within(1), verdict=NOTHING), "it has a limit and no verdict"),
+        (lambda states: replace(within(1), nothing=np.ones(N, bool)), "says that there is nothing to judge"),
         (lambda states: within(1, n=N - 1), f"of {N} instants, not"),
         (lambda states: replace(within(1), verdict=np.full(N, 7, np.uint8)), "its verdicts \\[7\\] are none"),
         (lambda states: np.ones(N), "returns ndarray, not seerob.answers.Answers"),
@@ -290,6 +296,12 @@ def test_arrays_of_ones_own_that_contradict_themselves_are_undecided(cell, motio
     assert found["own"].verdict is Verdict.UNDECIDED
     assert set(found["own"].answers.verdict.tolist()) == {CODES[Verdict.UNDECIDED]}
     assert all(re.search(told, reason) for reason in found["own"].reasons)
+
+
+def test_arrays_of_ones_own_say_where_there_is_nothing_to_judge(cell, motion):
+    own = Own(name="own", says=lambda states: within(1).without_verdict(np.arange(N) > 3))
+    found = cell.with_criteria(own).batch(*motion)["own"]
+    assert found.answers.verdict.tolist() == [CODES[Verdict.WITHIN]] * 4 + [NO_VERDICT] * (N - 4)
 
 
 @pytest.mark.parametrize("of", ["arm", "load", "arm/forearm_link"])

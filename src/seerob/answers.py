@@ -30,6 +30,8 @@ class Answers:
     """Shape (N,)."""
     interval: tuple[Array, Array] | None = None
     """Where the true values lie, as far as tolerances are known, shape (N,) each."""
+    nothing: Flags | None = None
+    """Where there is nothing to judge, shape (N,); without that, who says nothing is UNDECIDED."""
 
     @classmethod
     def against(cls, value: Array, limit: Array | float | None, *, at_most: bool) -> Answers:
@@ -45,16 +47,19 @@ class Answers:
         return replace(self, verdict=verdict, interval=(low, high))
 
     def finite(self) -> Answers:
-        """The same without values that are infinite; the verdicts stay."""
-        return replace(self, value=np.where(np.isinf(self.value), np.nan, self.value))
+        """The same without values that are infinite; the verdicts stay, and without one nothing is judged."""
+        none = np.isinf(self.value)
+        value = np.where(none, np.nan, self.value)
+        return replace(self, value=value).without_verdict(none & (self.verdict == NO_VERDICT))
 
     def exceeded(self, where: Flags) -> Answers:
         """The same, exceeded at some instants."""
         return replace(self, verdict=np.where(where, EXCEEDED, self.verdict).astype(np.uint8))
 
     def without_verdict(self, where: Flags) -> Answers:
-        """The same without a verdict at some instants."""
-        return replace(self, verdict=np.where(where, NO_VERDICT, self.verdict).astype(np.uint8))
+        """The same with nothing to judge at some instants."""
+        verdict = np.where(where, NO_VERDICT, self.verdict).astype(np.uint8)
+        return replace(self, verdict=verdict, nothing=where if self.nothing is None else self.nothing | where)
 
     def open(self) -> Answers:
         """The same where limits may be worse than they say: what is within them is undecided."""
@@ -62,16 +67,23 @@ class Answers:
         return replace(self, verdict=verdict.astype(np.uint8))
 
     def contradictions(self, *, at_most: bool) -> NDArray[np.object_]:
-        """Why each instant cannot be what it says, shape (N,); empty where it can."""
+        """Why each instant cannot be what it says, or says nothing, shape (N,); empty where it can."""
         low, high = (self.value, self.value) if self.interval is None else self.interval
         ends = np.array([self.value, low, high], float)
-        kept = (ends <= self.limit if at_most else ends >= self.limit).all(axis=0)
-        words = np.where(
+        kept = (ends <= self.limit if at_most else ends >= self.limit).all(axis=0) & np.isfinite(self.value)
+        nothing = np.zeros(len(self.value), bool) if self.nothing is None else self.nothing
+        within, silent = self.verdict == WITHIN, (self.verdict == NO_VERDICT) & ~nothing
+        told = np.where(
             np.isnan(self.limit), "it is within, and has no limit", "it is within, beyond its limit"
         )
-        words = np.where(np.isfinite(self.value), words, "it is within, and has no value")
-        wrong = (self.verdict == WITHIN) & ~(kept & np.isfinite(self.value))
-        return np.where(wrong, words, "").astype(object)
+        told = np.where(np.isfinite(self.value), told, "it is within, and has no value")
+        told = np.where(nothing, "it is within, and says that there is nothing to judge", told)
+        told = np.where(within & (nothing | ~kept), told, "")
+        empty = np.isnan(self.value) & np.isnan(low)
+        told = np.where(silent & ~np.isnan(self.limit), "it has a limit and no verdict", told)
+        return np.where(silent & empty, "it says nothing, neither a figure nor a verdict", told).astype(
+            object
+        )
 
 
 def judge_many(value: Array, limit: Array | float | None, *, at_most: bool) -> Codes:

@@ -329,7 +329,7 @@ def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:
         reasons[:] = why
         return _nothing(criterion, n), reasons
     found = answers.contradictions(at_most=criterion.at_most)
-    reasons = np.where(found == "", reasons, criterion.name + " contradicts itself: " + found)
+    reasons = np.where(found == "", reasons, f"{criterion.name}: " + found)
     verdict = np.where(found == "", answers.verdict, UNDECIDED).astype(np.uint8)
     return replace(answers, verdict=verdict), reasons
 

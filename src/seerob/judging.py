@@ -110,6 +110,8 @@ def contradiction(result: Result, criterion: Criterion) -> str:
         known = verdict is None or type(verdict) is Verdict
         return "" if known else f"its verdict is {verdict!r}, not a seerob.Verdict"
     value, limit = result.value, result.limit
+    if result.nothing:
+        return "it is within, and says that there is nothing to judge"
     if value is None or limit is None:
         return f"it is within, and has no {'value' if value is None else 'limit'}"
     ends = (value,) if result.interval is None else (value, *result.interval)
@@ -121,6 +123,21 @@ def contradiction(result: Result, criterion: Criterion) -> str:
     if result.at_most and not criterion.at_most:
         return "it bounds from the other side than its kind says (at_most)"
     return _worse_part(result)
+
+
+def unsaid(result: Result) -> str:
+    """Why a result without a verdict is not passed over; empty where it may be.
+
+    It may where it informs of a figure that has no limit, or says that there is nothing to judge, and why.
+    """
+    if result.verdict is not None:
+        return ""
+    if result.nothing:
+        return "" if result.reason else "it says that there is nothing to judge, and not why"
+    what = "" if result.limit is None else "it has a limit and no verdict"
+    if result.value is None and result.interval is None:
+        what = "it says nothing, neither a figure nor a verdict"
+    return f"{what}: where there is nothing to judge, say nothing=True with a reason" if what else ""
 
 
 def _worse_part(result: Result) -> str:
@@ -166,6 +183,7 @@ def undecided(result: Result, reason: str) -> Result:
     return replace(
         result,
         verdict=Verdict.UNDECIDED if taken_back else result.verdict,
+        nothing=result.nothing and not taken_back,
         reason=f"{reason}; {result.reason}".removesuffix("; ") if taken_back else result.reason,
         parts=tuple(_open(part, reason) for part in result.parts),
         rows=tuple(
@@ -365,6 +383,10 @@ class Judge:
             # When it was asked and whether it applied is for who asks to say: a log counts no instant twice.
             result = replace(result, t=None, muted=False)
         reason = contradiction(result, bound.criterion)
+        if not reason and (silent := unsaid(result)):
+            self._warn(bound, f"{_where(bound)}: {silent}")
+            silent = f"{silent}; {result.reason}".removesuffix("; ")
+            return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
         if reason:
             reason = f"{_where(bound)} contradicts itself: {reason}"
             self._warn(bound, reason)

@@ -206,7 +206,8 @@ class Row(Struct, frozen=True, kw_only=True, omit_defaults=True):
 class Result(Struct, frozen=True, kw_only=True):
     """What one criterion says at one instant.
 
-    A result without a limit has no verdict: it informs. UNDECIDED always carries a reason.
+    A result with a figure and without a limit has no verdict: it informs. UNDECIDED always carries a reason.
+    One that says nothing is UNDECIDED, unless it says that there is nothing to judge, and why.
     """
 
     name: str
@@ -233,6 +234,8 @@ class Result(Struct, frozen=True, kw_only=True):
     """Instant it speaks of [s] when that is not the snapshot's (a criterion with a period)."""
     muted: bool = False
     """Whether the criterion does not apply now, as a variable says: then it says nothing."""
+    nothing: bool = False
+    """Whether there is nothing to judge now, and ``reason`` says why: nobody is near."""
 
 
 class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot"):

@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "6dca70364f6c0b00";
+export const SCHEMA = "a4cb619a82085c8f";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -249,7 +249,8 @@ export interface Row {
 /**
  * What one criterion says at one instant.
  *
- * A result without a limit has no verdict: it informs. UNDECIDED always carries a reason.
+ * A result with a figure and without a limit has no verdict: it informs. UNDECIDED always carries a reason.
+ * One that says nothing is UNDECIDED, unless it says that there is nothing to judge, and why.
  */
 export interface Result {
   name: string;
@@ -276,6 +277,8 @@ export interface Result {
   t: number | null;
   /** Whether the criterion does not apply now, as a variable says: then it says nothing. */
   muted: boolean;
+  /** Whether there is nothing to judge now, and `reason` says why: nobody is near. */
+  nothing: boolean;
 }
 
 /** The twin and its results at one tick. */

@@ -139,6 +139,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
             value=value,
             limit=self.limit,
             verdict=verdict,
+            nothing=counting and verdict is None,
             reason="; ".join(reasons),
             interval=None if known else ends,
             parts=tuple(

@@ -111,6 +111,7 @@ class ContactForce(Criterion, frozen=True, kw_only=True):
                 unit=self.unit,
                 limit=None if largest is None else largest.limit,
                 verdict=Verdict.EXCEEDED if over else None,
+                nothing=not over,
                 reason=f"{'nothing touches' if worst is None else worst.name}; {ESTIMATE}",
                 parts=tuple(parts),
                 markers=tuple(lit),

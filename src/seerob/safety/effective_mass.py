@@ -170,6 +170,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                 unit=self.unit,
                 limit=self.limit,
                 verdict=verdict,
+                nothing=verdict is None and (mass is None or not np.isfinite(mass)),
                 interval=interval,
                 reason=reason
                 or open_

@@ -173,6 +173,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             unit=self.unit,
             limit=self.limit,
             verdict=verdict,
+            nothing=unbounded and verdict is None,
             reason=reason,
             parts=(
                 Result(name="in every direction", value=inscribed, unit="N"),

@@ -456,7 +456,7 @@ class Contacts:
         if not found:
             nobody = f"nobody within {spec.horizon:g} m of a moving part"
             reason = nobody if (judged.v_r > STANDSTILL).any() else "no part moves"
-            return Result(name=spec.name, unit="m/s", reason=reason, parts=mass_parts)
+            return Result(name=spec.name, unit="m/s", reason=reason, nothing=True, parts=mass_parts)
         verdict = worst([part.verdict for part, _ in found])
         chosen = [entry for entry in found if entry[0].verdict is verdict]
         part, row = min(chosen, key=margin)

@@ -67,6 +67,7 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
                 limit=self.limit,
                 verdict=judge(value, self.limit) if isinstance(value, float) else None,
                 reason="" if number else self._said(value),
+                nothing=not number,
             )
 
         return evaluate

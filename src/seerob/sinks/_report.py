@@ -56,6 +56,7 @@ def badge(verdict: Verdict | None) -> Html:
 
 
 def input_row(item: Input) -> list[str | Html]:
+    """Cells of one input of a basis: its name, value, origin and source."""
     value: str | Html = item.value if isinstance(item.value, str) else whole(number(item.value, item.unit))
     origin = (
         tag("span", f"! {WHO[item.origin]}", class_="doubt whole")

@@ -74,21 +74,36 @@ class Options(Protocol):
     """The options that a source of captured motion has."""
 
     @property
-    def human(self) -> str: ...
+    def human(self) -> str:
+        """Whom it drives."""
+
     @property
-    def at(self) -> Pose: ...
+    def at(self) -> Pose:
+        """Where the device's world lies."""
+
     @property
-    def weights(self) -> Weights: ...
+    def weights(self) -> Weights:
+        """How much each bone counts."""
+
     @property
-    def mapping(self) -> Mapping[str, str | Mapped]: ...
+    def mapping(self) -> Mapping[str, str | Mapped]:
+        """Names of the device, and the bones that they mean."""
+
     @property
-    def convention(self) -> str: ...
+    def convention(self) -> str:
+        """Whose names they are."""
+
     @property
-    def calibration(self) -> Calibration: ...
+    def calibration(self) -> Calibration:
+        """How the sensors' mounting is found."""
+
     @property
-    def latency(self) -> float: ...
+    def latency(self) -> float:
+        """By how much later than it happened the device says it [s]."""
+
     @property
-    def smoothing(self) -> float | None: ...
+    def smoothing(self) -> float | None:
+        """Cut-off frequency of the low-pass filter [Hz]; None is none."""
 
 
 def lateness(options: Options) -> float:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from seerob.results.series import CODES, NO_VERDICT
 from seerob.snapshot import Verdict
 from seerob.transforms import Array
+from seerob.verdict import ROUNDING
 
 Codes = NDArray[np.uint8]
 """Verdicts; see `seerob.results.series.CODES`."""
@@ -90,5 +91,12 @@ def judge_many(value: Array, limit: Array | float | None, *, at_most: bool) -> C
     """Verdicts of values against a limit or limits; the rule is `seerob.criterion.judge`."""
     if limit is None:
         return np.where(np.isnan(value), UNDECIDED, NO_VERDICT).astype(np.uint8)
-    within = value <= limit if at_most else value >= limit
+    within = keep_many(value, limit, at_most=at_most)
     return np.where(np.isnan(value), UNDECIDED, np.where(within, WITHIN, EXCEEDED)).astype(np.uint8)
+
+
+def keep_many(value: Array, limit: Array | float, *, at_most: bool = True) -> Flags:
+    """Whether computed figures keep a limit or limits; the rule is `seerob.verdict.keeps`."""
+    limits = np.asarray(limit, float)
+    room = np.where(np.isinf(limits), 0.0, ROUNDING * np.maximum(1.0, np.abs(limits)))
+    return np.asarray(value <= limits - room if at_most else value >= limits + room)

@@ -12,6 +12,7 @@ from msgspec import Meta, Struct
 from seerob.errors import UnknownName
 from seerob.quantities import Seconds
 from seerob.snapshot import Basis, Result, Verdict
+from seerob.verdict import keeps
 
 if TYPE_CHECKING:
     from seerob.answers import Answers
@@ -151,7 +152,7 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 def judge(value: float, limit: float | None, *, at_most: bool = True) -> Verdict | None:
-    """Verdict of a value against a limit; on the limit is WITHIN, no limit is no verdict.
+    """Verdict of a value against a limit, by the rule of `seerob.verdict.keeps`; no limit is no verdict.
 
     A value that is not a number is UNDECIDED, whatever the limit.
     """
@@ -159,8 +160,7 @@ def judge(value: float, limit: float | None, *, at_most: bool = True) -> Verdict
         return _UNDECIDED
     if limit is None:
         return None
-    within = value <= limit if at_most else value >= limit
-    return _WITHIN if within else _EXCEEDED
+    return _WITHIN if keeps(value, limit, at_most=at_most) else _EXCEEDED
 
 
 def judge_interval(

@@ -19,6 +19,7 @@ from seerob.model import Model
 from seerob.plugin import PluginError, kind_of
 from seerob.snapshot import Basis, Finding, Result, Row, Verdict
 from seerob.state import State
+from seerob.verdict import ROUNDING, keeps
 from seerob.whereabouts.hearing import SLACK
 
 _log = logging.getLogger(__name__)
@@ -117,8 +118,9 @@ def contradiction(result: Result, criterion: Criterion) -> str:
     ends = (value,) if result.interval is None else (value, *result.interval)
     for end in ends:
         # A value that is not a number keeps no limit.
-        if not (end <= limit if result.at_most else end >= limit):
+        if not keeps(end, limit, at_most=result.at_most):
             side = "above" if result.at_most else "below"
+            side = "but for rounding on" if abs(end - limit) <= ROUNDING * max(1.0, abs(limit)) else side
             return f"it is within, and {end:g} {result.unit} lies {side} its limit of {limit:g} {result.unit}"
     if result.at_most and not criterion.at_most:
         return "it bounds from the other side than its kind says (at_most)"

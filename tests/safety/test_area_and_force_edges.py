@@ -45,7 +45,8 @@ def test_of_two_areas_the_one_that_is_entered_or_near_is_named(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("x", "verdict", "reason"), [(0.75, "exceeded", "one"), (0.75 + 1e-9, "within", "one")]
+    ("x", "verdict", "reason"),
+    [(0.75, "exceeded", "one"), (0.75 + 5e-10, "exceeded", "one"), (0.75 + 2e-9, "within", "one")],
 )
 def test_what_touches_an_area_is_in_it(tmp_path, x, verdict, reason):
     """A cube of 1 m and one of 1/2 m: figures without rounding. Of one area the reason names none."""

@@ -37,9 +37,9 @@ def watched(folder, q, qd, places=ALONG, more=""):
     [
         # Of two places beside each other the lesser counts: 0.5 on both stretches.
         (0.25, 0.25, 0.5, "within"),
-        (0.25, -0.5, 1.0, "within"),
-        (1.75, 0.5, 1.0, "within"),
-        (1.75, np.nextafter(0.5, 1), 1.0, "exceeded"),
+        (0.25, -0.5, 1.0, "exceeded"),
+        (1.75, 0.5 - 1e-9, 1.0 - 2e-9, "within"),
+        (1.75, 0.5, 1.0, "exceeded"),
         (1.75, 0.75, 1.5, "exceeded"),
     ],
 )

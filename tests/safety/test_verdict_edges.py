@@ -13,6 +13,7 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
 from seerob import joint_torques
+from seerob.answers import judge_many
 from seerob.contact.areas import area_results, margin
 from seerob.contact.limits import Judged, RegionArrays
 from seerob.contact.shape import ContactShape, force_at_pressure
@@ -22,6 +23,7 @@ from seerob.errors import InputError
 from seerob.judging import Judge
 from seerob.norms.body_limits import SHIPPED, parse, shipped
 from seerob.norms.iso_13855 import Approach, Edition, intrusion, minimum_distance, speed_at
+from seerob.results.series import CODES
 from seerob.safety.effective_mass import inverse_effective_mass, principal_masses
 from seerob.safety.manipulability import Manipulability, singular_values
 from seerob.safety.minimum_distance import MinimumDistance
@@ -36,13 +38,20 @@ EXCLUDED = '"Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"'
 
 def test_judging_a_number_an_interval_and_a_whole():
     assert judge(float("nan"), 1.0) is judge(float("nan"), None) is UNDECIDED
-    assert [judge(x, 1.0) for x in (1.0, np.nextafter(1.0, 2))] == [WITHIN, EXCEEDED]
-    assert [judge(x, 1.0, at_most=False) for x in (1.0, np.nextafter(1.0, 0))] == [WITHIN, EXCEEDED]
-    assert [judge_interval(ends, 1.0) for ends in ((0, 1), (0.5, 1.5), (1.1, 2))] == [
-        WITHIN,
-        UNDECIDED,
-        EXCEEDED,
-    ]
+    # A figure that is its limit but for rounding is beyond it, a score on its limit is not.
+    assert [judge(x, 1.0) for x in (1 - 2e-9, 1 - 1e-10, 1.0, 1)] == [WITHIN, EXCEEDED, EXCEEDED, WITHIN]
+    above = [judge(x, 1.0, at_most=False) for x in (1 + 2e-9, 1 + 1e-10, 1.0, np.int64(1))]
+    assert above == [WITHIN, EXCEEDED, EXCEEDED, WITHIN]
+    # A share of large limits, of small ones a share of the unit; an infinite one is kept by what is finite.
+    assert [judge(x, 1e6) for x in (1e6 - 2e-3, 1e6 - 1e-4)] == [WITHIN, EXCEEDED]
+    assert [judge(x, 0.0, at_most=False) for x in (2e-9, 1e-10)] == [WITHIN, EXCEEDED]
+    assert judge(5.0, np.inf) is WITHIN
+    for limit, at_most in ((1.0, True), (0.0, False), (1e6, True), (-3.0, False), (np.inf, True)):
+        near = limit + np.array([-2e-3, -1e-4, -2e-9, -1e-10, 0.0, 1e-10, 2e-9, 1e-3, np.nan])
+        told = judge_many(near, limit, at_most=at_most).tolist()
+        assert told == [CODES[judge(x, limit, at_most=at_most)] for x in near.tolist()]
+    ends = ((0, 1), (0.5, 1.5), (1.1, 2), (0.5, 1.0))
+    assert [judge_interval(e, 1.0) for e in ends] == [WITHIN, UNDECIDED, EXCEEDED, UNDECIDED]
     assert judge_interval((0, 1), None) is None
     assert worst([WITHIN, None, UNDECIDED, EXCEEDED]) is EXCEEDED
     assert worst([WITHIN, None, UNDECIDED]) is UNDECIDED
@@ -162,6 +171,48 @@ def test_a_sharp_patch_is_not_hidden_by_one_that_is_longer_and_narrower():
     np.testing.assert_array_equal(both, np.minimum(long, round_))
 
 
+PLACED = """
+[[robots]]
+name = "arm"
+model = "arm.urdf"
+base = {{ {base}, rpy_deg = [0, 0, {turn}] }}
+[[parts]]
+name = "ball"
+shape = {{ sphere = 0.1 }}
+at = {{ {ball} }}
+[[safety]]
+kind = "minimum_distance"
+name = "gap"
+between = ["arm", "ball"]
+{limit}
+[[safety]]
+kind = "velocity"
+name = "speed"
+at = "arm"
+{fastest}
+"""
+
+
+@pytest.mark.parametrize("deviation", [0.0, 1e-6])
+@pytest.mark.parametrize("unit", ["", "_mm"])
+@pytest.mark.parametrize(("turn", "shift"), [(0.0, 0.0), (37.0, 0.1), (90.0, 1 / 3), (200.0, 7.7)])
+def test_on_its_limit_a_figure_is_beyond_it_wherever_the_cell_stands(tmp_path, turn, shift, unit, deviation):
+    """The arm of 2 m, a ball of 0.1 m 0.7 m before its end, and 2 m/s at 1 rad/s."""
+    yaw, scale = np.radians(turn), 1000.0 if unit else 1.0
+    ball = scale * (shift + (2.0 + 0.7 + deviation + 0.1) * np.array([np.cos(yaw), np.sin(yaw)]))
+    text = PLACED.format(
+        base=f"position{unit} = [{scale * shift!r}, {scale * shift!r}, 0]",
+        ball=f"position{unit} = [{ball[0].item()!r}, {ball[1].item()!r}, 0]",
+        turn=turn,
+        limit=f"limit{unit} = {scale * 0.7!r}",
+        fastest=f"limit{'_mm_s' if unit else ''} = {scale * (2.0 + deviation)!r}",
+    )
+    told = results_at(made(tmp_path, FLOATING + text, {"arm.urdf": two_r()}), arm=([0, 0], [1.0, 0.0]))
+    assert told["gap"].value == pytest.approx(0.7 + deviation, abs=1e-12)
+    assert told["speed"].value == pytest.approx(2.0, abs=1e-12)
+    assert {told[name].verdict for name in told} == {WITHIN if deviation else EXCEEDED}
+
+
 def test_what_is_least_permitted_and_how_far_it_is():
     part = Result(name="Chest", value=1.0, limit=3.0)
     assert margin((part, 0)) == 2.0
@@ -181,13 +232,15 @@ def test_ranks_on_and_beside_the_permissible_speed():
     n = len(arrays.regions)
     speeds = arrays.speeds(np.array([4.0]), np.full((1, 2, n), 1e9), np.zeros((1, n), bool))
     v = speeds.permissible
-    assert (ranks(v, speeds, None) == 0).all()
-    assert (ranks(np.nextafter(v, 9), speeds, None) == 2).all()
+    below = v - 1e-8
+    assert (ranks(below, speeds, None) == 0).all()
+    assert (ranks(v, speeds, None) == 2).all()
     unknown = replace(speeds, pressure=np.full_like(v, np.nan))
-    assert (ranks(v, unknown, None) == 1).all()
-    assert (ranks(np.nextafter(v, 9), unknown, None) == 2).all()
+    assert (ranks(below, unknown, None) == 1).all()
+    assert (ranks(v, unknown, None) == 2).all()
+    assert (ranks(np.full_like(v, np.nan), speeds, None) == 1).all()
     ends = Spread(v * 0.9, v * 1.1, np.zeros((0, 1, n)))
-    got = [int(ranks(v * f, speeds, ends)[0, 0]) for f in (0.9, 0.900001, 1.0, 1.1, 1.100001)]
+    got = [int(ranks(v * f, speeds, ends)[0, 0]) for f in (0.899999, 0.9, 1.0, 1.099999, 1.1)]
     assert got == [0, 1, 1, 1, 2]
     assert area_verdict(WITHIN, EXCEEDED, None) is WITHIN
     assert area_verdict(WITHIN, EXCEEDED, ends) is area_verdict(EXCEEDED, UNDECIDED, ends) is UNDECIDED
@@ -217,14 +270,14 @@ def test_areas_on_and_beside_the_speed_that_each_allows():
     for force, allowed in ((1e9, limit), (50.0, pressed), (np.nan, limit)):
         np.testing.assert_allclose([found.limit for found in areas(limit, force)], allowed, rtol=1e-12)
     (allowed,) = {found.limit for found in areas(1.0, 50.0)}
-    for v, verdict in ((allowed, WITHIN), (np.nextafter(allowed, 9), EXCEEDED)):
+    for v, verdict in ((allowed - 2e-9, WITHIN), (allowed, EXCEEDED)):
         told = {(found.value, found.unit, found.verdict, found.reason) for found in areas(v, 50.0)}
         assert told == {(v, "m/s", verdict, "")}
-    for v, verdict, reason in ((limit, UNDECIDED, "a mesh"), (np.nextafter(limit, 9), EXCEEDED, "")):
+    for v, verdict, reason in ((limit - 2e-9, UNDECIDED, "a mesh"), (limit, EXCEEDED, "")):
         assert {(f.verdict, f.reason) for f in areas(v, np.nan, "a mesh")} == {(verdict, reason)}
     ends = Spread(speeds.permissible, speeds.permissible, np.zeros((0, 1, n)))
     for unknown, reason in (("", "decided as its region is"), ("a mesh", "a mesh")):
-        found = areas(limit, 1e9, unknown, ends, UNDECIDED)
+        found = areas(limit - 2e-9, 1e9, unknown, ends, UNDECIDED)
         assert {(f.verdict, f.reason) for f in found} == {(UNDECIDED, reason)}
 
 

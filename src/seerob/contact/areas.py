@@ -9,6 +9,7 @@ from seerob.contact.limits import Judged, RegionArrays
 from seerob.contact.tolerances import area_verdict
 from seerob.snapshot import Result, Verdict
 from seerob.transforms import Array
+from seerob.verdict import keeps
 
 NOT_MODELLED = (
     "larynx, eyes, ears and feet have no row in the table",
@@ -55,7 +56,7 @@ def area_results(
     for area, v_P in zip(region.areas, pressed.tolist(), strict=True):
         open_ = math.isnan(v_P)
         limit = others if open_ else min(others, v_P)
-        verdict = Verdict.EXCEEDED if v > limit else Verdict.UNDECIDED if open_ else Verdict.WITHIN
+        verdict = Verdict.EXCEEDED if not keeps(v, limit) else Verdict.UNDECIDED if open_ else Verdict.WITHIN
         verdict = area_verdict(verdict, whole, judged.ends)
         reason = "" if verdict is not Verdict.UNDECIDED else unknown or "decided as its region is"
         found.append(Result(name=area.name, value=v, unit="m/s", limit=limit, verdict=verdict, reason=reason))

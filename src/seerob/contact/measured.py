@@ -38,6 +38,7 @@ from seerob.tables.grid import read_numbers
 from seerob.tables.text import TextGrid, check_file, encoding_of, head
 from seerob.toml_file import read_toml
 from seerob.transforms import Array
+from seerob.verdict import keeps
 
 Flags = NDArray[np.bool_]
 
@@ -158,7 +159,7 @@ def judged(value: float, limit: float, *, doubts: Sequence[str], above: Sequence
         doubts: Why it may be more than that.
         above: Why it may be less.
     """
-    if value > limit:
+    if not keeps(value, limit):
         open_ = tuple(above)
         return (Verdict.UNDECIDED, "; ".join(open_)) if open_ else (Verdict.EXCEEDED, "")
     return (Verdict.UNDECIDED, "; ".join(doubts)) if doubts else (Verdict.WITHIN, "")

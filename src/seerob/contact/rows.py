@@ -22,6 +22,7 @@ from seerob.human.skeleton import SIDES
 from seerob.norms.body_limits import BodyArea, BodyLimits, BodyRegion
 from seerob.snapshot import Aspect, Result, Row, RowState, Verdict
 from seerob.transforms import Array
+from seerob.verdict import keeps
 
 
 class _Place(NamedTuple):
@@ -127,7 +128,9 @@ class ContactRows:
             v_P = pressed[i]
             open_ = math.isnan(v_P)
             limit = others if open_ else min(others, v_P)
-            verdict = Verdict.EXCEEDED if value > limit else Verdict.UNDECIDED if open_ else Verdict.WITHIN
+            verdict = Verdict.UNDECIDED if open_ else Verdict.WITHIN
+            if not keeps(value, limit):
+                verdict = Verdict.EXCEEDED
             verdict = area_verdict(verdict, part.verdict, judged.ends)
             if verdict is Verdict.UNDECIDED and not open_:
                 reason = part.reason

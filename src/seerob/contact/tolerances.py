@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.answers import keep_many
 from seerob.contact.impact_mass import masses_along_motion
 from seerob.contact.limits import RegionArrays, Speeds
 from seerob.model import Mechanism, Model
@@ -129,7 +130,9 @@ class ContactEnds:
 def ranks(v: Array, speeds: Speeds, ends: Spread | None) -> NDArray[np.int64]:
     """2 exceeded, 1 open, 0 within, of relative speeds [m/s] (b, r)."""
     low, high = (speeds.permissible,) * 2 if ends is None else (ends.low, ends.high)
-    return np.where(v > high, 2, np.where(np.isnan(speeds.pressure) | (v > low), 1, 0))
+    open_ = np.isnan(speeds.pressure) | ~keep_many(v, low)
+    beyond = ~(keep_many(v, high) | np.isnan(v) | np.isnan(high))
+    return np.where(beyond, 2, np.where(open_, 1, 0))
 
 
 def area_verdict(verdict: Verdict, region: Verdict | None, ends: Spread | None) -> Verdict:

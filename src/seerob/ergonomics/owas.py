@@ -123,7 +123,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         if missing and judge(low, self.limit) is not Verdict.EXCEEDED:
             verdict = Verdict.UNDECIDED
         drivers = self._drivers(measured, span)
-        value = float(span.high) if span.known else None
+        value = int(span.high) if span.known else None
         reasons = []
         if missing:
             said = whatever_is_missing("category", low, high)
@@ -140,7 +140,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
             limit=self.limit,
             verdict=verdict,
             reason="; ".join(reasons),
-            interval=None if spread is None and not missing else (float(low), float(high)),
+            interval=None if spread is None and not missing else (low, high),
             parts=tuple(
                 _part(key, measured[key], None if spread is None else spread[key]) for key in measured
             ),

@@ -18,6 +18,7 @@ from seerob.safety.power_and_force import PowerAndForce
 from seerob.safety.separation import Separation
 from seerob.safety.velocity import Velocity
 from seerob.state import State
+from seerob.verdict import admitted
 
 
 def ceilings_of(criterion: Criterion, model: Model, robot: str, *, anywhere: bool = False) -> Ask | None:
@@ -97,7 +98,7 @@ def _power(criterion: Criterion, model: Model, robot: str, limit: float, power: 
         if result.interval is not None:
             # What may be off counts in full, as in the criterion's own verdict.
             value = result.interval[1]
-        share = math.inf if value <= 0 else (limit / value) ** (1 / power)
+        share = math.inf if value <= 0 else (max(0.0, admitted(limit)) / value) ** (1 / power)
         speed = limit if power == 1 else math.nan
         governs = "speed" if power == 1 else "kinetic energy"
         return (Ceiling(criterion.name, share, speed, surface=result.reason, governs=governs, limit=figure),)

@@ -130,7 +130,7 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
     def _joined(self, scores: Scores, side: int) -> tuple[float, float]:
         own = [ends for (name, at), ends in scores.items() if at == side or not sided(name)]
         join = max if self.combination() == "max" else sum
-        return float(join([e[0] for e in own] or [0.0])), float(join([e[1] for e in own] or [0.0]))
+        return _points(join([e[0] for e in own] or [0.0])), _points(join([e[1] for e in own] or [0.0]))
 
     def _bones(self, name: str, side: int) -> tuple[str, ...]:
         needed = [bone for part in DERIVED.get(name, (name,)) for bone in NEEDS[part]]
@@ -246,3 +246,8 @@ def _stated(row: ZoneRow) -> Input:
         origin={"": Origin.GIVEN, "M": Origin.ESTIMATED}.get(row.confidence, Origin.STATED),
         source=" ".join(filter(None, (row.label, f"[{row.confidence}]" if row.confidence else ""))),
     )
+
+
+def _points(score: float) -> float:
+    """A score that is whole as such, so that it keeps the limit that it is on; see `seerob.verdict.keeps`."""
+    return int(score) if float(score).is_integer() else score

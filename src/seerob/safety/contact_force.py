@@ -18,6 +18,7 @@ from seerob.norms.body_limits import BodyLimits, BodyRegion
 from seerob.norms.limit_inputs import table_input
 from seerob.snapshot import Basis, Highlight, Input, Origin, Result, Verdict
 from seerob.state import State
+from seerob.verdict import keeps
 
 ESTIMATE = "an estimate of the physics, with soft contacts and controllers for muscles: measure it"
 
@@ -55,7 +56,7 @@ def pressed(name: str, force: float, area: float | None, regions: tuple[BodyRegi
 
 def _against(name: str, value: float, unit: str, limit: float) -> Result:
     known = math.isfinite(limit)
-    over = value > limit
+    over = not keeps(value, limit)
     return Result(
         name=name,
         value=value,

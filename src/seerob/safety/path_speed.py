@@ -21,6 +21,7 @@ from seerob.state import State
 from seerob.trajectories.path_map import MAX_SIZE, PathMap, read_map
 from seerob.trajectories.path_markers import Place, path_markers
 from seerob.transforms import Array
+from seerob.verdict import keeps
 
 SAME = 1e-3
 """Places of the path that are nearer than the nearest and this are passed at once [rad or m]."""
@@ -117,7 +118,7 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
                     None, Verdict.EXCEEDED, f"moves where no speed is permitted: {why}", drawn
                 )
             share = speed / limit
-            return self._result(share, Verdict.WITHIN if share <= 1 else Verdict.EXCEEDED, why, drawn)
+            return self._result(share, Verdict.WITHIN if keeps(share, 1.0) else Verdict.EXCEEDED, why, drawn)
 
         return evaluate
 

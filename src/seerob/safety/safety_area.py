@@ -20,6 +20,7 @@ from seerob.snapshot import Basis, Highlight, Marker, Result, Segment, Verdict
 from seerob.spans import Falls, Points, approaching
 from seerob.state import State
 from seerob.transforms import Array
+from seerob.verdict import ROUNDING, keeps
 from seerob.whereabouts.partly_seen import seen_first
 from seerob.whereabouts.tracking_error import TrackingError
 
@@ -87,7 +88,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
                 room = found.distance - may
                 i = int(room.argmin())
                 perhaps = min(perhaps, (float(room[i]), _where(model, each, i, several), float(may[i])))
-                entered += [(each, found, i) for i in np.flatnonzero(found.distance <= 0).tolist()]
+                entered += [(each, found, i) for i in np.flatnonzero(found.distance <= ROUNDING).tolist()]
             pairs = [(int(found.body_a[i]), each.gap.b[i]) for each, found, i in entered]
             deeps = depths.ask(*state.placed(concerned, strayed=True), pairs) if pairs else []
             for (each, found, i), deep in zip(entered, deeps, strict=True):
@@ -125,7 +126,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
         else:
             # The real surface may stick out of the shape, a bone be elsewhere: nearly inside is not outside.
             least, close, deviation = perhaps
-            doubtful = least <= 0
+            doubtful = not keeps(least, 0.0, at_most=False)
             verdict = Verdict.UNDECIDED if doubtful else Verdict.WITHIN
             reason = (
                 f"{close} is within {deviation * 1e3:.1f} mm, what its shape and its place may be off by"

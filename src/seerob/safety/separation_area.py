@@ -25,6 +25,7 @@ from seerob.snapshot import Basis, Highlight, Hull, Marker, Result, Segment, Ver
 from seerob.spans import Fall, Falls, Points, Span, rows_of
 from seerob.state import State
 from seerob.transforms import Array
+from seerob.verdict import ROUNDING, keeps
 from seerob.volumes.offset_shell import offset_shell
 from seerob.whereabouts.partly_seen import seen_first
 from seerob.whereabouts.tracking_error import TrackingError
@@ -111,10 +112,12 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
             surely = float((least - may).min())
             k, perhaps = int(least.argmin()), int((least - may).argmin())
             doubt = self._doubt(model, outside[perhaps], float(least[perhaps]), float(may[perhaps]), unknown)
-            verdict = Verdict.EXCEEDED if least[k] <= 0 else Verdict.UNDECIDED if doubt else Verdict.WITHIN
+            verdict = (
+                Verdict.EXCEEDED if least[k] <= ROUNDING else Verdict.UNDECIDED if doubt else Verdict.WITHIN
+            )
             parts: list[Result] = []
             lit: list[Marker] = []
-            for j in np.flatnonzero(least <= 0).tolist():
+            for j in np.flatnonzero(least <= ROUNDING).tolist():
                 i, body = int(nearest[j]), model.bodies[outside[j]].name
                 e = i * len(outside) + j
                 parts.append(
@@ -158,7 +161,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         """Why somebody who is outside may be inside all the same."""
         if unknown:
             return f"{unknown}; the area is at least what is drawn"
-        if room - deviation <= 0:
+        if not keeps(room - deviation, 0.0, at_most=False):
             name = model.bodies[body].name
             return f"{name} is within {deviation * 1e3:.1f} mm, what shapes and places may be off by"
         return ""

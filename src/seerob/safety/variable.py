@@ -79,9 +79,9 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
 
     def _compared(self, value: Value) -> Result:
         """Of a bool itself, 0 or 1; of a text or a choice whether it is what is expected."""
-        figure, limit = float(value == self.expected), 1.0
+        figure, limit = int(value == self.expected), 1.0  # exact
         if isinstance(self.expected, bool):
-            figure, limit = float(bool(value)), float(self.expected)
+            figure, limit = int(bool(value)), float(self.expected)
         return Result(
             name=self.name,
             value=figure,

@@ -94,7 +94,7 @@ def judged(
     low, high = int(reach.low.max()), int(reach.high.max())
     verdict = _verdict((low, high), limit, complete=not missing)
     known = int(measured.low.max()) == int(measured.high.max())
-    value = float(measured.high.max()) if known else None
+    value = int(measured.high.max()) if known else None
     # By what is known at least: what is not assessed drives nothing. Sides that are as bad both count.
     worst = np.flatnonzero(measured.low == measured.low.max()).tolist()
     known_least = {key: span.low for key, span in sides.items()}
@@ -106,7 +106,7 @@ def judged(
         for key in keys
         for bone in BONES_OF.get(key, ())
     ]
-    shown = None if spread is None and not missing else (float(low), float(high))
+    shown = None if spread is None and not missing else (low, high)
     return Result(
         name=name,
         value=value,

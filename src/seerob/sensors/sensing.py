@@ -19,6 +19,7 @@ from seerob.snapshot import Highlight, Input, Label, Marker, Origin, Result, Ver
 from seerob.spans import Falls, approaching
 from seerob.state import State
 from seerob.transforms import Array
+from seerob.verdict import keeps
 from seerob.whereabouts.partly_seen import seen_first
 from seerob.whereabouts.tracking_error import TrackingError
 
@@ -169,7 +170,7 @@ class Presence:
         )
         if sights:
             verdict, reason = Verdict.EXCEEDED, self._told(sights)
-        elif found.distance[perhaps] - may[perhaps] <= 0:
+        elif not keeps(found.distance[perhaps] - may[perhaps], 0.0, at_most=False):
             verdict = Verdict.UNDECIDED
             mm = f"{may[perhaps] * 1e3:.1f} mm"
             reason = f"{self._name(perhaps)} is within {mm}, what its shape and its place may be off by"

@@ -261,3 +261,18 @@ def test_a_row_of_a_region_that_is_kept_from_contact_says_so(off: Station) -> No
     assert (rows["Face"].state, rows["Face"].verdict) == (RowState.EXCLUDED, None)
     assert rows["Face"].reason == "kept from contact by the workstation file"
     assert np.isfinite(rows["Chest"].limit)
+
+
+def test_who_is_named_is_not_alone(tmp_path):
+    """The arm is in another person than the one who is named, nine metres away."""
+    text = FLOATING + TWO_R + person(9).replace("op", "far") + person(1.5).replace("op", "near")
+    contact = '[[safety]]\nkind = "power_and_force"\nname = "contact"\nrobot = "arm"\nhuman = "far"\n'
+    distance = '[[safety]]\nkind = "minimum_distance"\nname = "distance"\nbetween = ["arm", "far"]\n'
+    cell = made(tmp_path, text + contact + distance, {"arm.urdf": two_r()})
+    found = results_at(cell, arm=((0.0, 0.0), (1.0, 0.0)))["contact"]
+    assert found.verdict is Verdict.EXCEEDED
+    assert found.reason.endswith("; near")
+    assert {bone.split("/")[0] for row in found.rows for bone in row.bones} == {"near"}
+    told = made(tmp_path / "told", text + distance, {"arm.urdf": two_r()}).model.findings
+    (finding,) = [f for f in told if f.subject == "near" and "not evaluated" in f.text]
+    assert "ask about far, and none about near" in finding.text

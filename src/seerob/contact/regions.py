@@ -44,7 +44,7 @@ def without_limit(name: str, permitted: bool, within: str | None, file: str) -> 
 
 
 class Person:
-    """The bones of a person by body region, bound once.
+    """The bones of one or several people by body region, bound once.
 
     A bone counts for its region in front and for that behind: a person can turn. Head and neck count
     for larynx, eyes and ears too. A bone that is off from where devices see it counts from as much farther.
@@ -54,8 +54,7 @@ class Person:
         self,
         model: Model,
         robot: Mechanism,
-        human: str,
-        *,
+        *people: str,
         horizon: float,
         without: tuple[int, ...] = (),
     ) -> None:
@@ -64,14 +63,16 @@ class Person:
         Args:
             model: The compiled workstation.
             robot: A robot with moving bodies that have shapes.
-            human: A human's name.
+            people: Names of humans.
             horizon: Distance within which a part could hit a bone [m].
             without: Bones that are left out, by index.
 
         Raises:
             UnknownName: No such human.
         """
-        self.bodies = tuple(i for i in model.human(human).bodies if i not in without)
+        every = (i for name in people for i in model.human(name).bodies)
+        self.bodies = tuple(i for i in every if i not in without)
+        self.several = len(people) > 1
         self._gap = model.gap(robot.moving, self.bodies)
         self._asked = (*robot.moving, *self.bodies)
         # Not the gap's own query: that measures pairs however far they are.
@@ -95,6 +96,10 @@ class Person:
         return tuple(
             self._names[i] for i in np.flatnonzero(self._close & self._member[:, REGIONS.index(region)])
         )
+
+    def owners(self, region: str) -> tuple[str, ...]:
+        """Whose bones these are."""
+        return tuple(dict.fromkeys(bone.rpartition("/")[0] for bone in self.hit(region)))
 
     def touched(self, state: State) -> NDArray[np.bool_]:
         """Which moving bodies touch which regions, or may since surfaces stick out, shape (b, len(REGIONS)).

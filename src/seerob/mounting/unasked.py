@@ -1,4 +1,4 @@
-"""What moves in a workstation with people, and no criterion asks about."""
+"""Whom and what in a workstation with people no criterion asks about."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from seerob.snapshot import Finding
 
 
 def unasked(model: Model) -> Iterator[Finding]:
-    """Robots and machines that move and are judged by nobody.
+    """Robots and machines that move and are judged by nobody, and people whom nobody asks about.
 
     One that carries a robot which somebody asks about holds that robot: nothing said of an arm is within
     while what moves it is not looked at.
@@ -25,6 +25,7 @@ def unasked(model: Model) -> Iterator[Finding]:
         with suppress(SeerobError):
             judged |= criterion.judged(model)
     named = {name for criterion in station.safety for name in criterion.subjects()}
+    yield from _people(model)
     for mechanism in model.mechanisms.values():
         own = {i for i in mechanism.moving if model.bodies[i].carrier == mechanism.name}
         if not own or not own.isdisjoint(judged) or not _moves(model, mechanism):
@@ -43,6 +44,22 @@ def unasked(model: Model) -> Iterator[Finding]:
             what += f" and carries {', '.join(carried)}"
         text = f"{what}, and no criterion asks about it: {remedy}"
         yield Finding(level="warning", subject=mechanism.name, text=text, holds=carried)
+
+
+def _people(model: Model) -> Iterator[Finding]:
+    """People whom no criterion of safety asks about, while it asks about others."""
+    asked: set[str] = set()
+    for criterion in model.workstation.safety:
+        with suppress(SeerobError):
+            asked |= {*criterion.subjects(), *criterion.depends(model)}
+    humans = {human.name for human in model.workstation.humans}
+    for name in [human.name for human in model.workstation.humans] if humans & asked else []:
+        if name not in asked:
+            others = ", ".join(sorted(humans & asked))
+            text = (
+                f"not evaluated: criteria ask about {others}, and none about {name}: name {name} in one, too"
+            )
+            yield Finding(level="warning", subject=name, text=text)
 
 
 def _moves(model: Model, mechanism: Mechanism) -> bool:

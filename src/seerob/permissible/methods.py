@@ -115,21 +115,16 @@ def require(by: By, criteria: Sequence[Criterion], model: Model, robot: str) -> 
         if wanted and not found
     ]
     if by is By.EITHER and ssm and pfl:
-        anyone = any(c.human is None for c in pfl)
-        asked = {
-            "separation": {name for c in ssm for name in c.between},
-            "power_and_force": set(model.mechanisms) if anyone else {c.human for c in pfl},
-        }
+        asked = {name for c in ssm for name in c.between}
         problems += [
             Problem(
                 "permissible speed",
                 "by",
-                f"either: {kind} does not ask about {human.name}, the other method would not protect them",
-                f"add a criterion of kind {kind} for {human.name}",
+                f"either: separation does not ask about {human.name}, contact alone would not protect them",
+                f"add a criterion of kind separation for {human.name}",
             )
             for human in model.workstation.humans
-            for kind, names in asked.items()
-            if human.name not in names
+            if human.name not in asked
         ]
     if problems:
         raise InputError(problems)

@@ -3,6 +3,7 @@ r"""Power and force limiting: permissible speed of contact, ISO/TS 15066:2016 5.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -67,8 +68,8 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     robot: str
     """A robot or a machine, with its tools and workpieces."""
     human: str | None = None
-    """A person: regions within ``horizon`` of a part can be hit by it. Without one, anyone could stand
-    anywhere."""
+    """A person: regions within ``horizon`` of a part can be hit by it, and those of everybody else in the
+    workstation. Without one, anyone could stand anywhere."""
     horizon: _Positive = 0.5
     """Distance within which a part of the robot could hit a body part [m]."""
     person_speed: Annotated[float, Meta(ge=0, extra={"unit": "m/s"})] | None = None
@@ -130,15 +131,13 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
 
     def depends(self, model: Model) -> tuple[str, ...]:
         """Everybody who can be hit, or who carries a surface that clamps."""
-        people = [name for name, m in model.mechanisms.items() if m.role == "human"]
-        spared = [] if self.human is None else [name for name in people if name != self.human]
-        return tuple(name for name in model.mechanisms if name not in spared)
+        return tuple(model.mechanisms)
 
     def bind(self, model: Model) -> Evaluate:
         """See `Criterion.bind`."""
         contacts = Contacts(self, model)
         bones = () if contacts.people is None else contacts.people.bodies
-        return seen_first(bones, contacts.evaluate, contacts.without)
+        return contacts.whoever_is_known(seen_first(bones, contacts.evaluate, contacts.without))
 
     def table(self, model: Model) -> body_limits.BodyLimits:
         """The limits that apply."""
@@ -191,7 +190,8 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""
         robot, limits = model.mover(self.robot), self.table(model)
-        names = (self.robot,) if self.human is None else (self.robot, self.human)
+        people = [] if self.human is None else [human.name for human in model.workstation.humans]
+        names = (self.robot, *people)
         table, doubts = table_input(limits, model.workstation.edition)
         return Basis(
             formula="v = min(F/√(μk), pA/√(μk), √(2E/μ)), μ = 1/(1/m_H + 1/m_R), "
@@ -342,18 +342,17 @@ class Contacts:
         )
         if spec.human is not None:
             model.human(spec.human)
-        self.people = (
-            None
-            if spec.human is None or not self.moving
-            else Person(model, self.robot, spec.human, horizon=spec.horizon)
+        self.humans = [human.name for human in model.workstation.humans]
+        # Who is named is not alone, and where anyone can be, everybody of the twin is somebody.
+        everybody = (
+            Person(model, self.robot, *self.humans, horizon=spec.horizon)
+            if self.humans and self.moving
+            else None
         )
-        # Where anyone can be, everybody of the twin is somebody.
-        self.everybody = tuple(
-            Person(model, self.robot, name, horizon=spec.horizon)
-            for name, one in model.mechanisms.items()
-            if spec.human is None and spec.excluded and self.moving and one.role == "human"
-        )
-        hand = {human.name: human.hand for human in model.workstation.humans}.get(spec.human or "")
+        self.people = None if spec.human is None else everybody
+        self.everybody = everybody if spec.human is None and spec.excluded else None
+        hands = {human.hand for human in model.workstation.humans}
+        hand = hands.pop() if spec.human is not None and len(hands) == 1 else None
         self.rows = ContactRows(self, hand=hand)
         self.measured = spec.measured(model)
         self.reach = (
@@ -366,12 +365,29 @@ class Contacts:
         )  # fmt: skip
 
     def without(self, lost: tuple[int, ...]) -> Evaluate | None:
-        """The same about the other bones of the person; None when there are none."""
-        spec, human = self.spec, self.spec.human or ""
-        if set(self.model.human(human).bodies) <= set(lost):
-            return None
-        rest = Person(self.model, self.robot, human, horizon=spec.horizon, without=lost)
-        return lambda state: self.evaluate(state, rest)
+        """The same about the other bones of these people; None when there are none."""
+        rest = Person(self.model, self.robot, *self.humans, horizon=self.spec.horizon, without=lost)
+        return (lambda state: self.evaluate(state, rest)) if rest.bodies else None
+
+    def whoever_is_known(self, judge: Evaluate) -> Evaluate:
+        """The same of several people: of whom nothing is known leaves nobody's contact within."""
+        if self.people is None or not self.people.several:
+            return judge
+        horizon = self.spec.horizon
+        alone = [Person(self.model, self.robot, name, horizon=horizon) for name in self.humans]
+
+        def evaluate(state: State) -> Result:
+            try:
+                return judge(state)
+            except Undecided:
+                for person in alone:
+                    with suppress(Undecided):
+                        result = self.evaluate(state, person)
+                        if result.verdict is Verdict.EXCEEDED:
+                            return result
+                raise
+
+        return evaluate
 
     def judge(self, state: State, people: Person | None = None) -> Judged:
         """Every part of the robot against every body region; of ``people`` instead of the whole person.
@@ -435,6 +451,8 @@ class Contacts:
         touched, doubt = self._touched(state, people, near) if spec.excluded else (None, "")
         for k in np.flatnonzero(near.any(axis=0)).tolist():
             part, row = self._region(k, judged)
+            if people is not None and people.several:
+                part = replace(part, reason=f"{part.reason}; {', '.join(people.owners(REGIONS[k]))}")
             if touched is not None and REGIONS[k] in spec.excluded and touched[:, k].any():
                 row = int(touched[:, k].argmax())
                 reason = f"{part.reason}, and {doubt or f'touched by {self.names[row]} here'}"
@@ -481,7 +499,8 @@ class Contacts:
         """Which moving body touches which region of a person, and why that is not known; then all are."""
         found = np.zeros_like(near)
         try:
-            for person in self.everybody if people is None else (people,):
+            person = self.everybody if people is None else people
+            if person is not None:
                 found |= person.touched(state)
         except Undecided as reason:
             return near, f"whether it is touched is open: {reason}"

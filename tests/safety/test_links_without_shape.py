@@ -79,7 +79,7 @@ def test_nothing_about_shapes_is_within(tmp_path):
     [
         (two_r(), ""),
         (BARE, COVER.format(0.5)),
-        (LAST.sub(r"\1", two_r(masses=(1.0, 0.05))), ""),
+        (LAST.sub(r"\1", two_r(masses=(1.0, 0.001))), ""),
         (BARE.replace('<link name="tip"/>', FIXED), ""),
     ],
     ids=["itself", "mounted", "as light as a frame", "fixed to it"],
@@ -106,7 +106,8 @@ def lump(mass=5.0, x=1.0, inertia=1e-3, shape=""):
         (lump(x=0.0), True),  # at the end of the last link's box
         (lump(x=-0.5, inertia=0.01), True),  # spread by 0.03 m in a box of half 0.05 m
         (lump(x=-0.5, inertia=5 * 0.6**2), False),  # and one that is too large for it
-        (lump(mass=0.04), True),
+        (lump(mass=0.04), False),
+        (lump(mass=0.001), True),
         (lump(x=0.0, shape=STUB.format(0.2)), True),
         (lump(x=0.25, shape=STUB.format(0.2)), False),
         (lump(x=0.0, shape=STUB.format(0.005)), True),
@@ -119,6 +120,7 @@ def lump(mass=5.0, x=1.0, inertia=1e-3, shape=""):
         "thin",
         "wide",
         "light",
+        "as light as a frame",
         "own",
         "beside its own",
         "stub on a box",
@@ -135,6 +137,7 @@ def test_what_is_fixed_to_a_shape_is_in_it_or_not_shown(tmp_path, urdf, shown):
 
 
 WITHOUT_BOTH = re.sub(r'(<link name="l1">).*?</collision>', r"\1", two_r())
+FIRST = re.compile(r'(<link name="l1">.*?)<collision>.*?</collision>')
 REFUSED = lump(x=0.0).replace('<mass value="5.0"/>', "")
 
 
@@ -144,6 +147,19 @@ def test_a_body_whose_mass_nobody_knows_either_is_not_shown(tmp_path, urdf):
     result = results_at(cell(tmp_path, urdf), arm=((0.0, 0.0), (1.0, 0.0)))["minimum_distance"]
     assert result.verdict == "undecided"
     assert "no shape shows" in result.reason
+
+
+@pytest.mark.parametrize(("first", "second", "shown"), [(5e-4, 1.0, False), (5e-4, 5e-4, True)])
+def test_what_carries_something_a_metre_ahead_is_no_frame(tmp_path, first, second, shown):
+    """Half a gram between two joints 1 m apart; it is a frame where nothing hangs on it."""
+    urdf = FIRST.sub(r"\1", two_r(masses=(first, second)))
+    station = cell(tmp_path, urdf)
+    result = results_at(station, arm=((0.0, 0.0), (1.0, 0.0)))["minimum_distance"]
+    assert (result.verdict, "no shape shows arm/l1" in result.reason) == (
+        ("within", False) if shown else ("undecided", True)
+    )
+    (told,) = [f for f in station.model.findings if f.subject == "arm/l1" and "but no shape" in f.text]
+    assert (told.level, "taken for a frame" in told.text) == ("assumed", True)
 
 
 @given(

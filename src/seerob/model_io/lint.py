@@ -38,7 +38,9 @@ DENSITIES = (10.0, 25_000.0)
 REPAIRABLE = 0.02
 """Violation of A + B >= C, relative to the largest moment, that rounding in a file explains."""
 LIGHT = 0.05
-"""Up to this a link without a shape is a frame or the like [kg]."""
+"""Up to this what nobody weighed, and is as small in the heaviest metal, is a marker [kg]."""
+FRAME = 1e-3
+"""Up to this a link without a shape is a frame to which a simulator's mass was given [kg]: it is told."""
 TIPS = (
     "tool0",
     "tcp",
@@ -247,12 +249,11 @@ def _findings(description: Description) -> Iterator[tuple[str, str, str]]:
             if text:
                 yield "warning", link.name, text
         yield from misplaced_mass(link)
-        if link.inertial is not None and not link.solids and link.inertial.mass > LIGHT:
-            yield (
-                "warning",
-                link.name,
-                f"has a mass of {link.inertial.mass:g} kg but no shape: no distance sees it",
-            )
+        if link.inertial is not None and not link.solids and link.inertial.mass > NOTHING:
+            frame = link.inertial.mass <= FRAME
+            text = f"has a mass of {link.inertial.mass:g} kg but no shape: no distance sees it"
+            text += f"; up to {1e3 * FRAME:g} g it is taken for a frame" if frame else ""
+            yield "assumed" if frame else "warning", link.name, text
     if joints and all(joint.armature is None for joint in joints):
         yield "assumed", "", ROTOR
     yield from rotors(joints)

@@ -10,10 +10,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from seerob.chains import beyond_flange, couple, unknown_masses, weighed
+from seerob.chains import ONE_PLACE, beyond_flange, couple, unknown_masses, weighed
 from seerob.model import Body, Frame, Mechanism
 from seerob.model_io.description import Description
-from seerob.model_io.lint import DENSITIES, LIGHT
+from seerob.model_io.lint import DENSITIES, FRAME
 from seerob.mounting.specification import Entry
 from seerob.snapshot import LinkMass, Origin
 from seerob.transforms import Array
@@ -189,6 +189,7 @@ def _unseen(mj: Any, masses: Iterable[LinkMass], bodies: Sequence[Body]) -> Iter
 
     The shapes of all that moves as one with a body count, and all its mass must go into them. A body whose
     mass nobody knows is shown by a shape of its own; by that of another only where its file says nothing.
+    What is as light as a frame is none where it reaches from one joint to another that moves more than that.
     """
     data = mujoco.MjData(mj)
     mujoco.mj_kinematics(mj, data)
@@ -200,7 +201,12 @@ def _unseen(mj: Any, masses: Iterable[LinkMass], bodies: Sequence[Body]) -> Iter
             near = [body.mj for body in bodies if mj.body_weldid[body.mj] == mj.body_weldid[i]]
             if i not in near and (row.note or not near):
                 yield row.name
-        elif i > 0 and (row.mass or 0.0) > LIGHT:
+        elif i > 0 and 0 < (row.mass or 0.0) <= FRAME:
+            if not any(mj.body_weldid[body.mj] == mj.body_weldid[i] for body in bodies) and _spans(
+                mj, data, i
+            ):
+                yield row.name
+        elif i > 0 and row.mass:
             groups.setdefault(int(mj.body_weldid[i]), []).append((i, row.name, float(mj.body_mass[i])))
     for weld, heavy in groups.items():
         shown = [body for body in bodies if int(mj.body_weldid[body.mj]) == weld and len(body.corners)]
@@ -215,6 +221,15 @@ def _unseen(mj: Any, masses: Iterable[LinkMass], bodies: Sequence[Body]) -> Iter
             centre, whole = (_out_of(mj, data, i, shown, spread=spread) for spread in (False, True))
             if centre > (SLIP if own else LUMP) or (not own and whole > SLIP):
                 yield name
+
+
+def _spans(mj: Any, data: Any, i: int) -> bool:
+    """Whether what moves as one with a body of MuJoCo joins joints in different places, and moves a mass."""
+    weld = int(mj.body_weldid[i])
+    onward = [k for k in range(mj.nbody) if mj.body_jntnum[k] and mj.body_weldid[mj.body_parentid[k]] == weld]
+    onward = [k for k in onward if mj.body_subtreemass[k] > FRAME]
+    places = [data.xanchor[mj.body_jntadr[k] + n] for k in (weld, *onward) for n in range(mj.body_jntnum[k])]
+    return bool(onward) and max(float(np.linalg.norm(x - places[0])) for x in places) > ONE_PLACE
 
 
 def _out_of(mj: Any, data: Any, i: int, shown: Sequence[Body], *, spread: bool) -> float:

@@ -111,6 +111,7 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
     t, q, v = [], [], []
     ways: list[Path] = []
     doubts: dict[str, list[str]] = {name: [] for name in engine.model.mechanisms}
+    noise: dict[str, list[Array | None]] = {name: [] for name in engine.model.mechanisms}
     for seq, samples in enumerate(feed):
         engine.take(samples)
         state = engine.tick() if seq else engine.start()
@@ -121,8 +122,16 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
             ways.append(state.path)
         for name, found in doubts.items():
             found.append(state.doubt(name))
+            noise[name].append(state.hearings[name].speed_error(state.t))
     reasons = {name: np.array(found, object) for name, found in doubts.items()}
-    return Motion(np.array(t), np.array(q), np.array(v), reasons, ways=tuple(ways), foreseen=True)
+    n = {name: len(mechanism.joints) for name, mechanism in engine.model.mechanisms.items()}
+    errors = {
+        name: np.array([np.zeros(n[name]) if one is None else one for one in every])
+        for name, every in noise.items()
+        if any(one is not None for one in every)
+    }
+    arrays = np.array(t), np.array(q), np.array(v)
+    return Motion(*arrays, reasons, ways=tuple(ways), foreseen=True, speed_errors=errors)
 
 
 def judged(
@@ -144,7 +153,7 @@ def judged(
     """
     n = len(motion.t)
     findings = tuple(dict.fromkeys((*model.findings, *findings)))
-    asked, notes = _able(model, bound, findings)
+    asked, notes = _able(model, bound, findings, noisy=bool(motion.speed_errors))
     parts = [motion.part(begin, end) for begin, end in pairwise([*range(0, n, STRETCH), n]) if begin < end]
     questions = Questions(model)
     found: dict[str, list[tuple[Answers, Reasons]]] = {name: [] for name in asked}
@@ -241,7 +250,7 @@ def _with(
 
 
 def _able(
-    model: Model, bound: Sequence[Bound], findings: Sequence[Finding]
+    model: Model, bound: Sequence[Bound], findings: Sequence[Finding], *, noisy: bool
 ) -> tuple[dict[str, _Able], dict[str, str]]:
     """Criteria that judge many instants at once; why others do not."""
     able: dict[str, _Able] = {}
@@ -256,6 +265,8 @@ def _able(
             notes[criterion.name] = "asked instant by instant: a finding holds what it is about"
         elif criterion.heavier_is_worse and any(m.unknown_masses for m in model.mechanisms.values()):
             notes[criterion.name] = "asked instant by instant: masses are not known"
+        elif noisy and criterion.by_speed:
+            notes[criterion.name] = "asked instant by instant: speeds are derived from noisy positions"
         elif criterion.variables():
             notes[criterion.name] = "asked instant by instant: it follows variables"
         else:
@@ -429,6 +440,8 @@ def _walked(
                 said = [motion.doubts[name][i].removeprefix(f"{name}: ") for i in range(since, k + 1)]
                 hearing.heard = list(zip(motion.t[since : k + 1].tolist(), said, strict=True))
                 hearing.torques = [None] * len(said)
+                errors = motion.speed_errors.get(name)
+                hearing.speed_errors = [None if errors is None else errors[i] for i in range(since, k + 1)]
             state.path = motion.ways[k - 1] if motion.ways and k and rows[-1] else None
             state.refresh(t)
             rows.append(judge(state))

@@ -44,6 +44,9 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Whether its limit bounds from above."""
     by_torque: ClassVar[bool] = False
     """Whether it rests on torques that a source measured."""
+    by_speed: ClassVar[bool] = False
+    """Whether its interval holds how far speeds may be off that were derived from noisy positions
+    (`State.speed_error`)."""
     by_shape: ClassVar[bool] = True
     """Whether it is about the shapes of its subjects, so that what no shape shows of a robot could make it
     worse; False only where no distance, area, volume or point of a surface is in it."""

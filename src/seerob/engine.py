@@ -227,7 +227,7 @@ class Engine:
             else:
                 taken, missed = self._take_pose(mechanism, sample)
                 reason = reason or missed
-            self._note(mechanism.name, sample.t, reason, torques_of(sample), taken=taken)
+            self._note(mechanism.name, sample.t, reason, sample, taken=taken)
             if isinstance(sample, JointSample) and not sample.placed:
                 self._hearings[mechanism.name].places.append((sample.t, NOWHERE))
 
@@ -281,7 +281,9 @@ class Engine:
         self._hearings[moved.machine].older = moved.age
         self._note(moved.machine, moved.t, moved.doubt, None, taken=taken)
 
-    def _note(self, name: str, t: float, reason: str, torques: Array | None, *, taken: bool) -> None:
+    def _note(
+        self, name: str, t: float, reason: str, sample: JointSample | PoseSample | None, *, taken: bool
+    ) -> None:
         """Note that a robot, a person or a machine was heard, and why that may not be relied on."""
         hearing = self._hearings[name]
         hearing.driven = self.controllers
@@ -293,7 +295,9 @@ class Engine:
                 until, said = self._leapt[name]
                 jump = said if t <= until else ""
             hearing.heard.append((t, reason or jump))
-            hearing.torques.append(torques)
+            hearing.torques.append(None if sample is None else torques_of(sample))
+            error = sample.qd_error if isinstance(sample, JointSample) else None
+            hearing.speed_errors.append(None if error is None else np.array(error))
             hearing.leaves_at = self._references[name].leaves_at if name in self._stands else 0.0
 
     def _following(self, name: str) -> Following:

@@ -75,6 +75,9 @@ class JointSample(SampleBase, frozen=True, kw_only=True, tag="joint"):
     """Joint positions in the target's joint order [rad or m]."""
     qd: tuple[float, ...] | None = None
     """Joint velocities [rad/s or m/s]."""
+    qd_error: tuple[float, ...] | None = None
+    """How far ``qd`` may be off where it was derived from noisy positions: three standard deviations
+    [rad/s or m/s]; None where it was measured, or where nobody knows."""
     tau: tuple[float, ...] | None = None
     """Measured joint torques [N·m or N]."""
     tcp: Vec3 | None = None

@@ -559,6 +559,15 @@ class State:
         self.require(mechanism.name)
         return np.asarray(self._data.qvel[self.columns[mechanism.name].own_v])
 
+    def speed_error(self, mechanism: Mechanism) -> Array | None:
+        """How far its joint velocities may be off, where they were derived from noisy positions.
+
+        Returns:
+            Three standard deviations [rad/s or m/s], shape (n,); None where nobody says that they were.
+        """
+        self.require(mechanism.name)
+        return self._hearings[mechanism.name].speed_error(self.t)
+
     def measured_torques(self, mechanism: Mechanism) -> Array:
         """Joint torques that its source measured, between samples as positions are [N·m or N], shape (n,).
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import mujoco
@@ -47,12 +47,16 @@ class Motion:
     ways: tuple[Path, ...] | None = None
     """From each instant to the next, N - 1 of them; None where the instants are no motion."""
 
+    speed_errors: Mapping[str, Array] = field(default_factory=dict)
+    """By name, see `seerob.state.State.speed_error`, shape (N, n)."""
+
     def part(self, begin: int, end: int) -> Motion:
         """Some instants that follow one another."""
         doubts = {name: found[begin:end] for name, found in self.doubts.items()}
         ways = None if self.ways is None else self.ways[begin : end - 1]
         part = self.t[begin:end], self.q[begin:end], self.v[begin:end]
-        return Motion(*part, doubts, self.foreseen, ways)
+        errors = {name: found[begin:end] for name, found in self.speed_errors.items()}
+        return Motion(*part, doubts, self.foreseen, ways, errors)
 
 
 class Questions:

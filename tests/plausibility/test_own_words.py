@@ -13,11 +13,10 @@ import pytest
 from oracles.pinocchio_oracle import pinocchio_model
 from seerob.engine import Engine
 from seerob.model_io import library
-from seerob.plausibility.of_motion import position_noise
 from seerob.plausibility.own_words import LiveWords, fixed_offset, rigid_error, sign_or_unit
 from seerob.protocols.fri import Edition, Monitoring, decode_monitoring, encode_monitoring
 from seerob.protocols.modbus_map import load as load_map
-from seerob.run import Judge, bind
+from seerob.run import Judge, bind, engine_of
 from seerob.samples import JointSample
 from seerob.snapshot import Finding, Verdict
 from seerob.sources.fri import joint_sample as fri_sample
@@ -25,6 +24,7 @@ from seerob.sources.modbus_robot import joint_sample as modbus_sample
 from seerob.sources.modbus_robot import standing
 from seerob.sources.rtde import joint_sample as rtde_sample
 from seerob.station import Station, load
+from seerob.trajectories.trajectory import position_noise
 from seerob.transforms import rotation_from_rpy
 
 DH = {
@@ -388,6 +388,41 @@ def test_a_standing_robot_that_seems_to_move_is_told(tmp_path: Path) -> None:
         ]
         assert len(texts) == (low is not None)
         assert all(low < float(re.findall(r"at up to (\d+) mm/s", text)[0]) < high for text in texts)
+
+
+def test_noise_of_derived_speeds_is_an_interval(tmp_path: Path) -> None:
+    """A standing robot that seems to move by noise neither keeps a small limit nor exceeds it."""
+    rng = np.random.default_rng(2)
+    t = 0.008 * np.arange(60)
+    q = np.tile(MOVING[0], (len(t), 1)) + rng.normal(0, 1e-4, (len(t), 6))
+    names = ["timestamp", *(f"actual_q_{i}" for i in range(6))]
+    limits = {0.001: Verdict.UNDECIDED, 0.02: Verdict.UNDECIDED, 0.5: Verdict.WITHIN}
+    more = "[engine]\nphysics = false\n"
+    for k, limit in enumerate(limits):
+        for name, rest in (("velocity", 'at = "arm"'), ("velocity", 'of = "arm"'), ("kinetic_energy", "")):
+            of = f"limit = {limit}" if rest else f'robot = "arm"\nlimit = {20 * limit**2}'
+            more += f'[[safety]]\nkind = "{name}"\nname = "{name}{rest[:2]}{k}"\n{rest}\n{of}\n'
+    log_of(tmp_path, MOVING, None)
+    station(tmp_path)
+    file = tmp_path / "workstation.toml"
+    file.write_text(file.read_text() + more)
+    np.savetxt(tmp_path / "log.csv", np.column_stack([t, q]), header=" ".join(names), comments="")
+    made = load(tmp_path)
+    log, batch = made.run(), made.batch()
+    for k, verdict in enumerate(limits.values()):
+        for name in ("velocityat", "velocityof", "kinetic_energy"):
+            assert log.results[f"{name}{k}"].verdict is verdict
+            assert batch[f"{name}{k}"].verdict is verdict
+    engine, judge = engine_of(made.model), Judge(bind(made.model))
+    engine.take(list(made.sources[0][1].samples)[:2])
+    (point,) = (r for r in judge(engine.start()) if r.name == "velocityat0")
+    assert point.interval is not None
+    arm = made.model.mechanisms["arm"]
+    J = engine.state.jacobian(arm.tip, arm)[:3]
+    # Of the first sample the difference is one-sided: (−3, 4, −1)/2.
+    sigma = 3 * 1e-4 * np.sqrt(26) / (2 * 0.008)
+    expected = np.sqrt((J**2).sum()) * sigma
+    assert point.interval[1] - (point.value or 0.0) == pytest.approx(expected, rel=0.3)
 
 
 def test_small_torques_tell_no_sign() -> None:

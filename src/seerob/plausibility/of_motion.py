@@ -11,38 +11,20 @@ from seerob.model_io.description import Description
 from seerob.plausibility.ranges import Quantity
 from seerob.snapshot import Finding
 from seerob.trajectories.checks import RESTS
-from seerob.trajectories.trajectory import Trajectory
-from seerob.transforms import Array
+from seerob.trajectories.trajectory import Trajectory, derived_noise
 from seerob.waypoints.arm import Arm
 
 TELLING = 0.005
 """Noise of the flange's speed that is told [m/s]: a fiftieth of the 250 mm/s of a reduced speed."""
-THREE = 3.0
-"""Standard deviations that are told: 99.7 % lie within."""
-UNEVEN = 0.05
-"""Share of the step that steps may differ by: what is sampled unevenly looks noisy where it is not."""
 POSTURES = 50
 """In which the levers are looked at, evenly."""
-
-
-def position_noise(q: Array) -> Array:
-    r"""Standard deviation of the noise of evenly sampled positions [rad or m], shape (n,).
-
-    Third differences :math:`q_{k+2} - 3 q_{k+1} + 3 q_k - q_{k-1}` of a smooth motion are nearly nothing, of
-    noise they are √20 σ; the median of their size is that of whatever the motion does most of the time.
-
-    Args:
-        q: [rad or m], shape (N, n), N >= 4.
-    """
-    return np.asarray(np.median(np.abs(np.diff(q, n=3, axis=0)), axis=0) * 1.4826 / np.sqrt(20))
 
 
 def noise_of_speeds(motion: Trajectory, description: Description, name: str) -> Finding | None:
     """How fast a robot seems to move that stands, when its speeds are derived from its positions."""
     valid = np.ones(len(motion.t), bool) if motion.invalid is None else ~motion.invalid
-    t, q = motion.t[valid], motion.q[valid]
-    step = np.diff(t)
-    if len(t) < POSTURES or np.ptp(step) > UNEVEN * float(np.median(step)):
+    q, error = motion.q[valid], derived_noise(motion.t[valid], motion.q[valid])
+    if error is None:
         return None
     try:
         arm = Arm(description)
@@ -50,14 +32,14 @@ def noise_of_speeds(motion: Trajectory, description: Description, name: str) -> 
         return None
     if arm.n != q.shape[1]:
         return None
-    sigma = position_noise(q) / (np.sqrt(2) * float(np.median(step)))
     levers = np.linalg.norm(arm.posture(q[:: max(1, len(q) // POSTURES)]).jacobian()[:, :3, :], axis=1)
-    speed = THREE * float(np.sqrt(((levers * sigma) ** 2).sum(axis=1)).max())
+    speed = float(np.sqrt(((levers * error) ** 2).sum(axis=1)).max())
     if speed < TELLING:
         return None
     text = (
         f"{motion.file}: speeds are derived from noisy positions: standing, its flange "
-        f"seems to move at up to {1e3 * speed:.0f} mm/s, and figures of speed are uncertain by so much"
+        f"seems to move at up to {1e3 * speed:.0f} mm/s, and figures of speed are uncertain by so much "
+        "(velocity and kinetic_energy are intervals; other criteria take the speeds as they are)"
     )
     return Finding(level="assumed", subject=name, text=text)
 

@@ -43,6 +43,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
 
     unit: ClassVar[str] = "J"
     heavier_is_worse: ClassVar[bool] = True
+    by_speed: ClassVar[bool] = True
     by_shape: ClassVar[bool] = False
 
     robot: str
@@ -80,6 +81,18 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
                 interval = float(ends.low), float(ends.high)
                 verdict = judge_interval(interval, self.limit)
                 reason = deciding(masses.tolerances, ends.widths) if verdict is Verdict.UNDECIDED else ""
+            error = state.speed_error(robot)
+            if error is not None:
+                # √(2E) is a norm of the velocities: it is off by no more than that of their errors.
+                off = float(np.sqrt(np.diagonal(state.mass_matrix(robot)) @ error**2))
+                low, high = (energy, energy) if interval is None else interval
+                interval = (
+                    0.5 * max(np.sqrt(2 * max(low, 0.0)) - off, 0.0) ** 2,
+                    0.5 * (np.sqrt(2 * max(high, 0.0)) + off) ** 2,
+                )
+                verdict = judge_interval(interval, self.limit)
+                if verdict is Verdict.UNDECIDED:
+                    reason = reason or "decided by the noise of positions that its speeds are derived from"
             _, position = state.pose(robot.tip)
             sphere = Sphere(
                 center=tuple(position.tolist()),

@@ -10,12 +10,12 @@ from msgspec import Meta
 
 from seerob import figures, provenance
 from seerob.answers import Answers
-from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge
+from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
 from seerob.errors import InputError
 from seerob.model import Model
 from seerob.moving_base import velocity_of
 from seerob.quantities import Metres3
-from seerob.snapshot import Arrow, Basis, Input, Result
+from seerob.snapshot import Arrow, Basis, Input, Result, Verdict
 from seerob.spans import Falls, Points, speeding
 from seerob.state import State
 from seerob.states import States
@@ -38,10 +38,29 @@ def point_velocity(J: Array, qd: Array) -> Array:
     return np.asarray((J @ qd[..., None])[..., 0])
 
 
+def speed_noise(J: Array, error: Array) -> Array:
+    r"""How far speeds of points may be off, :math:`\sqrt{\sum_j |J_j|^2 \delta_j^2}`.
+
+    Errors of joints are independent: each is that of its own encoder.
+
+    Args:
+        J: Linear rows, shape (..., 3, n) [m/rad or 1].
+        error: δ of each joint, shape (n,) [rad/s or m/s].
+
+    Returns:
+        [m/s], shape (...).
+    """
+    return np.asarray(np.sqrt(((J * error) ** 2).sum(axis=(-2, -1))))
+
+
+NOISE = "decided by the noise of positions that its speeds are derived from"
+
+
 class Velocity(Criterion, frozen=True, kw_only=True):
     """Speed of a point of a robot or person, or of the fastest point of a set of bodies."""
 
     unit: ClassVar[str] = "m/s"
+    by_speed: ClassVar[bool] = True
 
     at: str | None = None
     """Point: a robot (its tool's working point) or the full name of a link."""
@@ -83,7 +102,12 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         def evaluate(state: State) -> Result:
             v = velocity_of(state, frame, mechanism, offset)[:3]
             rotation, position = state.pose(frame)
-            return self._result(math.sqrt(float(v @ v)), position + rotation @ offset, v)
+            speed, interval = math.sqrt(float(v @ v)), None
+            error = state.speed_error(mechanism)
+            if error is not None:
+                off = float(speed_noise(state.jacobian(frame, mechanism, offset)[:3], error))
+                interval = max(speed - off, 0.0), speed + off
+            return self._result(speed, position + rotation @ offset, v, interval=interval)
 
         return evaluate
 
@@ -95,16 +119,48 @@ class Velocity(Criterion, frozen=True, kw_only=True):
 
     def _bind_set(self, model: Model) -> Evaluate:
         bodies = self._bodies(model)
+        movers = {i: model.bodies[i].carrier for i in bodies}
+
+        def noise(state: State, points: Array) -> Array:
+            """Of the fastest point of each body [m/s], shape (b,)."""
+            found = np.zeros(len(bodies))
+            for name in dict.fromkeys(movers.values()):
+                mechanism = model.mechanisms[name]
+                error = state.speed_error(mechanism)
+                if error is None:
+                    continue
+                rows = [k for k, i in enumerate(bodies) if movers[i] == name]
+                own = tuple(bodies[k] for k in rows)
+                axes = (np.tile(axis, (len(rows), 1)) for axis in np.eye(3))
+                J = np.stack([state.along(own, mechanism, points[rows], u) for u in axes], axis=-2)
+                found[rows] = speed_noise(J, error)
+            return found
 
         def evaluate(state: State) -> Result:
             speeds, points, velocities = state.fastest_points(bodies)
             k = int(speeds.argmax())
-            return self._result(float(speeds[k]), points[k], velocities[k], model.bodies[bodies[k]].name)
+            interval = None
+            off = noise(state, points)
+            if off.any():
+                low, high = np.maximum(speeds - off, 0.0), speeds + off
+                interval = float(low.max()), float(high.max())
+            where = model.bodies[bodies[k]].name
+            return self._result(float(speeds[k]), points[k], velocities[k], where, interval=interval)
 
         return evaluate
 
-    def _result(self, speed: float, point: Array, v: Array, where: str = "") -> Result:
-        verdict = judge(speed, self.limit)
+    def _result(
+        self,
+        speed: float,
+        point: Array,
+        v: Array,
+        where: str = "",
+        *,
+        interval: tuple[float, float] | None = None,
+    ) -> Result:
+        verdict = judge(speed, self.limit) if interval is None else judge_interval(interval, self.limit)
+        if interval is not None and verdict is Verdict.UNDECIDED:
+            where = f"{where}: {NOISE}".removeprefix(": ")
         arrow = Arrow(
             origin=tuple(point.tolist()),
             vector=tuple((DRAWN * v).tolist()),
@@ -118,6 +174,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
             limit=self.limit,
             verdict=verdict,
             reason=where,
+            interval=interval,
             markers=(arrow,),
         )
 

@@ -19,10 +19,12 @@ from seerob.trajectories.checks import (
     sampling_findings,
 )
 from seerob.trajectories.trajectory import (
+    QUIET,
     MotionOrigin,
     Trajectory,
     TrajectorySamples,
     derive_velocities,
+    derived_noise,
     origin_finding,
 )
 from seerob.transforms import Array
@@ -81,10 +83,16 @@ class TrajectoryFile(Source, frozen=True, kw_only=True):
         origin = origin_finding(self.origin, target.name, self.file)
         limits = limit_check(trajectory, target, beyond=self.beyond_limits)
         qd, about_velocities = self._velocities(trajectory, target)
+        error = None
+        if trajectory.qd is None or self.velocities is not Velocities.GIVEN:
+            valid = slice(None) if trajectory.invalid is None else ~trajectory.invalid
+            error = derived_noise(trajectory.t[valid], trajectory.q[valid])
+        if error is not None and not (error > QUIET).any():
+            error = None
         sampling = sampling_findings(trajectory, target.name, self.timeout)
         name = self.name or f"{type(self).__module__.rpartition('.')[2]} {target.name}"
         return Opened(
-            samples=TrajectorySamples(trajectory, name, target.name, qd),
+            samples=TrajectorySamples(trajectory, name, target.name, qd, error),
             duration=trajectory.duration,
             findings=(origin, *findings, *limits, *about_velocities, *sampling),
         )

@@ -51,6 +51,9 @@ class Hearing:
     some may lie ahead of the tick."""
     torques: list[Array | None] = field(default_factory=list)
     """Measured joint torques of the same samples [N·m or N], each (n,); None where there were none."""
+    speed_errors: list[Array | None] = field(default_factory=list)
+    """How far the speeds of the same samples may be off, derived from noisy positions [rad/s or m/s], each
+    (n,); None where nobody says so."""
     torque_doubt: str = ""
     """Why those torques may not be relied on; empty when they may."""
     error: float = 0.0
@@ -100,12 +103,14 @@ class Hearing:
         self.untold.append((found.t, found.untold))
         self.places.append((found.t, Places(found.unplaced, found.displaced, found.slack)))
         self.torques.append(None)
+        self.speed_errors.append(None)
 
     def forget(self, t: float) -> None:
         """Drop what is older than the last sample at or before ``t`` [s]."""
         while len(self.heard) > 1 and self.heard[1][0] <= t:
             del self.heard[0]
             del self.torques[:1]
+            del self.speed_errors[:1]
         for told in (self.parts, self.observed, self.bare, self.aims, self.untold, self.places):
             while len(told) > 1 and told[1][0] <= t:
                 del told[0]
@@ -133,6 +138,12 @@ class Hearing:
             speed = f"{self.leaves_at:.3g} rad/s or m/s"
             return f"what drives it ends in motion, with {speed} at {last:.3f} s: nobody says that it stopped"
         return next((reason for _, reason in self.heard[k - 1 : k + 1] if reason), "")
+
+    def speed_error(self, t: float) -> Array | None:
+        """How far joint velocities may be off at ``t`` [s], shape (n,): the worse of two samples."""
+        k = sum(1 for instant, _ in self.heard if instant <= t + SLACK)
+        around = [error for error in self.speed_errors[max(k - 1, 0) : k + 1] if error is not None]
+        return np.max(around, axis=0) if around else None
 
     def doubt_ahead(self, t: float, until: float) -> str:
         """Why what was heard does not tell what it does from ``t`` to ``until`` [s]; empty when it does."""

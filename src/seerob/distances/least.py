@@ -247,7 +247,11 @@ class Survey:
         columns = {k: slice(ends[i], ends[i + 1]) for i, k in enumerate(order)}
         self._columns = [columns[k] for k in range(len(order))]
         self._in_turn = np.concatenate([np.arange(len(self._caps))[part] for part in self._columns])
-        self._used = np.unique(self._pair)
+        self._bound = (
+            shapes.which, shapes.local, shapes.ball, shapes.corners, shapes.radius, shapes.nodes,
+            shapes.links, shapes.triangles, shapes.boxes, shapes.kids, shapes.probes,
+            np.unique(self._pair), self._pair, self._start, self._members,
+        )  # fmt: skip
         self._memory = self._forget()
 
     def ask(self, rotations: ArrayLike, positions: ArrayLike) -> list[Closests]:
@@ -296,9 +300,8 @@ class Survey:
         distance, points = np.empty(shape), np.empty((*shape, 6))
         winner, reach = np.empty(shape, np.int64), np.empty(shape, np.int8)
         bad, body = kernel.nearest(
-            R, x, s.which, s.local, s.ball, s.corners, s.radius, s.nodes, s.links, s.triangles, s.probes,
-            self._used, self._pair, self._start, self._members, self._caps if caps is None else caps,
-            self._whether, *memory, distance, points, winner, reach,
+            R, x, *self._bound, self._caps if caps is None else caps, self._whether, *memory,
+            distance, points, winner, reach,
         )  # fmt: skip
         if bad >= 0:
             self._memory = self._forget()

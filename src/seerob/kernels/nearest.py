@@ -23,9 +23,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.kernels.lanes import WIDTH
 from seerob.kernels.pairs import CLOSED, VOLUME, core_distance, inside, place, root_bound
+from seerob.kernels.wide import STACK
 from seerob.transforms import Array
 
+Boxes = NDArray[np.float32]
 Links = NDArray[np.int32]
 Indices = NDArray[np.int64]
 
@@ -46,6 +49,8 @@ def nearest(
     nodes: Array,
     links: Links,
     T: Array,
+    boxes: Boxes,
+    kids: Links,
     probes: Array,
     used: Indices,
     pair: Indices,
@@ -68,7 +73,7 @@ def nearest(
     Args:
         rotations: world_from_body, shape (N, n, 3, 3).
         positions: world_from_body [m], shape (N, n, 3).
-        which: See `seerob.kernels.pairs`, shape (ns, 11).
+        which: See `seerob.kernels.pairs`, shape (ns, 12).
         local: body_from_solid, nine of the rotation and three of the position, shape (ns, 12).
         ball: Bounding ball of each core in its own frame: centre and radius [m], shape (ns, 4).
         corners: Points whose hull contains the core, in its own frame, shape (ns, 8, 3).
@@ -76,6 +81,8 @@ def nearest(
         nodes: Trees of all meshes, one after the other.
         links: Likewise.
         T: Likewise.
+        boxes: See `seerob.kernels.wide`, of all meshes.
+        kids: Likewise, in numbers of all nodes and triangles.
         probes: A vertex of each connected piece of each core, shape (np, 3).
         used: Solids in any pair.
         pair: Solids of each pair, meshes first, shape (m, 2).
@@ -113,8 +120,10 @@ def nearest(
         if cap[g] > -np.inf:
             for e in range(start[g], start[g + 1]):
                 asked[members[e, 0]] = True
-    stack = np.empty((256, 2), np.int32)
-    bounds = np.empty(256)
+    stack = np.empty((STACK, 2), np.int32)
+    bounds = np.empty(STACK, np.float32)
+    given = np.empty(16, np.float32)
+    box_low = np.empty(WIDTH, np.float32)
     R = np.empty(9)
     t = np.empty(3)
     W = np.empty(12)
@@ -189,8 +198,9 @@ def nearest(
                     continue
                 reach = np.inf if within[p] else max(best + r + MARGIN, 0.0)
                 d2 = core_distance(
-                    i, j, reach * reach, which, nodes, links, T, world, at, first[p], stack, bounds, R, t, W
-                )
+                    i, j, reach * reach, which, nodes, links, T, boxes, kids, world, at, first[p], stack,
+                    bounds, given, box_low, R, t, W,
+                )  # fmt: skip
                 if not d2 < np.inf:
                     low[p] = max(low[p], best)
                     beyond[p] = g

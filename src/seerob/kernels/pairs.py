@@ -1,7 +1,8 @@
 """Two solids at given poses: where they are, whether one is inside the other, how near their cores are.
 
 Columns of ``which``, per solid: body, is a mesh, has an inside, is closed, first and last node, first
-and last triangle, first and last probe (a vertex of each connected piece), number of corners.
+and last triangle, first and last probe (a vertex of each connected piece), number of corners, first node of
+`seerob.kernels.wide`.
 """
 
 from __future__ import annotations
@@ -15,13 +16,18 @@ from numpy.typing import NDArray
 from seerob.kernels.boxes import box_box, segment_box
 from seerob.kernels.crossings import encloses
 from seerob.kernels.primitives import segment_segment
-from seerob.kernels.search import mesh_mesh, mesh_segment
+from seerob.kernels.search import first_crossing
+from seerob.kernels.wide import nearest_of_meshes, nearest_to_segment
 from seerob.transforms import Array
 
+Boxes = NDArray[np.float32]
 Links = NDArray[np.int32]
 Indices = NDArray[np.int64]
 
-BODY, MESH, VOLUME, CLOSED, NODE, NODE_END, TRIANGLE, TRIANGLE_END, PROBE, PROBE_END, CORNERS = range(11)
+BODY, MESH, VOLUME, CLOSED, NODE, NODE_END, TRIANGLE, TRIANGLE_END, PROBE, PROBE_END, CORNERS, WIDE = range(
+    12
+)
+COLUMNS = 12
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -147,16 +153,16 @@ def root_bound(
     """Lower bound of the distance of cores i (a mesh where one is) and j, from their root boxes [m]."""
     if not which[i, MESH]:
         return 0.0
-    A = nodes[which[i, NODE] : which[i, NODE_END]]
+    root = which[i, NODE]
     if which[j, MESH]:
         _relative(world, i, j, R, t)
-        return math.sqrt(box_box(A, 0, nodes[which[j, NODE] : which[j, NODE_END]], 0, R, t, np.inf))
+        return math.sqrt(box_box(nodes, root, nodes, which[j, NODE], R, t, np.inf))
     ax, ay, az = _into(world, i, at[j, 0, 0], at[j, 0, 1], at[j, 0, 2])
     bx, by, bz = _into(world, i, at[j, 1, 0], at[j, 1, 1], at[j, 1, 2])
     bx -= ax
     by -= ay
     bz -= az
-    return math.sqrt(segment_box(A, 0, ax, ay, az, bx, by, bz, bx * bx + by * by + bz * bz, np.inf))
+    return math.sqrt(segment_box(nodes, root, ax, ay, az, bx, by, bz, bx * bx + by * by + bz * bz, np.inf))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -168,11 +174,15 @@ def core_distance(
     nodes: Array,
     links: Links,
     T: Array,
+    boxes: Boxes,
+    kids: Links,
     world: Array,
     at: Array,
     first: Indices,
     stack: Links,
-    bounds: Array,
+    bounds: Boxes,
+    given: Boxes,
+    low: Boxes,
     R: Array,
     t: Array,
     W: Array,
@@ -189,26 +199,36 @@ def core_distance(
         W[0], W[1], W[2] = a[0, 0] + u * dx, a[0, 1] + u * dy, a[0, 2] + u * dz
         W[3], W[4], W[5] = b[0, 0] + v * ex, b[0, 1] + v * ey, b[0, 2] + v * ez
         return d2
-    A = nodes[which[i, NODE] : which[i, NODE_END]]
-    LA = links[which[i, NODE] : which[i, NODE_END]]
-    TA = T[which[i, TRIANGLE] : which[i, TRIANGLE_END]]
     if which[j, MESH]:
-        B = nodes[which[j, NODE] : which[j, NODE_END]]
-        LB = links[which[j, NODE] : which[j, NODE_END]]
-        TB = T[which[j, TRIANGLE] : which[j, TRIANGLE_END]]
         _relative(world, i, j, R, t)
-        d2, ka, kb = mesh_mesh(A, LA, TA, B, LB, TB, R, t, limit, first[0], first[1], stack, bounds, W)
+        wa, wb = which[i, WIDE], which[j, WIDE]
+        d2, ka, kb = nearest_of_meshes(
+            boxes, kids, T, wa, wb, R, t, limit, first[0], first[1], stack, bounds, given, low, W
+        )
         if d2 == 0.0:
-            d2, ka, kb = mesh_mesh(A, LA, TA, B, LB, TB, R, t, np.inf, -1, -1, stack, bounds, W)
+            a = which[i, TRIANGLE]
+            b = which[j, TRIANGLE]
+            ka, kb = first_crossing(
+                nodes[which[i, NODE] : which[i, NODE_END]],
+                links[which[i, NODE] : which[i, NODE_END]],
+                T[a : which[i, TRIANGLE_END]],
+                nodes[which[j, NODE] : which[j, NODE_END]],
+                links[which[j, NODE] : which[j, NODE_END]],
+                T[b : which[j, TRIANGLE_END]],
+                R, t, stack, W,
+            )  # fmt: skip
+            ka += a
+            kb += b
         if ka >= 0:
             first[0] = ka
             first[1] = kb
     else:
         ax, ay, az = _into(world, i, at[j, 0, 0], at[j, 0, 1], at[j, 0, 2])
         bx, by, bz = _into(world, i, at[j, 1, 0], at[j, 1, 1], at[j, 1, 2])
-        d2, ka = mesh_segment(
-            A, LA, TA, ax, ay, az, bx - ax, by - ay, bz - az, limit, first[0], stack[:, 0], bounds, W
-        )
+        d2, ka = nearest_to_segment(
+            boxes, kids, which[i, WIDE], T, ax, ay, az, bx - ax, by - ay, bz - az, limit, first[0],
+            stack[:, 0], bounds, given, low, W,
+        )  # fmt: skip
         if ka >= 0:
             first[0] = ka
     for e in (0, 3):

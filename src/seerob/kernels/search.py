@@ -1,4 +1,4 @@
-r"""Branch and bound in trees of boxes: nearest points of a mesh to a segment and of two meshes.
+r"""Branch and bound in trees of boxes: nearest point of a mesh to a segment, and where two meshes touch.
 
 A box is skipped only when its lower bound exceeds ``cut = best·(1 + 1e-9) + 1e-18`` [m²], which is
 more than rounding can do to a bound (1e-15 m) and to a distance. So the primitive that wins is the
@@ -106,8 +106,8 @@ def mesh_segment(
     return best, winner
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _row_in(T: Array, k: int, R: Array, t: Array, row: Array) -> None:
+@njit(cache=True, nogil=True, error_model="numpy")
+def row_in(T: Array, k: int, R: Array, t: Array, row: Array) -> None:
     """Triangle ``T[k]`` in frame a, given a_from_b, to ``row`` (1, 13)."""
     for c in range(3):
         for e in range(4):
@@ -119,23 +119,10 @@ def _row_in(T: Array, k: int, R: Array, t: Array, row: Array) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def mesh_mesh(
-    A: Array,
-    LA: Links,
-    TA: Array,
-    B: Array,
-    LB: Links,
-    TB: Array,
-    R: Array,
-    t: Array,
-    limit: float,
-    first_a: int,
-    first_b: int,
-    pairs: Links,
-    bounds: Array,
-    W: Array,
-) -> tuple[float, int, int]:
-    """Nearest points of two meshes, in the frame of the first.
+def first_crossing(
+    A: Array, LA: Links, TA: Array, B: Array, LB: Links, TB: Array, R: Array, t: Array, pairs: Links, W: Array
+) -> tuple[int, int]:
+    """The first two triangles that touch, down two trees, of meshes that do; -1, -1 where none does.
 
     Args:
         A: Tree of the first mesh.
@@ -146,56 +133,26 @@ def mesh_mesh(
         TB: Likewise.
         R: Rotation a_from_b, shape (9,).
         t: Position a_from_b [m], shape (3,).
-        limit: Squared distance above which nothing is looked for [m²].
-        first_a: Triangles to begin with, -1 for none.
-        first_b: Likewise.
         pairs: Scratch, shape (256, 2).
-        bounds: Scratch, shape (256,).
-        W: Receives the points, shape (12,), of which 6 are scratch.
-
-    Returns:
-        Squared distance and the two triangles; infinity and -1 when all exceed ``limit``.
-        Stops at the first intersection, which depends on ``limit`` and ``first``: ask again
-        without them for *the* first one.
+        W: Receives the point on each in the frame of the first, shape (12,), of which 6 are scratch.
     """
     row = np.empty((1, 13))
-    points = np.empty(12)
-    best = np.inf
-    cut = limit
-    ka = kb = -1
-    if first_a >= 0:
-        _row_in(TB, first_b, R, t, row)
-        g = triangle_triangle(TA, first_a, row, 0, cut, points)
-        if g <= cut:
-            best = g
-            cut = min(cut, cut_of(best))
-            ka = first_a
-            kb = first_b
-            W[:6] = points[:6]
+    cut = cut_of(0.0)
     pairs[0, 0] = 0
     pairs[0, 1] = 0
-    bounds[0] = box_box(A, 0, B, 0, R, t, cut)
     depth = 1
-    while depth > 0 and best > 0.0:
+    while depth > 0:
         depth -= 1
-        if bounds[depth] > cut:
-            continue
         i = int(pairs[depth, 0])
         j = int(pairs[depth, 1])
         if LA[i, 1] > 0 and LB[j, 1] > 0:
-            for b in range(LB[j, 0], LB[j, 0] + LB[j, 1]):
-                _row_in(TB, b, R, t, row)
-                for a in range(LA[i, 0], LA[i, 0] + LA[i, 1]):
-                    g = triangle_triangle(TA, a, row, 0, cut, points)
-                    if g <= cut and (g < best or (g == best and (a < ka or (a == ka and b < kb)))):
-                        best = g
-                        cut = min(cut, cut_of(best))
-                        ka = a
-                        kb = b
-                        W[:6] = points[:6]
+            for a in range(LA[i, 0], LA[i, 0] + LA[i, 1]):
+                for b in range(LB[j, 0], LB[j, 0] + LB[j, 1]):
+                    row_in(TB, b, R, t, row)
+                    if triangle_triangle(TA, a, row, 0, cut, W) == 0.0:
+                        return a, b
             continue
-        descend_a = LB[j, 1] > 0 or (LA[i, 1] == 0 and A[i, 19] > B[j, 19])
-        if descend_a:
+        if LB[j, 1] > 0 or (LA[i, 1] == 0 and A[i, 19] > B[j, 19]):
             i1, j1, i2, j2 = i + 1, j, int(LA[i, 0]), j
         else:
             i1, j1, i2, j2 = i, j + 1, i, int(LB[j, 0])
@@ -206,11 +163,9 @@ def mesh_mesh(
         if low1 <= cut:
             pairs[depth, 0] = i1
             pairs[depth, 1] = j1
-            bounds[depth] = low1
             depth += 1
         if low2 <= cut:
             pairs[depth, 0] = i2
             pairs[depth, 1] = j2
-            bounds[depth] = low2
             depth += 1
-    return best, ka, kb
+    return -1, -1

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 from seerob.errors import InputError, Problem, UnknownName
 from seerob.geometry import Solid
+from seerob.kernels.lanes import WIDTH
+from seerob.kernels.pairs import COLUMNS
 from seerob.kernels.tree_file import Tree, tree_of
+from seerob.kernels.wide import NONE
 from seerob.transforms import Array
 
 Indices = NDArray[np.int64]
@@ -34,6 +37,9 @@ class Shapes:
     nodes: Array
     links: NDArray[np.int32]
     triangles: Array
+    boxes: NDArray[np.float32]
+    kids: NDArray[np.int32]
+    """Of all meshes, in numbers of all; see `seerob.kernels.wide`."""
     probes: Array
 
     @classmethod
@@ -53,6 +59,7 @@ class Shapes:
         owned: list[tuple[int, ...]] = []
         which: list[list[int]] = []
         ends = np.zeros(3, int)
+        wide: list[int] = []
         for body, (_, solids) in enumerate(bodies):
             owned.append(tuple(range(len(made), len(made) + len(solids))))
             for solid in solids:
@@ -64,13 +71,14 @@ class Shapes:
                 spans = np.column_stack([ends, ends + size]).ravel().tolist()
                 ends += size
                 flags = [tree is not None, core.volume, core.closed]
-                which.append([body, *map(int, flags), *spans, core.corner_count])
+                which.append([body, *map(int, flags), *spans, core.corner_count, sum(wide)])
+                wide.append(0 if tree is None else len(tree.boxes))
                 made.append(core)
         trees = [m.tree for m in made if m.tree is not None]
         shapes = cls(
             names=tuple(name for name, _ in bodies),
             solids=tuple(owned),
-            which=np.array(which, np.int64).reshape(-1, 11),
+            which=np.array(which, np.int64).reshape(-1, COLUMNS),
             local=_rows([m.local for m in made], (12,)),
             ball=_rows([m.ball for m in made], (4,)),
             corners=_rows([m.corners for m in made], (8, 3)),
@@ -78,6 +86,8 @@ class Shapes:
             nodes=np.concatenate([np.zeros((0, 20)), *(t.nodes for t in trees)]),
             links=np.concatenate([np.zeros((0, 2), np.int32), *(t.links for t in trees)]),
             triangles=np.concatenate([np.zeros((0, 13)), *(t.triangles for t in trees)]),
+            boxes=np.concatenate([np.zeros((0, 120), np.float32), *(t.boxes for t in trees)]),
+            kids=_joined(trees),
             probes=np.concatenate([np.zeros((0, 3)), *(m.probes for m in made)]),
         )
         return shapes
@@ -145,6 +155,18 @@ def _flat_frame(points: Array) -> tuple[Array, Array]:
         basis = np.column_stack([x, y, np.cross(x, y)])
     four = np.array([np.zeros(3), u, u + v, v]) @ basis
     return np.concatenate([basis.ravel(), corner]), four
+
+
+def _joined(trees: list[Tree]) -> NDArray[np.int32]:
+    """Children of the nodes of all trees, in numbers of all nodes and triangles."""
+    parts = [np.zeros((0, WIDTH), np.int32)]
+    nodes = triangles = 0
+    for tree in trees:
+        shift = np.where(tree.kids < 0, -triangles, np.where(tree.kids == NONE, 0, nodes))
+        parts.append((tree.kids + shift).astype(np.int32))
+        nodes += len(tree.boxes)
+        triangles += len(tree.triangles)
+    return np.concatenate(parts)
 
 
 def _rows(parts: list[Array], shape: tuple[int, ...]) -> Array:

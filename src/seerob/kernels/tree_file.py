@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.kernels.tree import build_tree, component_of
+from seerob.kernels.wide import widen
 from seerob.whole_file import whole_file
 
-VERSION = b"seerob tree 1"
-"""Changes whenever `build_tree` or the layout does."""
+VERSION = b"seerob tree 2"
+"""Changes whenever `build_tree`, `widen` or the layout does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +27,9 @@ class Tree:
     """See `seerob.kernels.tree.build_tree`, shape (k, 20)."""
     links: NDArray[np.int32]
     triangles: NDArray[np.float64]
+    boxes: NDArray[np.float32]
+    """See `seerob.kernels.wide.widen`, shape (w, 120)."""
+    kids: NDArray[np.int32]
     probes: NDArray[np.float64]
     """A vertex of each connected piece [m], shape (p, 3)."""
     closed: bool
@@ -72,7 +76,7 @@ def _build(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Tree:
     first = np.flatnonzero(np.diff(edge[by_edge], prepend=-1))
     closed = bool((np.add.reduceat(sign[by_edge], first) == 0).all())
     nodes, links, triangles = build_tree(vertices, faces)
-    return Tree(nodes, links, triangles, probes, closed)
+    return Tree(nodes, links, triangles, *widen(nodes, links, triangles), probes, closed)
 
 
 def _read(path: Path) -> Tree | None:
@@ -83,8 +87,8 @@ def _read(path: Path) -> Tree | None:
             return None
         with np.load(io.BytesIO(blob[32:]), allow_pickle=False) as stored:
             part: dict[str, Any] = {name: stored[name] for name in stored.files}
-        return Tree(part["nodes"], part["links"], part["triangles"], part["probes"], bool(part["closed"]))
-    except (OSError, ValueError, KeyError, EOFError):
+        return Tree(**(part | {"closed": bool(part["closed"])}))
+    except (OSError, ValueError, KeyError, TypeError, EOFError):
         return None
 
 
@@ -95,6 +99,8 @@ def _write(path: Path, tree: Tree) -> None:
         nodes=tree.nodes,
         links=tree.links,
         triangles=tree.triangles,
+        boxes=tree.boxes,
+        kids=tree.kids,
         probes=tree.probes,
         closed=np.array(tree.closed),
     )

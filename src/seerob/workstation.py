@@ -116,6 +116,15 @@ class Robot(_Table, frozen=True, kw_only=True):
     """How far the masses of its links may be off, all alike, as a share: 0.05 for ± 5 %."""
     com_tolerance: Annotated[float, unit("m", ge=0, le=10)] | None = None
     """How far the centre of mass of every link may be from where it is said to be, in any direction [m]."""
+    published_mass: Mass | None = None
+    """What its maker says that the whole arm weighs, base included, without tools [kg]: the mass table is
+    compared with it."""
+    published_mass_source: Annotated[str, Meta(min_length=1, max_length=200)] | None = None
+    """Where the maker says so: data sheet, edition, page."""
+
+    def __post_init__(self) -> None:
+        if (self.published_mass is None) != (self.published_mass_source is None):
+            raise ValueError("published_mass and published_mass_source belong together: give both or none")
 
 
 class Body(_Table, frozen=True, kw_only=True):

@@ -317,3 +317,20 @@ def test_the_table_is_told_and_reported(tmp_path, capsys):
     html = str(masses(cell.scene()))
     assert html.count("<tr>") == 1 + 4
     assert "unknown: arm/tip" in html
+
+
+@pytest.mark.parametrize(
+    ("published", "told"), [(2.0, False), (2.2, False), (1.75, False), (2.3, True), (1.7, True)]
+)
+def test_the_links_are_compared_with_what_the_maker_weighed(tmp_path, published, told):
+    """Two links of 1 kg; a tool does not count, and what rests on another arm is held until confirmed."""
+    energy = '[[safety]]\nkind = "kinetic_energy"\nrobot = "arm"\nlimit = 100\n'
+    tool = '[[tools]]\nname = "t"\non = "arm/tip"\nshape = { sphere = 0.05 }\nmass = 0.5\n'
+    said = f'published_mass = {published}\npublished_mass_source = "data sheet of 2024"\n'
+    cell = made(tmp_path, FLOATING + TWO_R + said + tool + energy, {"arm.urdf": two_r()})
+    found = [f for f in cell.model.findings if "published_mass" in f.text]
+    assert bool(found) is told
+    if told:
+        assert "2 kg of" in found[0].text
+        assert "data sheet of 2024" in found[0].text
+        assert found[0].holds == ("arm",)

@@ -475,3 +475,29 @@ def test_a_link_that_its_table_makes_lighter_than_a_frame_of_rods(tmp_path: Path
     found = results_at(station, arm=((0, 0), (0.5, 0)))["energy"]
     assert found.verdict is (Verdict.WITHIN if sure else Verdict.UNDECIDED)
     assert ("robots[0].masses.l1.bulk_density" in found.reason) is not sure
+
+
+@pytest.mark.parametrize(("height", "told"), [(0.8, False), (0.3, True)])
+def test_two_parts_do_not_fill_one_place(height: float, told: bool, tmp_path: Path) -> None:
+    """A crate of half a metre on a table, and one that sits half a metre deep in it."""
+    text = f"""
+[[parts]]
+name = "table"
+shape = {{ box = [0.8, 1.4, 0.74] }}
+at = {{ position = [0, 0, 0.37] }}
+[[parts]]
+name = "crate"
+shape = {{ box = [0.5, 0.5, 0.3] }}
+at = {{ position = [0, 0, {height + 0.15 - 0.06}] }}
+[[safety]]
+kind = "minimum_distance"
+name = "about them"
+between = ["crate", "table"]
+limit = 0.2
+"""
+    found = doubted(station_of(tmp_path, text))
+    assert [f.holds for f in found] == ([("crate", "table")] if told else [])
+    if told:
+        value = found[0].text.split("value = ")[1].split(",")[0]
+        own = f'[[confirmed]]\nkey = "parts[1].inside.table"\nvalue = {value}\nwhy = "it is built in"\n'
+        assert not doubted(station_of(tmp_path, text + own))

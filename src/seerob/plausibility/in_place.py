@@ -12,6 +12,7 @@ from types import MappingProxyType
 import mujoco
 import numpy as np
 
+from seerob.chains import beyond_flange
 from seerob.distances.depth import Depths
 from seerob.distances.least import Query
 from seerob.model import Body, Mechanism, Model
@@ -49,10 +50,12 @@ def _following(model: Model) -> Iterator[Quantity]:
     yield from _sizes(model)
     yield from _links(model)
     yield from _payloads(model)
+    yield from _published(model)
     yield from _people(model)
     place = _Home(model)
     yield from _feet(model, place, place.still)
     yield from _overlaps(model, place, {*place.still, *(robot.name for robot in model.workstation.robots)})
+    yield from _parts(model, place)
     yield from _nobody(model, [place])
 
 
@@ -131,6 +134,23 @@ def _payloads(model: Model) -> Iterator[Quantity]:
             f"{', '.join(f'{name} {m:.4g} kg' for name, m in masses.items())} of {row.kg:g} kg: {row.source}"
         )
         yield Quantity(f"robots[{i}].payload", "robots.payload", "", (total / row.kg,), (robot.name,), said)
+
+
+def _published(model: Model) -> Iterator[Quantity]:
+    """What the links of each robot weigh, as a share of what its maker says that it weighs."""
+    for i, robot in enumerate(model.workstation.robots):
+        if robot.published_mass is None:
+            continue
+        mechanism = model.mechanisms[robot.name]
+        beyond = {f"{robot.name}/{link}" for link in beyond_flange(mechanism.description)}
+        rows = [row for row in mechanism.masses if row.name in mechanism.links - beyond]
+        total, unknown = sum(row.mass or 0.0 for row in rows), any(row.mass is None for row in rows)
+        share = total / robot.published_mass
+        if unknown and share < 1:
+            continue  # what nobody weighed is undecided by itself
+        said = f"{total:.4g} kg of {robot.published_mass:g} kg: {robot.published_mass_source}"
+        name = "published_mass.share"
+        yield Quantity(f"robots[{i}].{name}", f"robots.{name}", "", (share,), (robot.name,), said)
 
 
 def _people(model: Model) -> Iterator[Quantity]:
@@ -255,6 +275,22 @@ def _overlaps(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quan
                 yield Quantity(
                     f"{group}[{i}].inside.{owner}", f"{group}.inside.{owner}", "m", (deep,), about, said
                 )
+
+
+def _parts(model: Model, place: _Home) -> Iterator[Quantity]:
+    """How deep parts that stand reach into each other."""
+    every = [[b for b in _seen(model.bodies) if b.owner == part.name] for part in model.workstation.parts]
+    for i, (part, own) in enumerate(zip(model.workstation.parts, every, strict=True)):
+        for other, bodies in zip(model.workstation.parts[:i], every, strict=False):
+            a, b = [body.index for body in own], [body.index for body in bodies]
+            if not own or not bodies or place.distance(a, b, 0.1) >= 0:
+                continue
+            deep = max(place.depth(y, x) for x in own for y in bodies)
+            about = (part.name, other.name)
+            key = f"parts[{i}].inside.{other.name}"
+            yield Quantity(
+                key, f"parts.inside.{other.name}", "m", (deep,), about, f"{part.name} in {other.name}"
+            )
 
 
 def _nobody(model: Model, places: Sequence[_Home]) -> Iterator[Quantity]:

@@ -29,10 +29,10 @@ Entries = Mapping[str, Mapping[int, Any]]
 LISTS = ("robots", "tools", "workpieces", "parts", "machines", "areas", "sensors", "humans", "phases")
 PLUGINS = ("sources", "safety", "ergonomics")
 FOLLOWS: dict[str, tuple[str, ...]] = {
-    "robots": ("payload", "nobody_within", "inside."),
+    "robots": ("payload", "published_mass.share", "nobody_within", "inside."),
     "tools": ("mass", "extent", "bulk_density"),
     "workpieces": ("mass", "extent", "bulk_density"),
-    "parts": ("extent", "bulk_density"),
+    "parts": ("extent", "bulk_density", "inside."),
     "machines": ("extent", "mass", "bulk_density", "nobody_within"),
     "sources": ("step", "degrees", "speed"),
     "humans": ("bmi", "feet", "inside."),

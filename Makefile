@@ -19,7 +19,7 @@ NODE := $(VENV)/.node
 PAGE := src/seerob/server/page/index.html
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo demo-plc test setup check format lint types imports unit web-test package bench soak mutate wire web build docs lock clean
+.PHONY: help demo demo-plc test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs lock clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -35,7 +35,7 @@ demo-plc: $(DEV) $(PAGE)
 
 # Either keeps one core busy; the others want both.
 test: setup
-	$(MAKE) --no-print-directory -j2 check package
+	$(MAKE) --no-print-directory -j2 compiled package
 	$(MAKE) --no-print-directory unit web-test
 
 # -- set-up -------------------------------------------------------------------------------------
@@ -81,6 +81,13 @@ types: $(DEV)
 
 imports: $(DEV)
 	$(BIN)/lint-imports
+
+# After the checks, what the two workers of `unit` would both compile at the same time: modules and inner loops.
+compiled: export PYTHONDONTWRITEBYTECODE :=
+compiled: check
+	said=$$($(BIN)/pytest --collect-only -qq) || { echo "$$said"; exit 1; }
+	folder=$$(mktemp -d) && trap 'rm -rf "$$folder"' EXIT && $(BIN)/seerob new "$$folder/cell" >/dev/null && \
+	{ $(BIN)/seerob assess "$$folder/cell" -o "$$folder/out" >/dev/null || [ $$? -le 2 ]; }
 
 # Without it, every process that a test starts compiles every library again.
 unit: export PYTHONDONTWRITEBYTECODE :=

@@ -13,6 +13,7 @@ spend counts by half, as two free cores would take, and what only one can do cou
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 import time
@@ -168,9 +169,11 @@ def batched(samples: int, criteria: tuple[Criterion, ...]) -> tuple[float, float
     station = made(criteria, physics=False)
     feed = [one for _, one in zip(range(samples), pump(station), strict=False)]
     # What is compiled is loaded, and threads are there, before time is taken.
-    batch.judged(station.model, station.bound, batch.recorded(station.model, iter(feed[:600])), threads=2)
+    batch.judged(
+        station.model, station.bound, batch.recorded(station.model, iter(feed[:600]), math.inf), threads=2
+    )
     begin = time.process_time()
-    motion = batch.recorded(station.model, iter(feed))
+    motion = batch.recorded(station.model, iter(feed), math.inf)
     followed = time.process_time()
     batch.judged(station.model, station.bound, motion, threads=2)
     judged = time.process_time()
@@ -194,7 +197,7 @@ def beside(samples: int) -> tuple[float, float]:
     """Processor time per sample of four criteria: here on one core, and Pinocchio with numpy [s]."""
     station = made(SHORT, physics=False)
     motion = batch.recorded(
-        station.model, (one for _, one in zip(range(samples), pump(station), strict=False))
+        station.model, (one for _, one in zip(range(samples), pump(station), strict=False)), math.inf
     )
     robot = station.model.robot(ROBOT)
     batch.judged(station.model, station.bound, motion.part(0, 300), threads=1)

@@ -31,29 +31,40 @@ def zero_moment_set(
         directions as columns (3, d); radius of the largest ball about 0 [N].
     """
     no_corners, no_triangles = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
-    proper = np.isfinite(J_v).all() and np.isfinite(low).all() and np.isfinite(high).all()
-    if not (proper and (low <= high).all()):
+    proper = True
+    for i in range(len(low)):
+        proper = proper and math.isfinite(low[i]) and math.isfinite(high[i]) and low[i] <= high[i]
+        for r in range(3):
+            proper = proper and math.isfinite(J_v[r, i])
+    if not proper:
         return False, no_corners, no_triangles, np.zeros((3, 0)), np.nan
     possible, normals, below, above = unit_slabs(J_v, low, high)
     driven = len(normals)
-    free = np.eye(3)
+    sigma, axes = np.empty((1, 3)), np.empty((1, 3, 3))
+    count = 0
     if driven:
-        sigma, axes = np.empty((1, 3)), np.empty((1, 3, 3))
         used_up = np.empty((1, 3, driven))
-        used_up[0] = normals.T
+        for i in range(driven):
+            for r in range(3):
+                used_up[0, r, i] = normals[i, r]
         principal_axes(used_up, sigma, axes)
-        count = 0
         while count < 3 and sigma[0, count] > singular * sigma[0, 0]:
             count += 1
-        free = axes[0][:, count:].copy()
+    free = np.zeros((3, 3 - count))
+    for r in range(3):
+        for c in range(count, 3):
+            free[r, c - count] = axes[0, r, c] if driven else 1.0 if r == c else 0.0
     if not possible:
         return True, no_corners, no_triangles, free, np.nan
     # Across the free directions it is a polygon, a stretch or a point: one plane more for each.
     planes = free.shape[1]
     n = driven + planes
     N, l, h = np.zeros((n, 3)), np.zeros(n), np.zeros(n)
-    N[:driven], l[:driven], h[:driven] = normals, below, above
-    N[driven:] = free.T
+    for i in range(n):
+        for r in range(3):
+            N[i, r] = normals[i, r] if i < driven else free[r, i - driven]
+        if i < driven:
+            l[i], h[i] = below[i], above[i]
     if planes == 3:
         V = np.zeros((1, 3))
     else:
@@ -61,7 +72,10 @@ def zero_moment_set(
         V = room[: max(corners(N, l, h, room), 0)]
     if not len(V):
         return True, no_corners, no_triangles, free, np.nan
-    size = np.abs(V).max()
+    size = 0.0
+    for i in range(len(V)):
+        for r in range(3):
+            size = max(size, abs(V[i, r]))
     V = merged(V, same * size)
     return True, V, faces(N, l, h, V, 10 * same * size), free, inscribed(below, above)
 

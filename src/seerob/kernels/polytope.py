@@ -148,10 +148,12 @@ def _without_corners(N: Array, l: Array, h: Array) -> int:
     n = len(N)
     low, high = -np.inf, np.inf
     for i in range(n):
-        across = np.cross(N[0], N[i])
-        if (across * across).sum() >= PARALLEL * PARALLEL:
+        x = N[0, 1] * N[i, 2] - N[0, 2] * N[i, 1]
+        y = N[0, 2] * N[i, 0] - N[0, 0] * N[i, 2]
+        z = N[0, 0] * N[i, 1] - N[0, 1] * N[i, 0]
+        if x * x + y * y + z * z >= PARALLEL * PARALLEL:
             return EMPTY
-        if (N[0] * N[i]).sum() > 0:
+        if N[0, 0] * N[i, 0] + N[0, 1] * N[i, 1] + N[0, 2] * N[i, 2] > 0:
             low, high = max(low, l[i]), min(high, h[i])
         else:
             low, high = max(low, -h[i]), min(high, -l[i])
@@ -294,35 +296,40 @@ def faces(N: Array, l: Array, h: Array, V: Array, tolerance: float) -> Indices:
         sign = 1.0 if plane % 2 else -1.0
         b = h[i] if plane % 2 else l[i]
         m = 0
-        center = np.zeros(3)
-        seen[planes] = False
+        cx, cy, cz = 0.0, 0.0, 0.0
         for v in range(k):
-            if abs(N[i, 0] * V[v, 0] + N[i, 1] * V[v, 1] + N[i, 2] * V[v, 2] - b) <= tolerance:
+            seen[planes, v] = abs(N[i, 0] * V[v, 0] + N[i, 1] * V[v, 1] + N[i, 2] * V[v, 2] - b) <= tolerance
+            if seen[planes, v]:
                 on[m] = v
                 m += 1
-                center += V[v]
-                seen[planes, v] = True
+                cx, cy, cz = cx + V[v, 0], cy + V[v, 1], cz + V[v, 2]
         if m < 3:
             continue
         known = False
         for other in range(planes):
-            if (seen[other] == seen[planes]).all() and l[i] < h[i]:
-                known = True
+            equal = l[i] < h[i]
+            for v in range(k):
+                equal = equal and seen[other, v] == seen[planes, v]
+            known = known or equal
         if known:
             continue
         planes += 1
-        center /= m
-        normal = sign * N[i]
-        first = V[on[0]] - center
-        first = first - (first * normal).sum() * normal
-        second = np.cross(normal, first)
+        cx, cy, cz = cx / m, cy / m, cz / m
+        nx, ny, nz = sign * N[i, 0], sign * N[i, 1], sign * N[i, 2]
+        ux, uy, uz = V[on[0], 0] - cx, V[on[0], 1] - cy, V[on[0], 2] - cz
+        up = ux * nx + uy * ny + uz * nz
+        ux, uy, uz = ux - up * nx, uy - up * ny, uz - up * nz
+        wx, wy, wz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
         for p in range(m):
-            arm = V[on[p]] - center
-            angle[p] = math.atan2((arm * second).sum(), (arm * first).sum())
-        order = np.argsort(angle[:m])
+            v = on[p]
+            ax, ay, az = V[v, 0] - cx, V[v, 1] - cy, V[v, 2] - cz
+            about = math.atan2(ax * wx + ay * wy + az * wz, ax * ux + ay * uy + az * uz)
+            at = p
+            while at > 0 and angle[at - 1] > about:
+                angle[at], on[at] = angle[at - 1], on[at - 1]
+                at -= 1
+            angle[at], on[at] = about, v
         for p in range(1, m - 1):
-            triangles[count, 0] = on[order[0]]
-            triangles[count, 1] = on[order[p]]
-            triangles[count, 2] = on[order[p + 1]]
+            triangles[count, 0], triangles[count, 1], triangles[count, 2] = on[0], on[p], on[p + 1]
             count += 1
     return triangles[:count].copy()

@@ -10,12 +10,14 @@ from msgspec.structs import replace
 
 from seerob.errors import InputError, Problem
 from seerob.live.listening import LiveSource, delay_of
+from seerob.live.looked_at import looked_at
 from seerob.model import Model
 from seerob.mounting.compilation import pose_matrix
 from seerob.plausibility.in_place import implausible_motion
 from seerob.plausibility.of_file import findings as implausible
 from seerob.plausibility.of_motion import noise_of_speeds, quantities
 from seerob.plausibility.own_words import compared, said_by
+from seerob.plugin import home, kind_of
 from seerob.samples import JointSample
 from seerob.snapshot import Finding
 from seerob.source import Matrix4, Opened, Source, Target
@@ -47,7 +49,10 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
             problems.append(Problem(file, f"sources[{i}].timeout", what, "give a longer one"))
         problems += _too_short(model, source, delay)
         try:
-            found = source.open(model.folder, source_target(model, source))
+            driven = source_target(model, source)
+            found = source.open(model.folder, driven)
+            if not (_ships(source) or isinstance(source, LiveSource)):
+                found = looked_at(found, source.name or kind_of("sources", source), driven)
             found = replace(found, findings=(*found.findings, *_lateness(model, source)))
             opened.append((source, _compared(model, i, source, found)))
         except InputError as error:
@@ -58,6 +63,11 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
         source, first = opened[0]
         opened[0] = source, replace(first, findings=(*first.findings, *found))
     return tuple(opened)
+
+
+def _ships(source: Source) -> bool:
+    """Whether it is one of those whose files are looked at where they are read."""
+    return type(source).__module__.startswith(f"{home('sources')}.")
 
 
 def _begins(model: Model, opened: Sequence[tuple[Source, Opened]]) -> dict[str, list[Array]]:

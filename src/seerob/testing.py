@@ -6,7 +6,11 @@ and of its variables. A criterion fails when it, a part, a row or a marker of it
 it rests on somebody whom it does not declare (`Criterion.depends`); or when it is no criterion (no basis, a
 result that contradicts itself).
 
-As a plug-in of pytest, without a test file: ``pytest -p seerob.testing my_cell/workstation.toml``.
+``sources_never_within("my_cell")`` takes one in which every criterion is within while its files are played,
+and lets each source lie: it stops, fails, repeats itself, goes back in time, speaks of the future, jumps,
+says what is no number or of the wrong shape.
+
+As a plug-in of pytest, without a test file: ``pytest -p seerob.testing my_cell/workstation.toml`` asks both.
 """
 
 from __future__ import annotations
@@ -22,12 +26,17 @@ from msgspec.structs import replace as changed
 
 from seerob.criterion import Criterion
 from seerob.engine import Engine
-from seerob.errors import UnknownName
+from seerob.errors import SeerobError, UnknownName
 from seerob.human.skeleton import BONES
 from seerob.judging import Judge, bound_to
+from seerob.live.listening import LiveSource
+from seerob.live.looked_at import LookedAt
 from seerob.model import Mechanism, Model
-from seerob.samples import JointSample, Quality, SignalSample
+from seerob.opening import source_target
+from seerob.run import engine_of, pump, ticks
+from seerob.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
 from seerob.snapshot import Finding, Result, Verdict
+from seerob.source import Opened, Source
 from seerob.state import VARIABLE, State
 from seerob.station import Station, load
 from seerob.transforms import Array
@@ -131,6 +140,159 @@ def never_within(
         raise AssertionError("\n".join(dict.fromkeys(failures)))
 
 
+@dataclass(frozen=True)
+class Lie:
+    """One way in which a source can be wrong from an instant on."""
+
+    what: str
+    said: Callable[[Sample, float], Sample | None]
+    """What it yields instead of a sample from that instant on, which is given [s]; None for nothing."""
+
+
+def _numberless(sample: Sample, since: float) -> Sample:
+    if isinstance(sample, JointSample):
+        return changed(sample, q=(_NAN,) * len(sample.q))
+    if isinstance(sample, PoseSample):
+        return changed(sample, position=(_NAN,) * 3)
+    if isinstance(sample, BodySample):
+        nowhere = (_NAN,) * 3, (_NAN,) * 4
+        points = [
+            changed(
+                point,
+                position=None if point.position is None else nowhere[0],
+                wxyz=None if point.wxyz is None else nowhere[1],
+            )
+            for point in sample.points
+        ]
+        return changed(sample, points=tuple(points))
+    # What can be no number; of the rest it says nothing.
+    return changed(sample, values={n: _NAN for n, v in sample.values.items() if type(v) is float})
+
+
+def _fails(sample: Sample, since: float) -> Sample:
+    raise OSError("the disk is gone")
+
+
+def _misshapen(sample: Sample, since: float) -> Sample | None:
+    if isinstance(sample, JointSample):
+        return changed(sample, q=sample.q[:-1], qd=None)
+    return changed(sample, t=None)
+
+
+LIES = (
+    Lie("stops", lambda s, t: None),
+    Lie("fails", _fails),
+    Lie("says what is no number", _numberless),
+    Lie("says no time", lambda s, t: changed(s, t=_NAN)),
+    Lie("goes back in time", lambda s, t: changed(s, t=s.t - t)),
+    Lie("says everything at one instant", lambda s, t: changed(s, t=t)),
+    Lie("speaks of the future", lambda s, t: changed(s, t=s.t + 10.0)),
+    Lie("says what has the wrong shape", _misshapen),
+    Lie("calls it invalid", lambda s, t: changed(s, quality=Quality.INVALID)),
+)
+LIES_FROM = 0.3
+"""Share of a source's duration after which it lies."""
+
+
+def sources_never_within(cell: Station | Path | str, *, names: Sequence[str] = ()) -> None:
+    """Fail unless every criterion is within while files are played, and not once a source lies.
+
+    Args:
+        cell: A workstation, or its file or folder. Its live sources are left out: what they say is looked
+            at where it is heard.
+        names: Sources that lie, one after the other, by name; all of them when not given.
+
+    Raises:
+        AssertionError: With every criterion that is within where it must not be, or never.
+        InputError: The workstation or a file cannot be used.
+    """
+    station = cell if isinstance(cell, Station) else load(cell)
+    told: list[str] = []
+    for i, (source, _) in enumerate(station.sources):
+        if isinstance(source, LiveSource) or (names and source.name not in names):
+            continue
+        told += _Played(station, i).failures()
+    if told:
+        raise AssertionError("\n".join(dict.fromkeys(told)))
+
+
+class _Played:
+    """A workstation whose files are played, one source of which lies.
+
+    Args:
+        station: The workstation.
+        which: Number of that source.
+    """
+
+    def __init__(self, station: Station, which: int) -> None:
+        self._model, self._sources, self._which = station.model, station.sources, which
+        self._findings = station.scene().findings
+        source, opened = station.sources[which]
+        self._name = source.name or type(source).__module__
+        self._since = LIES_FROM * opened.duration
+        """Instant from which it lies [s]."""
+        self._from = self._since + source.timeout + 2 * station.workstation.engine.tick
+        """From which nothing may be within [s]."""
+        self._bound = [one for one in station.bound if self._concerns(source, one.criterion)]
+
+    def _concerns(self, source: Source, criterion: Criterion) -> bool:
+        variables = (self._model.dictionary.get(name) for name in criterion.variables())
+        if any(v is not None and v.source == source.name for v in variables):
+            return True
+        return source.target() in _declared(self._model, criterion.depends(self._model))
+
+    def failures(self) -> list[str]:
+        """What is wrong, one sentence each."""
+        if not self._bound:
+            return [f"{self._name}: no criterion depends on what it says: add one"]
+        end = self._sources[self._which][1].duration
+        if self._from >= end:
+            return [f"{self._name}: give more than {self._from / LIES_FROM:.3g} s, it says {end:.3g} s"]
+        honest = self._within(None, 0.0)
+        told = [
+            f"{one.criterion.name}: give a motion in which it is within, as {self._name} says it"
+            for one in self._bound
+            if one.criterion.name not in honest and getattr(one.criterion, "limit", None) is not None
+        ]
+        for lie in LIES:
+            for name, (where, t) in self._within(lie, self._from).items():
+                told.append(f"{name}: {where} is within at {t:.3f} s although {self._name} {lie.what}")
+        return told
+
+    def _within(self, lie: Lie | None, start: float) -> dict[str, tuple[str, float]]:
+        """By criterion that is within from an instant on, what of it, and when first."""
+        source, opened = self._sources[self._which]
+        target = source_target(self._model, source)
+        sources = list(self._sources)
+        if lie is not None:
+            lying = LookedAt(_Lying(opened, lie, self._since), self._name, target)
+            sources[self._which] = source, changed(opened, samples=lying)
+        feed = pump(sources, self._model.workstation.engine.tick)
+        found: dict[str, tuple[str, float]] = {}
+        try:
+            for out, _ in ticks(engine_of(self._model), Judge(self._bound, self._findings), feed):
+                for result in out.results if out.t >= start else ():
+                    if result.name not in found and (where := _within(result)):
+                        found[result.name] = where, out.t
+        except (SeerobError, OSError):
+            if lie is None:  # what ends a run is no verdict
+                raise
+        return found
+
+
+class _Lying:
+    """What a source yields, and from an instant on [s] something else."""
+
+    def __init__(self, opened: Opened, lie: Lie, since: float) -> None:
+        self._opened, self._lie, self._since = opened, lie, since
+
+    def __iter__(self) -> Iterator[Sample]:
+        for sample in self._opened.samples:
+            said = self._lie.said(sample, self._since) if sample.t >= self._since else sample
+            if said is not None:
+                yield said
+
+
 class _Harness:
     """One workstation, without physics, whose robots, people and machines are all driven from here."""
 
@@ -150,7 +312,7 @@ class _Harness:
     def failures(self) -> list[str]:
         """What is wrong, one sentence each."""
         criteria = [criterion for criterion, _ in self._asked]
-        declared = [self._declared(criterion.depends(self.model)) for criterion in criteria]
+        declared = [_declared(self.model, criterion.depends(self.model)) for criterion in criteria]
         variables = [set(criterion.variables()) for criterion in criteria]
         clean = list(self._run())
         told: list[str] = []
@@ -250,25 +412,26 @@ class _Harness:
             own = {n: values[n] for n, v in self.model.dictionary.items() if v.source == source}
             yield SignalSample(source=source, seq=k, t=k * _PERIOD, values=own)
 
-    def _declared(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Robots, people and machines that names mean, with what carries them and what is on them."""
-        model, found = self.model, dict[str, None]()
-        for name in names:
-            if name in model.mechanisms:
-                found[name] = None
-                continue
-            try:
-                found |= dict.fromkeys(filter(None, (model.bodies[i].mover for i in model.select(name))))
-            except UnknownName:  # a link without a shape
-                at = model.frames[name].mj if name in model.frames else -1
-                found |= dict.fromkeys(m.name for m in model.mechanisms.values() if at in m.mj_bodies)
-        for name in tuple(found):
-            mechanism = model.mechanisms[name]
-            found |= dict.fromkeys((*mechanism.riders, *mechanism.holders))
-            while mechanism.on:
-                found[mechanism.on] = None
-                mechanism = model.mechanisms[mechanism.on]
-        return tuple(found)
+
+def _declared(model: Model, names: Sequence[str]) -> tuple[str, ...]:
+    """Robots, people and machines that names mean, with what carries them and what is on them."""
+    found = dict[str, None]()
+    for name in names:
+        if name in model.mechanisms:
+            found[name] = None
+            continue
+        try:
+            found |= dict.fromkeys(filter(None, (model.bodies[i].mover for i in model.select(name))))
+        except UnknownName:  # a link without a shape
+            at = model.frames[name].mj if name in model.frames else -1
+            found |= dict.fromkeys(m.name for m in model.mechanisms.values() if at in m.mj_bodies)
+    for name in tuple(found):
+        mechanism = model.mechanisms[name]
+        found |= dict.fromkeys((*mechanism.riders, *mechanism.holders))
+        while mechanism.on:
+            found[mechanism.on] = None
+            mechanism = model.mechanisms[mechanism.on]
+    return tuple(found)
 
 
 def _sample(mechanism: Mechanism, k: int, elsewhere: float) -> JointSample:
@@ -324,7 +487,10 @@ def pytest_collect_file(parent: Any, file_path: Path) -> Any:
 
     class Cell(pytest.Item):
         def runtest(self) -> None:
-            never_within(file_path)
+            station = load(file_path)
+            never_within(station)
+            if not all(isinstance(source, LiveSource) for source in station.workstation.sources):
+                sources_never_within(station)
 
         def reportinfo(self) -> tuple[Path, None, str]:
             return file_path, None, f"never within: {file_path}"

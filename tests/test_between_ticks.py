@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from made_cell import TWO_R, UR10, heard, made, person, two_r
-from seerob.between_ticks import Told
 from seerob.engine import Engine
 from seerob.human.skeleton import BONES
-from seerob.run import Judge, engine_of, looks_ahead, pump, ticks
+from seerob.run import Judge, engine_of, pump, ticks
 from seerob.snapshot import Verdict
+from worst_between import worst_found
 
 STICK = (
     '[[tools]]\nname = "stick"\non = "arm/tip"\nmass = 0.01\n'
@@ -279,33 +279,6 @@ def random_cell(folder, rng, *, tick, physics, rate):
             lines.append(",".join(f"{x:.12g}" for x in (t, *wave(t)[0])))
         files |= {f"{name}.urdf": random_robot(rng, slides), f"{name}.csv": "\n".join(lines) + "\n"}
     return made(folder, RANDOM.format(tick=tick, physics=physics), files)
-
-
-def worst_found(station, looks):
-    """By criterion, how far the bound is from the worst that many looks between each two ticks meet."""
-    engine = engine_of(station.model)
-    judge = Judge(station.bound)
-    between = judge._between
-    room = {}
-
-    def watching(i, watch, ends, state):
-        if ends[0].margin is None or ends[1].margin is None:
-            return Told()
-        low = between._low(watch, between._way, ends, state)
-        path = between._way
-        instants = np.union1d(np.linspace(path.t[0], path.t[-1], looks + 2), path.t)
-        met = []
-        for t in instants.tolist():
-            _, there = between._look(i, watch, path, t, state)
-            met.append(-1.0 if there.margin is None else np.min(there.margin[0] - there.margin[1]))
-        room.setdefault(watch.criterion.name, []).append(min(met) - low)
-        return Told()
-
-    between._judge = watching
-    ahead = looks_ahead(station.model)
-    for _ in ticks(engine, judge, pump(station.sources, station.workstation.engine.tick, ahead=ahead)):
-        pass
-    return room
 
 
 CASES = [(1, 0.01, "true", 125), (2, 0.01, "false", 250), (3, 0.005, "true", 40), (4, 0.01, "false", 60)]

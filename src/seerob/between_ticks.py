@@ -208,6 +208,7 @@ class BetweenTicks:
         if span is None:
             span = watch.points.span(path, a.t, b.t, self._ids, state.model.mj)
             span.between_speeds(a.speeds, b.speeds)
+            span.foresee = state.foresee
             self._whole = span if whole else self._whole
         least = [end.margin[0] - end.margin[1] for end in ends if end.margin is not None]
         if len(least) == 1:

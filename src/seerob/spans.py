@@ -26,6 +26,9 @@ from seerob.model import Model
 from seerob.transforms import Array
 
 Indices = NDArray[np.int64]
+Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]
+"""Of a robot at instants to come [s]: positions and velocities of its joints [rad or m], shape (k, n), and
+why they are not known so; None where nothing is."""
 
 ROUNDING = 1e-9
 """Added to every bound on a way or a speed [m, m/s]: the error of rounding is far below."""
@@ -135,7 +138,7 @@ class Points:
         if path.broken:
             lost = ~np.isfinite(fast)
             fast[lost], quick[lost], bend[lost] = np.inf, np.inf, np.inf
-        return Span(begin, end, fast, quick, bend, self._bounds.copy())
+        return Span(begin, end, fast, quick, bend, self._bounds.copy(), path, mj)
 
     def chain(self, point: int) -> tuple[Indices, NDArray[np.bool_], Array]:
         """Joints that move a point, from base to tip, whether each turns, the segments behind them [m]."""
@@ -151,7 +154,7 @@ class Points:
         every = [(int(ids[b.index]), b.corners, b.radius + b.deviation) for b in bodies]
         start, joints, turns, lengths = [0], [], [], []
         for body, points, radius in (*every, *self._own):
-            chain = _chain(mj, body)
+            chain = joints_of(mj, body)
             ends = points @ data.xmat[body].reshape(3, 3).T + data.xpos[body]
             anchors = data.xanchor[chain]
             if chain:
@@ -165,7 +168,7 @@ class Points:
         self._ids = np.array(ids)
 
 
-def _chain(mj: Any, body: int) -> list[int]:
+def joints_of(mj: Any, body: int) -> list[int]:
     """Joints that move a body of MuJoCo's, from base to tip."""
     found: list[int] = []
     while body > 0:
@@ -179,9 +182,21 @@ class Span:
     """Bounds that hold at every instant from one to another; points as in `Points`."""
 
     def __init__(
-        self, begin: float, end: float, fast: Array, quick: Array, bend: Array, joints: Array
+        self,
+        begin: float,
+        end: float,
+        fast: Array,
+        quick: Array,
+        bend: Array,
+        joints: Array,
+        path: Path,
+        mj: Any,
     ) -> None:
         self.begin, self.end = begin, end
+        self.path, self.mj = path, mj
+        """Where all joints are, and the `mujoco.MjModel` that moves them."""
+        self.foresee: Foresee = lambda name, t: None
+        """What robots are known to do after the tick at which the path ends."""
         self.T = end - begin
         """Its length [s]."""
         self.fast = fast
@@ -217,6 +232,11 @@ Falls = Callable[[Span, Array | float], Fall]
 def rows_of(points: Iterable[int]) -> Indices:
     """Points as a `Span` wants them."""
     return np.array(tuple(points), np.int64)
+
+
+def down_to(least: Array | float, lowest: Array | float) -> Fall:
+    """Of margins that are ``least`` at the lesser end, and known not to be below ``lowest`` in between."""
+    return Fall(np.inf, np.maximum(np.asarray(least) - lowest, 0.0))
 
 
 def approaching(a: Iterable[int], b: Iterable[int]) -> Falls:

@@ -89,6 +89,12 @@ class MassTolerances:
         """How many tolerances there are."""
         return len(self.tolerances)
 
+    def heaviest(self, body: int) -> tuple[float, float]:
+        """Factor on the mass of one of MuJoCo's bodies, and way of its centre of mass [m], at most."""
+        offs = [off for off in self._offs if body in off.bodies]
+        factor = max(1 + sum(off.share for off in offs), *(off.heavier for off in offs), 1.0)
+        return factor, sum(off.way for off in offs)
+
     def simplified(self, nominal: float, shifts: Shifts) -> float:
         """M/2 + m_L at shifted masses [kg].
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, ClassVar, Literal
 
+import mujoco
 import numpy as np
 from msgspec import Meta
 
@@ -25,12 +26,15 @@ from seerob.norms.iso_13855 import Approach, Edition
 from seerob.sensors.sensing import Names, bodies_of, carriers_of, names_of
 from seerob.sensors.tables import Sensor
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
-from seerob.spans import Falls, Points, approaching
+from seerob.spans import Falls, Points, approaching, joints_of
 from seerob.state import State
 from seerob.transforms import Array
 
 LEVEL = 1e-3
 """Tilt below which a field lies along the floor [rad]."""
+
+STRAIGHT = 1e-9
+"""Sine of the angle below which two axes are parallel."""
 
 _m = Meta(ge=0, extra={"unit": "m"})
 
@@ -186,10 +190,10 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
         return ask
 
     def falls(self, model: Model, points: Points) -> Falls | None:
-        """See `Criterion.falls`; none of a device that moves where its border turns, or S with its height."""
+        """See `Criterion.falls`; none of a device that tilts, or whose height changes where S follows it."""
         sensor, plane, corners = self._device(model)
-        rises = self._way(sensor) is Approach.PARALLEL
-        if model.bodies[plane].mover and (corners is not None or rises):
+        along = self._way(sensor) is Approach.PARALLEL
+        if (corners is not None or along) and not _stays_flat(model, plane, level=along):
             return None
         return approaching((plane,), bodies_of(model, self.hazard))
 
@@ -223,3 +227,16 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
                 *(("edges that are left out, which other measures must guard",) if self.edges else ()),
             ),
         )
+
+
+def _stays_flat(model: Model, plane: int, *, level: bool) -> bool:
+    """Whether no joint that moves a field tilts it; nor, where it lies level, changes its height."""
+    joints = np.array(joints_of(model.mj, model.bodies[plane].mj), np.int64)
+    data = mujoco.MjData(model.mj)
+    mujoco.mj_kinematics(model.mj, data)
+    normal = data.xmat[model.bodies[plane].mj].reshape(3, 3)[:, 2]
+    up = np.array([0.0, 0.0, 1.0])
+    turns = model.mj.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE
+    tilts = [np.cross(data.xaxis[joints[turns]], axis) for axis in (normal, *((up,) if level else ()))]
+    lifts = data.xaxis[joints[~turns]] @ up if level else np.zeros(0)
+    return bool(np.all(np.abs(tilts) < STRAIGHT) and np.all(np.abs(lifts) < STRAIGHT))

@@ -15,7 +15,7 @@ from seerob.model import Mechanism, Model
 from seerob.mounting.mass_tolerances import MassTolerances
 from seerob.moving_base import energy_of
 from seerob.snapshot import Basis, Result, Sphere, Verdict
-from seerob.spans import Fall, Falls, Points, Span, rows_of
+from seerob.spans import Fall, Falls, Margin, Points, Span, rows_of
 from seerob.state import State
 from seerob.states import States
 from seerob.tolerances import deciding, spread
@@ -126,20 +126,23 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def falls(self, model: Model, points: Points) -> Falls | None:
-        r"""See `Criterion.falls`; none where a mass has a tolerance.
+        r"""See `Criterion.falls`, of the largest energy that tolerances of masses allow.
 
         :math:`\sqrt{2E}` is a norm of the velocities of all that has a mass, so it changes by no more than
-        the norm of how much they change.
+        the norm of how much they change. The largest is one too: of heavier masses, with centres that may
+        be d away, :math:`m (|v| + d |\omega|)^2 + \omega^T I \omega` (`seerob.mounting.mass_tolerances`).
         """
         robot, mj = model.mover(self.robot), model.mj
-        if self.limit is None or len(MassTolerances(model, robot)):
+        if self.limit is None:
             return None
+        tolerances = MassTolerances(model, robot)
         every = (robot, *_aboard(model, robot))
         heavy = dict.fromkeys(int(b) for each in every for b in each.mj_bodies)
         limit, bodies = self.limit, [b for b in heavy if mj.body_mass[b] > 0]
-        masses = mj.body_mass[bodies]
+        heaviest = np.array([tolerances.heaviest(body) for body in bodies]).reshape(-1, 2)
+        masses = heaviest[:, 0] * mj.body_mass[bodies]
         # The mean square distance from the centre of mass is what its moments of inertia say.
-        radii = np.sqrt(mj.body_inertia[bodies].sum(axis=1) / 2 / masses)
+        radii = np.sqrt(mj.body_inertia[bodies].sum(axis=1) / 2 / mj.body_mass[bodies]) + heaviest[:, 1]
         rows = rows_of(
             points.add(body, mj.body_ipos[body], radius) for body, radius in zip(bodies, radii, strict=True)
         )
@@ -156,6 +159,11 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
             return Fall(float((most + change) * change), float(most * bend + bend**2 / 2))
 
         return falls
+
+    def margin(self, result: Result) -> Margin:
+        """See `Criterion.margin`, of the largest energy that tolerances allow."""
+        far, off = super().margin(result)
+        return far - off, 0.0
 
     def basis(self, model: Model) -> Basis:
         """See `Criterion.basis`."""

@@ -17,6 +17,7 @@ from seerob.errors import InputError, Undecided
 from seerob.markers import Marker
 from seerob.model import Model
 from seerob.snapshot import Basis, Input, Origin, Result, Verdict
+from seerob.spans import ROUNDING, UNBOUNDED, Fall, Falls, Points, Span, down_to
 from seerob.state import State
 from seerob.trajectories.path_map import MAX_SIZE, PathMap, read_map
 from seerob.trajectories.path_markers import Place, path_markers
@@ -46,15 +47,20 @@ def passed(q: Array, qd: Array, legs: tuple[Array, Array]) -> Passed:
         qd: Joint velocities [rad/s or m/s], shape (d,).
         legs: Starts and ways of the stretches [rad or m], shape (n, d) each.
     """
+    distance = distances(q, legs)
+    nearest = float(distance.min())
+    near = np.flatnonzero(distance <= nearest + SAME)
+    along = near[legs[1][near] @ qd > 0]
+    return Passed(nearest, along if len(along) else near)
+
+
+def distances(q: Array, legs: tuple[Array, Array]) -> Array:
+    """How far joint positions (d,) are from each stretch of a path [rad or m], shape (n,); see `passed`."""
     start, way = legs
     off = q - start
     length = np.maximum((way * way).sum(axis=1), 1e-300)
     x = np.clip((off * way).sum(axis=1) / length, 0.0, 1.0)
-    distance = np.linalg.norm(off - x[:, None] * way, axis=1)
-    nearest = float(distance.min())
-    near = np.flatnonzero(distance <= nearest + SAME)
-    along = near[way[near] @ qd > 0]
-    return Passed(nearest, along if len(along) else near)
+    return np.asarray(np.linalg.norm(off - x[:, None] * way, axis=1))
 
 
 class PathSpeed(Criterion, frozen=True, kw_only=True):
@@ -88,12 +94,9 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
         """See `Criterion.bind`."""
         robot = model.robot(self.robot)
         found = read_map(self._data(model), name=self.map, units=robot.units)
-        same = np.flatnonzero(found.piece[1:] == found.piece[:-1])
+        same, legs, permitted = _legs(found)
         if not len(same):
             raise InputError.at(self.map, "piece", "no two places follow each other", "give a whole map")
-        legs = found.q[same], found.q[same + 1] - found.q[same]
-        # Of two neighbours the lesser counts; one that is not known leaves both open.
-        permitted = np.minimum(found.permissible[same], found.permissible[same + 1])
         drawn = path_markers(_places(found))
 
         def evaluate(state: State) -> Result:
@@ -122,6 +125,46 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
 
         return evaluate
 
+    def falls(self, model: Model, points: Points) -> Falls:
+        r"""See `Criterion.falls`: the fastest that it may be, on the slowest stretch that it may be on.
+
+        Within a span of length T in which :math:`|\dot q| \le v`, the robot is nowhere farther than vT/2
+        from where it is in the middle, and so are the distances from all stretches.
+        """
+        robot = model.robot(self.robot)
+        found = read_map(self._data(model), name=self.map, units=robot.units)
+        _, legs, permitted = _legs(found)
+        own_q, own_v = robot.q_address[robot.own], robot.v_address[robot.own]
+
+        def falls(span: Span, least: Array | float) -> Fall:
+            speeds, quick = span.qd[own_v], span.qdd[own_v]
+            if not np.isfinite(speeds).all():
+                return UNBOUNDED
+            ends = [float(np.linalg.norm(span.path.at(t)[1][own_v])) for t in (span.begin, span.end)]
+            most = (ends[0] + ends[1] + float(np.linalg.norm(quick)) * span.T) / 2
+            fast = min(float(np.linalg.norm(speeds)), most) + ROUNDING
+            q, qd = (each[own] for each, own in zip(
+                span.path.at((span.begin + span.end) / 2), (own_q, own_v), strict=True
+            ))  # fmt: skip
+            way = fast * span.T / 2 + ROUNDING
+            distance = distances(q, legs)
+            nearest = float(distance.min())
+            if nearest + way > self.tolerance:
+                return UNBOUNDED
+            there = distance <= nearest + SAME + 2 * way
+            turned = float(np.linalg.norm(quick)) * span.T / 2
+            along, length = legs[1] @ qd, np.linalg.norm(legs[1], axis=1)
+            # Whom it surely follows and is as near as any counts, and none that it surely does not follow.
+            if (there & (along > turned * length) & (distance + 2 * way <= nearest + SAME)).any():
+                there &= along > -turned * length
+            least_permitted = float(permitted[there].min())
+            if np.isnan(least_permitted) or (least_permitted == 0 and fast > STANDSTILL):
+                return UNBOUNDED
+            share = 0.0 if fast <= STANDSTILL else fast / least_permitted
+            return down_to(least, 1.0 - share)
+
+        return falls
+
     def _result(self, share: float | None, verdict: Verdict, why: str, drawn: tuple[Marker, ...]) -> Result:
         return Result(name=self.name, value=share, limit=1.0, verdict=verdict, reason=why, markers=drawn)
 
@@ -149,6 +192,14 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
                 "how the robot gets back to the path when it is off it",
             ),
         )
+
+
+def _legs(found: PathMap) -> tuple[NDArray[np.int64], tuple[Array, Array], Array]:
+    """Places that another one follows, the stretches from these, and the speed permitted on each."""
+    same = np.flatnonzero(found.piece[1:] == found.piece[:-1])
+    legs = found.q[same], found.q[same + 1] - found.q[same]
+    # Of two neighbours the lesser counts; one that is not known leaves both open.
+    return same, legs, np.minimum(found.permissible[same], found.permissible[same + 1])
 
 
 def _places(found: PathMap) -> list[list[Place]]:

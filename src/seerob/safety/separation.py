@@ -20,7 +20,7 @@ from seerob.norms import iso_13855
 from seerob.norms.iso_13855 import WALKING
 from seerob.sensors.detection import Detection, device_of
 from seerob.snapshot import Basis, Input, Origin, Result, Segment, Verdict
-from seerob.spans import Fall, Falls, Margin, Points, Span, rows_of
+from seerob.spans import UNBOUNDED, Fall, Falls, Margin, Points, Span, rows_of
 from seerob.state import State
 from seerob.stopping.inputs import approach_speed, intrusion
 from seerob.stopping.largest import LargestSeparation
@@ -368,14 +368,26 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return self.mode == "fixed"
 
     def falls(self, model: Model, points: Points) -> Falls | None:
-        """See `Criterion.falls`, of each moving part; where S_p follows from speeds alone."""
+        """See `Criterion.falls`, of each moving part; where S_p follows from speeds or joint tables."""
         gap, rises = self._gap(model), self.rises(model)
-        if rises is None:
-            return None
         people, parts, lasts = rows_of(gap.a), rows_of(gap.b), self.lasts(model)
+        if rises is None:
+            most = self._most(model, points)
+            n = len(parts)
+
+            def below(span: Span, least: Array | float) -> Fall:
+                S_p = None if most is None else most(span)
+                if S_p is None:
+                    return UNBOUNDED
+                nearer, each = span.way(people) + span.fast[parts] * span.T, np.asarray(least)
+                lost = np.maximum(each[:n] - (each[n:] - nearer - S_p), nearer)
+                return Fall(np.inf, np.concatenate([lost, nearer]))
+
+            return None if most is None else below
 
         def falls(span: Span, _: Array | float) -> Fall:
-            lost = span.way(people) + span.fast[parts] * span.T + rises(span)
+            nearer = span.way(people) + span.fast[parts] * span.T
+            lost = np.concatenate([nearer + rises(span), nearer])
             # What S_p has ahead may leave it at once: the margin at the end says nothing of the way there.
             return Fall(np.inf, lost) if lasts else Fall(lost)
 
@@ -407,15 +419,32 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
         return rises
 
+    def _most(self, model: Model, points: Points) -> Callable[[Span], Array | None] | None:
+        """S_p of each of `moving` within a span at most [m], by how far joints and people get in it."""
+        own = self.at_worst(model)._by_device(model)[0]
+        gap, bind = self._gap(model), own._stop(model).in_span
+        longest = None if bind is None else bind(points)
+        if longest is None:
+            return None
+        people, K = rows_of(gap.a), sum(own._terms()[0]) + gap.deviation
+
+        def most(span: Span) -> Array | None:
+            course = longest(span)
+            seen = float(span.fast[people].max(initial=0.0))
+            return None if course is None or not np.isfinite(seen) else own._distance(course, K, seen)
+
+        return most
+
     def _at_speeds(self, by_speed: Callable[[Array], Course], K: float, v: Array, seen: float) -> Array:
         return self._distance(by_speed(v), K, seen)
 
     def margin(self, result: Result) -> Margin:
-        """See `Criterion.margin`, of each moving part."""
+        """See `Criterion.margin`, of each moving part; then how far each is away."""
         parts = [part for part in result.parts if part.verdict is not None]
-        far = [(part.value or 0.0) - (part.limit or 0.0) for part in parts]
-        off = [(part.value or 0.0) - part.interval[0] if part.interval else 0.0 for part in parts]
-        return np.array(far), np.array(off)
+        away = np.array([part.value or 0.0 for part in parts])
+        least = np.array([part.limit or 0.0 for part in parts])
+        near = np.array([part.interval[0] if part.interval else part.value or 0.0 for part in parts])
+        return np.concatenate([away - least, near]), np.concatenate([away - near, np.zeros(len(parts))])
 
     def _required(self, now: Course, K: float, seen: float) -> Required:
         S_p = self._distance(now, K, seen)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 from msgspec.structs import replace as changed
 
@@ -14,11 +13,12 @@ from seerob.model import Gap, Mechanism, Model
 from seerob.mounting.mass_tolerances import MassTolerances
 from seerob.snapshot import Input, Origin
 from seerob.state import State
-from seerob.stopping.onset import Levers, Onset
+from seerob.stopping.in_span import InSpan, Stopping, reach_of
+from seerob.stopping.onset import Chain, Levers, Onset
 from seerob.stopping.table import JointStop, SpeedStop, StoppingTable, interpolate, joint_stop
 from seerob.stopping.terms import Braking, Course, braking, travel
 
-Bound = tuple[Braking, Callable[[Onset], Course] | None, tuple[Input, ...]]
+Bound = tuple[Braking, Callable[[Onset], Course] | None, tuple[Input, ...], InSpan | None]
 
 
 def not_its_own(table: StoppingTable, model: Model, robot: Mechanism) -> str:
@@ -40,6 +40,7 @@ def bind_table(
     gap: Gap,
     *,
     rated_payload: float | None = None,
+    bind: Callable[[Stopping], InSpan | None],
 ) -> Bound:
     """How a robot's moving parts brake by its stopping table, and the inputs that it needs.
 
@@ -53,6 +54,7 @@ def bind_table(
         robot: Who stops.
         gap: Its second set are the moving parts.
         rated_payload: Payload at which the figures hold [kg], of a table that does not say.
+        bind: Makes of how joints stop what bounds it within a span.
 
     Raises:
         InputError: The table speaks of joints that the robot does not have.
@@ -89,8 +91,9 @@ def bind_table(
     )
     if table.tool is not None:
         by_onset = _by_tool_speed(table, table.tool, robot, load)
-        return lambda state: lambda onset, scale: by_onset(onset), by_onset, inputs
-    return _by_joint(table, others, model, robot, gap, load), None, inputs
+        return lambda state: lambda onset, scale: by_onset(onset), by_onset, inputs, None
+    braking, stopping = _by_joint(table, others, model, robot, gap, load)
+    return braking, None, inputs, bind(stopping)
 
 
 def _by_tool_speed(
@@ -118,7 +121,7 @@ def _by_joint(
     robot: Mechanism,
     gap: Gap,
     load: float,
-) -> Braking:
+) -> tuple[Braking, Stopping]:
     entries = {entry.joint: entry for entry in table.joints}
     full = [_full_speed(entries.get(j), robot, j) for j in range(len(robot.joints))]
     levers = Levers(model, robot, gap)
@@ -150,30 +153,37 @@ def _by_joint(
         way, time = joint_stop(entry, *within)
         return min(way, speed * time), time, beyond or unknown
 
+    def after(onset: Onset, far: float, chains: Sequence[Chain]) -> Course:
+        speeds, ways = onset.speeds, onset.ways
+        assert speeds is not None
+        assert ways is not None
+        extension = far / table.reach if table.reach is not None else 1.0
+        stops = [joint(j, float(speed), extension) for j, speed in enumerate(speeds)]
+        every = np.abs(robot.coupling) @ (ways + np.array([way for way, _, _ in stops]))
+        total = np.array([travel(turns.tolist(), every[rows], arms) for turns, rows, arms in chains])
+        # What the way of both exceeds the reaction's by; the lever may grow during the reaction.
+        beside = np.maximum(total - onset.S_r, 0.0)
+        doubts = dict.fromkeys((onset.doubt, *(why for _, _, why in stops)))
+        longest = max(time for _, time, _ in stops)
+        return Course(onset.v_r, onset.S_r, beside, longest, "; ".join(filter(None, doubts)))
+
     def bound(state: State) -> Callable[[Onset, float], Course]:
         chains = levers.at(state)
-        extension = _extension(state, robot) / table.reach if table.reach is not None else 1.0
+        far = reach_of(state.data_of(robot.name), state.model, robot)
 
         def at(onset: Onset, scale: float) -> Course:
-            speeds, ways, doubt = onset.speeds, onset.ways, onset.doubt
-            if speeds is None or ways is None:
+            if onset.speeds is None or onset.ways is None:
                 speeds, ways = scale * np.abs(state.qd(robot)), np.zeros(len(robot.joints))
                 doubt = (
                     "an acceleration of points says nothing of joints, and the stopping table is by joints: "
                     f"give acceleration_limits of {robot.name} instead of stop.acceleration"
                 )
-            stops = [joint(j, float(speed), extension) for j, speed in enumerate(speeds)]
-            every = np.abs(robot.coupling) @ (ways + np.array([way for way, _, _ in stops]))
-            total = np.array([travel(turns.tolist(), every[rows], arms) for turns, rows, arms in chains])
-            # What the way of both exceeds the reaction's by; the lever may grow during the reaction.
-            beside = np.maximum(total - onset.S_r, 0.0)
-            doubts = dict.fromkeys((doubt, *(why for _, _, why in stops)))
-            longest = max(time for _, time, _ in stops)
-            return Course(onset.v_r, onset.S_r, beside, longest, "; ".join(filter(None, doubts)))
+                onset = replace(onset, speeds=speeds, ways=ways, doubt=doubt)
+            return after(onset, far, chains)
 
         return at
 
-    return bound
+    return bound, after
 
 
 def _payload_share(table: StoppingTable, robot: Mechanism, load: float) -> tuple[float, str]:
@@ -200,14 +210,3 @@ def _payload(model: Model, robot: Mechanism) -> float:
     if robot.unknown_masses:
         return float("nan")
     return MassTolerances(model, robot).heaviest_load()
-
-
-def _extension(state: State, robot: Mechanism) -> float:
-    """Distance of the flange from the first axis [m]."""
-    joint = int(state.model.mj.dof_jntid[robot.v_address[0]])
-    flange = state.model.frames[f"{robot.name}/{robot.description.tip}"]
-    data = state.data_of(robot.name)
-    arm = state.pose(flange)[1] - data.xanchor[joint]
-    if state.model.mj.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
-        return float(np.linalg.norm(arm))
-    return float(np.linalg.norm(np.cross(data.xaxis[joint], arm)))

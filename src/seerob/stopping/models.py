@@ -19,9 +19,10 @@ from seerob.snapshot import Input, Origin
 from seerob.state import State
 from seerob.stopping import table as stopping_table
 from seerob.stopping.by_table import bind_table, not_its_own
+from seerob.stopping.in_span import InSpan, Stopping, bind_in_span
 from seerob.stopping.onset import At as OnsetAt
 from seerob.stopping.onset import Onset, accelerated
-from seerob.stopping.reaction import Reactions, bind_reaction
+from seerob.stopping.reaction import Reactions, bind_reaction, joint_limits
 from seerob.stopping.simulated import Stopped, StopSimulation
 from seerob.stopping.table import StoppingTable
 from seerob.stopping.terms import (
@@ -159,6 +160,8 @@ class StopModel:
     by_speed: Callable[[Array], Course] | None = None
     """The course of parts of given speeds [m/s] that are held, or get faster as given, where nothing else
     counts; never shorter for higher ones."""
+    in_span: InSpan | None = None
+    """The longest course that begins within a span, where that follows from the joints."""
     lasts: bool = False
     """Whether what is known ahead is in a course: then it is that of the whole tick that begins with it."""
     costly: bool = False
@@ -178,6 +181,7 @@ class _Brakes:
     not_modelled: tuple[str, ...] = ()
     by_onset: Callable[[Onset], Course] | None = None
     """The same, where nothing but that counts."""
+    in_span: InSpan | None = None
     timed: bool = False
     costly: bool = False
     more: str = ""
@@ -250,6 +254,7 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
         (*found.not_modelled, *left_out),
         _inverse(stop) if found.timed else None,
         None if by_onset is None else lambda v: by_onset(accelerated(v, T_r, a, np.zeros(0))),
+        found.in_span,
         stop.acceleration is None,
         found.costly,
         found.more,
@@ -341,8 +346,15 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
         what = f"{stop.rated_payload:g} kg, and the table of {table.robot} says {table.rated_payload:g} kg"
         raise InputError.at("stop", "rated_payload", what, "leave it out: the table's own holds")
     doubt = not_its_own(table, model, robot) if stop.table_for is None else ""
-    by_table, by_onset, inputs = bind_table(
-        table, stop.stopping, model, robot, gap, rated_payload=stop.rated_payload
+
+    def bind(after: Stopping) -> InSpan | None:
+        if stop.acceleration:
+            return None
+        held, limits = stop.acceleration == 0, joint_limits(model, robot)
+        return bind_in_span(model, robot, gap, after, T_r=stop.reaction, held=held, limits=limits)
+
+    by_table, by_onset, inputs, in_span = bind_table(
+        table, stop.stopping, model, robot, gap, rated_payload=stop.rated_payload, bind=bind
     )
     source = f"{table.source} ({table.confidence})" + (f"; {table.note}" if table.note else "")
     named = Input(name="stopping table", value=table.robot, origin=Origin.STATED, source=source)
@@ -368,6 +380,7 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
             + ("" if table.tool is not None else ", and the lesser of its first way and speed times time"),
         ),
         by_onset=by_onset,
+        in_span=in_span,
     )
 
 

@@ -265,11 +265,21 @@ class Levers:
         turns = kinds == mujoco.mjtJoint.mjJNT_HINGE
         rows = [_chain(model, robot, model.bodies[i]) for i in gap.b]
         self._chains = [(index, turns[row], row) for index, row in zip(gap.b, rows, strict=True)]
-        self._robot = robot
+        self._robot, self._model = robot, model
 
     def at(self, state: State) -> list[Chain]:
         """Of every part, now."""
         return [Chain(t, rows, _levers(state, self._robot, rows, i)) for i, t, rows in self._chains]
+
+    def placed(self, data: mujoco.MjData) -> list[Chain]:
+        """Of every part, where data with kinematics have it; of those that nobody picks up."""
+        found = []
+        for i, turns, rows in self._chains:
+            body = self._model.bodies[i]
+            R, x = data.xmat[body.mj].reshape(3, 3), data.xpos[body.mj]
+            joints = self._model.mj.dof_jntid[self._robot.v_address[rows]]
+            found.append(Chain(turns, rows, _arms(data, joints, body, R, x)))
+        return found
 
 
 def _chain(model: Model, robot: Mechanism, body: Body) -> NDArray[np.int64]:
@@ -290,8 +300,12 @@ def _levers(state: State, robot: Mechanism, chain: NDArray[np.int64], index: int
         return np.zeros(len(chain))
     joints = state.model.mj.dof_jntid[robot.v_address[chain]]
     R, x = state.placed((index,))
-    data = state.data_of(robot.name)
-    corners = x[index] + body.corners @ R[index].T
+    return _arms(state.data_of(robot.name), joints, body, R[index], x[index])
+
+
+def _arms(data: mujoco.MjData, joints: NDArray[np.int64], body: Body, R: Array, x: Array) -> Array:
+    """Largest distance of a body at x, turned by R, from axes [m], shape (k,)."""
+    corners = x + body.corners @ R.T
     arms = corners[None] - data.xanchor[joints][:, None]
     along = np.einsum("kci,ki->kc", arms, data.xaxis[joints])
     squares = np.einsum("kci,kci->kc", arms, arms) - along**2

@@ -129,6 +129,14 @@ def _acceleration_limits(model: Model, robot: Mechanism) -> Array | None:
     return np.array(np.broadcast_to(np.array(given, float), len(robot.joints)))
 
 
+def joint_limits(model: Model, robot: Mechanism) -> tuple[Array, Array] | None:
+    """Largest accelerations and speeds of joints, shape (j,); None without ``acceleration_limits``."""
+    limits = _acceleration_limits(model, robot)
+    if limits is None:
+        return None
+    return limits, np.array([np.inf if limit is None else limit.value for limit in robot.velocity_limits])
+
+
 class _Bias:
     """Torques of gravity and motion on a robot's joints."""
 

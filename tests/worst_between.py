@@ -1,0 +1,35 @@
+"""How far a bound between two ticks is from the worst that is met there: ``from worst_between import …``."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from seerob.between_ticks import Told
+from seerob.run import Judge, engine_of, looks_ahead, pump, ticks
+
+
+def worst_found(station, looks):
+    """By criterion, how far the bound is from the worst that many looks between each two ticks meet."""
+    engine = engine_of(station.model)
+    judge = Judge(station.bound)
+    between = judge._between
+    room = {}
+
+    def watching(i, watch, ends, state):
+        if ends[0].margin is None or ends[1].margin is None:
+            return Told()
+        low = between._low(watch, between._way, ends, state)
+        path = between._way
+        instants = np.union1d(np.linspace(path.t[0], path.t[-1], looks + 2), path.t)
+        met = []
+        for t in instants.tolist():
+            _, there = between._look(i, watch, path, t, state)
+            met.append(-1.0 if there.margin is None else np.min(there.margin[0] - there.margin[1]))
+        room.setdefault(watch.criterion.name, []).append(min(met) - low)
+        return Told()
+
+    between._judge = watching
+    ahead = looks_ahead(station.model)
+    for _ in ticks(engine, judge, pump(station.sources, station.workstation.engine.tick, ahead=ahead)):
+        pass
+    return room

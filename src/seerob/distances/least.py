@@ -97,6 +97,17 @@ class Closests:
             self.reach[index],
         )
 
+    def shaped(self, shape: tuple[int, ...]) -> Closests:
+        """The same in another shape."""
+        return Closests(
+            self.distance.reshape(shape),
+            self.point_a.reshape((*shape, 3)),
+            self.point_b.reshape((*shape, 3)),
+            self.body_a.reshape(shape),
+            self.body_b.reshape(shape),
+            self.reach.reshape(shape),
+        )
+
     def at(self, *index: int) -> Closest:
         """One of them."""
         return Closest(
@@ -250,14 +261,16 @@ class Survey:
         self._bound = (
             shapes.which, shapes.local, shapes.ball, shapes.corners, shapes.radius, shapes.nodes,
             shapes.links, shapes.triangles, shapes.boxes, shapes.kids, shapes.probes,
-            np.unique(self._pair), self._pair, self._start, self._members,
+            np.unique(self._pair), self._pair, self._start, self._members, self._bodies,
         )  # fmt: skip
         self._memory = self._forget()
 
     def ask(self, rotations: ArrayLike, positions: ArrayLike) -> list[Closests]:
         """Answers for one set of poses, in the order of the questions; see `Query.minimum`."""
-        found = self._run(np.asarray(rotations)[None], np.asarray(positions)[None], self._memory)
-        return [found.of(0, columns) for columns in self._columns]
+        found = self._run(rotations, positions, (), self._memory, self._caps)
+        if len(self._columns) == 1:
+            return [found]
+        return [found.of(columns) for columns in self._columns]
 
     def within(self, rotations: ArrayLike, positions: ArrayLike, caps: Array) -> Closests:
         """Answers for one set of poses up to other caps, one after the other in the order of the questions.
@@ -269,12 +282,11 @@ class Survey:
         """
         own = np.empty_like(self._caps)
         own[self._in_turn] = caps
-        R, x = np.asarray(rotations)[None], np.asarray(positions)[None]
-        return self._run(R, x, self._memory, own).of(0, self._in_turn)
+        return self._run(rotations, positions, (), self._memory, own).of(self._in_turn)
 
     def batch(self, rotations: ArrayLike, positions: ArrayLike) -> list[Closests]:
         """Answers for many samples, in the order of the questions; see `Query.batch`."""
-        found = self._run(rotations, positions, self._forget())
+        found = self._run(rotations, positions, (len(np.asarray(rotations)),), self._forget(), self._caps)
         return [found.of(slice(None), columns) for columns in self._columns]
 
     def _forget(self) -> Memory:
@@ -288,27 +300,32 @@ class Survey:
         )
 
     def _run(
-        self, rotations: ArrayLike, positions: ArrayLike, memory: Memory, caps: Array | None = None
+        self, rotations: ArrayLike, positions: ArrayLike, many: tuple[int, ...], memory: Memory, caps: Array
     ) -> Closests:
-        s = self.shapes
+        """Answers of shape (*many, g), of poses with such leading dimensions.
+
+        Asked between other work, what it costs is mostly what of Python it touches: so it touches little.
+        """
         R = np.ascontiguousarray(rotations, float)
         x = np.ascontiguousarray(positions, float)
-        n = len(s.names)
-        if R.shape[1:] != (n, 3, 3) or x.shape != (len(R), n, 3):
+        n = len(self.shapes.names)
+        if R.shape != (*many, n, 3, 3) or x.shape != (*many, n, 3):
             raise ValueError(f"poses of {n} bodies expected, not rotations {R.shape} and positions {x.shape}")
-        shape = len(R), len(self._caps)
-        distance, points = np.empty(shape), np.empty((*shape, 6))
-        winner, reach = np.empty(shape, np.int64), np.empty(shape, np.int8)
+        if many:
+            R, x = R.reshape(-1, 3, 3), x.reshape(-1, 3)
+        count = len(caps) * many[0] if many else len(caps)
+        distance, point_a, point_b = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
+        body_a, body_b, reach = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int8)
         bad, body = kernel.nearest(
-            R, x, *self._bound, self._caps if caps is None else caps, self._whether, *memory,
-            distance, points, winner, reach,
+            R, x, n, *self._bound, caps, self._whether, *memory, distance, point_a, point_b, body_a, body_b,
+            reach,
         )  # fmt: skip
         if bad >= 0:
             self._memory = self._forget()
-            sample = f" of sample {bad}" if len(R) > 1 else ""
-            raise SimulationDiverged(f"the pose of {s.names[body]!r}{sample} is not finite")
-        bodies = self._bodies[winner]
-        return Closests(distance, points[..., :3], points[..., 3:], bodies[..., 0], bodies[..., 1], reach)
+            sample = f" of sample {bad}" if many and many[0] > 1 else ""
+            raise SimulationDiverged(f"the pose of {self.shapes.names[body]!r}{sample} is not finite")
+        found = Closests(distance, point_a, point_b, body_a, body_b, reach)
+        return found.shaped((*many, len(caps))) if many else found
 
 
 class Memory(NamedTuple):

@@ -41,6 +41,7 @@ EXACT, DEPTH_AT_LEAST, BEYOND_CAP, WITHIN_CAP = 0, 1, 2, 3
 def nearest(
     rotations: Array,
     positions: Array,
+    step: int,
     which: Indices,
     local: Array,
     ball: Array,
@@ -56,6 +57,7 @@ def nearest(
     pair: Indices,
     start: Indices,
     members: Indices,
+    bodies: Indices,
     cap: Array,
     whether: NDArray[np.bool_],
     at: Array,
@@ -64,15 +66,18 @@ def nearest(
     first: Indices,
     last: Indices,
     distance: Array,
-    points: Array,
-    winner: Indices,
+    point_a: Array,
+    point_b: Array,
+    body_a: Indices,
+    body_b: Indices,
     status: NDArray[np.int8],
 ) -> tuple[int, int]:
     """Least distance of each group of pairs, for each sample.
 
     Args:
-        rotations: world_from_body, shape (N, n, 3, 3).
-        positions: world_from_body [m], shape (N, n, 3).
+        rotations: world_from_body, one sample after the other, shape (N·n, 3, 3).
+        positions: Likewise [m], shape (N·n, 3).
+        step: Bodies of a sample, n.
         which: See `seerob.kernels.pairs`, shape (ns, 12).
         local: body_from_solid, nine of the rotation and three of the position, shape (ns, 12).
         ball: Bounding ball of each core in its own frame: centre and radius [m], shape (ns, 4).
@@ -88,6 +93,7 @@ def nearest(
         pair: Solids of each pair, meshes first, shape (m, 2).
         start: Where the pairs of each group begin in ``members``, shape (g + 1,).
         members: By group, a pair, and 1 where its first solid belongs to the second set, shape (k, 2).
+        bodies: Of the first and of the second set, of each member and of none, shape (k + 1, 2).
         cap: Distance above which the answer does not matter, of each group [m], shape (g,); -infinity
             where there is no question.
         whether: Of which groups only that is asked: whether anything is nearer than the cap, shape (g,).
@@ -96,10 +102,12 @@ def nearest(
         high: State: upper bound of each pair's distance then, infinity before the first.
         first: State: triangles that were nearest, -1 before the first, shape (m, 2).
         last: State: member that won each group, -1 before the first.
-        distance: Result [m], shape (N, g).
-        points: Result: points on the solids of the first and second set, shape (N, g, 6).
-        winner: Result: member, or -1 beyond ``cap``, shape (N, g).
-        status: Result, shape (N, g).
+        distance: Result [m], of one sample after the other, shape (N·g,).
+        point_a: Result: point on the solid of the first set [m], shape (N·g, 3).
+        point_b: Result: on that of the second.
+        body_a: Result: body of the first set, -1 beyond ``cap``, shape (N·g,).
+        body_b: Result: of the second.
+        status: Result, shape (N·g,).
 
     Returns:
         Sample and body of a pose that is not finite, or -1, -1.
@@ -127,8 +135,11 @@ def nearest(
     R = np.empty(9)
     t = np.empty(3)
     W = np.empty(12)
-    for n in range(len(rotations)):
-        body = place(rotations[n], positions[n], which, local, ball, corners, used, world, centre, at, moved)
+    groups = len(start) - 1
+    for n in range(len(rotations) // step):
+        body = place(
+            rotations, positions, n * step, which, local, ball, corners, used, world, centre, at, moved
+        )
         if body >= 0:
             return n, body
         for p in range(m):
@@ -158,12 +169,15 @@ def nearest(
                         which[i, VOLUME] and inside(j, i, which, nodes, links, T, probes, world)
                     ) or (which[j, VOLUME] and inside(i, j, which, nodes, links, T, probes, world))
             low[p] = -np.inf if within[p] else max(bound, max(gap, 0.0) - r)
-        for g in range(len(start) - 1):
+        for g in range(groups):
             best = cap[g]
             winning = -1
+            k = n * groups + g
+            status[k] = BEYOND_CAP
+            for c in range(3):
+                point_a[k, c] = point_b[k, c] = np.nan
             if best == -np.inf:
-                distance[n, g], winner[n, g], status[n, g] = best, -1, BEYOND_CAP
-                points[n, g] = np.nan
+                distance[k], body_a[k], body_b[k] = best, -1, -1
                 continue
             for e in range(start[g], start[g + 1]):
                 q = members[e, 0]
@@ -221,22 +235,19 @@ def nearest(
                 if value[p] < best or (value[p] == best and chosen < winning):
                     best = value[p]
                     winning = chosen
-            distance[n, g] = best
-            winner[n, g] = winning
-            status[n, g] = BEYOND_CAP
             last[g] = winning
-            points[n, g] = np.nan
+            distance[k] = best
             if whether[g]:
-                distance[n, g] = cap[g]
+                distance[k] = cap[g]
                 if winning >= 0:
-                    # By which pair depends on what was asked before.
-                    winner[n, g] = -1
-                    status[n, g] = WITHIN_CAP
+                    status[k] = WITHIN_CAP
+                    winning = -1  # by which pair depends on what was asked before
             elif winning >= 0:
                 p = members[winning, 0]
-                status[n, g] = DEPTH_AT_LEAST if deep[p] else EXACT
+                status[k] = DEPTH_AT_LEAST if deep[p] else EXACT
                 swap = 3 * members[winning, 1]
                 for c in range(3):
-                    points[n, g, c] = found[p, c + swap]
-                    points[n, g, 3 + c] = found[p, 3 + c - swap]
+                    point_a[k, c] = found[p, c + swap]
+                    point_b[k, c] = found[p, 3 + c - swap]
+            body_a[k], body_b[k] = bodies[winning, 0], bodies[winning, 1]
     return -1, -1

@@ -34,6 +34,7 @@ COLUMNS = 12
 def place(
     rotation: Array,
     position: Array,
+    begin: int,
     which: Indices,
     local: Array,
     ball: Array,
@@ -46,12 +47,14 @@ def place(
 ) -> int:
     """World poses, ball centres and corners of the solids in use, and how far each has moved.
 
+    The poses of the bodies are rows from ``begin`` on.
+
     Returns the body of a pose that is not finite, or -1.
     """
     for s in used:
         body = which[s, BODY]
-        R = rotation[body]
-        p = position[body]
+        R = rotation[begin + body]
+        p = position[begin + body]
         size = 0.0
         for c in range(3):
             size += abs(R[c, 0]) + abs(R[c, 1]) + abs(R[c, 2]) + abs(p[c])

@@ -16,6 +16,7 @@ from seerob.between_ticks import Asking, BetweenTicks, Watch
 from seerob.criterion import Criterion, Evaluate
 from seerob.errors import SeerobError, Undecided, UnknownName, Unweighed
 from seerob.model import Model
+from seerob.plausibility.as_heard import AsHeard
 from seerob.plugin import PluginError, kind_of
 from seerob.snapshot import Basis, Finding, Result, Row, Verdict
 from seerob.state import State
@@ -283,6 +284,7 @@ class Judge:
         self._findings = tuple(findings)
         self._held: tuple[str, ...] | None = None
         self._held_names: dict[str, str] = {}
+        self._as_heard: AsHeard | None = None
         self._needs: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] | None = None
         self._unmentioned: tuple[dict[str, str], ...] = ()
         self._kept: dict[int, _Kept] = {}
@@ -300,6 +302,12 @@ class Judge:
             self._held_names = held_names(findings, model)
             self._needs = tuple(needed(bound.criterion, model) for bound in self._bound)
             self._unmentioned = tuple(unmentioned(bound.criterion, model) for bound in self._bound)
+            self._as_heard = AsHeard(model)
+        assert self._as_heard is not None
+        if (told := self._as_heard.at(state)) is not None:
+            findings = tuple(dict.fromkeys((*state.model.findings, *self._findings, *told)))
+            self._held = tuple(held(bound.criterion, state.model, findings) for bound in self._bound)
+            self._held_names = held_names(findings, state.model)
         results = tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
 
         def ask(i: int) -> Result:

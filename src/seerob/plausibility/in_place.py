@@ -1,7 +1,8 @@
 """What follows from the compiled workstation and can be implausible: where things are, how large and heavy.
 
 The questions are asked once, of everybody at home; of whom a recorded source moves, when it was opened, of
-where its samples begin. Whom a live source moves is not asked for what depends on that.
+where its samples begin. Whom a live source moves is asked for what depends on that when heard, see
+`seerob.plausibility.as_heard`.
 """
 
 from __future__ import annotations
@@ -76,6 +77,20 @@ def implausible_motion(model: Model, q: Mapping[str, Sequence[Array]]) -> tuple[
     if people:
         every += _nobody(model, places)
     return tuple(findings(every, model.workstation.confirmed))
+
+
+def placed(model: Model, q: Mapping[str, Array]) -> Iterator[Quantity]:
+    """What can be implausible of where robots and people are, of whom that was heard.
+
+    Args:
+        model: The compiled workstation.
+        q: Joint positions by robot or human, shape (n,).
+    """
+    place = _Home(model, q)
+    people = q.keys() & {human.name for human in model.workstation.humans}
+    yield from _feet(model, place, people)
+    yield from _overlaps(model, place, people)
+    yield from _nobody(model, [place], "where they are heard to be")
 
 
 def _most(q: Mapping[str, Sequence[Array]]) -> int:
@@ -293,7 +308,9 @@ def _parts(model: Model, place: _Home) -> Iterator[Quantity]:
             )
 
 
-def _nobody(model: Model, places: Sequence[_Home]) -> Iterator[Quantity]:
+def _nobody(
+    model: Model, places: Sequence[_Home], where: str = "where the file puts them"
+) -> Iterator[Quantity]:
     """How near anybody comes to each robot and machine."""
     place = places[0]
     people = [model.mechanisms[h.name] for h in model.workstation.humans]
@@ -305,6 +322,6 @@ def _nobody(model: Model, places: Sequence[_Home]) -> Iterator[Quantity]:
             own = [b.index for b in _of(model, model.mechanisms[table.name])]
             if own:
                 near = max(min(at.distance(still, own, SIGHT) for at in places), 0.0)
-                said = f"from {table.name} to whoever is nearest, where the file puts them"
+                said = f"from {table.name} to whoever is nearest, {where}"
                 key = "nobody_within"
                 yield Quantity(f"{group}[{i}].{key}", f"{group}.{key}", "m", (near,), (table.name,), said)

@@ -7,6 +7,7 @@ import logging
 import os
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -35,6 +36,25 @@ class Told(LiveSource, frozen=True, kw_only=True):
         while True:
             yield JointSample(source="", seq=0, target=self.robot, t=time.monotonic(), q=(np.float64(0.5),))
             await asyncio.sleep(0.001)
+
+
+class Delayed(Told, frozen=True, kw_only=True):
+    """What the next process hears is on its way for 0.8 s; a file tells that there was one before."""
+
+    been: str
+
+    async def listen(self, target):
+        late = 0.8 * Path(self.been).exists()
+        Path(self.been).touch()
+        await asyncio.sleep(late)
+        yield SignalSample(source="", seq=0, t=time.monotonic(), values={"process": os.getpid()})
+        k = 0
+        while True:
+            now, k = time.monotonic(), k + 1
+            yield JointSample(
+                source="", seq=0, target=self.robot, t=now, t_device=now - late - 900, q=(1e-3 * (k % 2),)
+            )
+            await asyncio.sleep(0.002)
 
 
 class AtOnce(Told, frozen=True, kw_only=True):

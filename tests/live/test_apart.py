@@ -20,10 +20,10 @@ from seerob.live.apart import told
 from seerob.live.ears import Listening
 from seerob.live.listening import LiveSource
 from seerob.plugin import kinds, load
-from seerob.samples import JointSample, SignalSample
+from seerob.samples import JointSample, Quality, SignalSample
 from seerob.source import Source
 from seerob.sources.headset import Headset
-from told_sources import AtOnce, Large, Missing, Mistaken, Stubborn, Told
+from told_sources import AtOnce, Delayed, Large, Missing, Mistaken, Stubborn, Told
 
 
 def taken(listening, kind=JointSample):
@@ -106,6 +106,20 @@ def test_a_process_that_is_killed_is_started_again_with_one_line_each(caplog):
         taken(listening)
         wait_for(lambda: caplog.text.count("arm: heard again") == 3)
     assert len([r for r in caplog.records if r.name.startswith("seerob")]) == 6
+
+
+def test_a_delay_that_came_while_nobody_listened_stays_one(tmp_path):
+    """Whoever listens next knows the clock of the device: samples that are 0.8 s old are not of now."""
+    with Listening([(Delayed(name="arm", been=str(tmp_path / "been"), timeout=0.5), None)]) as listening:
+        pid = process_of(listening)
+        assert {s.quality for s in taken(listening)} == {Quality.GOOD}
+        os.kill(pid, signal.SIGKILL)
+        wait_for(lambda: not is_there(pid))
+        assert process_of(listening) != pid
+        for _ in range(5):
+            late = taken(listening)[-1]
+            assert late.quality is Quality.LATE
+            assert late.late > 0.7
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])

@@ -22,9 +22,10 @@ from typing import IO, NamedTuple
 
 import msgspec
 
+from seerob.live.device_clock import Known
 from seerob.live.listening import FIRST_PAUSE, LONGEST_PAUSE, STOP_WITHIN, LiveSource, because
 from seerob.live.shared_mailbox import SharedMailbox, memory
-from seerob.samples import Sample
+from seerob.samples import Quality, Sample, SignalSample
 from seerob.source import Target
 
 _log = logging.getLogger(__name__)
@@ -52,6 +53,8 @@ class Order(NamedTuple):
     """Whether another one listened before."""
     pair: bytes
     """From `told`."""
+    known: Known | None = None
+    """What the one before knew of the device's clock."""
 
 
 class Said(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -88,6 +91,7 @@ class Apart:
         self.name = name
         self._pair = pair
         self._box: SharedMailbox | None = None
+        self._known: Known | None = None
         self._begun, self._stopping = Event(), Event()
         self._lock = Lock()
         self._process: subprocess.Popen[bytes] | None = None
@@ -106,7 +110,13 @@ class Apart:
     def take(self) -> tuple[Sample, ...]:
         """What was heard since the last call, the newest of each."""
         box = self._box
-        return () if box is None else box.take()
+        samples = () if box is None else box.take()
+        for sample in samples:
+            # What is late has the right instant all the same; after a step nobody knows.
+            sure = sample.quality in (Quality.GOOD, Quality.LATE)
+            if sure and sample.t_device is not None and not isinstance(sample, SignalSample):
+                self._known = Known(sample.t - sample.t_device, sample.t_device, sample.t)
+        return samples
 
     def ask_to_stop(self) -> None:
         """Ask it to end; returns at once."""
@@ -167,7 +177,7 @@ class Apart:
         self._box = box
         with process:
             level = logging.getLogger("seerob").getEffectiveLevel()
-            self._tell(process, Order(sys.path, level, file, again, self._pair))
+            self._tell(process, Order(sys.path, level, file, again, self._pair, self._known))
             if process.stdout is not None:
                 self._hear(process.stdout)
             try:

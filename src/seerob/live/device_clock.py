@@ -56,14 +56,28 @@ class Instant(NamedTuple):
     """Why the device's time may not be relied on now; empty when it may."""
 
 
+class Known(NamedTuple):
+    """What is known of a device's clock, for whoever listens to it next."""
+
+    offset: float
+    """Host time less device time [s]."""
+    device: float
+    """Newest stamp [s]."""
+    host: float
+    """When that was, on the host's monotonic clock [s]."""
+
+
 class DeviceClock:
     """Estimates when, on the host's clock, a device took its samples.
+
+    Args:
+        known: What another listener knew of it: a delay that lasts stays one.
 
     Attributes:
         latency: How much later than the fastest one of late the newest sample arrived [s].
     """
 
-    def __init__(self) -> None:
+    def __init__(self, known: Known | None = None) -> None:
         self._newest = -math.inf
         """Stamp of the newest sample."""
         self._host = 0.0
@@ -83,6 +97,9 @@ class DeviceClock:
         self._said: dict[float, int] = {}
         self._doubt, self._until = "", -math.inf
         self.latency = 0.0
+        if known is not None:
+            self._offset = self._applied = known.offset
+            self._newest, self._host = known.device, known.host
 
     def reconnect(self) -> None:
         """It has connected anew: its clock may have started again, and else goes on."""

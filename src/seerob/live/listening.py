@@ -30,7 +30,7 @@ from seerob.errors import InputError, SeerobError
 from seerob.host_name import check_host, check_url
 from seerob.live.arrivals import Arrivals, Statistics
 from seerob.live.contradictions import Contradictions
-from seerob.live.device_clock import AFTER, HOLD, DeviceClock, Instant
+from seerob.live.device_clock import AFTER, HOLD, DeviceClock, Instant, Known
 from seerob.samples import BodySample, JointSample, Quality, Sample, SignalSample, key
 from seerob.snapshot import Finding
 from seerob.source import Opened, Source, Target
@@ -192,6 +192,7 @@ class Listener:
         target: What it drives.
         post: Called with each sample, on the host's clock; from the listener's thread.
         again: Whether it was heard before, and lost.
+        known: What was known of its clock then.
     """
 
     def __init__(
@@ -201,12 +202,13 @@ class Listener:
         post: Callable[[Sample], None],
         *,
         again: bool = False,
+        known: Known | None = None,
     ) -> None:
         self.name = name_of(source)
         self.drives = bool(source.target())
         """Whether it drives a robot or a person, or only has signals."""
         self._source, self._target, self._post = source, target, post
-        self._clock, self._arrivals = DeviceClock(), Arrivals(source.period())
+        self._clock, self._arrivals = DeviceClock(known), Arrivals(source.period())
         self._bound = source.timeout
         self._contradictions: dict[tuple[str, ...], Contradictions] = {}
         self._found: dict[tuple[str, ...], tuple[str, float]] = {}

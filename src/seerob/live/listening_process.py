@@ -66,7 +66,7 @@ def _listener(order: Order) -> Listener:
     # All of this stays: it need not be looked through while somebody listens.
     gc.collect()
     gc.freeze()
-    return Listener(source, target, SharedMailbox(order.memory).post, again=order.again)
+    return Listener(source, target, SharedMailbox(order.memory).post, again=order.again, known=order.known)
 
 
 def main() -> int:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -76,6 +77,22 @@ def build(
     """
     if hand not in SIDES:
         raise InputError.at(name, "hand", f"{hand!r} is not a side", "give right or left")
+    own = tuple(None if each is None else tuple(each.items()) for each in (own_lengths, own_masses))
+    return _built(name, stature, mass, sex, lengths, masses, hand, *own)
+
+
+@lru_cache(maxsize=64)  # the same person stands in cell after cell, and nobody changes one
+def _built(
+    name: str,
+    stature: float,
+    mass: float,
+    sex: str,
+    lengths: str,
+    masses: str,
+    hand: str,
+    own_lengths: tuple[tuple[str, float], ...] | None,
+    own_masses: tuple[tuple[str, float], ...] | None,
+) -> Description:
     person = body(
         name=name,
         stature=stature,
@@ -83,8 +100,8 @@ def build(
         sex=sex,
         lengths=lengths,
         masses=masses,
-        own_lengths=own_lengths,
-        own_masses=own_masses,
+        own_lengths=None if own_lengths is None else dict(own_lengths),
+        own_masses=None if own_masses is None else dict(own_masses),
     )
     solids = skin(person)
     mass_properties = inertials(person)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
+from functools import cache
 from importlib import resources
 from typing import Any
 
@@ -40,10 +41,8 @@ def load(robot: str, *, name: str | None = None) -> Description:
     """
     if robot not in names():
         raise UnknownName("robot in the library", robot, names())
-    content = (resources.files(__package__) / "robots" / f"{robot}.toml").read_bytes()
-    table = tomllib.loads(content.decode())
+    content, table, links = _read(robot)
     name = name or robot
-    links = tuple(_link(_si(entry), table) for entry in table["links"])
     return Description(
         name=name,
         links=links,
@@ -52,6 +51,14 @@ def load(robot: str, *, name: str | None = None) -> Description:
         findings=tuple(_findings(name, table, links)),
         files={f"library/{robot}.toml": content},
     )
+
+
+@cache
+def _read(robot: str) -> tuple[bytes, Table, tuple[Link, ...]]:
+    """File, table and links, which nobody changes: the same for each cell that has the robot."""
+    content = (resources.files(__package__) / "robots" / f"{robot}.toml").read_bytes()
+    table = tomllib.loads(content.decode())
+    return content, table, tuple(_link(_si(entry), table) for entry in table["links"])
 
 
 def _si(table: Table) -> dict[str, Any]:

@@ -277,6 +277,13 @@ SPOILED = {
     "pauses of the run": Case(
         stream(), gap=TIMEOUT, least=0.85, pauses={200: 0.5, 400: 0.2}, why="run time fell behind"
     ),
+    "pauses and jitter": Case(
+        stream(way=jitter(0.005)),
+        gap=TIMEOUT,
+        least=0.6,
+        pauses={100: 0.3, 200: 0.5, 300: 0.26, 400: 0.24},
+        why="run time fell behind",
+    ),
     "pauses, no velocities": Case(silent(stream()), gap=TIMEOUT, least=0.85, pauses={200: 0.5, 400: 0.2}),
     "a clock that is 1 % slow": Case(stream(device=lambda t: 0.99 * t), gap=0.08, shift=0.06),
     "a clock that starts again": Case(stream(device=lambda t: t - 50 * (t > 102)), gap=0.02, least=0.5),

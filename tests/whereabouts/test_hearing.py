@@ -8,9 +8,11 @@ import pytest
 from made_cell import FLOATING, TWO_R, heard, made, recorded, two_r
 from seerob.engine import Engine
 from seerob.errors import InputError, UnknownName
+from seerob.live.device_clock import AFTER
 from seerob.run import Judge, bind, pump, ticks
 from seerob.samples import Quality
 from seerob.source import Opened, Source
+from seerob.whereabouts.hearing import Hearing
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 ENERGY = '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = 2000.0\n'
@@ -194,3 +196,13 @@ def test_jump_of_a_robot_is_undecided_while_it_happens_and_decided_after(arm):
         assert verdict == ("undecided" if jumping else "within"), (t, reason)
         assert jumping or value < 1e-6
         assert ("jump" in reason) == jumping
+
+
+def test_a_doubt_about_what_was_said_before_counts_where_that_lies_ahead_too():
+    """After a pause of the run the newest sample is repeated as late, and may lie ahead of the tick."""
+    good = [(0.99, ""), (1.005, "")]
+    assert not Hearing(given=False, driven=True, heard=good).doubt(1.0)
+    repeated = Hearing(given=False, driven=True, heard=[*good, (1.005 + AFTER, "run time fell behind")])
+    assert repeated.doubt(1.0) == repeated.doubt(1.005) == "run time fell behind"
+    later = Hearing(given=False, driven=True, heard=[*good, (1.013, "robot off")])
+    assert not later.doubt(1.0)

@@ -21,6 +21,11 @@ STANDS = 1e-2
 as fast, and within the time-out nothing gets farther than some millimetres."""
 
 
+REPEATED = 2e-6
+"""What is said again with a doubt follows by less [s] (`seerob.live.device_clock.AFTER`): it is of the same
+instant, also where that lies ahead."""
+
+
 class Places(NamedTuple):
     """What devices leave open of where the bones of a person are, however well they see them turned."""
 
@@ -137,7 +142,10 @@ class Hearing:
         if k == len(self.heard) and t - last > self.grace + SLACK and self.leaves_at > STANDS:
             speed = f"{self.leaves_at:.3g} rad/s or m/s"
             return f"what drives it ends in motion, with {speed} at {last:.3f} s: nobody says that it stopped"
-        return next((reason for _, reason in self.heard[k - 1 : k + 1] if reason), "")
+        until = k + 1
+        while until < len(self.heard) and self.heard[until][0] - self.heard[until - 1][0] < REPEATED:
+            until += 1
+        return next((reason for _, reason in self.heard[k - 1 : until] if reason), "")
 
     def speed_error(self, t: float) -> Array | None:
         """How far joint velocities may be off at ``t`` [s], shape (n,): the worse of two samples."""

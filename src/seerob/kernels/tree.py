@@ -59,11 +59,36 @@ def triangle_rows(vertices: Array, faces: Links) -> Array:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _sort(order: Indices, start: int, stop: int, centre: Array, axis: int) -> None:
+    """Sort ``order[start:stop]`` along an axis, stably; what NumPy has for it takes seconds to compile."""
+    other = np.empty(stop - start, np.int64)
+    width = 1
+    while width < stop - start:
+        for low in range(start, stop, 2 * width):
+            middle = min(low + width, stop)
+            high = min(low + 2 * width, stop)
+            i = low
+            j = middle
+            for k in range(low, high):
+                if j >= high or (i < middle and centre[order[i], axis] <= centre[order[j], axis]):
+                    other[k - start] = order[i]
+                    i += 1
+                else:
+                    other[k - start] = order[j]
+                    j += 1
+        for k in range(start, stop):
+            order[k] = other[k - start]
+        width *= 2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _split(order: Indices, start: int, stop: int, centre: Array, low: Array, high: Array, level: int) -> int:
     """Reorder ``order[start:stop]`` and return where the right half begins."""
     middle = (start + stop) // 2
-    least = np.full(3, np.inf)
-    most = np.full(3, -np.inf)
+    least = np.empty(3)
+    most = np.empty(3)
+    for c in range(3):
+        least[c], most[c] = np.inf, -np.inf
     for q in range(start, stop):
         for c in range(3):
             least[c] = min(least[c], centre[order[q], c])
@@ -84,8 +109,9 @@ def _split(order: Indices, start: int, stop: int, centre: Array, low: Array, hig
             scale = BINS * (1.0 - 1e-12) / (most[c] - least[c])
             count = np.zeros(BINS, np.int64)
             box = np.empty((BINS, 6))
-            box[:, :3] = np.inf
-            box[:, 3:] = -np.inf
+            for b in range(BINS):
+                for d in range(3):
+                    box[b, d], box[b, 3 + d] = np.inf, -np.inf
             for q in range(start, stop):
                 k = order[q]
                 b = min(max(int((centre[k, c] - least[c]) * scale), 0), BINS - 1)
@@ -96,8 +122,8 @@ def _split(order: Indices, start: int, stop: int, centre: Array, low: Array, hig
             cost = np.zeros(BINS)
             for side in range(2):
                 grown = np.empty(6)
-                grown[:3] = np.inf
-                grown[3:] = -np.inf
+                for d in range(3):
+                    grown[d], grown[3 + d] = np.inf, -np.inf
                 n = 0
                 for m in range(BINS - 1):
                     b = m if side == 0 else BINS - 1 - m
@@ -132,8 +158,7 @@ def _split(order: Indices, start: int, stop: int, centre: Array, low: Array, hig
                     j -= 1
             if start < i < stop:
                 return i
-    part = order[start:stop].copy()
-    order[start:stop] = part[np.argsort(centre[part, axis], kind="mergesort")]
+    _sort(order, start, stop, centre, axis)
     return middle
 
 

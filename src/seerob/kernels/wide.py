@@ -51,7 +51,7 @@ def widen(nodes: Array, links: Links, T: Array) -> tuple[Boxes, Links]:
         grow += abs(nodes[0, c]) + nodes[0, 3 + c]
     grow *= 1e-6
     box = np.empty(20)
-    one = np.empty(1, np.int64)
+    every = np.arange(len(T))
     count = np.empty(len(nodes), np.int64)  # triangles under a node; children come after their parent
     for i in range(len(nodes) - 1, -1, -1):
         count[i] = links[i, 1] if links[i, 1] > 0 else count[i + 1] + count[links[i, 0]]
@@ -101,8 +101,7 @@ def widen(nodes: Array, links: Links, T: Array) -> tuple[Boxes, Links]:
                 depth += 1
                 made += 1
             else:
-                one[0] = ~i
-                fit_box(T, one, 0, 1, box, i >= 0)
+                fit_box(T, every, ~i, ~i + 1, box, i >= 0)
                 kids[w, k] = i
             for c in range(3):
                 boxes[w, WIDTH * c + k] = box[c]

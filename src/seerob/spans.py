@@ -13,7 +13,7 @@ falls at most ``bend`` below the lesser of both ends, is there nowhere below
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -29,6 +29,8 @@ Indices = NDArray[np.int64]
 Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]
 """Of a robot at instants to come [s]: positions and velocities of its joints [rad or m], shape (k, n), and
 why they are not known so; None where nothing is."""
+
+Coupling = Mapping[int, Array]
 
 ROUNDING = 1e-9
 """Added to every bound on a way or a speed [m, m/s]: the error of rounding is far below."""
@@ -145,6 +147,30 @@ class Points:
         assert self._ids is not None
         part = slice(int(self._start[point]), int(self._start[point + 1]))
         return self._joints[part], self._turns[part], self._lengths[part]
+
+    def column_changes(self, point: int, span: Span, coupling: Coupling) -> Array:
+        r"""How quickly columns of a point's linear Jacobian change at most, per second, shape (n,).
+
+        A column, :math:`z_j \times r_j` of a joint that turns and :math:`z_j` of one that slides, turns with
+        all joints before it, and :math:`r_j` changes with joint j and all after it.
+
+        Args:
+            point: See `add`.
+            span: Within which.
+            coupling: By joint that moves, in ``MjData.qvel``, the share of each commanded one, shape (n,).
+        """
+        dofs, turns, lengths = self.chain(point)
+        speeds = span.qd[dofs]
+        reach = np.cumsum((lengths + np.where(turns, 0.0, span.away[dofs]))[::-1])[::-1]
+        onward = np.cumsum((speeds * np.where(turns, reach, 1.0))[::-1])[::-1]
+        spin = np.where(turns, speeds, 0.0)
+        before = np.cumsum(spin) - spin
+        change = np.where(turns, before * reach + onward, before)
+        found = np.zeros(len(next(iter(coupling.values()), ())))
+        for dof, rate in zip(dofs.tolist(), change.tolist(), strict=True):
+            if dof in coupling:
+                found += rate * np.abs(coupling[dof])
+        return found
 
     def _chains(self, mj: Any, ids: Indices) -> None:
         """Resolve which joints move each point, from base to tip, and how long the segments between are."""

@@ -69,6 +69,8 @@ def bounded(seed):
     more = by_table("held", len(cell.links), ", acceleration = 0") + by_table("ahead", len(cell.links), "")
     more += by_table("ever", len(cell.links), ", acceleration = 0", 'mode = "fixed"\n')
     more += '[[safety]]\nkind = "path_speed"\nname = "path"\nrobot = "arm"\nmap = "map.csv"\n'
+    more += '[[safety]]\nkind = "force_polytope"\nname = "force"\nat = "arm"\nlimit = 1e7\n'
+    more += '[[safety]]\nkind = "force_polytope"\nname = "bare"\nat = "arm"\nlimit = 1e7\nload = "none"\n'
     cell = replace(
         cell,
         person=np.array([12 * np.cos(turn), 12 * np.sin(turn), turn]),
@@ -90,7 +92,8 @@ def test_no_bound_is_beaten_by_what_is_met_between_two_ticks(tmp_path, seed):
     for name, text in bounded(seed).items():
         (tmp_path / name).write_text(text)
     room = worst_found(load(tmp_path), looks=3)
-    assert set(room) == {"energy", "held", "ahead", "ever", "path"}
+    # An arm of two joints can press with any force in some direction: that exceeds every limit.
+    assert set(room) - {"force", "bare"} == {"energy", "held", "ahead", "ever", "path"}
     for name, found in room.items():
         assert min(found) >= -1e-9, name
         assert np.isfinite(found).mean() > 0.5, name  # it bounds something
@@ -224,3 +227,33 @@ def test_nothing_bounds_a_field_that_tilts_while_it_turns(tmp_path):
     found = driven(tmp_path, turning, 0.0, tilt=5e-4).run().results["c"]
     assert set(found.verdicts.tolist()) == {0}
     assert found.verdict is Verdict.UNDECIDED
+
+
+def elbow():
+    """An arm that turns and bends at shoulder and elbow, whose joints hold 10 N·m."""
+    text = '<link name="base"/>'
+    for i, (axis, x) in enumerate((("0 0 1", 0), ("0 1 0", 0), ("0 1 0", 1))):
+        text += (
+            f'<link name="l{i}"><inertial><origin xyz="0.5 0 0"/><mass value="1"/>'
+            '<inertia ixx="0.1" iyy="0.1" '
+            'izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial><collision><origin xyz="0.5 0 0"/><geometry>'
+            '<box size="1 0.1 0.1"/></geometry></collision></link>'
+            f'<joint name="j{i}" type="continuous"><parent link="{f"l{i - 1}" if i else "base"}"/>'
+            f'<child link="l{i}"/><origin xyz="{x} 0 0"/><axis xyz="{axis}"/>'
+            '<limit effort="10" velocity="10"/></joint>'
+        )
+    text += '<link name="tip"/><joint name="end" type="fixed"><parent link="l2"/><child link="tip"/>'
+    return f'<robot name="elbow">{text}<origin xyz="1 0 0"/></joint></robot>'
+
+
+@pytest.mark.parametrize(("around", "verdict"), [(BUMP, Verdict.EXCEEDED), (-0.2, Verdict.WITHIN)])
+def test_an_arm_that_is_straight_between_two_ticks_presses_with_any_force_there(tmp_path, around, verdict):
+    rows = ["t [s],j1 [rad],j2 [rad],j3 [rad]"]
+    rows += [f"{t:.3f},0,0.3,{3 * (t - around):.9g}" for t in np.arange(0, 0.2, 0.005).tolist()]
+    text = '[engine]\nphysics = false\n[[robots]]\nname = "arm"\nmodel = "arm.urdf"\ntool = "tip"\n'
+    text += '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "motion.csv"\n[[safety]]\nlimit = 4900\n'
+    text += 'kind = "force_polytope"\nname = "c"\nat = "arm"\nload = "none"\n'
+    station = made(tmp_path, text, {"arm.urdf": elbow(), "motion.csv": "\n".join(rows) + "\n"})
+    found = station.run().results["c"]
+    assert found.verdict is verdict
+    assert ("between two ticks, at 0.10" in found.worst().reason) is (verdict is Verdict.EXCEEDED)

@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
+import mujoco
 import numpy as np
 from msgspec import Meta
 from msgspec.structs import replace
@@ -25,6 +26,7 @@ from seerob.norms.force_limits import force_inputs, pushed_region
 from seerob.polytope import Polytope, free_moment, torque_box, zero_moment
 from seerob.quantities import Metres3
 from seerob.snapshot import Arrow, Basis, Hull, Input, Marker, Origin, Result, Sphere, Verdict
+from seerob.spans import ROUNDING, UNBOUNDED, Fall, Falls, Points, Span, down_to
 from seerob.state import State
 from seerob.states import States
 from seerob.transforms import Array
@@ -138,6 +140,57 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             return Answers.against(norm, limit, at_most=self.at_most).finite()
 
         return evaluate
+
+    def falls(self, model: Model, points: Points) -> Falls | None:
+        r"""See `Criterion.falls`; of ``zero_moment``, without velocity products in the load.
+
+        What the torques allow in one pose, made smaller by a share, they allow in the other. With columns of
+        the Jacobian that differ by :math:`\epsilon_j`, torques of gravity that differ by :math:`\delta_j` and
+        at least :math:`r_j` left for the force either way, the largest force F, near one of which it is
+        :math:`F_e`, is
+
+        .. math:: F \le F_e (1 + \max_j (\delta_j + \epsilon_j F) / r_j).
+        """
+        frame, limit = model.frame(self.at), self._against(model).limit
+        robot = model.carrier(frame)
+        if self.definition != "zero_moment" or self.load == "motion" or limit is None or robot.holders:
+            return None
+        lower, upper, _ = self._torques(model, robot)
+        local = frame.body_from_frame[:3, :3] @ np.array(self.offset) + frame.body_from_frame[:3, 3]
+        point = points.add(frame.mj, local)
+        coupling = dict(zip(robot.v_address.tolist(), robot.coupling, strict=True))
+        heavy = [int(b) for b in robot.mj_bodies if model.mj.body_mass[b] > 0 and self.load == "gravity"]
+        weights = np.linalg.norm(model.mj.opt.gravity) * model.mj.body_mass[heavy]
+        centres = [points.add(b, model.mj.body_ipos[b]) for b in heavy]
+        data, every = mujoco.MjData(model.mj), np.zeros(model.mj.nv)
+
+        def held(q: Array) -> Array:
+            data.qpos[:] = q
+            mujoco.mj_kinematics(model.mj, data)
+            mujoco.mj_comPos(model.mj, data)
+            mujoco.mj_comVel(model.mj, data)
+            mujoco.mj_rne(model.mj, data, 0, every)
+            return np.asarray(robot.coupling.T @ every[robot.v_address])
+
+        def falls(span: Span, least: Array | float) -> Fall:
+            # At any instant, the nearer end is half the span away at most.
+            half = span.T / 2
+            moved = points.column_changes(point, span, coupling) * half + ROUNDING
+            gained, left = np.zeros(len(moved)), np.minimum(upper, -lower)
+            for weight, centre in zip(weights, centres, strict=True):
+                gained += weight * points.column_changes(centre, span, coupling) * half
+            if heavy:
+                loads = [held(span.path.at(t)[0]) for t in (span.begin, span.end)]
+                left = np.min([np.minimum(upper - load, load - lower) for load in loads], axis=0)
+            largest = limit - float(least)
+            if not (np.all(left > 0) and np.isfinite(moved).all() and np.isfinite(gained).all()):
+                return UNBOUNDED
+            shrinks = 1 - largest * float((moved / left).max())
+            if shrinks <= 0:
+                return UNBOUNDED
+            return down_to(least, limit - largest * (1 + float((gained / left).max())) / shrinks)
+
+        return falls
 
     def _held(self, state: State, robot: Mechanism) -> Array:
         if self.load == "gravity":

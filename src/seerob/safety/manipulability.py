@@ -155,28 +155,15 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def falls(self, model: Model, points: Points) -> Falls:
-        r"""See `Criterion.falls`: no singular value changes by more than the Frobenius norm of the Jacobian.
-
-        A column, :math:`z_j \times r_j` of a joint that turns and :math:`z_j` of one that slides, turns with
-        all joints before it, and :math:`r_j` changes with joint j and all after it.
-        """
+        """See `Criterion.falls`: no singular value changes more than the Frobenius norm of the Jacobian."""
         frame = model.frame(self.at)
         mechanism = model.carrier(frame)
         local = frame.body_from_frame[:3, :3] @ np.array(self.offset) + frame.body_from_frame[:3, 3]
         point = points.add(frame.mj, local)
-        columns = {int(dof): np.abs(mechanism.coupling[k]) for k, dof in enumerate(mechanism.v_address)}
+        coupling = dict(zip(mechanism.v_address.tolist(), mechanism.coupling, strict=True))
 
         def falls(span: Span, _: Array | float) -> Fall:
-            dofs, turns, lengths = points.chain(point)
-            speeds = span.qd[dofs]
-            reach = np.cumsum((lengths + np.where(turns, 0.0, span.away[dofs]))[::-1])[::-1]
-            onward = np.cumsum((speeds * np.where(turns, reach, 1.0))[::-1])[::-1]
-            spin = np.where(turns, speeds, 0.0)
-            before = np.cumsum(spin) - spin
-            change = np.where(turns, before * reach + onward, before)
-            moved = np.zeros(mechanism.coupling.shape[1])
-            for dof, rate in zip(dofs.tolist(), change.tolist(), strict=True):
-                moved += rate * columns.get(dof, 0.0)
+            moved = points.column_changes(point, span, coupling)
             return Fall(float(np.linalg.norm(moved)) * span.T)
 
         return falls

@@ -139,19 +139,22 @@ def arm_codes(angles: Angles, accuracy: Accuracy = 0.0) -> Possible:
     return np.stack([(low <= n) & (n <= high) for n in range(3)], axis=-1)
 
 
+BOTH = tuple(itertools.product((False, True), repeat=2))
+"""Whether something is so of the right leg and of the left one."""
+
+
 def leg_codes(angles: Angles, thresholds: OwasThresholds, accuracy: Accuracy = 0.0) -> Possible:
     """Codes 2 to 6 of somebody who stands or kneels; sitting and walking cannot be seen from one posture."""
     t, m = thresholds, Measured(angles, accuracy)
     high = m.beyond("foot_rise", t.foot_rise)
     bent = m.beyond("knee_flexion", t.knee_bent)
     flat = m.beyond("shank_tilt", t.kneeling)
+    may_raise, may_fold, may_lie = map(_both_may, (high, bent, flat))
     found = np.zeros((*angles.trunk_flexion.shape, 7), bool)
-    for raised, folded, lying in itertools.product(itertools.product((False, True), repeat=2), repeat=3):
-        possible = np.ones(angles.trunk_flexion.shape, bool)
-        for side in range(2):
-            for span, value in ((high, raised), (bent, folded), (flat, lying)):
-                possible &= _may(Span(span.low[..., side], span.high[..., side]), value[side])
-        found[..., _leg_code(raised, folded, lying) - 1] |= possible
+    for raised, folded in itertools.product(BOTH, repeat=2):
+        legs = may_raise[raised] & may_fold[folded]
+        for lying in BOTH:
+            found[..., _leg_code(raised, folded, lying) - 1] |= legs & may_lie[lying]
     return found
 
 
@@ -166,3 +169,9 @@ def _leg_code(raised: tuple[bool, ...], bent: tuple[bool, ...], lying: tuple[boo
 
 def _may(span: Span, value: bool) -> Possible:
     return np.asarray(span.high == 1 if value else span.low == 0)
+
+
+def _both_may(span: Span) -> dict[tuple[bool, ...], Possible]:
+    """Where the right leg may be so and the left one, by what each is."""
+    right, left = (Span(span.low[..., side], span.high[..., side]) for side in range(2))
+    return {both: _may(right, both[0]) & _may(left, both[1]) for both in BOTH}

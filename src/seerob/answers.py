@@ -71,7 +71,7 @@ class Answers:
         """Why each instant cannot be what it says, or says nothing, shape (N,); empty where it can."""
         low, high = (self.value, self.value) if self.interval is None else self.interval
         ends = np.array([self.value, low, high], float)
-        kept = (ends <= self.limit if at_most else ends >= self.limit).all(axis=0) & np.isfinite(self.value)
+        kept = keep_many(ends, self.limit, at_most=at_most).all(axis=0) & np.isfinite(self.value)
         nothing = np.zeros(len(self.value), bool) if self.nothing is None else self.nothing
         within, silent = self.verdict == WITHIN, (self.verdict == NO_VERDICT) & ~nothing
         told = np.where(

@@ -34,6 +34,18 @@ def number(
     return found
 
 
+def at_least(name: str, value: ArrayLike, low: float = 0.0, unit: str = "") -> Array:
+    """A quantity as an array, of which some may be unknown: what is not a number stays so.
+
+    Raises:
+        ValueError: A value is below what can be.
+    """
+    found = np.asarray(value, float)
+    if (found < low).any():
+        number(name, found[found < low], low, unit=unit)
+    return found
+
+
 def whole(name: str, value: ArrayLike, low: int, high: int) -> NDArray[np.int64]:
     """A score or a code as an array of whole numbers.
 

@@ -50,7 +50,7 @@ def test_largest_permissible_speed_makes_the_distance_the_separation_distance(tm
     speed = part(S, "largest permissible speed").value
     assert speed == pytest.approx(factor * V)
     assert factor > 0
-    then = separation(tmp_path / "then", stop, x=x, qd=(factor * (1 - 1e-9), 0.0))
+    then = separation(tmp_path / "then", stop, x=x, qd=(factor * (1 - 1e-8), 0.0))
     assert then.verdict == "within"
     assert then.value - then.limit == pytest.approx(0, abs=2e-3 if stop == TABLE else 1e-6)
     assert (factor >= 1) == (S.verdict == "within")

@@ -63,7 +63,8 @@ def clamps(gaps: Array, speed: Array, period: float, thickness: Array) -> Flags:
         Shape (..., g, r).
     """
     ahead = np.asarray(gaps, float) - np.minimum(speed * period, AHEAD)
-    return np.asarray((speed > STILL)[..., None] & (ahead[..., None] <= thickness))
+    # What is not a number clamps: nobody knows that it does not.
+    return np.asarray(~(speed <= STILL)[..., None] & ~(ahead[..., None] > thickness))
 
 
 def thickest(widest: Array, fits: Array, thickness: Array, sizes: Sequence[float], *, least: float) -> Array:

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from seerob.contact.limits import RegionArrays
 from seerob.criterion import worst
+from seerob.domains import number
 from seerob.errors import InputError, Problem, UnknownName
 from seerob.model import Mechanism, Model
 from seerob.snapshot import Input, Origin, Result, Verdict
@@ -141,6 +142,9 @@ def peaks(t: Array, force: Array) -> tuple[float, float | None]:
     Returns:
         F_T and F_S; None for what the record does not reach.
     """
+    t, force = number("t", t), number("force", force)
+    if (np.diff(t) < 0).any():
+        raise ValueError("t falls: give the instants in their order")
     peak = float(force.max())
     first = int(np.argmax(force >= BEGIN * peak))
     # It began after the sample before: so what is called static begins no later than it does.

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.contact.limits import Speeds
+from seerob.domains import number
 from seerob.tolerances import Spread
 from seerob.transforms import Array
 
@@ -35,6 +36,7 @@ def permissible_while_pushed(v: Array, mu: Array, k: Array, F: float) -> Array:
     Returns:
         0 where the drive alone may reach it.
     """
+    number("F", F, 0.0, unit="N")
     root = np.sqrt(mu * k)
     return np.asarray(np.sqrt(np.maximum(v * (v - 2 * F / root), 0.0)))
 

@@ -19,6 +19,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seerob.domains import number
 from seerob.geometry import Mesh, Solid
 from seerob.transforms import Array
 
@@ -114,6 +115,7 @@ def force_at_pressure(radii: ArrayLike, pressure: ArrayLike, stiffness: ArrayLik
 
 def round_shape(radius: float) -> ContactShape:
     """A patch with the same radius in all directions [m]."""
+    number("radius", radius, 0.0, unit="m")
     return ContactShape(np.zeros((1, 3)), np.full((1, 2), radius))
 
 

@@ -49,7 +49,7 @@ def inverse_effective_mass(J_v: Array, M: Array) -> Array:
     points, masses = np.array(J_v).reshape(-1, rows, n), np.array(M).reshape(-1, n, n)
     found = np.empty((len(points), rows, rows))
     if not mobility(points, masses, found):
-        raise np.linalg.LinAlgError("a mass matrix is not positive definite")
+        raise np.linalg.LinAlgError("M, a mass matrix, is not positive definite")
     return found.reshape(*batch, rows, rows)
 
 
@@ -77,6 +77,7 @@ def principal_masses(inverse: Array) -> tuple[Array, Array]:
     values, axes = np.empty((len(used_up), 3)), np.empty_like(used_up)
     # Of a symmetric matrix without negative eigenvalues they are its singular values.
     principal_axes(used_up, values, axes)
+    values[np.isnan(values).any(axis=-1)] = np.nan
     return reciprocals(values.reshape(-1)).reshape(*batch, 3), axes.reshape(*batch, 3, 3)
 
 

@@ -14,6 +14,7 @@ from msgspec import Meta
 
 from seerob import joint_torques, provenance
 from seerob.criterion import Criterion, Evaluate, judge_interval, worst
+from seerob.domains import at_least
 from seerob.errors import InputError, Undecided
 from seerob.model import Mechanism, Model
 from seerob.snapshot import Basis, Input, Origin, Result, Verdict
@@ -34,6 +35,7 @@ def shares(torques: Array, limits: Array, uncertainty: Array) -> tuple[Array, Ar
     Returns:
         Share, lowest, highest, NaN without a limit, shape (..., n) each.
     """
+    limits, uncertainty = at_least("limits", limits), at_least("uncertainty", uncertainty)
     size = np.abs(torques)
     low = np.maximum(size - uncertainty, 0.0)
     return size / limits, low / limits, (size + uncertainty) / limits

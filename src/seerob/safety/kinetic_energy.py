@@ -10,6 +10,7 @@ from msgspec import Meta
 from seerob import figures, provenance
 from seerob.answers import Answers
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
+from seerob.domains import at_least
 from seerob.errors import Undecided
 from seerob.model import Mechanism, Model
 from seerob.mounting.mass_tolerances import MassTolerances
@@ -25,6 +26,10 @@ DRAWN = 0.1
 """Radius of the sphere of 1 J [m]; the volume is proportional to the energy."""
 
 
+LEAST = 1e-9
+"""What rounding may make of no energy [J]."""
+
+
 def kinetic_energy(M: Array, qd: Array) -> Array:
     r"""Kinetic energy :math:`E = \frac{1}{2} \dot{q}^T M(q) \dot{q}`.
 
@@ -35,7 +40,9 @@ def kinetic_energy(M: Array, qd: Array) -> Array:
     Returns:
         Energy [J], shape (...).
     """
-    return np.asarray(0.5 * (qd[..., None, :] @ M @ qd[..., :, None])[..., 0, 0])
+    energy = np.asarray(0.5 * (qd[..., None, :] @ M @ qd[..., :, None])[..., 0, 0])
+    at_least("energy of M, a mass matrix,", energy, -LEAST, "J")
+    return energy
 
 
 class KineticEnergy(Criterion, frozen=True, kw_only=True):

@@ -46,6 +46,7 @@ def singular_values(J_v: Array) -> tuple[Array, Array]:
     rows = J_v.reshape(-1, *J_v.shape[-2:]).copy()
     values, directions = np.empty((len(rows), 3)), np.empty((len(rows), 3, 3))
     principal_axes(rows, values, directions)
+    values[np.isnan(values).any(axis=-1)] = np.nan
     return values.reshape(*batch, 3), directions.reshape(*batch, 3, 3)
 
 

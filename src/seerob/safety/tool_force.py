@@ -14,6 +14,7 @@ from msgspec import Meta
 
 from seerob import figures, joint_torques, provenance
 from seerob.criterion import Criterion, Evaluate, judge, judge_interval
+from seerob.domains import at_least, number
 from seerob.errors import InputError, Undecided
 from seerob.model import Mechanism, Model
 from seerob.quantities import Metres3
@@ -44,6 +45,10 @@ class Wrench(NamedTuple):
     """Those axes as columns, best seen first, shape (..., 3 or 6, 3 or 6)."""
 
 
+LARGEST = 1e3
+"""No arm moves its point so fast for the speed of a joint [m/rad]."""
+
+
 def wrench_from_torques(J: Array, tau: Array, *, damped_below: float) -> Wrench:
     r"""Solve :math:`\tau = J^T w` by singular values, damped only near singularities.
 
@@ -59,7 +64,8 @@ def wrench_from_torques(J: Array, tau: Array, *, damped_below: float) -> Wrench:
         tau: External joint torques, shape (..., n) [N·m or N].
         damped_below: ε, singular value below which an axis is damped [m/rad].
     """
-    J, tau = np.asarray(J, float), np.asarray(tau, float)
+    J, tau = number("J", J), np.asarray(tau, float)
+    number("damped_below", damped_below, 0.0, LARGEST, "m/rad")
     rows, n = J.shape[-2:]
     axes, sigma, Vt = np.linalg.svd(J, full_matrices=True)
     sigma = np.concatenate([sigma, np.zeros((*sigma.shape[:-1], rows - sigma.shape[-1]))], axis=-1)
@@ -83,6 +89,7 @@ def largest_error(gain: Array, uncertainty: Array) -> Array:
     Returns:
         Shape (...) [N].
     """
+    uncertainty = at_least("uncertainty", uncertainty, unit="N·m or N")
     return np.asarray(np.linalg.norm(gain[..., :3, :], axis=-2) @ uncertainty)
 
 

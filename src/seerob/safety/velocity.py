@@ -11,6 +11,7 @@ from msgspec import Meta
 from seerob import figures, provenance
 from seerob.answers import Answers
 from seerob.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
+from seerob.domains import at_least
 from seerob.errors import InputError
 from seerob.model import Model
 from seerob.moving_base import velocity_of
@@ -50,6 +51,7 @@ def speed_noise(J: Array, error: Array) -> Array:
     Returns:
         [m/s], shape (...).
     """
+    error = at_least("error", error, unit="rad/s or m/s")
     return np.asarray(np.sqrt(((J * error) ** 2).sum(axis=(-2, -1))))
 
 

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.bearers import Bearers
+from seerob.domains import at_least, number
 from seerob.errors import Undecided
 from seerob.kernels.speed import fastest, placed, stacked, velocities
 from seerob.model import Body, Gap, Mechanism, Model
@@ -86,6 +87,8 @@ def held(v: Array, T_r: float, qd: Array, doubt: str = "") -> Onset:
 
 def accelerated(v: Array, T_r: float, a: float, qd: Array) -> Onset:
     """With a constant acceleration of every part; arguments as of `held`, and a [m/s²]."""
+    number("a", a, 0.0, unit="m/s²")
+    number("T_r", T_r, 0.0, unit="s")
     if a == 0.0:
         return held(v, T_r, qd)
     return Onset(v, v * T_r + a * T_r**2 / 2, v + a * T_r, None, None)
@@ -202,6 +205,8 @@ def farthest(t: Array, speeds: Array, T_r: float, lead: float) -> Array:
         T_r: [s]
         lead: [s]
     """
+    number("T_r", T_r, 0.0, unit="s")
+    number("lead", lead, 0.0, unit="s")
     steps, most = np.diff(t), np.maximum(speeds[:-1], speeds[1:])
     # What lies outside of the stretch is at its ends.
     ends = most[(t[:-1] < lead - SLACK) | (t[1:] > T_r + SLACK)].min(axis=0)
@@ -366,6 +371,7 @@ def from_torques(M: Array, bias: Array, torques: Array) -> Array:
         bias: Torques of gravity and of the motion, shape (j,) [N·m or N].
         torques: Limits, shape (j,).
     """
+    torques = at_least("torques", torques, unit="N·m or N")
     try:
         return np.asarray(np.abs(np.linalg.inv(M)) @ (torques + np.abs(bias)))
     except np.linalg.LinAlgError as error:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seerob.domains import number
+from seerob.domains import at_least, number
 from seerob.state import State
 from seerob.stopping.onset import Onset
 from seerob.transforms import Array
@@ -63,7 +63,8 @@ def _check(**given: float) -> None:
 
 def way_of_person(v_h: Array | float, T_r: float, T_s: Array | float) -> Array:
     """S_h of a person who comes near at constant speed [m]; a person who recedes counts as standing."""
-    return np.asarray(np.maximum(v_h, 0.0) * (T_r + np.asarray(T_s)))
+    time = at_least("T_r", T_r, unit="s") + at_least("T_s", T_s, unit="s")
+    return np.asarray(np.maximum(v_h, 0.0) * time)
 
 
 def braking(onset: Onset, T_s: float, share: float = BOUND) -> Course:
@@ -120,6 +121,7 @@ def largest_speed_decelerating(d: Array | float, v_h: Array | float, T_r: float,
     """
     _check(T_r=T_r)
     number("a", a, LEAST, unit="m/s²")
+    at_least("v_h", v_h, unit="m/s")
     b = a * T_r + np.asarray(v_h)
     left = np.asarray(d) - K - np.asarray(v_h) * T_r
     return np.asarray(np.sqrt(b**2 + 2 * a * np.maximum(left, 0.0)) - b)
@@ -133,6 +135,7 @@ def largest_speed_in_time(
     0 where no speed is, also when S_p is larger than ``d`` at standstill.
     """
     _check(T_r=T_r, T_s=T_s)
+    at_least("v_h", v_h, unit="m/s")
     left = np.asarray(d) - K - np.asarray(v_h) * (T_r + T_s)
     return np.asarray(np.maximum(left, 0.0) / (T_r + share * T_s))
 

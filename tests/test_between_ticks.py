@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from made_cell import TWO_R, UR10, heard, made, person, two_r
+from seerob.between_ticks import Told
+from seerob.contact.regions import REGIONS
 from seerob.engine import Engine
 from seerob.human.skeleton import BONES
 from seerob.run import Judge, engine_of, pump, ticks
+from seerob.safety.power_and_force import Contacts
 from seerob.snapshot import Verdict
 from worst_between import worst_found
 
@@ -267,7 +270,7 @@ of = "op"
 """
 
 
-def random_cell(folder, rng, *, tick, physics, rate):
+def random_cell(folder, rng, *, tick, physics, rate, text=RANDOM, scale=1.0):
     files = {}
     for name in "ab":
         joints = int(rng.integers(2, 6))
@@ -276,9 +279,9 @@ def random_cell(folder, rng, *, tick, physics, rate):
         units = ("m" if slide else "rad" for slide in slides)
         lines = [",".join(["t [s]", *(f"j{k} [{unit}]" for k, unit in enumerate(units))])]
         for t in np.arange(0, 0.2, 1 / rate):
-            lines.append(",".join(f"{x:.12g}" for x in (t, *wave(t)[0])))
+            lines.append(",".join(f"{x:.12g}" for x in (t, *(scale * wave(t)[0]))))
         files |= {f"{name}.urdf": random_robot(rng, slides), f"{name}.csv": "\n".join(lines) + "\n"}
-    return made(folder, RANDOM.format(tick=tick, physics=physics), files)
+    return made(folder, text.format(tick=tick, physics=physics), files)
 
 
 CASES = [(1, 0.01, "true", 125), (2, 0.01, "false", 250), (3, 0.005, "true", 40), (4, 0.01, "false", 60)]
@@ -293,6 +296,117 @@ def test_nothing_that_is_met_between_two_ticks_is_worse_than_the_bound(tmp_path,
     assert ("singularity" in room) is (seed != 1)
     for name, found in room.items():
         assert min(found) >= -1e-9, name
+
+
+NOT_HEAD = ["Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"]
+CONTACT = """
+[[parts]]
+name = "table"
+shape = {{ box = [0.6, 0.6, 0.3] }}
+at = {{ position = [{x}, {y}, -0.1] }}
+[[safety]]
+kind = "power_and_force"
+name = "pfl"
+robot = "a"
+excluded = {excluded}
+contact_area = {{ a = 1e-4 }}
+mass = "{mass}"
+{more}
+"""
+
+
+@pytest.mark.parametrize(
+    ("seed", "mass", "more", "physics", "scale"),
+    [
+        (5, "larger", "", "false", 0.3),
+        (6, "projected", "person_speed = 0.2", "true", 1.0),
+        (7, "simplified", "", "false", 1.0),
+        (14, "larger", 'human = "op"', "false", 1.0),
+    ],
+)
+def test_no_contact_between_two_ticks_uses_more_than_its_bound(tmp_path, seed, mass, more, physics, scale):
+    """Of every surface against every region, whatever it may come near to, and clamps, meanwhile."""
+    rng = np.random.default_rng(seed)
+    x, y = rng.normal(size=2) * 0.8
+    cell = RANDOM[: RANDOM.index("[[safety]]")].replace("position = [0, 3, 0]", "position = [0.3, 0.9, 0]")
+    text = cell + CONTACT.replace("{excluded}", str(NOT_HEAD)).replace("{x}", f"{x}").replace(
+        "{y}", f"{y}"
+    ).replace("{mass}", mass).replace("{more}", more)
+    station = random_cell(tmp_path, rng, tick=0.01, physics=physics, rate=250, text=text, scale=scale)
+    (bound,) = station.bound
+    contacts, between = Contacts(bound.criterion, station.model), None
+    told, known = [], contacts.in_regions
+    permitted = np.array([REGIONS[k] not in bound.criterion.excluded for k in known])
+
+    def watching(i, watch, ends, state):
+        low = between._low(watch, between._way, ends, state)
+        for t in np.linspace(ends[0].t, ends[1].t, 7).tolist():
+            _, _, shadow = between._look(i, watch, between._way, t, state)
+            judged = contacts.judge(shadow)
+            asked = judged.near[:, known] & permitted
+            used = np.where(asked, judged.v[:, known] / judged.speeds.permissible, 0.0).max()
+            told.append((low, 1 - used))
+        return Told()
+
+    judge = Judge(station.bound)
+    between = judge._between
+    between._judge = watching
+    for _ in ticks(engine_of(station.model), judge, pump(station.sources, 0.01), station.duration):
+        pass
+    low, met = np.array(told).T
+    assert (met >= low).all()
+    assert np.isfinite(low).mean() > 0.9
+    assert len(low) > 100
+
+
+def shaking(size):
+    """At rest at every tick of 10 ms, and at up to 2 · 100 π · size m/s between two."""
+
+    def motion(t):
+        angle = np.pi * t / 0.01 if 0.02 < t < 0.08 else 0.0
+        return (size * np.sin(angle) ** 2, 0.0), (size * np.pi / 0.01 * np.sin(2 * angle), 0.0)
+
+    return motion
+
+
+def touching(folder, motion, more="", things="", kind="power_and_force"):
+    text = f"engine = {{ physics = false, gravity = [0, 0, 0] }}\n{TWO_R}{person('op', 2.4, 0.5, 0)}{things}"
+    text += f'{SOURCE}[[safety]]\nkind = "{kind}"\nname = "c"\n{more}'
+    files = {"arm.urdf": two_r(), "motion.csv": rows(motion, np.arange(0, 0.1001, 0.002).tolist())}
+    return made(folder, text, files).run().results["c"]
+
+
+def contact(only="", **more):
+    excluded = [name for name in REGIONS if name != only] if only else NOT_HEAD
+    given = {"floor": "false", **more, "excluded": str(excluded), "contact_area": "{ arm = 1e-4 }"}
+    return 'robot = "arm"\n' + "".join(f"{key} = {value}\n" for key, value in given.items())
+
+
+def test_a_contact_between_two_ticks_decides_though_nothing_moves_at_any_tick(tmp_path):
+    slow = touching(tmp_path / "a", lambda t: ((0.05 * t, 0.0), (0.05, 0.0)), contact())
+    assert (slow.verdict, slow.open) == (Verdict.WITHIN, "")
+    assert touching(tmp_path / "b", shaking(0.02), contact()).verdict is Verdict.EXCEEDED
+    accepted = contact(between_samples='"accepted: nobody is there"')
+    assert touching(tmp_path / "c", shaking(0.02), accepted).verdict is None
+
+
+@pytest.mark.parametrize(("beyond", "verdict"), [(0.001, Verdict.EXCEEDED), (0.1, None)])
+def test_who_comes_within_reach_between_two_ticks_is_hit_there(tmp_path, beyond, verdict):
+    near = 'between = ["arm", "op"]\n'
+    distance = touching(tmp_path / "a", shaking(0.02), near, kind="minimum_distance").values[0]
+    one = contact(human='"op"', horizon=distance - beyond)
+    assert touching(tmp_path / "b", shaking(0.02), one).verdict is verdict
+
+
+@pytest.mark.parametrize(("gap", "verdict"), [(0.102, Verdict.EXCEEDED), (0.3, None)])
+def test_what_clamps_a_hand_only_between_two_ticks_is_exceeded(tmp_path, gap, verdict):
+    """At 1.2 m/s, which is permitted where the hand is free and not where it is clamped: in 100 mm."""
+    wall = (
+        "[[parts]]\nname = 'wall'\nshape = {{ box = [0.1, 0.1, 1] }}\nat = {{ position = [1.9, {y}, 0] }}\n"
+    )
+    hand = contact("Hands and fingers", mass='"simplified"')
+    found = touching(tmp_path, shaking(0.002), hand, wall.format(y=0.05 + 0.05 + gap))
+    assert found.verdict is verdict
 
 
 # -- and none is so wide that what nears its limits is open --------------------------------------

@@ -23,7 +23,7 @@ def worst_found(station, looks):
         instants = np.union1d(np.linspace(path.t[0], path.t[-1], looks + 2), path.t)
         met = []
         for t in instants.tolist():
-            _, there = between._look(i, watch, path, t, state)
+            _, there, _ = between._look(i, watch, path, t, state)
             met.append(-1.0 if there.margin is None else np.min(there.margin[0] - there.margin[1]))
         room.setdefault(watch.criterion.name, []).append(min(met) - low)
         return Told()

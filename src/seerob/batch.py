@@ -229,6 +229,7 @@ def _uncleared(
             if verdict[k] != WITHIN or verdict[k + 1] != WITHIN:
                 continue
             assert one.watch is not None
+            assert one.watch.falls is not None  # who judges many instants at once has no other bound
             bare, off = ends[name]
             m, other = bare[k], bare[k + 1]
             fall, bend = one.watch.falls(span, min(m - off[k], other - off[k + 1]))

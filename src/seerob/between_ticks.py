@@ -18,8 +18,8 @@ import mujoco
 import numpy as np
 from msgspec.structs import replace
 
-from seerob.criterion import Criterion, Evaluate
-from seerob.errors import UnknownName
+from seerob.criterion import Criterion, Evaluate, Lowest
+from seerob.errors import Undecided, UnknownName
 from seerob.model import Model
 from seerob.snapshot import Result, Verdict
 from seerob.spans import Fall, Falls, Indices, Margin, Path, Points, Span
@@ -29,6 +29,8 @@ from seerob.transforms import Array
 MOST = 32
 """Instants that are looked at between two ticks, of one criterion: spans of 10 ms are halved to less than
 1 ms everywhere; more would hold up a live run."""
+FEW = 8
+"""The same of one whose bound is a judgement of its own (`Criterion.lowest`)."""
 
 _WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 
@@ -40,7 +42,9 @@ class Watch:
     criterion: Criterion
     points: Points
     """Shared by all criteria of a workstation."""
-    falls: Falls
+    falls: Falls | None
+    lowest: Lowest | None
+    """Either of them."""
     remembers: bool
     """Whether it is asked in the order of time only."""
     again: Callable[[], Evaluate]
@@ -51,11 +55,11 @@ class Watch:
 
 def watched(criterion: Criterion, model: Model, points: Points) -> Watch | None:
     """How a criterion is judged between two ticks; None when nothing bounds it."""
-    falls = criterion.falls(model, points)
-    if falls is None:
+    falls, lowest = criterion.falls(model, points), criterion.lowest(model, points)
+    if falls is None and lowest is None:
         return None
     remembers, people = criterion.remembers(model), _people(criterion, model)
-    return Watch(criterion, points, falls, remembers, lambda: criterion.bind(model), people)
+    return Watch(criterion, points, falls, lowest, remembers, lambda: criterion.bind(model), people)
 
 
 def _people(criterion: Criterion, model: Model) -> tuple[str, ...]:
@@ -75,6 +79,8 @@ class End(NamedTuple):
     """None unless it is within."""
     speeds: Array
     """Of every body [m/s]."""
+    idle: bool = False
+    """Nothing was there to judge."""
 
 
 class Asking(NamedTuple):
@@ -165,7 +171,7 @@ class BetweenTicks:
             told = self._judge(i, watch, (before, now), state)
             if told.exceeded is not None:
                 result = told.exceeded
-            elif told.open and now.verdict is _WITHIN:
+            elif told.open and (now.verdict is _WITHIN or (now.idle and watch.lowest is not None)):
                 result = self._asking.take_back(result, told.open)
         self._before[i] = now
         return result
@@ -175,6 +181,10 @@ class BetweenTicks:
         path = self._way
         if path is None or self._ids is None or not np.array_equal(self._ids, state.bearers.ids):
             return None  # what was picked up has the speed of the hand at once
+        if watch.lowest is not None:
+            now = before._replace(t=state.t, speeds=speeds)
+            some = before.margin is not None or before.idle
+            return now if not some or self._low(watch, path, (before, now), state) >= 0 else None
         if any(state.hearings[person].bones for person in watch.people):
             return None  # how far devices are off now is not known from then
         if before.margin is None:
@@ -187,20 +197,21 @@ class BetweenTicks:
     def _judge(self, i: int, watch: Watch, ends: tuple[End, End], state: State) -> Told:
         """The way between two instants at which a criterion was asked."""
         before, now = ends
-        if _EXCEEDED in (before.verdict, now.verdict) or not (before.margin or now.margin):
+        idle = watch.lowest is not None and (before.idle or now.idle)
+        if _EXCEEDED in (before.verdict, now.verdict) or not (before.margin or now.margin or idle):
             return Told()
         assert self._way is not None
         low = self._low(watch, self._way, ends, state)
         if low >= 0:
             return Told()
-        if not np.isfinite(low) and not (before.margin and now.margin):
+        if not np.isfinite(low) and not (before.margin and now.margin) and watch.lowest is None:
             # Nothing was known at one end, which is said there, and from the other nothing follows.
             return Told()
         if not np.isfinite(low) and self._way.broken:
             return Told(open=f"{', '.join(self._way.broken)} jumped: its way between two ticks is not known")
         return self._search(i, watch, ends, low, state)
 
-    def _fall(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Fall:
+    def _span(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Span:
         a, b = ends
         assert self._ids is not None
         whole = a.t == path.t[0] and b.t == path.t[-1]
@@ -210,6 +221,11 @@ class BetweenTicks:
             span.between_speeds(a.speeds, b.speeds)
             span.foresee = state.foresee
             self._whole = span if whole else self._whole
+        return span
+
+    def _fall(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Fall:
+        assert watch.falls is not None
+        span = self._span(watch, path, ends, state)
         least = [end.margin[0] - end.margin[1] for end in ends if end.margin is not None]
         if len(least) == 1:
             return watch.falls(span, least[0])
@@ -217,7 +233,21 @@ class BetweenTicks:
         return watch.falls(span, min(m, other) if type(m) is float is type(other) else np.minimum(m, other))
 
     def _low(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> float:
-        """Bound on the margin everywhere between two ends, of which one is within at least."""
+        """Bound on the margin everywhere between two ends, of which one is within at least.
+
+        Args:
+            watch: Of the criterion.
+            path: The way from tick to tick.
+            ends: Of a part of it.
+            state: The twin at one of them.
+        """
+        if watch.lowest is not None:
+            if self._ids is None or not np.array_equal(self._ids, state.bearers.ids):
+                return -np.inf
+            try:
+                return float(watch.lowest(state, self._span(watch, path, ends, state)))
+            except Undecided:
+                return -np.inf
         fall, bend = self._fall(watch, path, ends, state)
         (m, off), *rest = [end.margin for end in ends if end.margin is not None]
         if not rest:
@@ -238,18 +268,18 @@ class BetweenTicks:
             return Told(open=f"not known to be within from {begin} to {end}: {what}")
         spans = [(low, ends[0].t, *ends)]
         doubt = ""
-        for _ in range(MOST):
+        for _ in range(MOST if watch.lowest is None else FEW):
             if not spans:
                 break
             _, _, a, b = heapq.heappop(spans)
             t = path.middle(a.t, b.t)
-            result, middle = self._look(i, watch, path, t, state)
+            result, middle, shadow = self._look(i, watch, path, t, state)
             if middle.verdict is _EXCEEDED:
                 reason = f"between two ticks, at {t:.4f} s: {result.reason}".removesuffix(": ")
                 return Told(exceeded=replace(result, t=t, reason=reason))
             for pair in ((a, middle), (middle, b)):
-                if pair[0].margin or pair[1].margin:
-                    low = self._low(watch, path, pair, state)
+                if pair[0].margin or pair[1].margin or (watch.lowest and (pair[0].idle or pair[1].idle)):
+                    low = self._low(watch, path, pair, shadow)
                     if not low >= 0:
                         heapq.heappush(spans, (low, pair[0].t, *pair))
                 elif _UNDECIDED in (pair[0].verdict, pair[1].verdict):
@@ -261,7 +291,7 @@ class BetweenTicks:
         _, _, a, b = spans[0]
         return Told(open=f"not known to be within from {a.t:.4f} s to {b.t:.4f} s, between two ticks")
 
-    def _look(self, i: int, watch: Watch, path: Path, t: float, state: State) -> tuple[Result, End]:
+    def _look(self, i: int, watch: Watch, path: Path, t: float, state: State) -> tuple[Result, End, State]:
         """A criterion at an instant between two ticks; what is in doubt at the tick is in doubt there."""
         self.looks += 1
         if i not in self._again:
@@ -275,9 +305,9 @@ class BetweenTicks:
         shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)
         shadow.refresh(t)
         result = self._asking.at(i, self._again[i], shadow)
-        return result, _end(watch.criterion, result, t, shadow.largest_speeds())
+        return result, _end(watch.criterion, result, t, shadow.largest_speeds()), shadow
 
 
 def _end(criterion: Criterion, result: Result, t: float, speeds: Array) -> End:
     margin = criterion.margin(result) if result.verdict is _WITHIN else None
-    return End(t, result.verdict, margin, speeds)
+    return End(t, result.verdict, margin, speeds, result.nothing)

@@ -17,12 +17,15 @@ from seerob.verdict import keeps
 if TYPE_CHECKING:
     from seerob.answers import Answers
     from seerob.model import Model
-    from seerob.spans import Falls, Margin, Points
+    from seerob.spans import Falls, Margin, Points, Span
     from seerob.state import State
     from seerob.states import States
 
 Evaluate = Callable[["State"], Result]
 """Called at each tick (or each ``every``); may raise `Undecided`."""
+Lowest = Callable[["State", "Span"], float]
+"""Below its margin at every instant of a span, negative where that is not known, given the twin at one end of
+the span; may raise `Undecided`."""
 EvaluateMany = Callable[["States"], "Answers"]
 """The same of many instants; may raise `Undecided`, of all of them."""
 
@@ -101,6 +104,10 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             model: The compiled workstation.
             points: Of which the motion is bounded: those of the bodies, and what it adds.
         """
+        return None
+
+    def lowest(self, model: Model, points: Points) -> Lowest | None:
+        """Instead of `falls`: what bounds its margin within a span of which the twin at one end is given."""
         return None
 
     def margin(self, result: Result) -> Margin:

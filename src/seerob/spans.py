@@ -255,6 +255,86 @@ Falls = Callable[[Span, Array | float], Fall]
 """How far the margins of a criterion can fall within a span, given the least known at its ends."""
 
 
+class Relative:
+    """How quickly points of bodies can change their velocity as seen from other bodies.
+
+    Args:
+        mj: The `mujoco.MjModel`.
+        pairs: From which of its bodies, and of which.
+        points: Of the latter, in its frame [m], shape (k, 3) each.
+    """
+
+    def __init__(self, mj: Any, pairs: Iterable[tuple[int, int]], points: Iterable[Array]) -> None:
+        data = mujoco.MjData(mj)
+        mujoco.mj_kinematics(mj, data)
+        start, joints, turns, lengths = [0], [], [], []
+        for (a, b), own in zip(pairs, points, strict=True):
+            back, forth = joints_of(mj, a), joints_of(mj, b)
+            same = sum(1 for k, j in enumerate(back) if back[: k + 1] == forth[: k + 1])
+            way = [*reversed(back[same:]), *forth[same:]]
+            anchors = data.xanchor[way]
+            if way:
+                ends = own @ data.xmat[b].reshape(3, 3).T + data.xpos[b]
+                far = float(np.linalg.norm(ends - anchors[-1], axis=1).max(initial=0.0))
+                lengths += [*np.linalg.norm(np.diff(anchors, axis=0), axis=1).tolist(), far]
+            joints += [int(mj.jnt_dofadr[j]) for j in way]
+            turns += [bool(mj.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE) for j in way]
+            start.append(len(joints))
+        self._start, self._joints = np.array(start, np.int64), np.array(joints, np.int64)
+        self._turns, self._lengths = np.array(turns, np.bool_), np.array(lengths, float)
+
+    def quick(self, span: Span) -> Array:
+        """Largest acceleration [m/s²], shape (pairs,)."""
+        fast, quick, bend = np.empty((3, len(self._start) - 1))
+        point_bounds(
+            span.qd, span.qdd, span.qdd, span.away, span.T,
+            self._start, self._joints, self._turns, self._lengths, fast, quick, bend,
+        )  # fmt: skip
+        return quick
+
+
+def change_of_motion(
+    model: Model,
+    bodies: Iterable[int],
+    dofs: Indices,
+    points: Points,
+    heaviest: Callable[[int], tuple[float, float]] = lambda _: (1.0, 0.0),
+) -> Callable[[Span], tuple[float, float]]:
+    r"""How much :math:`\sqrt{2E}` of all that has a mass can change within a span, and bend.
+
+    It is a norm of their velocities, so it changes by no more than the norm of how much they change.
+
+    Args:
+        model: The compiled workstation.
+        bodies: MuJoCo's.
+        dofs: Whose rotors count.
+        points: Of which the motion is bounded.
+        heaviest: Of a body, by which factor its mass may be more, and how far its centre off [m].
+
+    Returns:
+        In √J, as `Fall` has it; infinity of who jumps.
+    """
+    mj = model.mj
+    heavy = [b for b in dict.fromkeys(bodies) if mj.body_mass[b] > 0]
+    more = np.array([heaviest(body) for body in heavy]).reshape(-1, 2)
+    masses = more[:, 0] * mj.body_mass[heavy]
+    # The mean square distance from the centre of mass is what its moments of inertia say.
+    radii = np.sqrt(mj.body_inertia[heavy].sum(axis=1) / 2 / mj.body_mass[heavy]) + more[:, 1]
+    rows = rows_of(
+        points.add(body, mj.body_ipos[body], radius) for body, radius in zip(heavy, radii, strict=True)
+    )
+    rotors = mj.dof_armature[dofs]
+
+    def change(span: Span) -> tuple[float, float]:
+        if not (np.isfinite(span.quick[rows]).all() and np.isfinite(span.qdd[dofs]).all()):
+            return np.inf, np.inf
+        turned = rotors @ (span.qdd[dofs] * span.T) ** 2
+        fall = np.sqrt(masses @ (span.quick[rows] * span.T) ** 2 + turned)
+        return float(fall), float(np.sqrt(masses @ span.bend[rows] ** 2 + turned / 4))
+
+    return change
+
+
 def rows_of(points: Iterable[int]) -> Indices:
     """Points as a `Span` wants them."""
     return np.array(tuple(points), np.int64)

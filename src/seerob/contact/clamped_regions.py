@@ -21,6 +21,7 @@ from seerob.model import Mechanism, Model
 from seerob.norms.crushing_gaps import crushing_gaps, openings, sizes
 from seerob.provenance import given
 from seerob.snapshot import Input, Origin
+from seerob.spans import Span
 from seerob.state import State
 from seerob.transforms import Array
 
@@ -65,6 +66,15 @@ class FloorGap:
             wanted: Of which bodies and body parts that matters, shape (b, r).
         """
         gap, fall = self.lowest_and_falling(state).T
+        return self._clamped(gap, fall, thickness, wanted)
+
+    def ever(self, state: State, span: Span, thickness: Array, wanted: Flags) -> Flags:
+        """The same at any instant of a span of which the twin is at one end."""
+        fast = span.fast[self._moving]
+        gap = self.lowest_and_falling(state)[:, 0] - fast * span.T
+        return self._clamped(gap, fast, thickness, wanted)
+
+    def _clamped(self, gap: Array, fall: Array, thickness: Array, wanted: Flags) -> Flags:
         # As for other surfaces: where it may be no wider by the next tick, whatever way it goes.
         ahead = gap - np.clip(fall * self._period, 0.0, AHEAD)
         return np.asarray((ahead[:, None] <= thickness) & wanted)
@@ -106,6 +116,7 @@ class Clamping:
         least = min(openings()[0].values())
         between = thickest(widest + deviation, fits, plain, sizes(), least=least) + deviation
         self._gaps = ClosingGaps(model.shapes, pairs, between, period=period)
+        self._relative = self._gaps.relative(model)
         self._joints = JointGaps(
             model, robot, by_one, self._thickness, np.maximum(fits - deviation, 0.0),
             least=least, period=period,
@@ -140,6 +151,21 @@ class Clamping:
             return clamped, np.zeros_like(clamped), speeds
         floor = self._floor.clamped(state, self._thickness, wanted)
         return clamped | floor, floor, speeds
+
+    def ever(self, state: State, span: Span, wanted: Flags) -> tuple[Flags, Array]:
+        """What may clamp at any instant of a span of which the twin is at one end, and how fast; see `at`.
+
+        Raises:
+            Undecided: A robot or a machine that was not heard.
+        """
+        state.require(*self._carriers)
+        poses, twists = state.placed(self._asked), state.body_velocities(self._asked)
+        clamped, speeds = self._gaps.ever(*poses, twists, span, self._relative, wanted)
+        at_joints = self._joints.speeds(state, wanted, span)
+        clamped |= at_joints > 0
+        if self._floor is not None:
+            clamped |= self._floor.ever(state, span, self._thickness, wanted)
+        return clamped, np.maximum(speeds, at_joints)
 
 
 def floor_input(height: float | None) -> Input:

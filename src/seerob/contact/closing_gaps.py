@@ -16,6 +16,8 @@ from seerob.kernels.approach import relative_speeds
 from seerob.kernels.pairs import CORNERS
 from seerob.kernels.shapes import Shapes
 from seerob.kernels.speed import stacked
+from seerob.model import Model
+from seerob.spans import Relative, Span
 from seerob.transforms import Array
 
 ROUNDING = 1e-9
@@ -35,6 +37,7 @@ class ClosingGaps:
             period: Of the ticks at which they are asked for [s].
         """
         self._pairs, self._thickness, self._period = pairs, thickness, period
+        self._shapes = shapes
         self._survey = Survey(shapes, pairs.queries) if pairs.queries else None
         self._hulls = stacked([_corners(shapes, body) for body in range(len(shapes.names))])
         moving = np.array(pairs.moving, np.int64)
@@ -63,24 +66,60 @@ class ClosingGaps:
             Shape (b, r); False where it does not matter. And how fast each does so, seen from a side that
             moves too [m/s], 0 where none does, shape (b, r).
         """
+        speed = self._speeds(rotations, positions, twists, speeds)
+        return self._within(rotations, positions, speed, np.zeros(len(speed)), wanted)
+
+    def relative(self, model: Model) -> Relative:
+        """How the sides of gaps that move can move against each other, for `ever`."""
+        pairs, every = self._pair.tolist(), model.bodies
+        hulls = [_corners(self._shapes, j) for _, j in pairs]
+        return Relative(model.mj, [(every[i].mj, every[j].mj) for i, j in pairs], hulls)
+
+    def ever(
+        self,
+        rotations: Array,
+        positions: Array,
+        twists: tuple[Array, Array],
+        span: Span,
+        relative: Relative,
+        wanted: Flags,
+    ) -> tuple[Flags, Array]:
+        """The same at any instant of a span, given the poses and velocities at one end of it."""
+        bodies, first = np.array(self._pairs.moving, np.int64), self._pairs.first
+        speed = self._speeds(rotations, positions, twists, span.fast[bodies])
+        speed[self._seen] += relative.quick(span) * span.T
+        ways = span.fast[bodies][first] * span.T
+        ways[self._seen] += span.fast[self._pairs.across[self._seen]] * span.T
+        return self._within(rotations, positions, speed, ways, wanted)
+
+    def _speeds(
+        self, rotations: Array, positions: Array, twists: tuple[Array, Array], speeds: Array
+    ) -> Array:
+        """Of one side of each gap seen from the other [m/s], shape (g,)."""
+        speed = np.array(np.asarray(speeds)[self._pairs.first], float)
+        seen = np.empty(len(self._pair))
+        relative_speeds(rotations, positions, *twists, self._pair, *self._hulls, seen)
+        speed[self._seen] = seen
+        return speed
+
+    def _within(
+        self, rotations: Array, positions: Array, speed: Array, ways: Array, wanted: Flags
+    ) -> tuple[Flags, Array]:
+        """See `clamped`, with gaps that may be narrower by some ways [m], shape (g,)."""
         pairs = self._pairs
         nothing = np.zeros_like(wanted), np.zeros(wanted.shape)
         if self._survey is None or not wanted.any():
             return nothing
         # A row of False at the end is what -1 means.
         rows = np.concatenate([wanted, np.zeros((1, wanted.shape[1]), bool)])
-        speed = np.asarray(speeds)[pairs.first]
-        seen = np.empty(len(self._pair))
-        relative_speeds(rotations, positions, *twists, self._pair, *self._hulls, seen)
-        speed[self._seen] = seen
         of_gaps = (rows[pairs.first] | rows[pairs.second]) & (speed > STILL)[:, None]
         widest = np.where(of_gaps, self._thickness, -np.inf).max(axis=1)
-        caps = widest + np.minimum(speed * self._period, AHEAD) + ROUNDING
+        caps = widest + np.minimum(speed * self._period, AHEAD) + ways + ROUNDING
         if not (caps > -np.inf).any():
             return nothing
         found = self._survey.within(rotations, positions, caps)
         known = (caps > -np.inf) & (found.reach != Reach.BEYOND_CAP)
-        gaps = np.where(known, found.distance, np.inf)
+        gaps = np.where(known, found.distance - ways, np.inf)
         flags = clamps(gaps, speed, self._period, self._thickness) & of_gaps
         return np.asarray(pairs.per_body(flags) & wanted), pairs.fastest(flags, speed) * wanted
 

@@ -27,6 +27,7 @@ from seerob.contact.clamping import STILL, Coordinate, Flags, OwnJoints
 from seerob.distances.least import Query, Shapes
 from seerob.geometry import Solid
 from seerob.model import Mechanism, Model
+from seerob.spans import Span
 from seerob.state import State
 from seerob.transforms import Array
 
@@ -113,13 +114,20 @@ class _Table:
     rates: Array
     """See `closing`, shape (2, m - 1, r)."""
 
-    def at(self, q: float, qd: float, period: float) -> Array:
-        """How fast the pair clamps each body part [m/s], 0 where it does not, shape (r,)."""
+    def at(self, start: float, end: float, qd: tuple[float, float]) -> Array:
+        """How fast the pair clamps each body part [m/s], 0 where it does not, shape (r,).
+
+        Args:
+            start: From where on the joint is looked at [rad or m].
+            end: To where, likewise.
+            qd: Its least and largest speed [rad/s or m/s].
+        """
         count = self.rates.shape[1]
-        ends = sorted((int((q - self.low) // self.step), int((q + qd * period - self.low) // self.step)))
+        ends = sorted(int((q - self.low) // self.step) for q in (start, end))
         seen = np.arange(ends[0], min(ends[1], ends[0] + count) + 1)
         seen = seen % count if self.turns else np.clip(seen, 0, count - 1)
-        speed = self.rates[int(qd < 0), seen].max(axis=0) * abs(qd)
+        ways = [way for way, moves in enumerate((qd[1] > 0, qd[0] < 0)) if moves]
+        speed = self.rates[ways][:, seen].max(axis=(0, 1), initial=0.0) * max(abs(qd[0]), abs(qd[1]))
         return np.where(speed > STILL, speed, 0.0)
 
 
@@ -174,12 +182,13 @@ class JointGaps:
                 step = max((high - low) / STEPS, 1e-12)
                 self._tables.append(_Table(*coordinate, rows, low, step, turns, rates))
 
-    def speeds(self, state: State, wanted: Flags) -> Array:
+    def speeds(self, state: State, wanted: Flags, span: Span | None = None) -> Array:
         """At which speed moving bodies clamp body parts now [m/s], 0 where they do not, shape (b, r).
 
         Args:
             state: The twin.
             wanted: Of which bodies, that move now, and which body parts that matters, shape (b, r).
+            span: At any instant of that instead, of which the twin is at one end.
         """
         found = np.zeros(wanted.shape)
         for table in self._tables:
@@ -187,9 +196,15 @@ class JointGaps:
             if not wanted[rows].any():
                 continue
             mechanism = state.model.mechanisms[table.mechanism]
-            qd = float(state.qd(mechanism)[table.column])
-            if qd:
-                at = table.at(float(state.q(mechanism)[table.column]), qd, self._period)
+            q, qd = (float(each(mechanism)[table.column]) for each in (state.q, state.qd))
+            least, most, way = qd, qd, 0.0
+            if span is not None:
+                dof = mechanism.v_address[mechanism.own[table.column]]
+                way, change = span.qd[dof] * span.T, span.qdd[dof] * span.T
+                least, most = qd - change, qd + change
+            if least or most:
+                start, end = q - way + min(least, 0.0) * self._period, q + way + max(most, 0.0) * self._period
+                at = table.at(start, end, (least, most))
                 found[rows] = np.maximum(found[rows], at)
         return found * wanted
 

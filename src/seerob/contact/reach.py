@@ -23,6 +23,7 @@ from seerob.human.skeleton import bone_poses, without_side
 from seerob.human.skin import BODY_REGION
 from seerob.model import Mechanism, Model
 from seerob.snapshot import Input, Origin
+from seerob.spans import Span, rows_of
 from seerob.state import State
 from seerob.transforms import Array
 
@@ -113,19 +114,20 @@ class HeightReach:
         )
         self.words = " or ".join(postures)
 
-    def at(self, state: State) -> NDArray[np.bool_]:
-        """Per moving body and region, shape (b, len(REGIONS))."""
+    def at(self, state: State, span: Span | None = None) -> NDArray[np.bool_]:
+        """Per moving body and region, shape (b, len(REGIONS)); ``span`` as of `Person.near`."""
+        horizon = self._horizon + (0.0 if span is None else span.way(rows_of(self._moving)))
         R, x = state.placed(self._moving)
         z = [
             (body.corners @ R[i, 2] + x[i, 2], body.radius + body.deviation)
             for i, body in zip(self._moving, self._bodies, strict=True)
         ]
-        low = np.array([at.min() - r - self._horizon for at, r in z])[:, None]
-        high = np.array([at.max() + r + self._horizon for at, r in z])[:, None]
+        low = np.array([at.min() - r - horizon for at, r in z])[:, None]
+        high = np.array([at.max() + r + horizon for at, r in z])[:, None]
         found: NDArray[np.bool_] = (low <= self._high) & (high >= self._low)
         for person in self._people:
             try:
-                found |= person.near(state, 0.0)[0]
+                found |= person.near(state, 0.0, span)[0]
             except Undecided:
                 return np.ones_like(found)
         return found

@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.distances.least import Per, Query, Reach, Survey
+from seerob.errors import Undecided
 from seerob.human.skeleton import without_side
 from seerob.human.skin import BODY_REGION
 from seerob.model import Mechanism, Model
 from seerob.norms import body_limits
 from seerob.snapshot import Verdict
+from seerob.spans import Span, rows_of
 from seerob.state import State
 from seerob.transforms import Array
 from seerob.whereabouts.tracking_error import TrackingError
@@ -74,6 +76,7 @@ class Person:
         self.bodies = tuple(i for i in every if i not in without)
         self.several = len(people) > 1
         self._gap = model.gap(robot.moving, self.bodies)
+        self._robot, self._people = rows_of(robot.moving), rows_of(self.bodies)
         self._asked = (*robot.moving, *self.bodies)
         # Not the gap's own query: that measures pairs however far they are.
         self._reach = float(np.nextafter(horizon + self._gap.deviation, np.inf))
@@ -101,32 +104,40 @@ class Person:
         """Whose bones these are."""
         return tuple(dict.fromkeys(bone.rpartition("/")[0] for bone in self.hit(region)))
 
-    def touched(self, state: State) -> NDArray[np.bool_]:
+    def touched(self, state: State, more: float = 0.0) -> NDArray[np.bool_]:
         """Which moving bodies touch which regions, or may since surfaces stick out, shape (b, len(REGIONS)).
+
+        Or come so near [m].
 
         Raises:
             Undecided: As of `near`.
         """
         state.require_bodies(self._asked)
-        caps = np.tile(np.nextafter(self._gap.deviation, np.inf) + self._off.at(state), self._shape[0])
+        caps = np.tile(np.nextafter(self._gap.deviation + more, np.inf) + self._off.at(state), self._shape[0])
         found = self._farther.within(*state.placed(self._asked), caps)
         close: NDArray[np.bool_] = np.asarray(found.reach == _WITHIN_CAP).reshape(self._shape)
         return close @ self._member
 
-    def near(self, state: State, speed: float | None) -> tuple[NDArray[np.bool_], Array]:
+    def near(
+        self, state: State, speed: float | None, span: Span | None = None
+    ) -> tuple[NDArray[np.bool_], Array]:
         """What could be hit.
 
         Args:
             state: The twin.
             speed: Of every region, instead of the observed one [m/s].
+            span: At any instant of that instead, of which the twin is at one end.
 
         Returns:
             Per moving body and region, shape (b, len(REGIONS)), and bounds on the regions' speeds [m/s].
         """
         state.require_bodies(self._asked)
         off = self._off.at(state)
-        if off.any():
-            caps = np.tile(self._reach + off, self._shape[0])
+        if span is not None and off.any():
+            raise Undecided("how far devices are off is not known between two ticks")
+        more = 0.0 if span is None else span.way(self._robot) + span.way(self._people)
+        if off.any() or more:
+            caps = np.tile(self._reach + more + off, self._shape[0])
             found = self._farther.within(*state.placed(self._asked), caps)
         else:
             found = state.distances(self._query, Per.WHETHER)
@@ -135,5 +146,6 @@ class Person:
         near: NDArray[np.bool_] = close @ self._member
         if speed is not None:
             return near, np.full(len(REGIONS), speed)
-        v = np.where(self._close, state.fastest_points(self.bodies)[0], 0.0)
+        fast = state.fastest_points(self.bodies)[0] if span is None else span.fast[self._people]
+        v = np.where(self._close, fast, 0.0)
         return near, np.asarray(np.max(v[:, None] * self._member, axis=0))

@@ -16,7 +16,7 @@ from seerob.model import Mechanism, Model
 from seerob.mounting.mass_tolerances import MassTolerances
 from seerob.moving_base import energy_of
 from seerob.snapshot import Basis, Result, Sphere, Verdict
-from seerob.spans import Fall, Falls, Margin, Points, Span, rows_of
+from seerob.spans import UNBOUNDED, Fall, Falls, Margin, Points, Span, change_of_motion
 from seerob.state import State
 from seerob.states import States
 from seerob.tolerances import deciding, spread
@@ -139,29 +139,19 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         the norm of how much they change. The largest is one too: of heavier masses, with centres that may
         be d away, :math:`m (|v| + d |\omega|)^2 + \omega^T I \omega` (`seerob.mounting.mass_tolerances`).
         """
-        robot, mj = model.mover(self.robot), model.mj
+        robot = model.mover(self.robot)
         if self.limit is None:
             return None
         tolerances = MassTolerances(model, robot)
         every = (robot, *_aboard(model, robot))
-        heavy = dict.fromkeys(int(b) for each in every for b in each.mj_bodies)
-        limit, bodies = self.limit, [b for b in heavy if mj.body_mass[b] > 0]
-        heaviest = np.array([tolerances.heaviest(body) for body in bodies]).reshape(-1, 2)
-        masses = heaviest[:, 0] * mj.body_mass[bodies]
-        # The mean square distance from the centre of mass is what its moments of inertia say.
-        radii = np.sqrt(mj.body_inertia[bodies].sum(axis=1) / 2 / mj.body_mass[bodies]) + heaviest[:, 1]
-        rows = rows_of(
-            points.add(body, mj.body_ipos[body], radius) for body, radius in zip(bodies, radii, strict=True)
-        )
+        bodies = [int(b) for each in every for b in each.mj_bodies]
         dofs = np.concatenate([each.v_address for each in every])
-        rotors = mj.dof_armature[dofs]
+        limit, changes = self.limit, change_of_motion(model, bodies, dofs, points, tolerances.heaviest)
 
         def falls(span: Span, least: Array | float) -> Fall:
-            if not (np.isfinite(span.quick[rows]).all() and np.isfinite(span.qdd[dofs]).all()):
-                return Fall(np.inf, np.inf)  # who jumps
-            turned = rotors @ (span.qdd[dofs] * span.T) ** 2
-            change = np.sqrt(masses @ (span.quick[rows] * span.T) ** 2 + turned)
-            bend = np.sqrt(masses @ span.bend[rows] ** 2 + turned / 4)
+            change, bend = changes(span)
+            if not np.isfinite(change):
+                return UNBOUNDED  # who jumps
             most = np.sqrt(2 * max(limit - float(least), 0.0))
             return Fall(float((most + change) * change), float(most * bend + bend**2 / 2))
 

@@ -28,7 +28,7 @@ from seerob.contact.reach import HeightReach, reach_inputs
 from seerob.contact.regions import REGIONS, Person, without_limit
 from seerob.contact.rows import ContactRows
 from seerob.contact.tolerances import ContactEnds, ranks, robot_masses
-from seerob.criterion import Criterion, Evaluate, worst
+from seerob.criterion import Criterion, Evaluate, Lowest, worst
 from seerob.errors import InputError, Undecided, UnknownName
 from seerob.human.anthropometry import STATURE_RANGE
 from seerob.kernels.contact_speeds import governing
@@ -38,6 +38,7 @@ from seerob.norms.crushing_gaps import NOT_VERIFIED, gap_inputs
 from seerob.norms.limit_inputs import excluded_input, limit_inputs, table_input
 from seerob.quantities import Coordinate, Tolerance
 from seerob.snapshot import Basis, Input, Origin, Result, Verdict
+from seerob.spans import Points, Span, change_of_motion, rows_of
 from seerob.state import State
 from seerob.tolerances import Spread, deciding
 from seerob.transforms import Array
@@ -45,6 +46,8 @@ from seerob.whereabouts.partly_seen import seen_first
 
 STANDSTILL = 1e-3
 """Speed below which a part of the robot hits nobody [m/s]."""
+ADMITTED = 1e-6
+"""Share of a permissible speed that is more than rounding (`seerob.verdict.ROUNDING`) of whatever moves."""
 FAR = 1e6
 """Larger than any margin of speed [m/s]."""
 GOVERNING = tuple(limit.name.lower() for limit in collision.Governing)
@@ -138,6 +141,10 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         contacts = Contacts(self, model)
         bones = () if contacts.people is None else contacts.people.bodies
         return contacts.whoever_is_known(seen_first(bones, contacts.evaluate, contacts.without))
+
+    def lowest(self, model: Model, points: Points) -> Lowest | None:
+        """See `Criterion.lowest`; none where the file accepts that there is none."""
+        return None if self.between_samples else Contacts(self, model).lowest(points)
 
     def table(self, model: Model) -> body_limits.BodyLimits:
         """The limits that apply."""
@@ -439,6 +446,86 @@ class Contacts:
         return Judged(
             v_r, v_h, near, projected, speeds, clamped, *governing, ends, on_floor, closing, simplified, doubt
         )
+
+    def lowest(self, points: Points) -> Lowest | None:
+        r"""Least margin in a span, a share of what is permitted; none of tolerances, carriers, measurements.
+
+        Surfaces are as fast as they get in the span, hit whatever they may come near and clamp whatever they
+        may clamp. Of the effective mass along the motion, :math:`m_u v^2 \le 2E`, E the kinetic energy of
+        the robot: no motion of its joints that gives a point that velocity has less (Cauchy and Schwarz).
+        """
+        spec, model, robot = self.spec, self.model, self.robot
+        held = any(body.holder for body in model.bodies)
+        if not self.moving or not robot.alone or self.behind.pushed or self.ends.tolerances or held:
+            return None
+        if spec.measurements is not None:
+            return None
+        moving = rows_of(self.moving)
+        reach = np.array([model.bodies[i].radius + model.bodies[i].deviation for i in self.moving])
+        changes = change_of_motion(model, robot.mj_bodies, robot.v_address, points)
+        excluded = np.array([name in spec.excluded for name in REGIONS])
+        limited = np.isin(np.arange(len(REGIONS)), self.in_regions)
+        simplified = self.behind.simplified(None)
+
+        def turned(span: Span) -> Array:
+            """How much faster surfaces are than the points whose direction counts [m/s], shape (b,)."""
+            chains = (points.chain(int(i)) for i in moving)
+            return np.asarray(reach * [span.qd[joints][turns].sum() for joints, turns, _ in chains])
+
+        def energy(state: State, span: Span) -> float:
+            qd = state.qd(robot)
+            now = math.sqrt(float(qd @ state.mass_matrix(robot) @ qd))
+            return (now + changes(span)[0]) ** 2 / 2
+
+        def shares(v: Array, m_R: Array, clamped: NDArray[np.bool_]) -> Array:
+            # Who may be clamped may be free too, of which another table may permit less.
+            both = (self.arrays.speeds(m_R, self.least, each) for each in (clamped, np.zeros_like(clamped)))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                used = (np.where(np.isnan(x.pressure), np.inf, v / x.permissible) for x in both)
+                return np.maximum(*used)
+
+        def lowest(state: State, span: Span) -> float:
+            state.require_bodies(self.moving)
+            fast = span.fast[moving]
+            if not np.isfinite(fast).all():
+                return -math.inf
+            if self.people is None:
+                near: NDArray[np.bool_] = np.ones((len(moving), len(REGIONS)), bool)
+                if self.reach is not None:
+                    near &= self.reach.at(state, span)
+                v_h: Array = np.full(len(REGIONS), spec.person_speed or 0.0)
+            else:
+                near, v_h = self.people.near(state, spec.person_speed, span)
+            near &= (fast > STANDSTILL)[:, None]
+            if not near.any():
+                return math.inf
+            if near[:, ~(limited | excluded)].any():
+                return -math.inf  # no limit, or no contact at all
+            if spec.excluded:
+                person = self.people or self.everybody
+                if person is not None:
+                    way = span.way(moving) + span.way(rows_of(person.bodies))
+                    if (person.touched(state, way) & near)[:, excluded].any():
+                        return -math.inf
+            wanted = near[:, self.in_regions]
+            clamped, closing = self.clamping.ever(state, span, wanted)
+            v = fast[:, None] + v_h[self.in_regions]
+            m_hit = m_closing = np.full(len(moving), simplified)
+            if spec.mass != "simplified":
+                more, E = turned(span), energy(state, span)
+                slower = np.maximum(span.slow[moving] - more, STANDSTILL)
+                # m_u (v_r + v_h)² of a point that is at least so fast: as a share of v² it is most at an end.
+                ends = [np.maximum(fast + v_h.min(), STANDSTILL), np.maximum(fast + v_h.max(), STANDSTILL)]
+                most = np.max([(slower + more + each - fast) / (slower * each) for each in ends], axis=0)
+                m_hit = np.maximum(simplified, 2 * E * most**2)
+                m_closing = np.maximum(simplified, 2 * E / slower**2)
+            found = shares(v, m_hit, clamped)
+            if (closing > 0).any():
+                found = np.maximum(found, np.where(closing > 0, shares(closing, m_closing, clamped), 0.0))
+            asked = wanted & ~excluded[self.in_regions]
+            return 1 - float(np.where(asked, found, 0.0).max(initial=0.0)) - ADMITTED
+
+        return lowest
 
     def evaluate(self, state: State, people: Person | None = None) -> Result:
         """The result at a state; see `judge`."""

@@ -15,6 +15,7 @@ from mcap.writer import Writer
 
 import seerob as sr
 from seerob.cli import COMMANDS
+from seerob.kernels._kept_loops import key_of
 
 FILES = ["report.html", "results.xlsx", "run.mcap"]
 
@@ -213,7 +214,7 @@ def test_a_wait_for_the_compiler_is_announced_once(capsys, tmp_path, monkeypatch
     (folder / "tree.build-1-0123456789abcdef.py311.nbi").write_bytes(b"")  # of another source
     loops.tell_compiling()
     assert capsys.readouterr() == ("", "compiling the inner loops (once)\n")
-    (folder / f"tree.build-1-{loops.key_of('tree')}.py311.nbi").write_bytes(b"")
+    (folder / f"tree.build-1-{key_of('tree')}.py311.nbi").write_bytes(b"")
     loops.tell_compiling()
     assert capsys.readouterr() == ("", "")
 

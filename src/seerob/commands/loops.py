@@ -8,13 +8,14 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from seerob.commands import STATUS
-from seerob.kernels._kept_loops import FOLDER, key_of
 
 COMPILING = "compiling the inner loops (once)"
 
 
 def tell_compiling() -> None:
     """One line that stays during the wait, when nothing is compiled yet of the loops as they are now."""
+    from seerob.kernels._kept_loops import FOLDER, key_of
+
     kept = {found.name for folder in cache_folders() if folder.is_dir() for found in folder.glob("*.nbi")}
     keys = {key_of(module.stem) for module in FOLDER.glob("*.py")} if kept else ()
     if not any(f"-{key}." in name for key in keys for name in kept):

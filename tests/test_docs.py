@@ -15,14 +15,14 @@ from seerob.human import keyframes, manikin
 from seerob.reading import convert_workstation
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 ONLY_NAMES = re.compile(r"(no [a-z ]+|nothing) named ")
 """Mistakes of a table that stands alone: what it names is in another block."""
 
 
 def pages() -> list[object]:
-    return [pytest.param(path, id=path.name) for path in PAGES]
+    return [pytest.param(path, id=path.relative_to(ROOT).as_posix()) for path in PAGES]
 
 
 def blocks(path: Path, language: str) -> list[str]:
@@ -140,14 +140,21 @@ def test_tests_named_as_evidence_exist() -> None:
     assert not missing
 
 
-@pytest.mark.parametrize(("group", "page"), [("sources", "sources.md"), ("safety", "safety.md")])
-def test_every_kind_is_explained_with_its_options(group: str, page: str) -> None:
-    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
-    alike = {"csv": "excel"}  # the same options, printed once
-    missing = [
-        k for k in plugin.kinds(group) if f"<!-- write-docs: {group}/{alike.get(k, k)} -->" not in text
-    ]
-    assert not missing
+@pytest.mark.parametrize("group", ["sources", "safety", "ergonomics", "sinks"])
+def test_every_kind_is_explained_with_its_options(group: str) -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    alike = {("sources", "csv"): "excel"}  # the same options, printed once
+    named = {k: f"{group}/{alike.get((group, k), k)}" for k in plugin.kinds(group)}
+    assert not [k for k, name in named.items() if f"<!-- write-docs: {name} -->" not in text]
+
+
+def test_every_source_is_in_the_list_and_its_page_begins_with_an_example() -> None:
+    text = (ROOT / "docs/sources.md").read_text(encoding="utf-8")
+    listed = re.findall(r"<!-- write-docs: list/sources ([\w ]+) -->", text)
+    assert sorted(" ".join(listed).split()) == sorted(plugin.kinds("sources"))
+    for page in (*(ROOT / "docs/sources").glob("*.md"), *(ROOT / "docs/workstation").glob("*.md")):
+        if page.stem not in {"checks", "live", "capture"}:
+            assert "```toml" in "\n".join(page.read_text(encoding="utf-8").splitlines()[:8]), page.name
 
 
 def test_every_cited_key_is_in_the_references() -> None:

@@ -4,7 +4,7 @@
 //
 // Runs where the camera is plugged in (Windows or Linux, with the GPU that the tracker needs). Works with an
 // Azure Kinect and, through Orbbec's K4A wrapper, with a Femto Bolt or Mega. Ctrl-C ends it.
-// The message is explained in docs/sources.md of seerob.
+// The message is explained in docs/sources/kinect.md of seerob.
 
 #include <k4a/k4a.h>
 #include <k4abt.h>

@@ -1,7 +1,7 @@
 """A depth camera that tracks bodies (Azure Kinect, Orbbec Femto), live, from a sender on its PC.
 
 The tracker runs where the camera is plugged in; a small program there (``tools/kinect_sender``) sends what
-it finds: 32 joints per person, in datagrams, or over a WebSocket. The message is in docs/sources.md.
+it finds: 32 joints per person, in datagrams, or over a WebSocket. The message is in docs/sources/kinect.md.
 """
 
 from __future__ import annotations

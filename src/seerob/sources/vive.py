@@ -1,6 +1,6 @@
 """Worn trackers (Vive, or others of SteamVR), live: from this computer, or from a sender on SteamVR's.
 
-The sender is ``tools/vive_sender``; its message is in docs/sources.md. Any program that reads trackers,
+The sender is ``tools/vive_sender``; its message is in docs/sources/vive.md. Any program that reads trackers,
 through OpenXR for one, can send the same.
 """
 

@@ -33,7 +33,7 @@ WITH_UNIT = re.compile(
 )
 KIND = {"x": "m", "y": "m", "z": "m", "blend": "m", "duration": "s", "pause": "s"}
 CALCULATE = "open it in Excel or LibreOffice and save it: what wrote it does not calculate"
-REMEDY = "columns are named in docs/sources.md, waypoints: q1_deg, x_mm, roll_deg, blend_mm …"
+REMEDY = "columns are named in docs/sources/waypoints.md: q1_deg, x_mm, roll_deg, blend_mm …"
 
 
 def read_sheet(path: Path, file: str) -> Program:

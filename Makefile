@@ -16,7 +16,7 @@ BIN := $(VENV)/bin
 RUN := $(VENV)/.run
 DEV := $(VENV)/.dev
 NODE := $(VENV)/.node
-PAGE := src/seerob/server/page/index.html
+PAGE := src/seerob/app/server/page/index.html
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: help demo demo-plc test setup check compiled format lint types imports unit web-test package bench soak mutate wire web build docs lock clean
@@ -70,7 +70,7 @@ setup: $(DEV) $(PAGE)
 # -- checks -------------------------------------------------------------------------------------
 
 check: $(DEV) lint types imports
-	$(BIN)/python -m seerob.wire --check
+	$(BIN)/python -m seerob.app.wire --check
 
 lint: $(DEV)
 	$(BIN)/ruff format --check
@@ -114,7 +114,7 @@ format: $(DEV)
 	$(BIN)/ruff format
 
 wire: $(DEV)
-	$(BIN)/python -m seerob.wire
+	$(BIN)/python -m seerob.app.wire
 
 web: $(PAGE)
 
@@ -134,4 +134,4 @@ lock: $(DEV)
 	scripts/lock $(BIN)/python
 
 clean:
-	rm -rf $(VENV) web/node_modules dist src/seerob/server/page .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) web/node_modules dist src/seerob/app/server/page .mypy_cache .ruff_cache .pytest_cache

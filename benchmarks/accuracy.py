@@ -27,17 +27,17 @@ import pinocchio as pin
 
 from made_cell import FLOATING, heard, hinge_limits, made, state_at
 from oracles import pinocchio_oracle as oracle
-from seerob.engine import Engine
-from seerob.model_io import library
-from seerob.recorded_station import load_recorded
-from seerob.recordings.recording import Recording
-from seerob.run import pump
-from seerob.safety.kinetic_energy import kinetic_energy
-from seerob.sinks.recorder import Recorder
-from seerob.source import Opened, Source
-from seerob.state import State
-from seerob.station import Station, load
-from seerob.transforms import Array
+from seerob.core.transforms import Array
+from seerob.criteria.safety.kinetic_energy import kinetic_energy
+from seerob.description.robots import library
+from seerob.outputs.sinks.recorder import Recorder
+from seerob.recording.recording import Recording
+from seerob.session.recorded_station import load_recorded
+from seerob.session.run import pump
+from seerob.session.station import Station, load
+from seerob.twin.engine import Engine
+from seerob.twin.state import State
+from seerob.workstation.source import Opened, Source
 
 Motion = Callable[[float], tuple[Array, Array]]
 UR10 = '[[robots]]\nname = "arm"\nmodel = "library:ur10"\n'
@@ -161,7 +161,7 @@ def energy(ticks: int) -> None:
 
 def replay(ticks: int | None) -> None:
     """The starter's run, or its first ticks, against its recording, computed again from the files in it."""
-    source, place = files("seerob.commands") / "starter", folder()
+    source, place = files("seerob.app.commands") / "starter", folder()
     for entry in source.iterdir():
         (place / entry.name).write_bytes(entry.read_bytes())
     left = repeat(None) if ticks is None else repeat(None, ticks)

@@ -24,14 +24,14 @@ import mujoco
 import numpy as np
 import trimesh
 
-from seerob.distances.depth import Depths
-from seerob.distances.least import Shapes
-from seerob.distances.rays import Rays
-from seerob.geometry import Mesh, Solid, capsule
+from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.description.shapes.shapes import box_mesh
+from seerob.distance.depth import Depths
+from seerob.distance.least import Shapes
+from seerob.distance.rays import Rays
 from seerob.kernels.crossings import encloses
 from seerob.kernels.tree_file import tree_of
 from seerob.kernels.winding import contains
-from seerob.model_io.shapes import box_mesh
 
 BEAMS, PARTS, TOLERANCE = 541, 21, 0.005
 

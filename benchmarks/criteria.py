@@ -28,24 +28,24 @@ import numpy as np
 import pinocchio as pin
 from msgspec.structs import replace
 
-from seerob import batch
-from seerob import run as road
-from seerob.commands import cache_folder
-from seerob.criterion import Criterion
-from seerob.engine import Engine
-from seerob.model_io import library
-from seerob.reading import read
-from seerob.safety.effective_mass import EffectiveMass
-from seerob.safety.force_polytope import ForcePolytope
-from seerob.safety.kinetic_energy import KineticEnergy
-from seerob.safety.manipulability import Manipulability
-from seerob.safety.minimum_distance import MinimumDistance
-from seerob.safety.power_and_force import PowerAndForce
-from seerob.safety.safety_area import SafetyArea
-from seerob.safety.separation import Separation, Stop
-from seerob.safety.velocity import Velocity
-from seerob.station import Station
-from seerob.transforms import Array
+from seerob.app.console.terminal import cache_folder
+from seerob.core.transforms import Array
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.safety.effective_mass import EffectiveMass
+from seerob.criteria.safety.force_polytope import ForcePolytope
+from seerob.criteria.safety.kinetic_energy import KineticEnergy
+from seerob.criteria.safety.manipulability import Manipulability
+from seerob.criteria.safety.minimum_distance import MinimumDistance
+from seerob.criteria.safety.power_and_force import PowerAndForce
+from seerob.criteria.safety.safety_area import SafetyArea
+from seerob.criteria.safety.separation import Separation, Stop
+from seerob.criteria.safety.velocity import Velocity
+from seerob.description.robots import library
+from seerob.session import batch
+from seerob.session import run as road
+from seerob.session.reading import read
+from seerob.session.station import Station
+from seerob.twin.engine import Engine
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from oracles.pinocchio_oracle import pinocchio_model

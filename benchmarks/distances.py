@@ -24,9 +24,9 @@ import pinocchio as pin
 import trimesh
 from defusedxml import ElementTree
 
-from seerob.distances.least import Per, Query, Reach, Shapes
-from seerob.geometry import Mesh, Solid, capsule
-from seerob.transforms import Array, rotation_from_rpy
+from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.transforms import Array, rotation_from_rpy
+from seerob.distance.least import Per, Query, Reach, Shapes
 
 ROBOTS = Path(coal.__file__).parents[4] / "share" / "example-robot-data" / "robots"
 UR10 = ROBOTS / "ur_description" / "urdf" / "ur10_robot.urdf"

@@ -21,17 +21,17 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "
 
 import numpy as np
 
-from seerob.ergonomics.reba import METHOD as REBA
-from seerob.ergonomics.reba import Reba, RebaPhase
-from seerob.ergonomics.rula import METHOD as RULA
-from seerob.ergonomics.rula import Rula, RulaPhase
-from seerob.human import manikin
-from seerob.human.angles import Angles, angles
-from seerob.human.skeleton import bone_poses
-from seerob.scoring.judgement import Method
-from seerob.scoring.reba import Coupling
-from seerob.scoring.rula import LoadUse
-from seerob.scoring.spans import Span
+from seerob.criteria.ergonomics.reba import METHOD as REBA
+from seerob.criteria.ergonomics.reba import Reba, RebaPhase
+from seerob.criteria.ergonomics.rula import METHOD as RULA
+from seerob.criteria.ergonomics.rula import Rula, RulaPhase
+from seerob.criteria.scoring.judgement import Method
+from seerob.criteria.scoring.reba import Coupling
+from seerob.criteria.scoring.rula import LoadUse
+from seerob.criteria.scoring.spans import Span
+from seerob.description.humans import manikin
+from seerob.description.humans.angles import Angles, angles
+from seerob.description.humans.skeleton import bone_poses
 
 CHUNK = 5_000
 """Postures at a time: what fits the cache."""

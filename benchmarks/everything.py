@@ -22,9 +22,9 @@ import msgspec
 import numpy as np
 
 import seerob as sr
-from seerob import run as road
-from seerob.commands import cache_folder
-from seerob.engine import Engine
+from seerob.app.console.terminal import cache_folder
+from seerob.session import run as road
+from seerob.twin.engine import Engine
 
 FOLDER = Path(__file__).parents[1] / "workstations" / "two_robots"
 

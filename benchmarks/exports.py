@@ -22,12 +22,12 @@ from tempfile import TemporaryDirectory
 from openpyxl import Workbook, load_workbook
 
 import seerob as sr
-from seerob import run as road
-from seerob.commands import cache_folder
-from seerob.sink import Sink
-from seerob.sinks.csv import CsvFiles
-from seerob.sinks.dossier import Dossier
-from seerob.sinks.excel import Excel
+from seerob.app.console.terminal import cache_folder
+from seerob.outputs.sink import Sink
+from seerob.outputs.sinks.csv import CsvFiles
+from seerob.outputs.sinks.dossier import Dossier
+from seerob.outputs.sinks.excel import Excel
+from seerob.session import run as road
 
 FOLDER = Path(__file__).parents[1] / "workstations" / "captured_operator"
 GOAL = 0.3

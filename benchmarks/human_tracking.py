@@ -3,10 +3,10 @@
     python benchmarks/human_tracking.py            # 10 s of walking and of standing at a table
     python benchmarks/human_tracking.py --smoke    # a fraction of a second, correctness only
 
-A device sees all 21 bones 60 times a second; every sample becomes a posture (`seerob.human.fitting`), and
-the body is pulled there, 1 000 steps a second, with errors per bone at every tick. The goal is at most 35 %
-of one core. The peer, in the same run, is the bare `mujoco.mj_step` of the same model: what no twin of this
-body can be faster than.
+A device sees all 21 bones 60 times a second; every sample becomes a posture
+(`seerob.description.capture.fitting`), and the body is pulled there, 1 000 steps a second, with errors per
+bone at every tick. The goal is at most 35 % of one core. The peer, in the same run, is the bare
+`mujoco.mj_step` of the same model: what no twin of this body can be faster than.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ import mujoco
 import numpy as np
 from msgspec.structs import replace
 
-from seerob.engine import Engine
-from seerob.human import keyframes, manikin, motion
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.reading import convert_workstation
-from seerob.samples import BodyPoint, BodySample
-from seerob.station import Station
-from seerob.transforms import wxyz_from_rotation
+from seerob.core.samples import BodyPoint, BodySample
+from seerob.core.transforms import wxyz_from_rotation
+from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.session.reading import convert_workstation
+from seerob.session.station import Station
+from seerob.twin.engine import Engine
 
 RATE = 60.0
 GOAL = 0.35

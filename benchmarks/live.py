@@ -32,12 +32,12 @@ from pathlib import Path
 import numpy as np
 
 import seerob as sr
-from seerob import cli
-from seerob.emulators.rtde import RtdeServer
-from seerob.live import apart, ears, listening_process
-from seerob.live.listening import Listener, LiveSource, name_of
-from seerob.opening import source_target
-from seerob.samples import SignalSample, key
+from seerob.app import cli
+from seerob.app.emulators.rtde import RtdeServer
+from seerob.core.samples import SignalSample, key
+from seerob.devices.live import apart, ears, listening_process
+from seerob.devices.live.listening import Listener, LiveSource, name_of
+from seerob.session.opening import source_target
 
 FOLDER = Path(__file__).parents[1] / "workstations" / "plc_cell"
 KUKA = """

@@ -26,12 +26,12 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "
 
 import numpy as np
 
-from seerob.emulators.mvn_datagrams import datagrams
-from seerob.emulators.mvn_person import Pose
-from seerob.protocols.mvn import Kind, decode
-from seerob.protocols.mvn_segments import JOINTS, PARENTS, SEGMENTS
-from seerob.sources import bvh, mvnx
-from seerob.sources._mvn_frames import Frames
+from seerob.app.emulators.mvn_datagrams import datagrams
+from seerob.app.emulators.mvn_person import Pose
+from seerob.devices.capture.mvn_frames import Frames
+from seerob.devices.sources import bvh, mvnx
+from seerob.protocols.tracking.mvn import Kind, decode
+from seerob.protocols.tracking.mvn_segments import JOINTS, PARENTS, SEGMENTS
 
 GOAL = 100_000
 ITEM = struct.Struct(">i7f")

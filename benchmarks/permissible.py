@@ -22,12 +22,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from made_cell import FLOATING, UR10, made, wave
-from seerob.permissible.evaluation import Wish
-from seerob.permissible.rescaled import Rescaled, ceiling, rescale
-from seerob.permissible.speed_map import SpeedMap
-from seerob.permissible.timing import PER_WAY, fastest
-from seerob.station import Station
-from seerob.transforms import Array
+from seerob.core.transforms import Array
+from seerob.session.permissible.evaluation import Wish
+from seerob.session.permissible.rescaled import Rescaled, ceiling, rescale
+from seerob.session.permissible.speed_map import SpeedMap
+from seerob.session.permissible.timing import PER_WAY, fastest
+from seerob.session.station import Station
 
 PERSON = (
     '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [1.9, 0, -0.9] }\n'

@@ -21,11 +21,11 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
+from seerob.core.transforms import Array
+from seerob.criteria.polytope import SAME, zero_moment
+from seerob.description.description import Description, JointKind
+from seerob.description.robots import library
 from seerob.kernels.polytope import largest, vertices
-from seerob.model_io import library
-from seerob.model_io.description import Description, JointKind
-from seerob.polytope import SAME, zero_moment
-from seerob.transforms import Array
 
 ROBOTS = ("ur10e", "iiwa14")
 PUBLISHED = {6: np.array([330.0, 330, 150, 54, 54, 54]), 7: np.array([320.0, 320, 176, 176, 110, 40, 40])}

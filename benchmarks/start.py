@@ -22,7 +22,7 @@ def once() -> float:
     command = [
         sys.executable,
         "-m",
-        "seerob.cli",
+        "seerob.app.cli",
         "run",
         str(FOLDER),
         "--port",

@@ -21,10 +21,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import coal
 
 from made_sweep import missed
-from seerob.model import Model
-from seerob.station import load
-from seerob.transforms import Array
-from seerob.volumes.swept import swept_volume
+from seerob.core.transforms import Array
+from seerob.model.model import Model
+from seerob.model.volumes.swept import swept_volume
+from seerob.session.station import load
 
 ROBOTS = Path(coal.__file__).parents[4] / "share" / "example-robot-data" / "robots"
 HOME = np.array([0.0, -1.2, 1.4, -1.5, -1.57, 0.0])

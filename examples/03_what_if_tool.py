@@ -7,7 +7,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 import seerob as sr
-from seerob.workstation import Pose, Shape
+from seerob.workstation.workstation import Pose, Shape
 
 cell = sr.read(Path(__file__).parents[1] / "workstations" / "ur10_assembly")
 (gripper,) = cell.tools

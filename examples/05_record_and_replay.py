@@ -6,8 +6,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import seerob as sr
-from seerob.safety.velocity import Velocity
-from seerob.sinks.recorder import Recorder
+from seerob.criteria.safety.velocity import Velocity
+from seerob.outputs.sinks.recorder import Recorder
 
 station = sr.load(Path(__file__).parents[1] / "workstations" / "ur10_assembly")
 stricter = Velocity(name="slow", at="ur10", limit=0.25)

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from seerob.distances.least import Query, Reach, Shapes
-from seerob.geometry import Mesh, Solid, capsule
-from seerob.model_io.shapes import box_mesh
+from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.description.shapes.shapes import box_mesh
+from seerob.distance.least import Query, Reach, Shapes
 
 
 def channel() -> Mesh:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 from fact_tables import markdown
 
-from seerob import cli
-from seerob.commands import Exit
+from seerob.app import cli
+from seerob.app.console.terminal import Exit
 
 _HEAD = (
     "<!-- Written by scripts/write-docs from the command line. Do not edit. -->\n\n"

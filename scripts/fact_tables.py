@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from seerob.human import anthropometry
-from seerob.human.skeleton import AXES
-from seerob.human.tables import table
-from seerob.model_io import library
-from seerob.plausibility.ranges import data
+from seerob.description.humans import anthropometry
+from seerob.description.humans.skeleton import AXES
+from seerob.description.humans.tables import table
+from seerob.description.robots import library
+from seerob.workstation.plausibility.ranges import data
 
 
 def plain(text: str) -> str:
@@ -90,6 +90,6 @@ def statures_table() -> str:
 
 def headers_table() -> str:
     """Headers on every answer of the server."""
-    from seerob.server.door import HEADERS
+    from seerob.app.server.door import HEADERS
 
     return markdown(("header", "value"), [(f"`{name}`", f"`{value}`") for name, value in HEADERS.items()])

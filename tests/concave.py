@@ -5,8 +5,8 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from seerob.distances.least import Shapes
-from seerob.geometry import Mesh, Solid, capsule, dilated_rectangle
+from seerob.core.shapes.geometry import Mesh, Solid, capsule, dilated_rectangle
+from seerob.distance.least import Shapes
 
 IDENTITY = np.eye(3)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 
-from seerob.sink import Closing
+from seerob.outputs.sink import Closing
 
 
 class Kept(Closing):

@@ -10,9 +10,9 @@ from contextlib import contextmanager
 import numpy as np
 
 from kept_run import Kept
-from seerob.live.listening import Listener
-from seerob.live.real_time import SETTLE
-from seerob.samples import JointSample
+from seerob.core.samples import JointSample
+from seerob.devices.live.listening import Listener
+from seerob.devices.live.real_time import SETTLE
 
 
 class Story(Kept):

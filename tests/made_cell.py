@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from seerob.engine import Engine
-from seerob.run import Bound, Judge
-from seerob.samples import JointSample
-from seerob.snapshot import Result
-from seerob.source import Opened
-from seerob.state import State
-from seerob.station import Station, load
+from seerob.core.samples import JointSample
+from seerob.core.snapshot import Result
+from seerob.session.run import Bound, Judge
+from seerob.session.station import Station, load
+from seerob.twin.engine import Engine
+from seerob.twin.state import State
+from seerob.workstation.source import Opened
 
 FLOATING = "engine = { gravity = [0, 0, 0] }\n"
 

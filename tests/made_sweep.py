@@ -3,10 +3,10 @@
 import mujoco
 import numpy as np
 
-from seerob.geometry import Mesh
+from seerob.core.shapes.geometry import Mesh
 from seerob.kernels.tree_file import tree_of
 from seerob.kernels.winding import contains
-from seerob.volumes.moving import posed
+from seerob.model.volumes.moving import posed
 
 
 def points_of(solid, count, rng):

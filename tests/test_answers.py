@@ -7,10 +7,10 @@ import itertools
 import numpy as np
 import pytest
 
-from seerob.answers import Answers, judge_many
-from seerob.criterion import judge, judge_interval
-from seerob.results.series import CODES, NO_VERDICT
-from seerob.snapshot import Verdict
+from seerob.core.snapshot import Verdict
+from seerob.criteria.criterion import judge, judge_interval
+from seerob.recording.answers import Answers, judge_many
+from seerob.recording.series import CODES, NO_VERDICT
 
 EDGES = np.array([-1.0, np.nextafter(1.0, 0), 1.0, np.nextafter(1.0, 2), np.inf, np.nan])
 

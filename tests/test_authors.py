@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, person, state_at, two_r
-from seerob.engine import Engine
-from seerob.errors import InputError, NotAsked, Undecided
-from seerob.judging import Judge, contradiction
-from seerob.run import bind
-from seerob.safety.minimum_distance import MinimumDistance
-from seerob.safety.velocity import Velocity
-from seerob.snapshot import Result, Row, Verdict
+from seerob.core.errors import InputError, NotAsked, Undecided
+from seerob.core.snapshot import Result, Row, Verdict
+from seerob.criteria.judging import Judge, contradiction
+from seerob.criteria.safety.minimum_distance import MinimumDistance
+from seerob.criteria.safety.velocity import Velocity
+from seerob.session.run import bind
+from seerob.twin.engine import Engine
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 WITHIN, EXCEEDED, UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 HEAD = """
 from dataclasses import dataclass
 import numpy as np
-from seerob.criterion import Criterion, judge
-from seerob.distances.least import Per
-from seerob.snapshot import Basis, Result, Verdict
+from seerob.criteria.criterion import Criterion, judge
+from seerob.distance.least import Per
+from seerob.core.snapshot import Basis, Result, Verdict
 
 class Own(Criterion, frozen=True, kw_only=True):
     '''A rule of one's own.'''

@@ -9,10 +9,10 @@ import pytest
 import trimesh
 
 from made_cell import FLOATING, TWO_R, made, two_r
-from seerob.errors import InputError
-from seerob.station import load
+from seerob.core.errors import InputError
+from seerob.session.station import load
 
-LIMITS = files("seerob.norms").joinpath("iso_ts_15066_2016.toml").read_text(encoding="utf-8")
+LIMITS = files("seerob.description.norms").joinpath("iso_ts_15066_2016.toml").read_text(encoding="utf-8")
 BOX = trimesh.creation.box((0.2, 0.1, 0.1))
 OPEN = trimesh.Trimesh(BOX.vertices, BOX.faces[:-4], process=False).export(file_type="stl")
 HOLED = trimesh.Trimesh(

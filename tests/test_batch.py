@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from made_cell import TWO_R, UR10, heard, made, two_r, wave
-from seerob.answers import Answers
-from seerob.criterion import Criterion
-from seerob.engine import Engine
-from seerob.errors import InputError, UnknownName
-from seerob.results.series import CODES, NO_VERDICT
-from seerob.run import Judge
-from seerob.snapshot import Basis, Result, Verdict
-from seerob.states import States
+from seerob.core.errors import InputError, UnknownName
+from seerob.core.snapshot import Basis, Result, Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.recording.answers import Answers
+from seerob.recording.series import CODES, NO_VERDICT
+from seerob.session.run import Judge
+from seerob.twin.engine import Engine
+from seerob.twin.states import States
 
 N = 70
 T = 0.01 * np.arange(N)
@@ -171,7 +171,7 @@ def test_only_what_remembers_is_asked_instant_by_instant(batch):
 
 
 def test_number_of_threads_changes_no_bit(cell, motion, batch, monkeypatch):
-    monkeypatch.setattr("seerob.batch.STRETCH", 9)
+    monkeypatch.setattr("seerob.session.batch.STRETCH", 9)
     for threads in (1, 3):
         again = cell.batch(*motion, t=T, threads=threads)
         for name, column in batch.items():
@@ -287,7 +287,7 @@ def within(value, limit=2.0, interval=None, n=N):
         (lambda states: replace(within(1), nothing=np.ones(N, bool)), "says that there is nothing to judge"),
         (lambda states: within(1, n=N - 1), f"of {N} instants, not"),
         (lambda states: replace(within(1), verdict=np.full(N, 7, np.uint8)), "its verdicts \\[7\\] are none"),
-        (lambda states: np.ones(N), "returns ndarray, not seerob.answers.Answers"),
+        (lambda states: np.ones(N), "returns ndarray, not seerob.api.Answers"),
         (lambda states: 1 / 0, "own failed: ZeroDivisionError: division by zero"),
     ],
 )

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from made_cell import TWO_R, UR10, heard, made, person, two_r
-from seerob.between_ticks import Told
-from seerob.contact.regions import REGIONS
-from seerob.engine import Engine
-from seerob.human.skeleton import BONES
-from seerob.run import Judge, engine_of, pump, ticks
-from seerob.safety.power_and_force import Contacts
-from seerob.snapshot import Verdict
+from seerob.core.snapshot import Verdict
+from seerob.criteria.between_ticks import Told
+from seerob.criteria.contact.regions import REGIONS
+from seerob.criteria.safety.power_and_force import Contacts
+from seerob.description.humans.skeleton import BONES
+from seerob.session.run import Judge, engine_of, pump, ticks
+from seerob.twin.engine import Engine
 from worst_between import worst_found
 
 STICK = (

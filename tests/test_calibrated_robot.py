@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from made_cell import made
-from seerob.cli import main
-from seerob.emulators.motions import swing
-from seerob.emulators.rtde import RtdeServer
-from seerob.errors import InputError
-from seerob.protocols.ur_primary import Kinematics
+from seerob.app.cli import main
+from seerob.app.emulators.motions import swing
+from seerob.app.emulators.rtde import RtdeServer
+from seerob.core.errors import InputError
+from seerob.protocols.robots.ur_primary import Kinematics
 
 ALPHA = (np.pi / 2, 0.0, 0.0, np.pi / 2, -np.pi / 2, 0.0)
 TYPE = Kinematics(

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from kept_run import Kept
-from seerob.results.result_log import log_of
-from seerob.sinks import _posture_safety
-from seerob.snapshot import Verdict
-from seerob.station import load
+from seerob.core.snapshot import Verdict
+from seerob.outputs.report import posture_safety as _posture_safety
+from seerob.recording.result_log import log_of
+from seerob.session.station import load
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "workstations/captured_operator"

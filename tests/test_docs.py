@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from seerob import cli, plugin
-from seerob.human import keyframes, manikin
-from seerob.reading import convert_workstation
+from seerob.app import cli
+from seerob.core import plugin
+from seerob.description.humans import keyframes, manikin
+from seerob.session.reading import convert_workstation
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])

@@ -13,14 +13,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seerob.contact import collision
-from seerob.domains import number, whole
-from seerob.errors import SeerobError
-from seerob.norms import iso_13855
-from seerob.safety.separation import separation_bound
-from seerob.scoring import eaws_posture, niosh, owas, reba, repetition, rula
-from seerob.scoring.posture_time import PostureTime
-from seerob.stopping import terms
+from seerob.core.domains import number, whole
+from seerob.core.errors import SeerobError
+from seerob.criteria.contact import collision
+from seerob.criteria.safety.separation import separation_bound
+from seerob.criteria.scoring import eaws_posture, niosh, owas, reba, repetition, rula
+from seerob.criteria.scoring.posture_time import PostureTime
+from seerob.criteria.stopping import terms
+from seerob.description.norms import iso_13855
 
 END = niosh.End(H=0.3, V=0.8)
 NEGATIVE = st.floats(max_value=-1e-6, allow_nan=False)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, heard, made, two_r
-from seerob.engine import Engine
-from seerob.recordings.recording import Recording
-from seerob.reference import Reference
-from seerob.run import engine_of, pump, ticks
-from seerob.snapshot import Verdict
-from seerob.source import Opened, Pump
-from seerob.trajectories.trajectory import derive_velocities
+from seerob.core.snapshot import Verdict
+from seerob.files.trajectories.trajectory import derive_velocities
+from seerob.recording.recording import Recording
+from seerob.session.run import engine_of, pump, ticks
+from seerob.twin.control.reference import Reference
+from seerob.twin.engine import Engine
+from seerob.workstation.source import Opened, Pump
 
 TICK = 0.01
 PLACED = "engine = { gravity = [0, 0, 0], physics = false }\n"

@@ -8,9 +8,9 @@ import pytest
 from msgspec.structs import replace
 
 from made_cell import AMPLITUDE, FLOATING, Q0, TWO_R, UR10, heard, hinge_limits, made, recorded, two_r, wave
-from seerob.engine import Engine
-from seerob.run import pump
-from seerob.source import Source
+from seerob.session.run import pump
+from seerob.twin.engine import Engine
+from seerob.workstation.source import Source
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from seerob.errors import InputError, Problem, SeerobError, UnknownName, suggestion
+from seerob.core.errors import InputError, Problem, SeerobError, UnknownName, suggestion
 
 
 def test_a_problem_reads_as_one_line():

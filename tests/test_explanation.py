@@ -12,12 +12,12 @@ import pytest
 from scipy.signal import lfilter
 
 from oracles.pinocchio_oracle import pinocchio_model
-from seerob import cli
-from seerob.errors import InputError
-from seerob.explanation import NORMAL_95, SLOW, Dynamics, explain, fit, friction, slopes
-from seerob.model_io import library
-from seerob.plausibility.own_words import Said
-from seerob.station import load
+from seerob.app import cli
+from seerob.core.errors import InputError
+from seerob.description.robots import library
+from seerob.session.explanation import NORMAL_95, SLOW, Dynamics, explain, fit, friction, slopes
+from seerob.session.station import load
+from seerob.twin.own_words import Said
 
 CELL = '[[robots]]\nname = "arm"\nmodel = "library:ur5e"\nq = [0, 0, 0, 0, 0, 0]\n'
 MASS, COM, INERTIA = 2.0, np.array([0.03, -0.02, 0.08]), np.array([0.004, 0.005, 0.003])

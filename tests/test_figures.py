@@ -6,7 +6,7 @@ from decimal import Context, Decimal
 import numpy as np
 import pytest
 
-from seerob.figures import DECIMALS, against, between, figure, margin, told, with_unit
+from seerob.core.figures import DECIMALS, against, between, figure, margin, told, with_unit
 
 
 def back(text):

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob import cli
-from seerob.commands import Exit
-from seerob.host_name import check_host, check_url
-from seerob.sources.rtde import Rtde
+from seerob.app import cli
+from seerob.app.console.terminal import Exit
+from seerob.core.host_name import check_host, check_url
+from seerob.devices.sources.rtde import Rtde
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.tolerances import Spread, Tolerance, deciding, spread
+from seerob.core.tolerances import Spread, Tolerance, deciding, spread
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, hinge_limits, made, two_r
-from seerob.inverse_kinematics import _rotation_vector, solve_pose
-from seerob.transforms import rotation_from_rpy
+from seerob.core.transforms import rotation_from_rpy
+from seerob.twin.control.inverse_kinematics import _rotation_vector, solve_pose
 
 
 def placed(station, name, q):

@@ -9,11 +9,11 @@ import pytest
 from msgspec.structs import replace
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
-from seerob import batch
-from seerob.given_states import motion_of
-from seerob.judging import Judge, undecided
-from seerob.markers import Label, Segment
-from seerob.snapshot import Finding, Result, Row, Verdict
+from seerob.core.markers import Label, Segment
+from seerob.core.snapshot import Finding, Result, Row, Verdict
+from seerob.criteria.judging import Judge, undecided
+from seerob.session import batch
+from seerob.twin.given_states import motion_of
 
 WITHIN, EXCEEDED = Verdict.WITHIN, Verdict.EXCEEDED
 

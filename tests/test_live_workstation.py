@@ -11,15 +11,15 @@ from pathlib import Path
 
 import pytest
 
-from seerob import cli
-from seerob.commands import Exit
-from seerob.commands.emulating._motions import read, target_of
-from seerob.commands.emulating.rtde import HOME
-from seerob.emulators.motions import swing
-from seerob.emulators.rtde import RtdeServer
-from seerob.errors import InputError
-from seerob.recordings.recording import Recording
-from seerob.station import load
+from seerob.app import cli
+from seerob.app.console.terminal import Exit
+from seerob.app.emulating._motions import read, target_of
+from seerob.app.emulating.rtde import HOME
+from seerob.app.emulators.motions import swing
+from seerob.app.emulators.rtde import RtdeServer
+from seerob.core.errors import InputError
+from seerob.recording.recording import Recording
+from seerob.session.station import load
 
 FOLDER = Path(__file__).parents[1] / "workstations" / "ur10_rtde"
 ATTEMPTS = 5
@@ -29,7 +29,7 @@ MOTION = FOLDER.parent / "ur10_assembly" / "motion" / "cycle.xlsx"
 @contextmanager
 def emulator(*more: str) -> Iterator[int]:
     """The port of an emulator that was started as a user starts it."""
-    command = [sys.executable, "-m", "seerob.cli", "emulate", "rtde", "--port", "0", *more]
+    command = [sys.executable, "-m", "seerob.app.cli", "emulate", "rtde", "--port", "0", *more]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         try:

@@ -9,13 +9,13 @@ from msgspec.structs import replace
 
 from made_cell import FLOATING, TWO_R, made, person, two_r
 from motion_io import made_pictures
-from seerob.errors import SeerobError
-from seerob.live.listening import LiveSource
-from seerob.plugin import kinds, load
-from seerob.samples import JointSample
-from seerob.source import Opened, Source
-from seerob.station import Station
+from seerob.core.errors import SeerobError
+from seerob.core.plugin import kinds, load
+from seerob.core.samples import JointSample
+from seerob.devices.live.listening import LiveSource
+from seerob.session.station import Station
 from seerob.testing import sources_never_within
+from seerob.workstation.source import Opened, Source
 
 DURATION, PERIOD, LIES_AT = 1.2, 0.01, 40
 SPEED = (

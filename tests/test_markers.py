@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from seerob.snapshot import Polyline, Prism, Rays
-from seerob.transforms import Array
-from seerob.volumes.ear_cutting import cut_ears
+from seerob.core.shapes.ear_cutting import cut_ears
+from seerob.core.snapshot import Polyline, Prism, Rays
+from seerob.core.transforms import Array
 
 
 def test_an_open_line_has_a_leg_less_than_points_and_a_closed_one_as_many() -> None:
@@ -59,7 +59,7 @@ def test_what_encloses_nothing_has_no_triangles() -> None:
 
 
 def test_a_prism_is_a_closed_solid_of_its_volume_where_its_frame_is() -> None:
-    from seerob.sinks._marker_shapes import prism
+    from seerob.outputs.picture.marker_shapes import prism
 
     outline = ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (2.0, 1.0), (0.0, 3.0))
     marker = Prism(

@@ -4,8 +4,8 @@ import csv
 
 import pytest
 
-from seerob.no_formula import FORMULA, no_formula
-from seerob.permissible.tables import csv_bytes
+from seerob.core.files.no_formula import FORMULA, no_formula
+from seerob.session.permissible.tables import csv_bytes
 
 
 @pytest.mark.parametrize("text", ["=HYPERLINK(1)", "+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1"])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from made_cell import AMPLITUDE, Q0, UR10, heard, made
-from seerob.engine import Engine
-from seerob.run import Judge
-from seerob.scene import scene_of
+from seerob.session.run import Judge
+from seerob.session.scene import scene_of
+from seerob.twin.engine import Engine
 
 MORE = """
 [[parts]]

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from kept_run import Chapters
 from seerob import load
-from seerob.cli import parser
-from seerob.commands.emulating import opcua, rtde
-from seerob.recordings.recording import Recording
-from seerob.sinks.recorder import Recorder
+from seerob.app.cli import parser
+from seerob.app.emulating import opcua, rtde
+from seerob.outputs.sinks.recorder import Recorder
+from seerob.recording.recording import Recording
 
 SHIPPED = Path(__file__).parents[1] / "workstations" / "plc_cell"
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from seerob import plugin
-from seerob.criterion import Criterion
-from seerob.errors import SeerobError, UnknownName
-from seerob.reading import BASES
+from seerob.core import plugin
+from seerob.core.errors import SeerobError, UnknownName
+from seerob.criteria.criterion import Criterion
+from seerob.session.reading import BASES
 
-HEAD = "from seerob.criterion import Criterion\n"
+HEAD = "from seerob.criteria.criterion import Criterion\n"
 RULE = "class {0}(Criterion, frozen=True, kw_only=True):\n    '''A rule.'''\n    robot: str\n"
 
 
@@ -31,7 +31,7 @@ def module(tmp_path, monkeypatch):
 @pytest.mark.parametrize(("group", "kind"), [(g, k) for g in BASES for k in plugin.kinds(g)])
 def test_every_kind_that_ships_is_one_documented_class(group, kind):
     found = plugin.load(group, kind, BASES[group])
-    assert found.__module__ == f"seerob.{group}.{kind}"
+    assert found.__module__ == f"{plugin.home(group)}.{kind}"
     title = found.__doc__.strip().splitlines()[0]
     assert title.endswith(".")
     assert len(title) < 120
@@ -75,6 +75,6 @@ def test_a_module_of_ours_is_no_kind_of_another_group():
     with pytest.raises(UnknownName):
         plugin.load("safety", "csv", Criterion)
     with pytest.raises(SeerobError, match="must define one Criterion"):
-        plugin.load("safety", "seerob.errors", Criterion)
+        plugin.load("safety", "seerob.core.errors", Criterion)
     with pytest.raises(SeerobError, match=r"no module 'acme\.nothing'"):
         plugin.load("safety", "acme.nothing", Criterion)

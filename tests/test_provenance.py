@@ -3,8 +3,8 @@
 import pytest
 
 import seerob as sr
-from seerob.sinks._setup import setup
-from seerob.snapshot import Origin
+from seerob.core.snapshot import Origin
+from seerob.outputs.report.setup import setup
 
 PERSON = """
 [[humans]]

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.samples import JointSample, Quality, SignalSample
-from seerob.source import Opened, Pump
+from seerob.core.samples import JointSample, Quality, SignalSample
+from seerob.workstation.source import Opened, Pump
 
 
 def opened(times, values=None):

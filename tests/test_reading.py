@@ -10,16 +10,16 @@ from typing import get_args, get_type_hints
 import msgspec
 import pytest
 
-from seerob import plugin
-from seerob.errors import InputError
-from seerob.reading import BASES, convert_workstation, read, readable
-from seerob.toml_file import MAX_FILE_SIZE
-from seerob.workstation import Workstation
+from seerob.core import plugin
+from seerob.core.errors import InputError
+from seerob.core.files.toml_file import MAX_FILE_SIZE
+from seerob.session.reading import BASES, convert_workstation, read, readable
+from seerob.workstation.workstation import Workstation
 
 ROBOT = '[[robots]]\nname = "ur10"\nmodel = "library:ur10"\n'
 HUMAN = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 SOLID = "shape = { sphere = 0.1 }\n"
-STARTER = (resources.files("seerob.commands") / "starter" / "workstation.toml").read_text()
+STARTER = (resources.files("seerob.app.commands") / "starter" / "workstation.toml").read_text()
 
 
 def mistakes(text):

@@ -11,11 +11,11 @@ from importlib import resources
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from seerob.errors import InputError
-from seerob.reading import convert_workstation, read
-from seerob.workstation import TABLES, Workstation
+from seerob.core.errors import InputError
+from seerob.session.reading import convert_workstation, read
+from seerob.workstation.workstation import TABLES, Workstation
 
-STARTER = (resources.files("seerob.commands") / "starter" / "workstation.toml").read_text()
+STARTER = (resources.files("seerob.app.commands") / "starter" / "workstation.toml").read_text()
 FIELDS = sorted(
     {f for kind in TABLES.values() for f in kind.__struct_fields__} | {"position", "rpy", "kind", "stop"}
 )

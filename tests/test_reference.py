@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.reference import MAX_KEPT, Reference
+from seerob.twin.control.reference import MAX_KEPT, Reference
 
 ZERO = np.zeros(1)
 

@@ -15,13 +15,13 @@ import trimesh
 import seerob as sr
 from kept_run import Kept
 from made_cell import FLOATING, TWO_R, heard, made, two_r
-from seerob.engine import Engine, last_tick
-from seerob.errors import InputError
-from seerob.recorded_station import load_recorded
-from seerob.recordings.recording import Recording
-from seerob.run import Clock, Judge, bind, pump, ticks
-from seerob.sinks.recorder import Recorder
-from seerob.source import Opened, Source
+from seerob.core.errors import InputError
+from seerob.outputs.sinks.recorder import Recorder
+from seerob.recording.recording import Recording
+from seerob.session.recorded_station import load_recorded
+from seerob.session.run import Clock, Judge, bind, pump, ticks
+from seerob.twin.engine import Engine, last_tick
+from seerob.workstation.source import Opened, Source
 
 DEMO = Path(__file__).parent.parent / "workstations" / "ur10_assembly"
 TICKS = 80
@@ -89,8 +89,8 @@ def test_replay_of_the_demo_is_the_run(demo):
 
 AGAIN = """
 import sys, hashlib, msgspec
-from seerob.recordings.recording import Recording
-from seerob.recorded_station import load_recorded
+from seerob.recording.recording import Recording
+from seerob.session.recorded_station import load_recorded
 sys.path.insert(0, sys.argv[2])
 from test_run import encoded, replayed
 recording = Recording.open(sys.argv[1])
@@ -281,7 +281,7 @@ def test_slow_criterion_does_not_outlive_what_it_rests_on(tmp_path):
 def test_value_that_is_not_finite_is_undecided(tmp_path):
     from dataclasses import replace
 
-    from seerob.snapshot import Result
+    from seerob.core.snapshot import Result
 
     station = cell(tmp_path)
     (bound, _) = bind(station.model)
@@ -315,7 +315,7 @@ def test_every_value_of_the_demo_is_finite_or_undecided_with_a_reason(demo):
 
 
 def test_criteria_can_be_added_in_python(tmp_path):
-    from seerob.safety.velocity import Velocity
+    from seerob.criteria.safety.velocity import Velocity
 
     station = cell(tmp_path).with_criteria(Velocity(name="tight", at="arm", limit=0.1))
     engine = Engine(station.model)
@@ -326,7 +326,7 @@ def test_criteria_can_be_added_in_python(tmp_path):
 
 
 def test_all_names_that_are_wrong_are_told_at_once(tmp_path):
-    from seerob.safety.velocity import Velocity
+    from seerob.criteria.safety.velocity import Velocity
 
     station = cell(tmp_path).with_criteria(Velocity(name="a", at="x"), Velocity(name="b", of="y"))
     with pytest.raises(InputError) as error:

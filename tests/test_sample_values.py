@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from made_cell import UR10, made
-from seerob.engine import Engine
-from seerob.samples import JointSample
+from seerob.core.samples import JointSample
+from seerob.twin.engine import Engine
 
 NAN, INF = math.nan, math.inf
 

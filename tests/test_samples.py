@@ -7,7 +7,7 @@ from threading import Thread
 import msgspec
 import pytest
 
-from seerob.samples import JointSample, Mailbox, PoseSample, Quality, Sample, SignalSample, key
+from seerob.core.samples import JointSample, Mailbox, PoseSample, Quality, Sample, SignalSample, key
 
 
 def joints(target, seq, source="s"):

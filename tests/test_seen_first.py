@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import pytest
 
 from made_cell import FLOATING, made, state_at
-from seerob.human.skeleton import BONES
-from seerob.judging import Judge
-from seerob.snapshot import Result, Verdict
-from seerob.whereabouts.partly_seen import seen_first
+from seerob.core.snapshot import Result, Verdict
+from seerob.criteria.judging import Judge
+from seerob.criteria.partly_seen import seen_first
+from seerob.description.humans.skeleton import BONES
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 RIGHT = frozenset(bone for bone in BONES if bone.startswith("right_"))

@@ -11,11 +11,11 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, hinge_limits, made, state_at, two_r
 from oracles import pinocchio_oracle as oracle
-from seerob.errors import Undecided
-from seerob.model_io import library
-from seerob.safety.kinetic_energy import kinetic_energy
-from seerob.state import State
-from seerob.transforms import rotation_from_rpy
+from seerob.core.errors import Undecided
+from seerob.core.transforms import rotation_from_rpy
+from seerob.criteria.safety.kinetic_energy import kinetic_energy
+from seerob.description.robots import library
+from seerob.twin.state import State
 
 LIBRARY = library.names()
 BASE = "base = { position = [0.3, -0.2, 0.9], rpy_deg = [10, -20, 130] }\n"

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from made_cell import UR10, heard, made, wave
-from seerob.engine import Engine
-from seerob.errors import Undecided
-from seerob.samples import PoseSample
+from seerob.core.errors import Undecided
+from seerob.core.samples import PoseSample
+from seerob.twin.engine import Engine
 
 
 @pytest.fixture(scope="module")

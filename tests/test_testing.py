@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from made_cell import FLOATING, made, person, two_r
-from seerob import plugin
-from seerob.errors import SeerobError
+from seerob.core import plugin
+from seerob.core.errors import SeerobError
 from seerob.testing import never_within
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -130,8 +130,8 @@ def test_whatever_ships_is_asked(everything):
 
 HEAD = """
 import numpy as np
-from seerob.criterion import Criterion, judge
-from seerob.snapshot import Basis, Label, Result, Verdict
+from seerob.criteria.criterion import Criterion, judge
+from seerob.core.snapshot import Basis, Label, Result, Verdict
 
 class Own(Criterion, frozen=True, kw_only=True):
     '''A rule of one's own.'''

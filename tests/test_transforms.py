@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from seerob import transforms as tf
+from seerob.core import transforms as tf
 
 RNG = np.random.default_rng(5)
 RANDOM = Rotation.random(200, random_state=5)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from seerob import units
+from seerob.core import units
 
 
 def test_a_suffix_is_split_off_with_its_factor():

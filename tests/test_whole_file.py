@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from interrupted_anywhere import interrupted_anywhere
-from seerob.commands.whole_folder import whole_folder
-from seerob.errors import InputError
-from seerob.geometry import Mesh
-from seerob.model_io.mesh_out import stl_bytes, write_mesh
-from seerob.sinks._growing_table import GrowingTable
-from seerob.sinks._sheets import workbook
-from seerob.sinks._whole_folder import WholeFolder
-from seerob.sinks.dossier import write_whole
-from seerob.whole_file import whole_file
+from seerob.app.console.whole_folder import whole_folder
+from seerob.core.errors import InputError
+from seerob.core.files.whole_file import whole_file
+from seerob.core.shapes.geometry import Mesh
+from seerob.description.shapes.mesh_out import stl_bytes, write_mesh
+from seerob.outputs.sinks.dossier import write_whole
+from seerob.outputs.tables.growing_table import GrowingTable
+from seerob.outputs.tables.whole_folder import WholeFolder
+from seerob.outputs.workbook.sheets import workbook
 
 MESH = Mesh(np.eye(3), np.array([[0, 1, 2]]))
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from seerob import snapshot, wire
-from seerob.errors import InputError
+from seerob.app import wire
+from seerob.core import snapshot
+from seerob.core.errors import InputError
 
 STRUCTS = [c for c in vars(snapshot).values() if isinstance(c, type) and issubclass(c, msgspec.Struct)]
 STRUCTS.remove(msgspec.Struct)
@@ -98,7 +99,7 @@ def test_a_comment_cannot_end_early():
 
 
 def test_the_command_line_tells_what_it_takes():
-    run = [sys.executable, "-m", "seerob.wire"]
+    run = [sys.executable, "-m", "seerob.app.wire"]
     assert subprocess.run([*run, "--check"], check=False).returncode == 0
     wrong = subprocess.run([*run, "--chekc"], check=False, capture_output=True, text=True)
     assert wrong.returncode == 2

@@ -11,7 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import seerob as sr
-from seerob.workstation import PLUGINS, TABLES, Engine, Pose, Shape, Workstation, content_hash, locate
+from seerob.workstation.workstation import (
+    PLUGINS,
+    TABLES,
+    Engine,
+    Pose,
+    Shape,
+    Workstation,
+    content_hash,
+    locate,
+)
 
 LIVE = {"ur10_rtde", "plc_cell"}
 """Run in real time only; see test_live_workstation.py and test_plc_cell.py."""
@@ -36,7 +45,7 @@ def test_every_workstation_is_looked_at():
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
 def test_a_workstation_that_ships_runs_decided_within_limits_and_without_a_crash(folder):
-    from seerob.safety.minimum_distance import MinimumDistance
+    from seerob.criteria.safety.minimum_distance import MinimumDistance
 
     station = sr.load(folder).with_criteria(MinimumDistance(name="clear", between=CLEARANCES[folder.name]))
     run = station.run()
@@ -59,7 +68,7 @@ def test_a_loop_goes_on_without_a_gap(folder):
     """Of what loops, the ends are the same place and the pause is told: live, nothing turns undecided."""
     station = sr.load(folder)
     assert all(source.loop for source in station.workstation.sources)
-    from seerob.source import Pump
+    from seerob.workstation.source import Pump
 
     for source, opened in station.sources:
         pump = Pump(opened, loop=True, pause=source.loop_pause)

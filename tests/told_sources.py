@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from seerob.live.ears import Listening
-from seerob.live.listening import LiveSource
-from seerob.samples import JointSample, SignalSample
+from seerob.core.samples import JointSample, SignalSample
+from seerob.devices.live.ears import Listening
+from seerob.devices.live.listening import LiveSource
 
 _log = logging.getLogger("told")
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from seerob.between_ticks import Told
-from seerob.run import Judge, engine_of, looks_ahead, pump, ticks
+from seerob.criteria.between_ticks import Told
+from seerob.session.run import Judge, engine_of, looks_ahead, pump, ticks
 
 
 def worst_found(station, looks):

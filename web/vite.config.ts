@@ -5,7 +5,7 @@ import { defineConfig } from "vite";
 export default defineConfig({
   base: "/",
   build: {
-    outDir: "../src/seerob/server/page",
+    outDir: "../src/seerob/app/server/page",
     emptyOutDir: true,
     target: "es2022",
     assetsInlineLimit: 0,

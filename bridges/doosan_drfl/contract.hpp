@@ -1,5 +1,5 @@
 // The message of this bridge: one UDP datagram of 128 bytes, little endian, in DRFL's own units.
-// The layout is documented in src/seerob/protocols/doosan_drfl.py and docs/sources/drfl.md.
+// The layout is documented in src/seerob/protocols/robots/doosan_drfl.py and docs/sources/drfl.md.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 

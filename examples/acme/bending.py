@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from seerob.criterion import Criterion, Evaluate, judge
-from seerob.model import Model
-from seerob.postures.ergonomic_posture import bind_posture
-from seerob.scoring.spans import beyond
-from seerob.snapshot import Basis, Result, Verdict
-from seerob.state import State
+from seerob.api import Basis, Criterion, Evaluate, Model, Result, State, Verdict, beyond, bind_posture, judge
 
 BENT = 0.7
 """The trunk counts as bent beyond this [rad]."""

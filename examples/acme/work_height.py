@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from seerob.criterion import Criterion, Evaluate, judge
-from seerob.model import Model
-from seerob.snapshot import Basis, Result
-from seerob.spans import Falls, Points, approaching
-from seerob.state import State
+from seerob.api import Basis, Criterion, Evaluate, Falls, Model, Points, Result, State, approaching, judge
 
 
 class WorkHeight(Criterion, frozen=True, kw_only=True):

@@ -16,28 +16,28 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from seerob.errors import InputError, SeerobError, Undecided, UnknownName
-    from seerob.model import Model
-    from seerob.reading import read
-    from seerob.recorded_station import load_recorded
-    from seerob.recordings.recording import Recording
-    from seerob.results.result_log import ResultLog, Series
-    from seerob.run import Summary
-    from seerob.snapshot import Origin, Result, Snapshot, Verdict
-    from seerob.station import Station, load
-    from seerob.workstation import Workstation
+    from seerob.core.errors import InputError, SeerobError, Undecided, UnknownName
+    from seerob.core.snapshot import Origin, Result, Snapshot, Verdict
+    from seerob.model.model import Model
+    from seerob.recording.recording import Recording
+    from seerob.recording.result_log import ResultLog, Series
+    from seerob.session.reading import read
+    from seerob.session.recorded_station import load_recorded
+    from seerob.session.run import Summary
+    from seerob.session.station import Station, load
+    from seerob.workstation.workstation import Workstation
 
 _HOMES = {
-    "errors": ("InputError", "SeerobError", "Undecided", "UnknownName"),
-    "model": ("Model",),
-    "reading": ("read",),
-    "recordings.recording": ("Recording",),
-    "results.result_log": ("ResultLog", "Series"),
-    "run": ("Summary",),
-    "snapshot": ("Origin", "Result", "Snapshot", "Verdict"),
-    "recorded_station": ("load_recorded",),
-    "station": ("Station", "load"),
-    "workstation": ("Workstation",),
+    "core.errors": ("InputError", "SeerobError", "Undecided", "UnknownName"),
+    "model.model": ("Model",),
+    "session.reading": ("read",),
+    "recording.recording": ("Recording",),
+    "recording.result_log": ("ResultLog", "Series"),
+    "session.run": ("Summary",),
+    "core.snapshot": ("Origin", "Result", "Snapshot", "Verdict"),
+    "session.recorded_station": ("load_recorded",),
+    "session.station": ("Station", "load"),
+    "workstation.workstation": ("Workstation",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -3,14 +3,14 @@
 import signal
 import sys
 
-from seerob.interrupted import stopped
+from seerob.core.interrupted import stopped
 
 
 def program() -> int:
     """Run one command; its exit code."""
     try:
         try:
-            from seerob.cli import main
+            from seerob.app.cli import main
 
             return main()
         finally:

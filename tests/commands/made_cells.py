@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from seerob.cli import main
-from seerob.commands.loops import COMPILING
+from seerob.app.cli import main
+from seerob.app.console.loops import COMPILING
 
 ROBOT = '[[robots]]\nname = "ur5e"\nmodel = "library:ur5e"\n'
 SOURCE = '[[sources]]\nkind = "csv"\nrobot = "ur5e"\nfile = "motion.csv"\n'

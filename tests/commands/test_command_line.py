@@ -14,7 +14,7 @@ from made_cells import HUMAN, SEPARATION, make_cell, seerob
 from mcap.writer import Writer
 
 import seerob as sr
-from seerob.cli import COMMANDS
+from seerob.app.cli import COMMANDS
 from seerob.kernels._kept_loops import key_of
 
 FILES = ["report.html", "results.xlsx", "run.mcap"]
@@ -23,7 +23,7 @@ FILES = ["report.html", "results.xlsx", "run.mcap"]
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """A cell, assessed once: its folder and the folder of its files."""
-    from seerob.cli import main
+    from seerob.app.cli import main
 
     folder = tmp_path_factory.mktemp("recorded")
     cell = make_cell(folder / "cell")
@@ -36,7 +36,7 @@ def recorded(tmp_path_factory):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_help_of_each_command_has_one_example_that_parses(capsys, name):
-    from seerob.cli import parser
+    from seerob.app.cli import parser
 
     code, out, err = seerob(capsys, name.replace("_", "-"), "--help")
     assert (code, err) == (0, "")
@@ -59,7 +59,7 @@ def test_help_needs_none_of_the_heavy_packages():
         "fcl",
     ]
     script = (
-        "import sys\nfrom seerob.cli import main\n"
+        "import sys\nfrom seerob.app.cli import main\n"
         "try: main(['--help'])\nexcept SystemExit: pass\n"
         f"print('loaded', [m for m in {heavy} if m in sys.modules])"
     )
@@ -117,7 +117,7 @@ def test_new_makes_a_folder_that_is_fine_and_touches_nothing_that_exists(capsys,
 
 
 def test_kinds_lists_every_kind_once(capsys):
-    from seerob import plugin
+    from seerob.core import plugin
 
     code, out, _ = seerob(capsys, "kinds")
     assert code == 0
@@ -150,7 +150,7 @@ def test_assess_as_json_says_what_the_api_says(capsys, tmp_path):
 
 
 def test_exit_codes_tell_within_exceeded_and_undecided(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("seerob.commands.assess.sinks_of", lambda *_, **__: [])
+    monkeypatch.setattr("seerob.app.commands.assess.sinks_of", lambda *_, **__: [])
     far = HUMAN + SEPARATION
     for name, code, word, cell in (
         ("w", 0, "within ", make_cell(tmp_path / "w")),
@@ -204,7 +204,7 @@ def test_no_file_of_another_run_is_written_over(capsys, tmp_path, recorded, comm
 
 
 def test_a_wait_for_the_compiler_is_announced_once(capsys, tmp_path, monkeypatch):
-    from seerob.commands import loops
+    from seerob.app.console import loops
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     loops.tell_compiling()
@@ -238,7 +238,7 @@ def test_the_wait_begins_with_the_announcement(tmp_path, recorded, command):
 def test_numba_keeps_what_it_compiles_where_it_is_looked_for(tmp_path):
     """Asked of Numba itself, in a process that may keep it nowhere else."""
     script = (
-        "from pathlib import Path\nfrom seerob.commands import loops\n"
+        "from pathlib import Path\nfrom seerob.app.console import loops\n"
         "from seerob.kernels import boxes\n"
         "kept = boxes._spread._cache.cache_path\n"
         "assert [Path(kept)] == loops.cache_folders(), (kept, loops.cache_folders())"

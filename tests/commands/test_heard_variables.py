@@ -4,10 +4,10 @@ import re
 
 import httpx  # noqa: F401 - what is imported late would count as silence
 
-from seerob.commands.heard_variables import tell_heard
-from seerob.emulators.web import WebServer
-from seerob.sources._variables import Node
-from seerob.sources.web import Web
+from seerob.app.commands.heard_variables import tell_heard
+from seerob.app.emulators.web import WebServer
+from seerob.devices.sources.web import Web
+from seerob.devices.variables.live_source import Node
 
 
 def test_the_rate_and_what_is_missing_are_said(capsys):

@@ -12,11 +12,11 @@ import zipfile
 import numpy as np
 import pytest
 
-from seerob import cli
-from seerob.automationml import read
-from seerob.commands import Exit
-from seerob.errors import InputError
-from seerob.station import load
+from seerob.app import cli
+from seerob.app.console.terminal import Exit
+from seerob.core.errors import InputError
+from seerob.description.formats.automationml import read
+from seerob.session.station import load
 
 OLD = '<CAEXFile SchemaVersion="2.15" FileName="cell.aml">{}</CAEXFile>'
 NEW = '<CAEXFile SchemaVersion="3.0" xmlns="http://www.dke.de/CAEX">{}</CAEXFile>'

@@ -13,10 +13,10 @@ import time
 import pytest
 from made_cells import make_cell
 
-from seerob import cli
-from seerob.commands.interruption import Stopped
-from seerob.errors import InputError, SeerobError
-from seerob.recordings.recording import Recording
+from seerob.app import cli
+from seerob.app.console.interruption import Stopped
+from seerob.core.errors import InputError, SeerobError
+from seerob.recording.recording import Recording
 
 
 @pytest.fixture(autouse=True)
@@ -34,7 +34,7 @@ def live(tmp_path):
     command = [
         sys.executable,
         "-m",
-        "seerob.cli",
+        "seerob.app.cli",
         "run",
         cell,
         "--port",
@@ -100,7 +100,7 @@ def test_a_second_signal_writes_no_report_but_loses_no_recording(live):
 
 def interrupting(monkeypatch, command):
     """Have ``seerob kinds`` do something else."""
-    from seerob.commands import kinds
+    from seerob.app.commands import kinds
 
     monkeypatch.setattr(kinds, "run", command)
     return cli.main(["kinds"])
@@ -214,8 +214,8 @@ def test_an_interrupt_in_generated_code_ends_with_the_exit_code_too(tmp_path):
     """Dataclasses and the like run text; CPython remembers an interrupt in there and ends by a signal."""
     program = (
         "import sys\n"
-        "from seerob import cli\n"
-        "from seerob.commands import kinds\n"
+        "from seerob.app import cli\n"
+        "from seerob.app.commands import kinds\n"
         "kinds.run = lambda options: exec('raise KeyboardInterrupt')\n"
         "sys.exit(cli.main(['kinds']))\n"
     )
@@ -229,7 +229,7 @@ def test_ctrl_c_before_the_command_line_is_there_and_after_its_end_needs_no_trac
         "def press(*_): signal.raise_signal(signal.SIGINT)\n"
         "class Finder:\n"
         "    def find_spec(self, name, path, target=None):\n"
-        "        if name == 'seerob.cli': press()\n"
+        "        if name == 'seerob.app.cli': press()\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "sys.meta_path.insert(0, Finder())\n"
         "atexit.register(press)\n"

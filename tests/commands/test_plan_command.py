@@ -12,14 +12,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import seerob
-from seerob import cli
-from seerob.commands import Exit
-from seerob.commands.emulating import fri, rtde
-from seerob.commands.interruption import Stopped
-from seerob.errors import InputError
-from seerob.model_io import library
-from seerob.waypoints.arm import Arm
-from seerob.waypoints.branches import branch
+from seerob.app import cli
+from seerob.app.console.interruption import Stopped
+from seerob.app.console.terminal import Exit
+from seerob.app.emulating import fri, rtde
+from seerob.core.errors import InputError
+from seerob.description.robots import library
+from seerob.files.waypoints.arm import Arm
+from seerob.files.waypoints.branches import branch
 
 CELL = """
 [[robots]]

@@ -9,7 +9,7 @@ import openpyxl
 import pytest
 from made_cells import make_cell, seerob
 
-from seerob.commands.printable import PrintableLines, printable
+from seerob.app.console.printable import PrintableLines, printable
 
 OBEYED = "\x1b[2J\x1b]0;title\x07\x00\x9b31m\u202egnirts\u2066"
 WORDS = "操作员 – Рука 🤖 ½ m²\tπ"

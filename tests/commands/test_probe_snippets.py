@@ -10,14 +10,14 @@ from importlib import import_module
 
 import pytest
 
-from seerob.commands import emulate, probe
-from seerob.commands.emulating._hint import probes_of
-from seerob.live.listening import LiveSource
-from seerob.plugin import kinds, load
-from seerob.source import Source
-from seerob.sources.fri import Fri
-from seerob.sources.kinect import Kinect
-from seerob.sources.rtde import Rtde
+from seerob.app.commands import emulate, probe
+from seerob.app.emulating._hint import probes_of
+from seerob.core.plugin import kinds, load
+from seerob.devices.live.listening import LiveSource
+from seerob.devices.sources.fri import Fri
+from seerob.devices.sources.kinect import Kinect
+from seerob.devices.sources.rtde import Rtde
+from seerob.workstation.source import Source
 
 KINDS = [kind for kind in kinds(emulate.PACKAGE) if not kind.startswith("_")]
 
@@ -32,7 +32,7 @@ def words(module, line):
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_hears_an_emulated_device_is_understood_and_goes_where_it_is(kind, port):
     asked = words(emulate, kind if port is None else f"{kind} --port {port}")
-    made = import_module(f"seerob.{emulate.PACKAGE}.{kind}").emulated(asked)
+    made = import_module(f"seerob.app.{emulate.PACKAGE}.{kind}").emulated(asked)
     to = getattr(made.server, "to", None)
     host, port = to or (asked.host, asked.port)
     commands = probes_of(kind, host, port, sends=bool(to), commands=made.commands)

@@ -12,15 +12,15 @@ import pytest
 from jsonschema import Draft202012Validator
 from made_cells import seerob
 
-from seerob import plugin
-from seerob.commands.schema import schema
-from seerob.reading import convert_workstation
-from seerob.workstation import PLUGINS, TABLES
+from seerob.app.commands.schema import schema
+from seerob.core import plugin
+from seerob.session.reading import convert_workstation
+from seerob.workstation.workstation import PLUGINS, TABLES
 
 pytestmark = pytest.mark.xdist_group("schema")
 """What all of them ask is made once: it takes seconds."""
 
-STARTER = tomllib.loads((resources.files("seerob.commands") / "starter" / "workstation.toml").read_text())
+STARTER = tomllib.loads((resources.files("seerob.app.commands") / "starter" / "workstation.toml").read_text())
 STATIONS = sorted((Path(__file__).parents[2] / "workstations").glob("*/workstation.toml"))
 
 

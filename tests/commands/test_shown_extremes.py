@@ -1,8 +1,8 @@
 """The one line that is printed of a criterion."""
 
-from seerob.commands import extreme
-from seerob.results.result_log import log_of
-from seerob.snapshot import Result, Snapshot, Verdict
+from seerob.app.console.terminal import extreme
+from seerob.core.snapshot import Result, Snapshot, Verdict
+from seerob.recording.result_log import log_of
 
 
 def shown(*results):

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob import cli
-from seerob.commands import Exit
-from seerob.commands.emulating import siemens_web
-from seerob.errors import InputError
-from seerob.sources._variables import Node
-from seerob.variables.dictionary import read
-from seerob.variables.skeleton import skeleton
+from seerob.app import cli
+from seerob.app.console.terminal import Exit
+from seerob.app.emulating import siemens_web
+from seerob.core.errors import InputError
+from seerob.devices.variables.live_source import Node
+from seerob.devices.variables.skeleton import skeleton
+from seerob.workstation.variables.dictionary import read
 
 STATION = """
 variables = "variables.toml"

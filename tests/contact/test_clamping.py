@@ -6,9 +6,9 @@ import numpy as np
 import trimesh
 
 from made_cell import UR10, made
-from seerob.contact.clamping import STILL, clamps, pinch_pairs, robot_pinch_pairs, thickest
-from seerob.distances.least import Shapes
-from seerob.geometry import Mesh, Solid, capsule
+from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.criteria.contact.clamping import STILL, clamps, pinch_pairs, robot_pinch_pairs, thickest
+from seerob.distance.least import Shapes
 
 HAND, BODY = 0.1, 0.5
 THICKNESS = np.array([[HAND, BODY]])

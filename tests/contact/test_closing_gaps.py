@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.contact.clamping import clamps, pinch_pairs
-from seerob.contact.closing_gaps import ClosingGaps
-from seerob.distances.least import Shapes
-from seerob.geometry import Mesh, Solid, capsule
+from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.criteria.contact.clamping import clamps, pinch_pairs
+from seerob.criteria.contact.closing_gaps import ClosingGaps
+from seerob.distance.least import Shapes
 
 THICKNESS = np.array([0.05, 0.1, 0.3])
 CAP, TICK = 0.45, 0.01

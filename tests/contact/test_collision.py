@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.contact import collision as c
-from seerob.norms.body_limits import shipped
+from seerob.criteria.contact import collision as c
+from seerob.description.norms.body_limits import shipped
 
 MASSES = np.array([1.0, 2, 5, 10, 15, 20])
 # mm/s, transient limits, least pressure on 1 cm².

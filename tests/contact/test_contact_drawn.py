@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.snapshot import Arrow, Result, Sphere
+from seerob.core.snapshot import Arrow, Result, Sphere
 
 PFL = (
     '[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\nmass = "simplified"\nfloor = false\n'

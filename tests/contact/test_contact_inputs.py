@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
-from seerob.contact.impact_mass import simplified_mass
-from seerob.contact.limits import RegionArrays, contact_input, credited_input
-from seerob.contact.shape import ContactShape, round_shape
-from seerob.contact.tolerances import ContactEnds, robot_masses
-from seerob.norms.body_limits import shipped
-from seerob.tolerances import Tolerance
+from seerob.core.tolerances import Tolerance
+from seerob.criteria.contact.impact_mass import simplified_mass
+from seerob.criteria.contact.limits import RegionArrays, contact_input, credited_input
+from seerob.criteria.contact.shape import ContactShape, round_shape
+from seerob.criteria.contact.tolerances import ContactEnds, robot_masses
+from seerob.description.norms.body_limits import shipped
 
 BOX = ContactShape(np.zeros((0, 3)), np.zeros((0, 2)), "edges")
 

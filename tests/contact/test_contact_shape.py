@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.contact.limits import RegionArrays
-from seerob.contact.shape import (
+from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.criteria.contact.limits import RegionArrays
+from seerob.criteria.contact.shape import (
     ContactShape,
     body_shape,
     force_at_pressure,
@@ -18,8 +19,7 @@ from seerob.contact.shape import (
     round_shape,
     solid_shape,
 )
-from seerob.geometry import Mesh, Solid, capsule
-from seerob.norms.body_limits import shipped
+from seerob.description.norms.body_limits import shipped
 
 CAP = 1e-4
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.contact.shape import (
+from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.criteria.contact.shape import (
     ContactShape,
     body_shape,
     force_at_pressure,
@@ -17,7 +18,6 @@ from seerob.contact.shape import (
     round_shape,
     solid_shape,
 )
-from seerob.geometry import Mesh, Solid
 
 
 def mesh(made: trimesh.Trimesh) -> Mesh:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.contact.shape import ContactShape, body_shape, mesh_shape, solid_shape
-from seerob.geometry import Mesh, Solid
-from seerob.transforms import Array
-from seerob.volumes.floor_polygon import prism_mesh
+from seerob.core.shapes.floor_polygon import prism_mesh
+from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.core.transforms import Array
+from seerob.criteria.contact.shape import ContactShape, body_shape, mesh_shape, solid_shape
 
 
 def mesh(made: trimesh.Trimesh) -> Mesh:

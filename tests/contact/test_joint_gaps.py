@@ -10,11 +10,11 @@ import pytest
 import trimesh
 
 from made_cell import FLOATING, Q0, UR10, made, results_at, state_at, two_r
-from seerob.contact.clamped_regions import Clamping
-from seerob.contact.joint_gaps import closing, places
-from seerob.geometry import Mesh, Solid, capsule
-from seerob.snapshot import Verdict
-from seerob.station import Station
+from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.snapshot import Verdict
+from seerob.criteria.contact.clamped_regions import Clamping
+from seerob.criteria.contact.joint_gaps import closing, places
+from seerob.session.station import Station
 
 HAND, CHEST = "Hands and fingers", "Chest"
 ARM = '[[robots]]\nname = "arm"\nmodel = "arm.urdf"\n'

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.contact.measured import peaks, read, read_curve
-from seerob.errors import InputError, UnknownName
-from seerob.safety.power_and_force import PowerAndForce
-from seerob.snapshot import Origin, Result, Verdict
-from seerob.station import Station
+from seerob.core.errors import InputError, UnknownName
+from seerob.core.snapshot import Origin, Result, Verdict
+from seerob.criteria.contact.measured import peaks, read, read_curve
+from seerob.criteria.safety.power_and_force import PowerAndForce
+from seerob.session.station import Station
 
 CHEST = "Chest"
 GOOD = {

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, heard, made, person, results_at, state_at, two_r
-from seerob.contact.reach import ANYWHERE, heights
-from seerob.contact.regions import REGIONS
-from seerob.errors import SeerobError
-from seerob.human import manikin
-from seerob.human.posture import posture
-from seerob.human.skeleton import bone_poses
-from seerob.judging import Judge
-from seerob.snapshot import Origin, Result, RowState, Verdict
-from seerob.station import Station
+from seerob.core.errors import SeerobError
+from seerob.core.snapshot import Origin, Result, RowState, Verdict
+from seerob.criteria.contact.reach import ANYWHERE, heights
+from seerob.criteria.contact.regions import REGIONS
+from seerob.criteria.judging import Judge
+from seerob.description.humans import manikin
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import bone_poses
+from seerob.session.station import Station
 
 STANDING = 'postures = ["standing"]\npostures_source = "risk assessment 7"\n'
 

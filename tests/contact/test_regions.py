@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob.contact.clamped_regions import Clamping
-from seerob.contact.regions import FEET, REGIONS, SENSITIVE, Person
-from seerob.snapshot import Verdict
-from seerob.station import Station, load
-from seerob.transforms import Array
+from seerob.core.snapshot import Verdict
+from seerob.core.transforms import Array
+from seerob.criteria.contact.clamped_regions import Clamping
+from seerob.criteria.contact.regions import FEET, REGIONS, SENSITIVE, Person
+from seerob.session.station import Station, load
 
 REACH = 2.0
 """Of the arm along x [m]; it is ± 0.05 m thick."""

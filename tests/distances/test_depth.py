@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from concave import bumpy_ball
-from seerob.distances.depth import Depths
-from seerob.distances.least import Shapes
-from seerob.geometry import Solid, capsule
+from seerob.core.shapes.floor_polygon import prism_mesh
+from seerob.core.shapes.geometry import Solid, capsule
+from seerob.description.shapes.shapes import box_mesh
+from seerob.distance.depth import Depths
+from seerob.distance.least import Shapes
 from seerob.kernels.tree_file import tree_of
 from seerob.kernels.winding import contains
-from seerob.model_io.shapes import box_mesh
-from seerob.volumes.floor_polygon import prism_mesh
 
 CUBE = Solid(mesh=box_mesh([-0.5] * 3, [0.5] * 3))
 L = Solid(mesh=prism_mesh([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], 0, 2))

@@ -6,9 +6,9 @@ import pytest
 import trimesh
 
 from concave import IDENTITY, SLOT, SOLIDS, bumpy_ball, poses
-from seerob.distances.least import Query, Reach, Shapes
-from seerob.errors import InputError
-from seerob.geometry import Mesh, Solid, capsule
+from seerob.core.errors import InputError
+from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.distance.least import Query, Reach, Shapes
 
 
 def coal_distance(a: Mesh, b: Mesh, R, x) -> float:

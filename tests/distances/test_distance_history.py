@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from concave import made_crowd, said, walk
-from seerob.distances.least import Per, Query, Reach
-from seerob.errors import InputError, SimulationDiverged, UnknownName
+from seerob.core.errors import InputError, SimulationDiverged, UnknownName
+from seerob.distance.least import Per, Query, Reach
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from concave import IDENTITY, SLOT, SOLIDS, U_BOXES, boxes, bumpy_ball, poses
-from seerob.distances.least import Query, Reach, Shapes
-from seerob.geometry import Solid, capsule
+from seerob.core.shapes.geometry import Solid, capsule
+from seerob.distance.least import Query, Reach, Shapes
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from concave import made_crowd, said, walk
-from seerob.distances.least import Per, Query, Reach, Survey
-from seerob.distances.surveying import Surveyor
+from seerob.distance.least import Per, Query, Reach, Survey
+from seerob.distance.surveying import Surveyor
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from importlib import import_module
 
 import pytest
 
-from seerob.errors import InputError
+from seerob.core.errors import InputError
 
 KINDS = {
     "natnet": ["--port", "0", "--version", "3.1"],
@@ -16,7 +16,7 @@ KINDS = {
 
 
 def emulated(kind, *more):
-    module = import_module(f"seerob.commands.emulating.{kind}")
+    module = import_module(f"seerob.app.emulating.{kind}")
     parser = argparse.ArgumentParser()
     parser.add_argument("--host", default="127.0.0.1")
     module.add(parser)

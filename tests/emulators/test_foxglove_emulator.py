@@ -7,11 +7,11 @@ import json
 import pytest
 from websockets.sync.client import connect
 
-from seerob.emulators.foxglove import FoxgloveBridge
-from seerob.emulators.ros_robot import EPOCH
-from seerob.protocols import foxglove
-from seerob.protocols.ros_serialised import Edition
-from seerob.sources.foxglove import Foxglove
+from seerob.app.emulators.foxglove import FoxgloveBridge
+from seerob.app.emulators.ros_robot import EPOCH
+from seerob.devices.sources.foxglove import Foxglove
+from seerob.protocols.ros import foxglove
+from seerob.protocols.ros.ros_serialised import Edition
 from sources.listening import heard
 
 NAMES = ("a", "b")

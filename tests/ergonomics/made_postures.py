@@ -6,11 +6,11 @@ from dataclasses import fields
 
 import numpy as np
 
-from seerob.human import manikin
-from seerob.human.angles import SIDED, Angles, angles
-from seerob.human.posture import posture
-from seerob.human.skeleton import JOINTS, bone_poses, resolve
-from seerob.scoring.spans import Span, exactly
+from seerob.criteria.scoring.spans import Span, exactly
+from seerob.description.humans import manikin
+from seerob.description.humans.angles import SIDED, Angles, angles
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import JOINTS, bone_poses, resolve
 
 PERSON = manikin.build(name="op", stature=1.75, mass=75, sex="male")
 NEUTRAL = {"elbow_flexion": 80.0, "wrist_across": -20.0, "arm_rise": -80.0}

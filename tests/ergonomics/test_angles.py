@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from made_postures import PERSON, degrees, made_angles, posed, random_q
 
-from seerob.human.angles import NEEDS, SIDED, Angles, angles
-from seerob.human.skeleton import BONES, bone_poses, mirrored
-from seerob.transforms import rotation_from_axis_angle
+from seerob.core.transforms import rotation_from_axis_angle
+from seerob.description.humans.angles import NEEDS, SIDED, Angles, angles
+from seerob.description.humans.skeleton import BONES, bone_poses, mirrored
 
 ODD = ("trunk_side_bend", "trunk_twist", "neck_side_bend", "neck_twist")
 """Angles that change sign in a mirror."""

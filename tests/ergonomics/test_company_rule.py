@@ -10,11 +10,11 @@ from made_postures import PERSON
 
 from made_cell import judged, made, state_at
 from seerob import load
-from seerob.human.posture import posture
-from seerob.human.skeleton import JOINTS
-from seerob.sinks.dossier import Dossier
-from seerob.sinks.excel import Excel
-from seerob.snapshot import Verdict
+from seerob.core.snapshot import Verdict
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import JOINTS
+from seerob.outputs.sinks.dossier import Dossier
+from seerob.outputs.sinks.excel import Excel
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 HUMAN = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'

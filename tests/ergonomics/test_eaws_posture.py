@@ -7,10 +7,8 @@ import pytest
 from made_postures import PERSON, made_angles
 
 from made_cell import judged, made, state_at
-from seerob.human.posture import posture
-from seerob.human.skeleton import JOINTS
-from seerob.results.result_log import ResultLog
-from seerob.scoring.eaws_posture import (
+from seerob.core.snapshot import Snapshot, Verdict
+from seerob.criteria.scoring.eaws_posture import (
     EawsThresholds,
     Interpolation,
     asymmetry_points,
@@ -18,9 +16,11 @@ from seerob.scoring.eaws_posture import (
     lines,
     possible_lines,
 )
-from seerob.scoring.posture_time import PostureTime
-from seerob.scoring.published import published
-from seerob.snapshot import Snapshot, Verdict
+from seerob.criteria.scoring.posture_time import PostureTime
+from seerob.criteria.scoring.published import published
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import JOINTS
+from seerob.recording.result_log import ResultLog
 
 USUAL = EawsThresholds()
 STILL = np.zeros(len(JOINTS))

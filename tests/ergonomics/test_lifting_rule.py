@@ -3,8 +3,8 @@
 import pytest
 
 from made_cell import made, results_at
-from seerob.errors import InputError
-from seerob.run import bind
+from seerob.core.errors import InputError
+from seerob.session.run import bind
 
 HUMAN = """
 [[humans]]

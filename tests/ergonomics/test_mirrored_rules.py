@@ -7,8 +7,8 @@ import pytest
 from made_postures import random_q
 
 from made_cell import judged, made, state_at
-from seerob.human.skeleton import JOINTS, mirrored
-from seerob.snapshot import Highlight
+from seerob.core.snapshot import Highlight
+from seerob.description.humans.skeleton import JOINTS, mirrored
 
 STILL = np.zeros(len(JOINTS))
 pytestmark = pytest.mark.xdist_group("mirrored rules")

@@ -8,13 +8,13 @@ import pytest
 from made_postures import PERSON
 
 from made_cell import judged, made, state_at
-from seerob.errors import InputError
-from seerob.human.posture import posture
-from seerob.human.skeleton import JOINTS
-from seerob.postures.zone_file import read_zones
-from seerob.run import bind
-from seerob.scoring.published import published
-from seerob.snapshot import Origin, RowState, Verdict
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Origin, RowState, Verdict
+from seerob.criteria.postures.zone_file import read_zones
+from seerob.criteria.scoring.published import published
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import JOINTS
+from seerob.session.run import bind
 
 HEAD = ["Angle", "from [deg]", "to [°]", "score", "either way", "hold s", "per_minute", "colour", "label"]
 ROWS = [

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from seerob.scoring.niosh import (
+from seerob.criteria.scoring.niosh import (
     Duration,
     End,
     Grip,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from made_postures import UNSUPPORTED, known, made_angles
 
-from seerob.scoring.edges import ROUNDING
-from seerob.scoring.reba import (
+from seerob.criteria.scoring.edges import ROUNDING
+from seerob.criteria.scoring.reba import (
     Coupling,
     coupling,
     knees,
@@ -17,8 +17,8 @@ from seerob.scoring.reba import (
     upper_arm,
     wrist,
 )
-from seerob.scoring.spans import exactly
-from seerob.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.spans import exactly
+from seerob.criteria.scoring.thresholds import Thresholds
 
 SIX = ("neck", "trunk", "legs", "upper arm", "lower arm", "wrist")
 

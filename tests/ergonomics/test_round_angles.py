@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from made_postures import PERSON, UNSUPPORTED, posed, random_q
 
-from seerob.human.angles import angles
-from seerob.human.skeleton import JOINTS, bone_poses, mirrored
-from seerob.postures.zone_file import zones_of
-from seerob.scoring import eaws_posture, owas, reba, rula
-from seerob.scoring.edges import ROUNDING, fallen, reached
-from seerob.scoring.published import published
-from seerob.scoring.shoulder import ArmPolicy
-from seerob.scoring.spans import exactly
-from seerob.scoring.thresholds import Thresholds
-from seerob.scoring.zones import ZoneRow, ZoneWatch
+from seerob.criteria.postures.zone_file import zones_of
+from seerob.criteria.scoring import eaws_posture, owas, reba, rula
+from seerob.criteria.scoring.edges import ROUNDING, fallen, reached
+from seerob.criteria.scoring.published import published
+from seerob.criteria.scoring.shoulder import ArmPolicy
+from seerob.criteria.scoring.spans import exactly
+from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.zones import ZoneRow, ZoneWatch
+from seerob.description.humans.angles import angles
+from seerob.description.humans.skeleton import JOINTS, bone_poses, mirrored
 
 YAWS = 12
 TURN = JOINTS.index("pelvis_turn_left")

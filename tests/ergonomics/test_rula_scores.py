@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from made_postures import UNSUPPORTED, known, made_angles
 
-from seerob.ergonomics.rula import Rula
-from seerob.scoring.edges import ROUNDING
-from seerob.scoring.rula import (
+from seerob.criteria.ergonomics.rula import Rula
+from seerob.criteria.scoring.edges import ROUNDING
+from seerob.criteria.scoring.rula import (
     LEAST,
     LoadUse,
     Profile,
@@ -19,9 +19,9 @@ from seerob.scoring.rula import (
     upper_arm,
     wrist,
 )
-from seerob.scoring.shoulder import ArmPolicy
-from seerob.scoring.spans import exactly
-from seerob.scoring.thresholds import Thresholds
+from seerob.criteria.scoring.shoulder import ArmPolicy
+from seerob.criteria.scoring.spans import exactly
+from seerob.criteria.scoring.thresholds import Thresholds
 
 SEVEN = list(LEAST)[:7]
 

@@ -7,17 +7,17 @@ import pytest
 from made_postures import PERSON
 
 from made_cell import heard, judged, made, results_at, state_at
-from seerob.engine import Engine
-from seerob.ergonomics import reba, rula
-from seerob.errors import InputError
-from seerob.human.angles import Angles, angles
-from seerob.human.posture import posture
-from seerob.human.skeleton import JOINTS, bone_poses, mirrored
-from seerob.postures.ergonomic_posture import posture as angles_of
-from seerob.run import Judge, bind
-from seerob.scoring.bands import band_of
-from seerob.scoring.owas import Legs
-from seerob.snapshot import Origin, RowState, Verdict
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Origin, RowState, Verdict
+from seerob.criteria.ergonomics import reba, rula
+from seerob.criteria.postures.ergonomic_posture import posture as angles_of
+from seerob.criteria.scoring.bands import band_of
+from seerob.criteria.scoring.owas import Legs
+from seerob.description.humans.angles import Angles, angles
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import JOINTS, bone_poses, mirrored
+from seerob.session.run import Judge, bind
+from seerob.twin.engine import Engine
 
 STILL = np.zeros(len(JOINTS))
 HUMAN = """

@@ -6,14 +6,22 @@ import numpy as np
 import pytest
 from made_postures import PERSON, UNSUPPORTED, made_angles, random_q
 
-from seerob.human.angles import angles
-from seerob.human.skeleton import bone_poses, mirrored
-from seerob.scoring import reba, rula
-from seerob.scoring.measured import Measured
-from seerob.scoring.owas import OwasThresholds, arm_codes, back_codes, category_span, leg_codes, only, owas
-from seerob.scoring.shoulder import ArmPolicy, arm_score
-from seerob.scoring.spans import Span, beyond, exactly, graded
-from seerob.scoring.thresholds import Thresholds
+from seerob.criteria.scoring import reba, rula
+from seerob.criteria.scoring.measured import Measured
+from seerob.criteria.scoring.owas import (
+    OwasThresholds,
+    arm_codes,
+    back_codes,
+    category_span,
+    leg_codes,
+    only,
+    owas,
+)
+from seerob.criteria.scoring.shoulder import ArmPolicy, arm_score
+from seerob.criteria.scoring.spans import Span, beyond, exactly, graded
+from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.description.humans.angles import angles
+from seerob.description.humans.skeleton import bone_poses, mirrored
 
 USUAL = Thresholds()
 

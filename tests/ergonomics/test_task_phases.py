@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from made_cell import judged, made, state_at
-from seerob.errors import InputError
-from seerob.postures.task_phase import Phase, check_order, phase_at
-from seerob.run import bind
-from seerob.snapshot import Origin, Verdict
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Origin, Verdict
+from seerob.session.run import bind
+from seerob.workstation.tables.task_phase import Phase, check_order, phase_at
 
 HUMANS = "".join(
     f'[[humans]]\nname = "{n}"\nstature = 1.75\nmass = 75\nsex = "male"\n' for n in ("op", "ann")

@@ -4,12 +4,12 @@ import pytest
 from made_postures import PERSON
 from test_rules import parts, station, table
 
-from seerob.engine import Engine
-from seerob.human.posture import posture
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.run import Judge
-from seerob.samples import BodyPoint, BodySample
-from seerob.transforms import wxyz_from_rotation
+from seerob.core.samples import BodyPoint, BodySample
+from seerob.core.transforms import wxyz_from_rotation
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.session.run import Judge
+from seerob.twin.engine import Engine
 
 THREE = ("head", "left_hand", "right_hand")
 PLACE = {"rula": ("trunk", "legs", "neck"), "reba": ("trunk", "legs", "neck")}

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from made_postures import UNSUPPORTED, known, made_angles
 
-from seerob.scoring import reba, rula
-from seerob.scoring.owas import owas
-from seerob.scoring.published import cells, published
-from seerob.scoring.spans import exactly
-from seerob.scoring.thresholds import Thresholds
+from seerob.criteria.scoring import reba, rula
+from seerob.criteria.scoring.owas import owas
+from seerob.criteria.scoring.published import cells, published
+from seerob.criteria.scoring.spans import exactly
+from seerob.criteria.scoring.thresholds import Thresholds
 
 USUAL = Thresholds()
 CARTON = "https://studylib.es/doc/9445509/rula"

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from made_postures import PERSON, made_angles, random_q
 
-from seerob.errors import InputError
-from seerob.human.angles import angles
-from seerob.human.skeleton import JOINTS, bone_poses, mirrored
-from seerob.postures.zone_file import zones_of
-from seerob.scoring.published import published
-from seerob.scoring.zones import MEASURES, ZoneRow, ZoneWatch, mistakes, value_of
+from seerob.core.errors import InputError
+from seerob.criteria.postures.zone_file import zones_of
+from seerob.criteria.scoring.published import published
+from seerob.criteria.scoring.zones import MEASURES, ZoneRow, ZoneWatch, mistakes, value_of
+from seerob.description.humans.angles import angles
+from seerob.description.humans.skeleton import JOINTS, bone_poses, mirrored
 
 
 def row(low=None, high=None, score=1.0, angle="trunk_flexion", **more):

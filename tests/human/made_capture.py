@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 from msgspec.structs import replace
 
-from seerob import run as road
-from seerob.engine import Engine
-from seerob.human import keyframes, manikin, motion
-from seerob.human.captured import Captured, CaptureFrame, Layout, Seen
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.reading import convert_workstation
-from seerob.sources._capture_file import CaptureFile
-from seerob.station import Station
-from seerob.transforms import wxyz_from_rotation
-from seerob.workstation import Workstation
+from seerob.core.transforms import wxyz_from_rotation
+from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
+from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.devices.capture.file_source import CaptureFile
+from seerob.session import run as road
+from seerob.session.reading import convert_workstation
+from seerob.session.station import Station
+from seerob.twin.engine import Engine
+from seerob.workstation.workstation import Workstation
 
 PERSON = manikin.build(name="operator", stature=1.75, mass=75, sex="male")
 TABLE = {"name": "operator", "stature": 1.75, "mass": 75.0, "sex": "male"}

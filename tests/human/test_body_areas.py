@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.human import anthropometry
-from seerob.human.body_area import area_in, words
-from seerob.human.body_areas import AREAS, body_area
-from seerob.human.skeleton import BONES
-from seerob.human.skin import body_region, edges, skin
-from seerob.norms.body_limits import shipped
+from seerob.description.humans import anthropometry
+from seerob.description.humans.body_area import area_in, words
+from seerob.description.humans.body_areas import AREAS, body_area
+from seerob.description.humans.skeleton import BONES
+from seerob.description.humans.skin import body_region, edges, skin
+from seerob.description.norms.body_limits import shipped
 
 MIRROR = np.array([1.0, 1.0, -1.0])
 

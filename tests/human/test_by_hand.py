@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.human import manikin
-from seerob.human.anthropometry import body
-from seerob.human.by_hand import BESIDE, CHAIN, LENGTHS
-from seerob.human.observing import stature as vertex
-from seerob.human.skeleton import BONES, bone_poses
+from seerob.core.errors import InputError
+from seerob.description.capture.observing import stature as vertex
+from seerob.description.humans import manikin
+from seerob.description.humans.anthropometry import body
+from seerob.description.humans.by_hand import BESIDE, CHAIN, LENGTHS
+from seerob.description.humans.skeleton import BONES, bone_poses
 
 PERSON = {"name": "p", "stature": 1.75, "mass": 75.0, "sex": "male"}
 

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from made_capture import PERSON
 
-from seerob.errors import InputError
-from seerob.human.calibration import POSTURES, CalibrationPose, calibrate
-from seerob.human.captured import CaptureFrame, Layout, Seen
-from seerob.human.mapping import choose, places
-from seerob.human.observing import bind, with_mounts
-from seerob.human.posture import posture
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.transforms import (
+from seerob.core.errors import InputError
+from seerob.core.transforms import (
     rotation_from_axis_angle,
     rotation_from_rpy,
     rotation_from_wxyz,
     wxyz_from_rotation,
 )
+from seerob.description.capture.calibration import POSTURES, CalibrationPose, calibrate
+from seerob.description.capture.captured import CaptureFrame, Layout, Seen
+from seerob.description.capture.mapping import choose, places
+from seerob.description.capture.observing import bind, with_mounts
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import BONES, bone_poses
 
 WORN = ("waist", "chest", "head", "left_hand", "right_hand", "left_foot", "right_foot")
 BONE = {"waist": "pelvis", "chest": "thorax"}

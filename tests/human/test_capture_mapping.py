@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from made_capture import PERSON, TABLE
 
-from seerob.errors import InputError, UnknownName
-from seerob.human.captured import CaptureFrame, Layout, Seen
-from seerob.human.mapping import Place, choose, conventions, places, plain, read_conventions
-from seerob.human.observing import bind, stature
-from seerob.human.posture import posture
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.samples import BodyPoint
-from seerob.transforms import rotation_from_wxyz
+from seerob.core.errors import InputError, UnknownName
+from seerob.core.samples import BodyPoint
+from seerob.core.transforms import rotation_from_wxyz
+from seerob.description.capture.captured import CaptureFrame, Layout, Seen
+from seerob.description.capture.mapping import Place, choose, conventions, places, plain, read_conventions
+from seerob.description.capture.observing import bind, stature
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import BONES, bone_poses
 
 XSENS = (
     "Pelvis",

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from made_capture import PERSON, captured, frames_of, source, walking, workstation
 
-from seerob import run as road
-from seerob.engine import Engine
-from seerob.human.ends import ENDS, aimed, bare, swing, turned, untold
-from seerob.human.posture import posture
-from seerob.human.skeleton import AXES, BONES, bone_poses
-from seerob.postures.ergonomic_posture import bind_posture
-from seerob.samples import BodyPoint
-from seerob.station import Station
-from seerob.whereabouts.tracking_error import TrackingError
+from seerob.core.samples import BodyPoint
+from seerob.criteria.postures.ergonomic_posture import bind_posture
+from seerob.description.capture.ends import ENDS, aimed, bare, swing, turned, untold
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import AXES, BONES, bone_poses
+from seerob.session import run as road
+from seerob.session.station import Station
+from seerob.twin.accuracy.tracking_error import TrackingError
+from seerob.twin.engine import Engine
 
 LIMITS = PERSON.joints()
 LOWER = np.array([-np.inf if j.lower is None else j.lower for j in LIMITS])

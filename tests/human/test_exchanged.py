@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from made_capture import PERSON, captured, frames_of, source, walking
 
-from seerob.human.exchanged import Exchanges
-from seerob.human.skeleton import BONES
-from seerob.source import Target
+from seerob.description.capture.exchanged import Exchanges
+from seerob.description.humans.skeleton import BONES
+from seerob.workstation.source import Target
 
 NAMES = ("a", "b", "c")
 

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from made_capture import PERSON
 
-from seerob.human.fitting import Fitter, Pulls, pulls
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.kernels import posture_fit as kernel
-from seerob.samples import BodyPoint
-from seerob.transforms import (
+from seerob.core.samples import BodyPoint
+from seerob.core.transforms import (
     inverse,
     rotation_from_axis_angle,
     rotation_from_rpy,
     transform,
     wxyz_from_rotation,
 )
+from seerob.description.capture.fitting import Fitter, Pulls, pulls
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.kernels import posture_fit as kernel
 
 FITTER = Fitter(PERSON)
 

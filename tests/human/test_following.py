@@ -8,14 +8,14 @@ import pytest
 from made_capture import PERSON, captured, frames_of, play, source, walking, workstation
 from msgspec.structs import replace
 
-from seerob.engine import Engine
-from seerob.human.following import Following
-from seerob.human.skeleton import BONES, JOINTS, bone_poses
-from seerob.human.smoothing import POINT_SPEED
-from seerob.quantities import Pose
-from seerob.samples import BodyPoint, BodySample, Quality
-from seerob.station import Station
-from seerob.transforms import rotation_from_axis_angle, rotation_from_wxyz, wxyz_from_rotation
+from seerob.core.quantities import Pose
+from seerob.core.samples import BodyPoint, BodySample, Quality
+from seerob.core.transforms import rotation_from_axis_angle, rotation_from_wxyz, wxyz_from_rotation
+from seerob.description.capture.following import Following
+from seerob.description.capture.smoothing import POINT_SPEED
+from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
+from seerob.session.station import Station
+from seerob.twin.engine import Engine
 
 HAND = BONES.index("right_hand")
 
@@ -238,7 +238,7 @@ def test_mujoco_agrees_where_the_bones_are():
 
 
 def test_hostile_samples_are_refused_and_what_waits_is_bounded():
-    from seerob.human import following as module
+    from seerob.description.capture import following as module
 
     _, q = walking()
     good = points(BONES, q[0])

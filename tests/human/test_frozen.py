@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from made_capture import RATE, captured, frames_of, play, source, walking
 
-from seerob.human.frozen import Frozen
-from seerob.human.skeleton import BONES
-from seerob.samples import BodyPoint
+from seerob.core.samples import BodyPoint
+from seerob.description.capture.frozen import Frozen
+from seerob.description.humans.skeleton import BONES
 
 HAND, FOOT = BONES.index("right_hand"), BONES.index("left_foot")
 

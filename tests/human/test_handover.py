@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from made_capture import PERSON
 
-from seerob.human.following import Following
-from seerob.human.handover import AGAIN, FADE
-from seerob.human.posture import posture
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.samples import BodyPoint, BodySample
+from seerob.core.samples import BodyPoint, BodySample
+from seerob.description.capture.following import Following
+from seerob.description.capture.handover import AGAIN, FADE
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import BONES, bone_poses
 
 RATE = 30.0
 OFFSET = np.array([0.06, -0.05, 0.04])

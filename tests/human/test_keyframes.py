@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seerob.errors import InputError
-from seerob.human import keyframes, manikin, motion
-from seerob.human.motion import Motion, Travel, interpolated, sample
-from seerob.human.posture import HEIGHT, lowest_sole, posture, sole_corners
-from seerob.human.skeleton import BONES, JOINTS, bone_poses
+from seerob.core.errors import InputError
+from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans.motion import Motion, Travel, interpolated, sample
+from seerob.description.humans.posture import HEIGHT, lowest_sole, posture, sole_corners
+from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
 
 PERSON = manikin.build(name="p", stature=1.75, mass=75, sex="male")
 LOW = np.array([-np.inf if j.lower is None else j.lower for j in PERSON.joints()])

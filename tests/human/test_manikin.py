@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seerob.errors import InputError, UnknownName
-from seerob.geometry import Solid
-from seerob.human import anthropometry, manikin, skin, zatsiorsky
-from seerob.human.skeleton import AXES, BONES, bone_poses
-from seerob.human.tables import table
-from seerob.model_io.description import Description, JointKind
-from seerob.snapshot import Origin
+from seerob.core.errors import InputError, UnknownName
+from seerob.core.shapes.geometry import Solid
+from seerob.core.snapshot import Origin
+from seerob.description.description import Description, JointKind
+from seerob.description.humans import anthropometry, manikin, skin, zatsiorsky
+from seerob.description.humans.skeleton import AXES, BONES, bone_poses
+from seerob.description.humans.tables import table
 
 SEXES, LENGTHS = ("male", "female"), ("drillis", "deleva")
 PEOPLE = st.tuples(st.floats(1.2, 2.3), st.floats(30, 250), st.sampled_from(SEXES), st.sampled_from(LENGTHS))

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.human import keyframes, manikin, motion
-from seerob.human.captured import Captured, CaptureFrame, Layout, Seen
-from seerob.human.mapping import conventions, places, plain
-from seerob.human.marker_stature import marker_stature
-from seerob.human.observing import bind
-from seerob.human.skeleton import BONES, bone_poses
+from seerob.core.errors import InputError
+from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
+from seerob.description.capture.mapping import conventions, places, plain
+from seerob.description.capture.marker_stature import marker_stature
+from seerob.description.capture.observing import bind
+from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans.skeleton import BONES, bone_poses
 
 PAIRS = ("ASI", "PSI", "FHD", "BHD", "SHO", "ELB", "WRA", "KNE", "ANK", "HEE", "TOE")
 EVERY = ("C7", "T10", "CLAV", "STRN", *(side + name for name in PAIRS for side in "RL"))

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from made_capture import PERSON, walking
 
-from seerob.cli import main
-from seerob.commands.probe import options_of
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.reading import convert_workstation
-from seerob.tables.mapping import toml_value
+from seerob.app.cli import main
+from seerob.app.commands.probe import options_of
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.files.tables.mapping import toml_value
+from seerob.session.reading import convert_workstation
 
 NAMES = {
     "Hips": "pelvis", "Chest": "lumbar", "Chest2": "thorax", "Neck": "neck", "Head": "head",

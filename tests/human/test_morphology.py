@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from made_capture import walking
 
-from seerob.errors import InputError
-from seerob.human import manikin
-from seerob.human.anthropometry import body
-from seerob.human.by_hand import CHAIN
-from seerob.human.captured import CaptureFrame, Layout, Seen
-from seerob.human.mapping import choose, places
-from seerob.human.morphology import measure
-from seerob.human.observing import bind
-from seerob.human.skeleton import BONES, bone_poses
+from seerob.core.errors import InputError
+from seerob.description.capture.captured import CaptureFrame, Layout, Seen
+from seerob.description.capture.mapping import choose, places
+from seerob.description.capture.morphology import measure
+from seerob.description.capture.observing import bind
+from seerob.description.humans import manikin
+from seerob.description.humans.anthropometry import body
+from seerob.description.humans.by_hand import CHAIN
+from seerob.description.humans.skeleton import BONES, bone_poses
 
 GIVEN = {"thigh": 0.40, "shank": 0.44, "upper_arm": 0.30, "forearm": 0.27, "hip_centres": 0.19}
 WHO = {"name": "p", "sex": "female", "mass": 62.0}

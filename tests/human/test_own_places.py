@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from made_capture import PERSON, play, source, walking, workstation
 
-from seerob.human.calibration import calibrate
-from seerob.human.captured import Captured, CaptureFrame, Layout, Seen
-from seerob.human.mapping import conventions, places
-from seerob.human.observing import bind, without_unplaced
-from seerob.human.posture import posture
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.station import Station
+from seerob.description.capture.calibration import calibrate
+from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
+from seerob.description.capture.mapping import conventions, places
+from seerob.description.capture.observing import bind, without_unplaced
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.session.station import Station
 
 NAMES = ("RightCollar", "LeftCollar")
 LAYOUT_BONES = [b for b in BONES if "toes" not in b]

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from made_capture import captured, frames_of, play, source, walking, workstation
 
-from seerob import run as road
-from seerob.engine import Engine
-from seerob.errors import Undecided
-from seerob.human.estimated import in_doubt_with
-from seerob.human.skeleton import BONES
-from seerob.postures.ergonomic_posture import bind_posture
-from seerob.station import Station
+from seerob.core.errors import Undecided
+from seerob.criteria.postures.ergonomic_posture import bind_posture
+from seerob.description.capture.estimated import in_doubt_with
+from seerob.description.humans.skeleton import BONES
+from seerob.session import run as road
+from seerob.session.station import Station
+from seerob.twin.engine import Engine
 
 ARM = ("right_upper_arm", "right_forearm", "right_hand")
 

@@ -7,22 +7,22 @@ import pytest
 from made_capture import PERSON, captured, frames_of, source, walking, workstation
 from msgspec.structs import replace
 
-from seerob import run as road
-from seerob.engine import Engine
-from seerob.human.estimated import located
-from seerob.human.following import HELD_SPEED, Following
-from seerob.human.mapping import conventions
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.postures.ergonomic_posture import bind_posture
-from seerob.reading import read
-from seerob.run import Judge
-from seerob.safety.minimum_distance import MinimumDistance
-from seerob.samples import BodyPoint, BodySample
-from seerob.snapshot import Verdict
-from seerob.sources._capture_options import Weights
-from seerob.station import Station
-from seerob.transforms import wxyz_from_rotation
-from seerob.whereabouts.hearing import Hearing
+from seerob.core.samples import BodyPoint, BodySample
+from seerob.core.snapshot import Verdict
+from seerob.core.transforms import wxyz_from_rotation
+from seerob.criteria.postures.ergonomic_posture import bind_posture
+from seerob.criteria.safety.minimum_distance import MinimumDistance
+from seerob.description.capture.estimated import located
+from seerob.description.capture.following import HELD_SPEED, Following
+from seerob.description.capture.mapping import conventions
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.devices.capture.options import Weights
+from seerob.session import run as road
+from seerob.session.reading import read
+from seerob.session.run import Judge
+from seerob.session.station import Station
+from seerob.twin.engine import Engine
+from seerob.twin.whereabouts.hearing import Hearing
 
 TIMEOUT = 0.2
 POST = {"name": "post", "at": {"position": [1.6, 0.0, 1.0]}, "shape": {"box": [0.1, 1.0, 1.6]}}

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull, Delaunay
 
-from seerob.errors import InputError, UnknownName
-from seerob.human import manikin
-from seerob.human.posture import HEIGHT, lowest_sole, names, on_floor, posture, sole_corners
-from seerob.human.skeleton import BONES, JOINTS, bone_poses
+from seerob.core.errors import InputError, UnknownName
+from seerob.description.humans import manikin
+from seerob.description.humans.posture import HEIGHT, lowest_sole, names, on_floor, posture, sole_corners
+from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
 
 PERSON = manikin.build(name="p", stature=1.75, mass=75, sex="male")
 LIMITS = np.array(

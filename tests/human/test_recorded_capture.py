@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from made_capture import captured, frames_of, source, walking, workstation
 
-from seerob.human.skeleton import BONES
-from seerob.recordings.recording import Recording
-from seerob.samples import BodySample
-from seerob.sinks.recorder import Recorder
-from seerob.sources._capture_options import Weights
-from seerob.station import Station
+from seerob.core.samples import BodySample
+from seerob.description.humans.skeleton import BONES
+from seerob.devices.capture.options import Weights
+from seerob.outputs.sinks.recorder import Recorder
+from seerob.recording.recording import Recording
+from seerob.session.station import Station
 
 
 def test_two_devices_are_recorded_and_replayed_bit_for_bit(tmp_path):

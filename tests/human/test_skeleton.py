@@ -10,10 +10,10 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from seerob.errors import UnknownName
-from seerob.human import manikin
-from seerob.human.skeleton import AXES, BONES, JOINTS, bone_poses, mirrored, resolve
-from seerob.model_io.description import JointKind
+from seerob.core.errors import UnknownName
+from seerob.description.description import JointKind
+from seerob.description.humans import manikin
+from seerob.description.humans.skeleton import AXES, BONES, JOINTS, bone_poses, mirrored, resolve
 
 PERSON = manikin.build(name="p", stature=1.75, mass=75, sex="male")
 FORWARD, LEFT, UP = np.eye(3)

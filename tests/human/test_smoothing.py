@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from made_capture import captured, frames_of, play, source, walking
 
-from seerob.human.smoothing import PAUSE, Smoother, group_delay
-from seerob.samples import BodyPoint
+from seerob.core.samples import BodyPoint
+from seerob.description.capture.smoothing import PAUSE, Smoother, group_delay
 
 CUT = 4.0
 
@@ -87,7 +87,7 @@ def test_noise_of_a_centimetre_no_longer_makes_a_person_undecided():
 def test_the_samples_stay_raw_and_count_the_delay_as_latency():
     from made_capture import workstation
 
-    from seerob.station import Station
+    from seerob.session.station import Station
 
     frames = frames_of(*walking(0.5))
     plain, smooth = (

@@ -8,19 +8,19 @@ from made_capture import PERSON, captured, frames_of, source, workstation
 from msgspec.structs import replace
 from test_touching import desk, pressing
 
-from seerob import run as road
-from seerob.engine import Engine
-from seerob.errors import Undecided
-from seerob.human.angles import angles
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.postures.ergonomic_posture import bind_posture
-from seerob.run import Judge
-from seerob.safety.minimum_distance import MinimumDistance
-from seerob.safety.separation import Separation, Stop
-from seerob.samples import JointSample
-from seerob.snapshot import Verdict
-from seerob.station import Station
-from seerob.whereabouts.tracking_error import TrackingError
+from seerob.core.errors import Undecided
+from seerob.core.samples import JointSample
+from seerob.core.snapshot import Verdict
+from seerob.criteria.postures.ergonomic_posture import bind_posture
+from seerob.criteria.safety.minimum_distance import MinimumDistance
+from seerob.criteria.safety.separation import Separation, Stop
+from seerob.description.humans.angles import angles
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.session import run as road
+from seerob.session.run import Judge
+from seerob.session.station import Station
+from seerob.twin.accuracy.tracking_error import TrackingError
+from seerob.twin.engine import Engine
 
 POST = {"name": "post", "at": {"position": [1.0, -0.2, 0.9]}, "shape": {"box": [0.05, 0.05, 0.05]}}
 

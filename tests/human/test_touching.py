@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from made_capture import PERSON, captured, frames_of, play, source, walking, workstation
 
-from seerob import run as road
-from seerob.engine import Engine
-from seerob.human.skeleton import BONES, JOINTS, bone_poses
-from seerob.joint_torques import gravity
-from seerob.samples import JointSample
-from seerob.station import Station
+from seerob.core.samples import JointSample
+from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
+from seerob.session import run as road
+from seerob.session.station import Station
+from seerob.twin.engine import Engine
+from seerob.twin.joint_torques import gravity
 
 DESK_TOP = 1.08
 SHOULDER, ELBOW = JOINTS.index("right_shoulder_flexion"), JOINTS.index("right_elbow_flexion")
@@ -147,7 +147,7 @@ def test_a_workpiece_in_the_hand_moves_with_it_and_weighs():
 
 
 def test_a_shoulder_whose_axes_fall_together_does_not_spin():
-    """Without inertia of its own (`seerob.actuation.REGULAR`) it turned at 200 rad/s and the step failed."""
+    """Without inertia of its own (`actuation.REGULAR`) it turned at 200 rad/s and the step failed."""
     random = np.random.default_rng(1)
     t = np.arange(45) / 30.0
     q = np.tile(walking(0.1)[1][0], (len(t), 1))

@@ -9,19 +9,19 @@ import pytest
 from made_capture import captured, frames_of, source, walking, workstation
 from msgspec.structs import replace
 
-from seerob import run as road
-from seerob.engine import Engine
-from seerob.errors import Undecided
-from seerob.human.estimated import estimated
-from seerob.human.skeleton import BONES, PARENTS
-from seerob.postures.ergonomic_posture import bind_posture
-from seerob.run import Judge
-from seerob.safety.minimum_distance import MinimumDistance
-from seerob.snapshot import Verdict
-from seerob.sources._capture_options import Weights
-from seerob.station import Station
-from seerob.whereabouts.hearing import Hearing
-from seerob.whereabouts.tracking_error import TrackingError
+from seerob.core.errors import Undecided
+from seerob.core.snapshot import Verdict
+from seerob.criteria.postures.ergonomic_posture import bind_posture
+from seerob.criteria.safety.minimum_distance import MinimumDistance
+from seerob.description.capture.estimated import estimated
+from seerob.description.humans.skeleton import BONES, PARENTS
+from seerob.devices.capture.options import Weights
+from seerob.session import run as road
+from seerob.session.run import Judge
+from seerob.session.station import Station
+from seerob.twin.accuracy.tracking_error import TrackingError
+from seerob.twin.engine import Engine
+from seerob.twin.whereabouts.hearing import Hearing
 
 RIGHT = ("right_clavicle", "right_upper_arm", "right_forearm", "right_hand")
 UPPER = ("pelvis", "lumbar", "thorax", "neck", "head", *RIGHT)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from made_capture import PERSON, source
 
-from seerob.human.angles import angles
-from seerob.human.captured import Captured, CaptureFrame, Layout, Seen
-from seerob.human.fit_check import registered
-from seerob.human.fitting import Fitter, pulls
-from seerob.human.posture import posture
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.sources._capture_options import observer
+from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
+from seerob.description.capture.fit_check import registered
+from seerob.description.capture.fitting import Fitter, pulls
+from seerob.description.humans.angles import angles
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.devices.capture.options import observer
 
 LANDMARKS = {
     # The epicondyles do not turn with the forearm; the styloids turn with it and do not bend with the hand.

@@ -7,7 +7,7 @@ import pytest
 
 from made_cell import UR10, made, state_at
 from seerob.kernels.displacement import displacements
-from seerob.model import Frame
+from seerob.model.model import Frame
 
 TOLERANCE = 1e-13
 

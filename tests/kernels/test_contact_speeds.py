@@ -1,8 +1,8 @@
-"""What is compiled of contacts, against the formulae of `seerob.contact.collision` and a search."""
+"""What is compiled of contacts, against the formulae of `seerob.criteria.contact.collision` and a search."""
 
 import numpy as np
 
-from seerob.contact import collision
+from seerob.criteria.contact import collision
 from seerob.kernels.axes import reciprocals
 from seerob.kernels.contact_forces import drawn_corners
 from seerob.kernels.contact_speeds import governing, permissible_speeds

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from concave import bumpy_ball
-from seerob.geometry import Mesh
+from seerob.core.shapes.floor_polygon import prism_mesh
+from seerob.core.shapes.geometry import Mesh
+from seerob.description.shapes.shapes import box_mesh
 from seerob.kernels.crossings import UX, UY, UZ, crossings, encloses
 from seerob.kernels.tree_file import tree_of
 from seerob.kernels.winding import winding_number
-from seerob.model_io.shapes import box_mesh
-from seerob.volumes.floor_polygon import prism_mesh
 
 BOX = box_mesh([-0.5] * 3, [0.5] * 3)
 STAR = bumpy_ball(2, 0.6)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from seerob.polytope import Polytope, free_moment, torque_box, zero_moment
+from seerob.criteria.polytope import Polytope, free_moment, torque_box, zero_moment
 
 LOW, HIGH = np.array([-3.0, -5, -2, -4, -1, -2, -6]), np.array([4.0, 2, 3, 1, 2, 5, 1])
 

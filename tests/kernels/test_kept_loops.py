@@ -80,7 +80,7 @@ def test_what_loops_import_is_of_the_form_that_their_key_follows():
         }
         others = ours - followed
         if "njit" in path.read_text():
-            assert others <= {"seerob.transforms"}, path  # a type
+            assert others <= {"seerob.core.transforms"}, path  # a type
 
 
 def test_loops_are_kept_in_a_folder_of_the_process_where_there_is_no_other(tmp_path, monkeypatch):

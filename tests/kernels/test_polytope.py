@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
+from seerob.criteria.polytope import SAME, Polytope, _hull, free_moment, torque_box, zero_moment
 from seerob.kernels.polytope import largest, vertices
-from seerob.polytope import SAME, Polytope, _hull, free_moment, torque_box, zero_moment
 
 
 def brute_force(A: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from seerob.distance.voxels import VoxelGrid
 from seerob.kernels.revolve import profile, revolve
-from seerob.volumes.voxels import VoxelGrid
 
 
 @pytest.mark.parametrize("axis", [(0, 0, 1), (1, 1, 1), (0.3, -0.8, 0.2)])

@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from made_sweep import inside
-from seerob.geometry import Mesh
-from seerob.volumes.voxels import VoxelGrid
+from seerob.core.shapes.geometry import Mesh
+from seerob.distance.voxels import VoxelGrid
 
 
 def grid_of(marked, pitch=0.1):

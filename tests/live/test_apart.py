@@ -15,14 +15,14 @@ import pytest
 
 import told_sources
 from live_story import open_files, wait_for
-from seerob.live import apart
-from seerob.live.apart import told
-from seerob.live.ears import Listening
-from seerob.live.listening import LiveSource
-from seerob.plugin import kinds, load
-from seerob.samples import JointSample, Quality, SignalSample
-from seerob.source import Source
-from seerob.sources.headset import Headset
+from seerob.core.plugin import kinds, load
+from seerob.core.samples import JointSample, Quality, SignalSample
+from seerob.devices.live import apart
+from seerob.devices.live.apart import told
+from seerob.devices.live.ears import Listening
+from seerob.devices.live.listening import LiveSource
+from seerob.devices.sources.headset import Headset
+from seerob.workstation.source import Source
 from told_sources import AtOnce, Delayed, Large, Missing, Mistaken, Stubborn, Told
 
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from live_story import listening, wait_for
-from seerob.emulators.motions import swing
-from seerob.emulators.rtde import RtdeServer
-from seerob.live.contradictions import SPAN, Contradictions
-from seerob.live.device_clock import HOLD
-from seerob.live.listening import LiveSource
-from seerob.samples import BodyPoint, BodySample, JointSample, PoseSample, Quality
-from seerob.source import Target
-from seerob.sources.rtde import Rtde
+from seerob.app.emulators.motions import swing
+from seerob.app.emulators.rtde import RtdeServer
+from seerob.core.samples import BodyPoint, BodySample, JointSample, PoseSample, Quality
+from seerob.devices.live.contradictions import SPAN, Contradictions
+from seerob.devices.live.device_clock import HOLD
+from seerob.devices.live.listening import LiveSource
+from seerob.devices.sources.rtde import Rtde
+from seerob.workstation.source import Target
 
 HOME = (0.0, -1.2, 1.4, -1.5, -1.5, 0.0)
 ARM = Target(name="arm", joints=tuple("abcdef"), units=("rad",) * 6, velocity=(3.2,) * 6)

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.live.arrivals import Arrivals
-from seerob.live.device_clock import (
+from seerob.devices.live.arrivals import Arrivals
+from seerob.devices.live.device_clock import (
     AGAIN,
     DRIFT,
     HOLD,

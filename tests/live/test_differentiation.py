@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.live.differentiation import SAMPLES, Differentiator, end_weights
+from seerob.devices.live.differentiation import SAMPLES, Differentiator, end_weights
 
 steps = st.lists(st.floats(1e-3, 0.1), min_size=2, max_size=SAMPLES - 1)
 

@@ -14,9 +14,10 @@ import msgspec
 import pytest
 
 from live_story import wait_for as until
-from seerob.errors import SeerobError
-from seerob.live.ears import PROMPT, Listening
-from seerob.live.listening import (
+from seerob.core.errors import SeerobError
+from seerob.core.samples import JointSample, SignalSample
+from seerob.devices.live.ears import PROMPT, Listening
+from seerob.devices.live.listening import (
     FIRST_PAUSE,
     LONGEST_PAUSE,
     MARGIN,
@@ -25,9 +26,8 @@ from seerob.live.listening import (
     delay_of,
     say_once,
 )
-from seerob.live.real_time import Clock, hear
-from seerob.samples import JointSample, SignalSample
-from seerob.source import Source
+from seerob.devices.live.real_time import Clock, hear
+from seerob.workstation.source import Source
 
 
 class Made(LiveSource, frozen=True, kw_only=True):
@@ -103,7 +103,7 @@ def test_one_line_per_loss_and_one_per_return_whatever_ends_it(caplog, error):
         if error:
             raise error
 
-    with caplog.at_level(logging.INFO, "seerob.live.listening"), Ears(script) as ears:
+    with caplog.at_level(logging.INFO, "seerob.devices.live.listening"), Ears(script) as ears:
         until(lambda: len(ears.samples) == 2)
     lines = [r.getMessage() for r in caplog.records if "mistake in the source" not in r.getMessage()]
     assert len(lines) == 2
@@ -113,8 +113,8 @@ def test_one_line_per_loss_and_one_per_return_whatever_ends_it(caplog, error):
 
 
 def test_it_is_tried_again_less_and_less_often(monkeypatch):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.01)
-    monkeypatch.setattr("seerob.live.listening.LONGEST_PAUSE", 0.08)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.01)
+    monkeypatch.setattr("seerob.devices.live.listening.LONGEST_PAUSE", 0.08)
     tried = []
 
     async def script():
@@ -290,7 +290,7 @@ def test_what_a_machine_says_is_counted_and_so_are_its_losses():
 @pytest.mark.parametrize("kind", [Made, Machine])
 def test_who_only_has_signals_of_a_robot_is_not_heard_again(monkeypatch, caplog, kind):
     """Where the joints are is what is missed; of a machine the signals are all there is."""
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.005)
     begun = itertools.count()
     sessions = []
 
@@ -304,14 +304,14 @@ def test_who_only_has_signals_of_a_robot_is_not_heard_again(monkeypatch, caplog,
     until(lambda: len(sessions) > 3)
     listener.ask_to_stop()
     assert listener.join(30.0)
-    lines = [r.getMessage() for r in caplog.records if r.name == "seerob.live.listening"]
+    lines = [r.getMessage() for r in caplog.records if r.name == "seerob.devices.live.listening"]
     assert lines[0] == "made: not heard: no joints"
     assert ("made: heard again" in lines) == (kind is Machine)
     assert kind is Machine or len(lines) == 1
 
 
 def test_a_mistake_in_a_source_is_told_with_its_place_once(monkeypatch, caplog):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.005)
     sessions = []
 
     async def script():
@@ -321,7 +321,11 @@ def test_a_mistake_in_a_source_is_told_with_its_place_once(monkeypatch, caplog):
 
     with Ears(script):
         until(lambda: len(sessions) > 3)
-    said = [(r.getMessage(), bool(r.exc_info)) for r in caplog.records if r.name == "seerob.live.listening"]
+    said = [
+        (r.getMessage(), bool(r.exc_info))
+        for r in caplog.records
+        if r.name == "seerob.devices.live.listening"
+    ]
     assert said == [
         ("made: a mistake in the source itself", True),
         ("made: not heard: KeyError: 'gone'", False),

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.errors import SeerobError
-from seerob.live import shared_mailbox
-from seerob.live.shared_mailbox import SharedMailbox, memory
-from seerob.samples import BodyPoint, BodySample, JointSample, Mailbox, PoseSample, Quality, SignalSample
+from seerob.core.errors import SeerobError
+from seerob.core.samples import BodyPoint, BodySample, JointSample, Mailbox, PoseSample, Quality, SignalSample
+from seerob.devices.live import shared_mailbox
+from seerob.devices.live.shared_mailbox import SharedMailbox, memory
 
 
 @pytest.fixture(name="ends", params=["memory", "file"])
@@ -105,8 +105,8 @@ def test_what_is_no_sample_is_a_mistake_of_who_says_it(ends):
 
 WRITER = """
 import sys
-from seerob.live.shared_mailbox import SharedMailbox
-from seerob.samples import SignalSample
+from seerob.devices.live.shared_mailbox import SharedMailbox
+from seerob.core.samples import SignalSample
 box = SharedMailbox(int(sys.argv[1]))
 for k in range(int(sys.argv[2])):
     box.post(SignalSample(source="s", seq=k, t=0.0, values={str(i): float(k) for i in range(k % 200)}))

@@ -15,13 +15,13 @@ import pytest
 from msgspec.structs import replace
 
 from made_cell import TWO_R, made, two_r
-from seerob.engine import NEAR
-from seerob.live import real_time
-from seerob.live.device_clock import SETTLED, SLEW
-from seerob.live.listening import Listener, delay_of
-from seerob.live.real_time import Clock, hear
-from seerob.run import Judge, bind, engine_of, ticks
-from seerob.samples import JointSample, Mailbox
+from seerob.core.samples import JointSample, Mailbox
+from seerob.devices.live import real_time
+from seerob.devices.live.device_clock import SETTLED, SLEW
+from seerob.devices.live.listening import Listener, delay_of
+from seerob.devices.live.real_time import Clock, hear
+from seerob.session.run import Judge, bind, engine_of, ticks
+from seerob.twin.engine import NEAR
 
 RATE, TICK = 125.0, 0.01
 OMEGA, SIZE = 2.0, np.array([0.5, -0.3])

@@ -9,10 +9,10 @@ import pytest
 
 from made_cell import person
 from seerob import load
-from seerob.engine import Engine
-from seerob.errors import InputError, Undecided
-from seerob.moving_base import velocity_of
-from seerob.samples import JointSample, PoseSample
+from seerob.core.errors import InputError, Undecided
+from seerob.core.samples import JointSample, PoseSample
+from seerob.twin.engine import Engine
+from seerob.twin.moving_base import velocity_of
 
 STATION = (
     f"[engine]\nphysics = false\n{person('op', 3, 0, 0)}"
@@ -133,7 +133,7 @@ def test_a_carrier_counts_in_v_r_and_in_the_energy(model, tmp_path):
 def test_the_energy_is_that_of_the_whole_mass_matrix(model):
     import mujoco
 
-    from seerob.moving_base import energy_of
+    from seerob.twin.moving_base import energy_of
 
     motion = MOTION | {name: (MOTION[name][0], np.zeros(1)) for name in ("axis", "table")}
     _, state = moving(model, motion)

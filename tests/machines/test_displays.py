@@ -6,10 +6,10 @@ import pytest
 
 from kept_run import Kept
 from seerob import load
-from seerob.engine import Engine
-from seerob.errors import InputError
-from seerob.machines.displays import UNKNOWN, Looks
-from seerob.samples import SignalSample
+from seerob.core.errors import InputError
+from seerob.core.samples import SignalSample
+from seerob.session.displays import UNKNOWN, Looks
+from seerob.twin.engine import Engine
 
 STATION = """
 variables = "variables.toml"

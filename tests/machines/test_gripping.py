@@ -7,11 +7,11 @@ import pytest
 
 from made_cell import heard, made, two_r
 from seerob import load
-from seerob.engine import Engine
-from seerob.errors import InputError, Undecided
-from seerob.run import Judge
-from seerob.samples import JointSample
-from seerob.snapshot import Verdict
+from seerob.core.errors import InputError, Undecided
+from seerob.core.samples import JointSample
+from seerob.core.snapshot import Verdict
+from seerob.session.run import Judge
+from seerob.twin.engine import Engine
 
 AXIS = """
 [[machines]]
@@ -134,7 +134,7 @@ def test_it_weighs_on_the_gripper_while_it_is_held(cell):
 def test_gravity_and_energy_go_with_it(tmp_path):
     energy = '[[safety]]\nkind = "velocity"\nname = "v"\nof = "nut"\nlimit = 1.0\n'
     cell = Cell(tmp_path, STATION + energy)
-    from seerob.joint_torques import gravity
+    from seerob.twin.joint_torques import gravity
 
     axis = cell.model.mechanisms["axis"]
     (speed,) = cell.station.bound

@@ -9,12 +9,12 @@ import pytest
 
 from made_cell import person
 from seerob import load
-from seerob.engine import Engine
-from seerob.errors import InputError, Undecided
-from seerob.machines.following import carried, follow, nearest_turn
-from seerob.machines.tables import AtEnd, Belt, Slide, Turn, Vehicle
-from seerob.opening import signal_timeouts
-from seerob.samples import SignalSample
+from seerob.core.errors import InputError, Undecided
+from seerob.core.samples import SignalSample
+from seerob.session.opening import signal_timeouts
+from seerob.twin.engine import Engine
+from seerob.twin.machines.following import carried, follow, nearest_turn
+from seerob.workstation.tables.machines import AtEnd, Belt, Slide, Turn, Vehicle
 
 PERSON = f"""
 variables = "variables.toml"

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from made_cell import heard, made, person, two_r
-from seerob.engine import Engine
-from seerob.errors import InputError
-from seerob.judging import Judge
-from seerob.verdict import Verdict
+from seerob.core.errors import InputError
+from seerob.core.verdict import Verdict
+from seerob.criteria.judging import Judge
+from seerob.twin.engine import Engine
 
 VARIABLES = "".join(
     f'[[variables]]\nname = "{name}"\nsource = "plc"\naddress = "{name}"\nunit = "{unit}"\n'

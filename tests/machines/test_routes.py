@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from seerob.machines.following import follow
-from seerob.machines.tables import Fingers, Route
-from seerob.machines.track import Track
+from seerob.core.shapes.track import Track
+from seerob.twin.machines.following import follow
+from seerob.workstation.tables.machines import Fingers, Route
 
 SQUARE = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))
 

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.errors import InputError
-from seerob.geometry import Mesh
-from seerob.model_io.decomposition import convex_parts
+from seerob.core.errors import InputError
+from seerob.core.shapes.geometry import Mesh
+from seerob.description.shapes.decomposition import convex_parts
 
 
 def mesh_of(body):

@@ -3,8 +3,8 @@ import pytest
 import trimesh
 from surface_distance import hausdorff
 
-from seerob.geometry import Mesh
-from seerob.model_io.detail import display_mesh, physics_mesh
+from seerob.core.shapes.geometry import Mesh
+from seerob.description.shapes.detail import display_mesh, physics_mesh
 
 
 def mesh_of(body):

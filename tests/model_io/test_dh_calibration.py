@@ -7,9 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.model_io import loader
-from seerob.model_io.calibration import Calibration, calibrated, off_by, poses, read_calibration, written
+from seerob.core.errors import InputError
+from seerob.description import loader
+from seerob.description.robots.calibration import (
+    Calibration,
+    calibrated,
+    off_by,
+    poses,
+    read_calibration,
+    written,
+)
 
 
 def load_robot(model):

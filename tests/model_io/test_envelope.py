@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.model_io import library
-from seerob.model_io.loader import load_robot
-from seerob.model_io.maker_geometry import with_geometry_of
-from seerob.model_io.rigid import groups
+from seerob.description.loader import load_robot
+from seerob.description.rigid import groups
+from seerob.description.robots import library
+from seerob.description.robots.maker_geometry import with_geometry_of
 
 
 def half_spaces(mesh):

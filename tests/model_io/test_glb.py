@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.geometry import Mesh, Solid, capsule, dilated_rectangle
-from seerob.model_io.glb import glb_bytes, mesh_hash, shown, solid_mesh
-from seerob.model_io.moments import of_closed_mesh, of_solid
-from seerob.model_io.shading import shaded
+from seerob.core.shapes.geometry import Mesh, Solid, capsule, dilated_rectangle
+from seerob.description.shapes.glb import glb_bytes, mesh_hash, shown, solid_mesh
+from seerob.description.shapes.moments import of_closed_mesh, of_solid
+from seerob.description.shapes.shading import shaded
 
 
 def mesh_of(body, color=(0.5, 0.25, 1.0, 1.0)):

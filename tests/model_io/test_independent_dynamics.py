@@ -12,8 +12,8 @@ import pytest
 
 from oracles import numpy_dynamics
 from oracles import pinocchio_oracle as oracle
-from seerob.model_io import library
-from seerob.model_io.loader import load_robot
+from seerob.description.loader import load_robot
+from seerob.description.robots import library
 
 WITH_MASSES = [name for name in library.names() if any(link.inertial for link in library.load(name).links)]
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from oracles import pinocchio_oracle as oracle
-from seerob.errors import UnknownName
-from seerob.model_io import library
-from seerob.model_io.loader import load_robot
-from seerob.snapshot import Origin
+from seerob.core.errors import UnknownName
+from seerob.core.snapshot import Origin
+from seerob.description.loader import load_robot
+from seerob.description.robots import library
 
 RNG = np.random.default_rng(7)
 

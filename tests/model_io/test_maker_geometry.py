@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from oracles import numpy_dynamics
-from seerob.errors import InputError
-from seerob.model_io import library
-from seerob.model_io.loader import load_robot
+from seerob.core.errors import InputError
+from seerob.description.loader import load_robot
+from seerob.description.robots import library
 
 UR10 = "package:example-robot-data/robots/ur_description/urdf/ur10_robot.urdf"
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.errors import InputError
-from seerob.geometry import Mesh
-from seerob.model_io.mass_properties import from_shape
-from seerob.snapshot import Origin
+from seerob.core.errors import InputError
+from seerob.core.shapes.geometry import Mesh
+from seerob.core.snapshot import Origin
+from seerob.description.shapes.mass_properties import from_shape
 
 DENSITY = 2700.0
 CYLINDER = trimesh.creation.cylinder(0.05, 0.4, sections=64)

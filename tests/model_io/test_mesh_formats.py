@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.errors import InputError
-from seerob.model_io.mesh import load_meshes
-from seerob.model_io.moments import combined, of_closed_mesh
-from seerob.transforms import rotation_from_rpy, transform
+from seerob.core.errors import InputError
+from seerob.core.transforms import rotation_from_rpy, transform
+from seerob.description.mesh import load_meshes
+from seerob.description.shapes.moments import combined, of_closed_mesh
 
 L_SHAPE = trimesh.creation.box((0.3, 0.1, 0.1)).union(
     trimesh.creation.box((0.1, 0.1, 0.3)).apply_translation([-0.1, 0.02, 0.1])

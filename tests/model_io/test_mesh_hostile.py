@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.errors import InputError
-from seerob.model_io.mesh import load_meshes
+from seerob.core.errors import InputError
+from seerob.description.mesh import load_meshes
 
 BOX = trimesh.creation.box((1, 1, 1))
 

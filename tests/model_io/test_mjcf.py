@@ -10,9 +10,9 @@ import pytest
 import trimesh
 
 from oracles import numpy_dynamics
-from seerob.errors import InputError
-from seerob.model_io.loader import load_robot
-from seerob.snapshot import Origin
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Origin
+from seerob.description.loader import load_robot
 
 ARM = """
 <mujoco model="m">

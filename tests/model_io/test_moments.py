@@ -4,10 +4,16 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.geometry import Mesh, capsule, dilated_rectangle
-from seerob.model_io.moments import combined, of_capsule, of_closed_mesh, of_dilated_rectangle, of_solid
-from seerob.snapshot import Origin
-from seerob.transforms import rotation_from_rpy
+from seerob.core.shapes.geometry import Mesh, capsule, dilated_rectangle
+from seerob.core.snapshot import Origin
+from seerob.core.transforms import rotation_from_rpy
+from seerob.description.shapes.moments import (
+    combined,
+    of_capsule,
+    of_closed_mesh,
+    of_dilated_rectangle,
+    of_solid,
+)
 
 R = rotation_from_rpy((0.3, -0.7, 1.1))
 X, Y, Z = R.T

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.geometry import Mesh, Solid, capsule, dilated_rectangle
-from seerob.model_io import shapes
-from seerob.model_io.description import Description, Link
-from seerob.model_io.protrusion import outside_distances, with_protrusions
+from seerob.core.shapes.geometry import Mesh, Solid, capsule, dilated_rectangle
+from seerob.description.description import Description, Link
+from seerob.description.shapes import shapes
+from seerob.description.shapes.protrusion import outside_distances, with_protrusions
 
 
 def robot(visual: Mesh, *solids: Solid) -> Description:

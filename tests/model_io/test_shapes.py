@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.model_io import shapes
+from seerob.description.shapes import shapes
 
 AXIS = np.array([1.0, 2, -2]) / 3
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from seerob.errors import InputError, UnknownName
-from seerob.model_io.description import JointKind
-from seerob.model_io.loader import load_robot
-from seerob.model_io.resolve import Resolver
-from seerob.model_io.xml_values import Reader
-from seerob.snapshot import Origin
+from seerob.core.errors import InputError, UnknownName
+from seerob.core.snapshot import Origin
+from seerob.description.description import JointKind
+from seerob.description.formats.resolve import Resolver
+from seerob.description.loader import load_robot
+from seerob.description.xml_values import Reader
 
 LIMIT = '<limit lower="-1" upper="2" effort="30" velocity="3"/>'
 INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.01" iyy="0.02" izz="0.02"/></inertial>'

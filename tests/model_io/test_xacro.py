@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.model_io.loader import load_robot
+from seerob.core.errors import InputError
+from seerob.description.loader import load_robot
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 MAIN = (

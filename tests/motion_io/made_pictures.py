@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 
-from seerob.emulators import kinect_person
-from seerob.protocols.kinect import JOINTS, Picture, body_object
+from seerob.app.emulators import kinect_person
+from seerob.protocols.tracking.kinect import JOINTS, Picture, body_object
 
 RATE = 30.0
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.human.captured import Seen
-from seerob.motion_io import body_csv
-from seerob.motion_io.body_columns import Column, column
-from seerob.motion_io.markers import MarkerReading
+from seerob.core.errors import InputError
+from seerob.description.capture.captured import Seen
+from seerob.files.motion_capture import body_csv
+from seerob.files.motion_capture.body_columns import Column, column
+from seerob.files.motion_capture.markers import MarkerReading
 
 NAMES = ("Head", "Left Foot", "pelvis")
 READING = MarkerReading(file="r.csv")

@@ -7,10 +7,10 @@ import ezc3d
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.motion_io import c3d, c3d_format
-from seerob.motion_io.markers import MarkerReading
-from seerob.motion_io.upright import Up, height_of, up_axis, world_from_file
+from seerob.core.errors import InputError
+from seerob.files.motion_capture import c3d, c3d_format
+from seerob.files.motion_capture.markers import MarkerReading
+from seerob.files.motion_capture.upright import Up, height_of, up_axis, world_from_file
 
 NAMES = ["S:LFHD", "S:C7", "S:LASI", "S:LANK", "S:*5", "box:a"]
 FRAMES = 30

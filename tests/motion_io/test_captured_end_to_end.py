@@ -10,11 +10,11 @@ import openpyxl
 import pytest
 from mcap.reader import make_reader
 
-from seerob.cli import main
-from seerob.human import keyframes, manikin, motion
-from seerob.human.mapping import conventions, plain
-from seerob.human.skeleton import BONES, JOINTS, bone_poses
-from seerob.recordings.recording import Recording
+from seerob.app.cli import main
+from seerob.description.capture.mapping import conventions, plain
+from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
+from seerob.recording.recording import Recording
 
 PERSON = manikin.build(name="person", stature=1.75, mass=75.0, sex="male")
 RATE, COUNT = 30.0, 24

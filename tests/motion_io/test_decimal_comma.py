@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.human.captured import Seen
-from seerob.human.skeleton import JOINTS
-from seerob.motion_io import body_csv, joint_angles
-from seerob.motion_io.decimal_comma import Commas
-from seerob.motion_io.markers import MarkerReading
+from seerob.core.errors import InputError
+from seerob.description.capture.captured import Seen
+from seerob.description.humans.skeleton import JOINTS
+from seerob.files.motion_capture import body_csv, joint_angles
+from seerob.files.motion_capture.decimal_comma import Commas
+from seerob.files.motion_capture.markers import MarkerReading
 
 KNEE = JOINTS.index("right_knee_extension")
 

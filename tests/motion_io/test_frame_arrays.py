@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.motion_io.frame_arrays import FrameArrays, check_size, checked
-from seerob.transforms import rotation_from_rpy, rotation_from_wxyz, transform, turned
+from seerob.core.errors import InputError
+from seerob.core.transforms import rotation_from_rpy, rotation_from_wxyz, transform, turned
+from seerob.files.motion_capture.frame_arrays import FrameArrays, check_size, checked
 
 
 def test_quaternions_are_turned_as_their_rotations():

@@ -6,11 +6,11 @@ import made_pictures
 import numpy as np
 import pytest
 
-from seerob.emulators.kinect_person import CAMERA
-from seerob.errors import InputError
-from seerob.motion_io import kinect_bag, kinect_json, kinect_text
-from seerob.motion_io.kinect_recording import Reading
-from seerob.protocols.kinect import JOINTS, body_object
+from seerob.app.emulators.kinect_person import CAMERA
+from seerob.core.errors import InputError
+from seerob.files.motion_capture import kinect_bag, kinect_json, kinect_text
+from seerob.files.motion_capture.kinect_recording import Reading
+from seerob.protocols.tracking.kinect import JOINTS, body_object
 
 LOST = range(10, 14)
 KNOWN = Reading("r", level=True)

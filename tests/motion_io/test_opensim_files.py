@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.human import manikin
-from seerob.human.skeleton import BONES, JOINTS, bone_poses
-from seerob.motion_io import joint_angles, storage, trc
-from seerob.motion_io import opensim_coordinates as opensim
-from seerob.motion_io.markers import MarkerReading
+from seerob.core.errors import InputError
+from seerob.description.humans import manikin
+from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
+from seerob.files.motion_capture import joint_angles, storage, trc
+from seerob.files.motion_capture import opensim_coordinates as opensim
+from seerob.files.motion_capture.markers import MarkerReading
 
 NAMES = ("LFHD", "C 7", "LASI", "LANK")
 T = 0.5 + np.arange(20) / 120

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.motion_io.persons import Follower, numbers
-from seerob.protocols.kinect import Body, Picture
+from seerob.core.errors import InputError
+from seerob.files.motion_capture.persons import Follower, numbers
+from seerob.protocols.tracking.kinect import Body, Picture
 
 
 def body(number, x):

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from made_cell import TWO_R, heard, made, two_r
-from seerob.engine import Engine
-from seerob.errors import InputError
+from seerob.core.errors import InputError
+from seerob.twin.engine import Engine
 
 DROP = """<robot name="d"><link name="base"/>
 <link name="ball"><inertial><mass value="1"/>

@@ -9,11 +9,11 @@ import pytest
 import trimesh
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob import cli
-from seerob.contact.impact_mass import moving_masses
-from seerob.errors import Undecided
-from seerob.mounting.mass_tolerances import MassTolerances
-from seerob.sinks._masses import masses
+from seerob.app import cli
+from seerob.core.errors import Undecided
+from seerob.criteria.contact.impact_mass import moving_masses
+from seerob.outputs.report.masses import masses
+from seerob.twin.accuracy.mass_tolerances import MassTolerances
 
 BOX = '<collision><geometry><box size="{0} {0} {0}"/></geometry></collision>'
 SIX = '<inertia ixx="{0}" iyy="{0}" izz="{0}" ixy="0" ixz="0" iyz="0"/>'

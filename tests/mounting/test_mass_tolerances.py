@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
-from seerob.mounting.mass_tolerances import MassTolerances
-from seerob.tolerances import Tolerance
+from seerob.core.tolerances import Tolerance
+from seerob.twin.accuracy.mass_tolerances import MassTolerances
 
 M, I_Z = 2.0, 0.05
 

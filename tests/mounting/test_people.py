@@ -6,10 +6,10 @@ import math
 
 import pytest
 
-from seerob.errors import InputError
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.mounting.people import SLIPS, describe, size
-from seerob.workstation import Human
+from seerob.core.errors import InputError
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.model.mounting.people import SLIPS, describe, size
+from seerob.workstation.workstation import Human
 
 CHAIN = ("ankle_height", "shank", "thigh", "pelvis", "lumbar", "thorax", "neck", "head")
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, two_r
-from seerob.errors import InputError
-from seerob.model_io.lint import impossible_inertia
+from seerob.core.errors import InputError
+from seerob.description.lint import impossible_inertia
 
 BOX = "shape = { box = [0.2, 0.1, 0.1] }\n"
 TOOL = '[[tools]]\nname = "grip"\non = "arm/tip"\n'

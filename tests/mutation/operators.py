@@ -165,7 +165,7 @@ def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, str, str]]:
                 continue
             if isinstance(node, ast.keyword) and node.arg == "strict":
                 continue
-            # Of `seerob.domains`: the unit in its message.
+            # Of `seerob.core.domains`: the unit in its message.
             if name == "keywords" and isinstance(node, ast.Call) and _called(node) in ("number", "whole"):
                 continue
             # Of a new shape: whatever is left.

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from mutation.operators import SPOKEN, mutants, mutated
 from mutation.session import PACKAGE, put_in
-from seerob.criterion import judge
-from seerob.stopping import models, terms
-from seerob.verdict import Verdict
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import judge
+from seerob.criteria.stopping import models, terms
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = '''
@@ -58,8 +58,8 @@ def test_what_is_left_alone_is_left_alone_by_its_own_name():
     other = "class Other:\n    def _told(self, v): return v < 1\n"
     assert mutants(text, "made.py") == []
     assert {m.function for m in mutants(text + other, "made.py")} == {"Other._told"}
-    trees = [ast.parse(path.read_text("utf-8")) for path in (PACKAGE / "sensors").glob("*.py")]
-    trees += [ast.parse(path.read_text("utf-8")) for path in (PACKAGE / "safety").glob("*.py")]
+    trees = [ast.parse(path.read_text("utf-8")) for path in (PACKAGE / "criteria/sensors").glob("*.py")]
+    trees += [ast.parse(path.read_text("utf-8")) for path in (PACKAGE / "criteria/safety").glob("*.py")]
     found = {name for tree in trees for name in _functions(tree)}
     assert found >= set(SPOKEN)
 
@@ -73,8 +73,10 @@ def _functions(tree):
 
 
 def test_a_default_is_changed_where_the_function_keeps_it(monkeypatch):
-    source = (PACKAGE / "criterion.py").read_text("utf-8")
-    (mutant,) = (m for m in mutants(source, "criterion.py") if (m.function, m.before) == ("judge", "True"))
+    source = (PACKAGE / "criteria/criterion.py").read_text("utf-8")
+    (mutant,) = (
+        m for m in mutants(source, "criteria/criterion.py") if (m.function, m.before) == ("judge", "True")
+    )
     monkeypatch.setattr(judge, "__kwdefaults__", dict(judge.__kwdefaults__))
     assert judge(1.0, 2.0) is Verdict.WITHIN
     put_in(mutant, source)
@@ -82,8 +84,8 @@ def test_a_default_is_changed_where_the_function_keeps_it(monkeypatch):
 
 
 def test_each_constant_of_a_statement_that_binds_several_is_put_in_by_its_name(monkeypatch):
-    source = (PACKAGE / "stopping/terms.py").read_text("utf-8")
-    changed = [m for m in mutants(source, "stopping/terms.py") if m.function == "<module>"]
+    source = (PACKAGE / "criteria/stopping/terms.py").read_text("utf-8")
+    changed = [m for m in mutants(source, "criteria/stopping/terms.py") if m.function == "<module>"]
     assert [(m.assigned, m.after) for m in changed] == [
         ("BOUND", "1.1"), ("BOUND", "1000.0"), ("CONSTANT", "0.55"), ("CONSTANT", "500.0"),
     ]  # fmt: skip
@@ -104,7 +106,7 @@ def test_equivalent_mutants_have_a_reason_and_are_named_once():
 def test_a_sample_is_killed():
     """In a process of its own: it changes living code."""
     command = [sys.executable, ROOT / "scripts/mutate", "--sample", "16", "--jobs", "1"]
-    for only in ("contact/collision.py", "stopping/terms.py"):
+    for only in ("criteria/contact/collision.py", "criteria/stopping/terms.py"):
         command += ["--only", only]
     stopping = ("stopping", "stop_options", "stop_edges")
     for tests in ("contact/test_collision.py", *(f"stopping/test_{name}.py" for name in stopping)):
@@ -112,5 +114,5 @@ def test_a_sample_is_killed():
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
     told = re.findall(r"^(\S+): (\d+) of (\d+) mutants killed", done.stdout, re.MULTILINE)
-    assert [file for file, *_ in told] == ["contact/collision.py", "stopping/terms.py"]
+    assert [file for file, *_ in told] == ["criteria/contact/collision.py", "criteria/stopping/terms.py"]
     assert all(int(killed) == int(tried) > 3 for _, killed, tried in told)

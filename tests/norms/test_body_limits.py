@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from seerob.errors import InputError
-from seerob.norms.body_limits import FORBIDDEN, REGIONS, SHIPPED, parse, read, shipped
-from seerob.norms.crushing_gaps import crushing_gaps
-from seerob.norms.limit_inputs import limit_inputs
+from seerob.core.errors import InputError
+from seerob.description.norms.body_limits import FORBIDDEN, REGIONS, SHIPPED, parse, read, shipped
+from seerob.description.norms.crushing_gaps import crushing_gaps
+from seerob.description.norms.limit_inputs import limit_inputs
 
-TEXT = files("seerob.norms").joinpath(SHIPPED).read_text("utf-8")
+TEXT = files("seerob.description.norms").joinpath(SHIPPED).read_text("utf-8")
 
 # number: p_s [N/cm²], written down apart from the file.
 PRESSURES = [

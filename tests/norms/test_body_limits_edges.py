@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from seerob.errors import InputError
-from seerob.norms.body_limits import parse, read
+from seerob.core.errors import InputError
+from seerob.description.norms.body_limits import parse, read
 
 HEAD = """title = "Own"
 edition = "ISO/TS 15066:2016"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, person, two_r
-from seerob.norms.editions import editions, headline
-from seerob.snapshot import Basis, Input, Origin
+from seerob.core.snapshot import Basis, Input, Origin
+from seerob.description.norms.editions import editions, headline
 
 PFL = '[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\nhuman = "op"\n'
 SPEED = '[[safety]]\nkind = "velocity"\nname = "v"\nat = "arm"\nlimit = 1\n'

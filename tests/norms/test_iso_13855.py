@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.errors import InputError, Undecided
-from seerob.norms.iso_13855 import (
+from seerob.core.errors import InputError, Undecided
+from seerob.description.norms.iso_13855 import (
     Approach,
     Edition,
     intrusion,

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from seerob.norms.body_limits import FORBIDDEN, shipped
-from seerob.norms.crushing_gaps import crushing_gaps, gap_inputs
-from seerob.norms.limit_inputs import excluded_input, limit_inputs, table_input
+from seerob.description.norms.body_limits import FORBIDDEN, shipped
+from seerob.description.norms.crushing_gaps import crushing_gaps, gap_inputs
+from seerob.description.norms.limit_inputs import excluded_input, limit_inputs, table_input
 
 NAME = "Hands and fingers: transient multiplier"
 

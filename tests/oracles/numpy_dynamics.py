@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from seerob.model_io.description import Description, JointKind
+from seerob.description.description import Description, JointKind
 
 
 def _rotation(axis, angle):

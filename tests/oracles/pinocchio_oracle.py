@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from seerob.model_io.description import Description, JointKind
+from seerob.description.description import Description, JointKind
 
 
 def pinocchio_model(description: Description) -> pin.Model:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, two_r
-from seerob import cli
-from seerob.errors import InputError, Undecided, UnknownName
-from seerob.permissible.between_samples import BetweenSamples
-from seerob.permissible.given_motion import GivenMotion
-from seerob.permissible.moving_joints import MovingJoints, chains_of
+from seerob.app import cli
+from seerob.core.errors import InputError, Undecided, UnknownName
+from seerob.session.permissible.between_samples import BetweenSamples
+from seerob.session.permissible.given_motion import GivenMotion
+from seerob.session.permissible.moving_joints import MovingJoints, chains_of
 
 POST = '[[parts]]\nname = "post"\nshape = {{ box = [0.2, 0.3, 0.2] }}\nat = {{ position = [{x}, 0.4, 0] }}\n'
 SLIDING = (

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from test_permissible_speed import KEPT_OUT, KNOWN, PERSON, PFL, cell
 
-from seerob.errors import InputError
-from seerob.permissible.ceiling import Ceiling, Method
-from seerob.permissible.evaluation import Wish, given_motion, witness
-from seerob.permissible.joint_limits import joint_limits
-from seerob.permissible.methods import By, governing
-from seerob.permissible.path import path_of
-from seerob.permissible.survey import Survey
-from seerob.verdict import Verdict
+from seerob.core.errors import InputError
+from seerob.core.verdict import Verdict
+from seerob.session.permissible.ceiling import Ceiling, Method
+from seerob.session.permissible.evaluation import Wish, given_motion, witness
+from seerob.session.permissible.joint_limits import joint_limits
+from seerob.session.permissible.methods import By, governing
+from seerob.session.permissible.path import path_of
+from seerob.session.permissible.survey import Survey
 
 NAN = math.nan
 

@@ -11,12 +11,12 @@ from test_methods_of_permission import maps
 from test_permissible_speed import KEPT_OUT, KNOWN, LIMITS, PERSON, PFL, SOURCE, cell, turn
 
 from made_cell import FLOATING, TWO_R, made, two_r
-from seerob.errors import Undecided
-from seerob.permissible.ceiling import Ceiling, Method
-from seerob.permissible.methods import By, governing
-from seerob.permissible.witness import Posed, Witness
-from seerob.state import Hearing, State
-from seerob.whereabouts.tracking_error import TrackingError
+from seerob.core.errors import Undecided
+from seerob.session.permissible.ceiling import Ceiling, Method
+from seerob.session.permissible.methods import By, governing
+from seerob.session.permissible.witness import Posed, Witness
+from seerob.twin.accuracy.tracking_error import TrackingError
+from seerob.twin.state import Hearing, State
 
 PLC = '[[sources]]\nkind = "signals_csv"\nname = "plc"\nfile = "s.csv"\ntime = "t"\ntime_unit = "s"\n'
 GATE = '[[variables]]\nname = "gate/open"\nsource = "plc"\naddress = "x"\ntype = "bool"\n'

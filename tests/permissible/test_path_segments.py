@@ -12,18 +12,18 @@ import pytest
 from test_permissible_speed import KEPT_OUT, KNOWN, LIMITS, PFL, SOURCE, cell, turn
 
 from made_cell import FLOATING, TWO_R, made, two_r
-from seerob import cli
-from seerob.commands.whole_folder import whole_folder
-from seerob.errors import InputError
-from seerob.permissible.evaluation import Wish
-from seerob.permissible.segments import segments
-from seerob.permissible.solved_motion import solved
-from seerob.permissible.tables import SEGMENT_HEAD, csv_bytes, map_head, map_rows, segment_rows
-from seerob.safety.path_speed import passed
-from seerob.samples import PoseSample
-from seerob.trajectories.path_map import read_map
-from seerob.trajectories.path_markers import Place, path_markers
-from seerob.verdict import Verdict
+from seerob.app import cli
+from seerob.app.console.whole_folder import whole_folder
+from seerob.core.errors import InputError
+from seerob.core.samples import PoseSample
+from seerob.core.verdict import Verdict
+from seerob.criteria.safety.path_speed import passed
+from seerob.files.trajectories.path_map import read_map
+from seerob.files.trajectories.path_markers import Place, path_markers
+from seerob.session.permissible.evaluation import Wish
+from seerob.session.permissible.segments import segments
+from seerob.session.permissible.solved_motion import solved
+from seerob.session.permissible.tables import SEGMENT_HEAD, csv_bytes, map_head, map_rows, segment_rows
 
 TIP = '[[safety]]\nkind = "velocity"\nname = "V"\nat = "arm"\nlimit = 0.5\n'
 
@@ -78,7 +78,7 @@ def test_the_plan_is_asked_again_every_millisecond(mapped):
 
 
 def _plan(found):
-    from seerob.permissible.tables import trajectory_head, trajectory_rows
+    from seerob.session.permissible.tables import trajectory_head, trajectory_rows
 
     plan = found.rescaled.trajectory(0.002)
     return csv_bytes(trajectory_head(plan, found.map.limits.units), trajectory_rows(plan))

@@ -11,12 +11,12 @@ import openpyxl
 import pytest
 
 from made_cell import FLOATING, UR10, made
-from seerob.errors import InputError
-from seerob.permissible.segments import segments
-from seerob.permissible.tables import csv_bytes, map_head, map_rows, trajectory_head, trajectory_rows
-from seerob.permissible.urscript import refusal, urscript
-from seerob.permissible.workbook import workbook
-from seerob.samples import JointSample
+from seerob.core.errors import InputError
+from seerob.core.samples import JointSample
+from seerob.session.permissible.segments import segments
+from seerob.session.permissible.tables import csv_bytes, map_head, map_rows, trajectory_head, trajectory_rows
+from seerob.session.permissible.urscript import refusal, urscript
+from seerob.session.permissible.workbook import workbook
 
 START = np.array([0, -1.2, 1.4, -1.5, -1.5, 0])
 TIP = '[[safety]]\nkind = "velocity"\nname = "V"\nat = "arm"\nlimit = 0.4\n'

@@ -7,12 +7,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.permissible.given_motion import GivenMotion, largest_hermite, largest_on
-from seerob.permissible.joint_limits import JointLimits
-from seerob.permissible.path import path_of
-from seerob.permissible.profile import Parabolas, Profile
-from seerob.permissible.timing import timed
+from seerob.core.errors import InputError
+from seerob.session.permissible.given_motion import GivenMotion, largest_hermite, largest_on
+from seerob.session.permissible.joint_limits import JointLimits
+from seerob.session.permissible.path import path_of
+from seerob.session.permissible.profile import Parabolas, Profile
+from seerob.session.permissible.timing import timed
 
 
 def motion(t, q, qd):

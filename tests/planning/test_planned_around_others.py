@@ -7,14 +7,14 @@ import pytest
 from test_planning import ARM
 
 import seerob
-from seerob import cli
-from seerob.commands import Exit
-from seerob.errors import InputError, UnknownName
-from seerob.planning.clearance import Clearance
-from seerob.planning.others import Witness, movers
-from seerob.planning.plan import plan
-from seerob.snapshot import Snapshot
-from seerob.waypoints.reading import read_program
+from seerob.app import cli
+from seerob.app.console.terminal import Exit
+from seerob.core.errors import InputError, UnknownName
+from seerob.core.snapshot import Snapshot
+from seerob.files.waypoints.reading import read_program
+from seerob.session.planning.clearance import Clearance
+from seerob.session.planning.others import Witness, movers
+from seerob.session.planning.plan import plan
 
 CELL = """
 [[robots]]

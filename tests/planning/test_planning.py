@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import seerob
-from seerob.errors import InputError
-from seerob.planning.clearance import Clearance
-from seerob.planning.plan import plan
-from seerob.planning.search import NoPath, Stopped
+from seerob.core.errors import InputError
+from seerob.session.planning.clearance import Clearance
+from seerob.session.planning.plan import plan
+from seerob.session.planning.search import NoPath, Stopped
 
 LINK = """
 <link name="{0}"><inertial><mass value="1"/>
@@ -118,8 +118,8 @@ def test_it_stops_when_asked_and_does_not_claim_that_there_is_no_path(model):
 
 
 def test_the_planned_file_is_a_motion_that_keeps_the_margin(model, tmp_path):
-    from seerob.opening import target
-    from seerob.sources.waypoints import Waypoints
+    from seerob.devices.sources.waypoints import Waypoints
+    from seerob.session.opening import target
 
     found = plan(model, "arm", [[1.2, 0.0]], margin=0.03, seed=3)
     (tmp_path / "planned.toml").write_text(found.toml(), encoding="utf-8")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, heard, made, person, two_r
-from seerob.engine import Engine
-from seerob.judging import Judge
-from seerob.verdict import Verdict
+from seerob.core.verdict import Verdict
+from seerob.criteria.judging import Judge
+from seerob.twin.engine import Engine
 
 CELL = (
     FLOATING.replace("{ ", "{ physics = false, ")

@@ -11,21 +11,21 @@ import pinocchio as pin
 import pytest
 
 from oracles.pinocchio_oracle import pinocchio_model
-from seerob.engine import Engine
-from seerob.model_io import library
-from seerob.plausibility.own_words import LiveWords, fixed_offset, rigid_error, sign_or_unit
-from seerob.protocols.fri import Edition, Monitoring, decode_monitoring, encode_monitoring
-from seerob.protocols.modbus_map import load as load_map
-from seerob.run import Judge, bind, engine_of
-from seerob.samples import JointSample
-from seerob.snapshot import Finding, Verdict
-from seerob.sources.fri import joint_sample as fri_sample
-from seerob.sources.modbus_robot import joint_sample as modbus_sample
-from seerob.sources.modbus_robot import standing
-from seerob.sources.rtde import joint_sample as rtde_sample
-from seerob.station import Station, load
-from seerob.trajectories.trajectory import position_noise
-from seerob.transforms import rotation_from_rpy
+from seerob.core.samples import JointSample
+from seerob.core.snapshot import Finding, Verdict
+from seerob.core.transforms import rotation_from_rpy
+from seerob.description.robots import library
+from seerob.devices.sources.fri import joint_sample as fri_sample
+from seerob.devices.sources.modbus_robot import joint_sample as modbus_sample
+from seerob.devices.sources.modbus_robot import standing
+from seerob.devices.sources.rtde import joint_sample as rtde_sample
+from seerob.files.trajectories.trajectory import position_noise
+from seerob.protocols.plc.modbus_map import load as load_map
+from seerob.protocols.robots.fri import Edition, Monitoring, decode_monitoring, encode_monitoring
+from seerob.session.run import Judge, bind, engine_of
+from seerob.session.station import Station, load
+from seerob.twin.engine import Engine
+from seerob.twin.own_words import LiveWords, fixed_offset, rigid_error, sign_or_unit
 
 DH = {
     # a2, a3, d1, d4, d5, d6 [m]: Universal Robots, "DH Parameters for calculations of kinematics"

@@ -16,18 +16,26 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob import plugin
-from seerob.errors import InputError
-from seerob.expectations import is_struct, members, unit_of
-from seerob.live.listening import LiveSource
-from seerob.plausibility.in_place import implausible
-from seerob.plausibility.of_file import FOLLOWS, LISTS, PLUGINS, entries_of, findings, listed, unknown
-from seerob.plausibility.ranges import data
-from seerob.reading import BASES, read
-from seerob.safety.velocity import Velocity
-from seerob.snapshot import Finding, Verdict
-from seerob.station import Station, load
-from seerob.workstation import TABLES, Confirmed, Engine, Workstation
+from seerob.core import plugin
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Finding, Verdict
+from seerob.criteria.safety.velocity import Velocity
+from seerob.devices.live.listening import LiveSource
+from seerob.model.mounting.in_place import implausible
+from seerob.session.reading import BASES, read
+from seerob.session.station import Station, load
+from seerob.workstation.expectations import is_struct, members, unit_of
+from seerob.workstation.plausibility.of_file import (
+    FOLLOWS,
+    LISTS,
+    PLUGINS,
+    entries_of,
+    findings,
+    listed,
+    unknown,
+)
+from seerob.workstation.plausibility.ranges import data
+from seerob.workstation.workstation import TABLES, Confirmed, Engine, Workstation
 
 ROOT = Path(__file__).parents[2]
 CELL = {
@@ -101,8 +109,8 @@ def doubted(station: Station) -> list[Finding]:
 
 def verdicts(station: Station) -> dict[str, Verdict | None]:
     """At the first tick."""
-    from seerob.engine import Engine as Twin
-    from seerob.run import Judge, bind
+    from seerob.session.run import Judge, bind
+    from seerob.twin.engine import Engine as Twin
 
     return {r.name: r.verdict for r in Judge(bind(station.model))(Twin(station.model).start())}
 
@@ -346,8 +354,8 @@ def test_a_confirmation_of_nothing_is_a_mistake(key: str, tmp_path: Path) -> Non
 OWN = '''
 from typing import Annotated
 from msgspec import Meta
-from seerob.criterion import Criterion
-from seerob.snapshot import Basis, Result, Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.core.snapshot import Basis, Result, Verdict
 
 class Own(Criterion, frozen=True, kw_only=True):
     """Always within."""
@@ -386,7 +394,7 @@ def test_a_criterion_that_is_added_in_python_is_looked_at(tmp_path: Path) -> Non
 SHIPPED = sorted(p.parent for p in ROOT.glob("workstations/*/workstation.toml"))
 
 
-@pytest.mark.parametrize("folder", [*SHIPPED, ROOT / "src/seerob/commands/starter"], ids=lambda p: p.name)
+@pytest.mark.parametrize("folder", [*SHIPPED, ROOT / "src/seerob/app/commands/starter"], ids=lambda p: p.name)
 def test_nothing_that_ships_is_implausible(folder: Path) -> None:
     station = load(folder)
     live = any(isinstance(source, LiveSource) for source in station.workstation.sources)

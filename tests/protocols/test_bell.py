@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from seerob.protocols.bell import Bell
+from seerob.protocols.links.bell import Bell
 
 
 async def turns(count=3):

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seerob.protocols import ProtocolError
-from seerob.protocols.fri import (
+from seerob.protocols.links.protobuf_wire import doubles, fields, message, varint, whole
+from seerob.protocols.robots.fri import (
     COMMAND,
     LARGEST,
     Answer,
@@ -23,7 +24,6 @@ from seerob.protocols.fri import (
     encode_answer,
     encode_monitoring,
 )
-from seerob.protocols.protobuf_wire import doubles, fields, message, varint, whole
 
 Q = (0.1, 0.2, 0.3, -1.2, 0.5, 0.6, 0.7)
 POSE = (512.5, -3.0, 640.25, 0.5, -0.5, 0.5, 0.5)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from seerob.emulators.mvn_datagrams import datagrams
-from seerob.emulators.mvn_person import Pose
+from seerob.app.emulators.mvn_datagrams import datagrams
+from seerob.app.emulators.mvn_person import Pose
 from seerob.protocols import ProtocolError
-from seerob.protocols.mvn import (
+from seerob.protocols.tracking.mvn import (
     Header,
     Items,
     Kind,
@@ -28,9 +28,9 @@ from seerob.protocols.mvn import (
     pack_scale,
     pack_tags,
 )
-from seerob.protocols.mvn_assembly import LATE, MAX_PARTS, MAX_WAITING, Assembly
-from seerob.protocols.mvn_pose import Up, looks_y_up, pose, unit_of
-from seerob.protocols.mvn_segments import FINGERS, JOINTS, PARENTS, SEGMENTS, UNITY, names
+from seerob.protocols.tracking.mvn_assembly import LATE, MAX_PARTS, MAX_WAITING, Assembly
+from seerob.protocols.tracking.mvn_pose import Up, looks_y_up, pose, unit_of
+from seerob.protocols.tracking.mvn_segments import FINGERS, JOINTS, PARENTS, SEGMENTS, UNITY, names
 
 RNG = np.random.default_rng(0)
 STEPS = np.array([[0, 0, 0.1]] * 23) + RNG.uniform(-0.03, 0.03, (23, 3))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from seerob.protocols.opcua_client import Way, connect
+from seerob.protocols.plc.opcua_client import Way, connect
 
 
 def test_a_server_that_never_answers_is_hung_up_on():

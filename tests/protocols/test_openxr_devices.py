@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from seerob.core.transforms import rotation_from_wxyz
 from seerob.protocols import ProtocolError
-from seerob.protocols.openxr_devices import Located, OpenXr, serials
-from seerob.protocols.openxr_session import OpenXrSession
-from seerob.protocols.vive import MOST_DEVICES, decode, encode
-from seerob.transforms import rotation_from_wxyz
+from seerob.protocols.tracking.openxr_devices import Located, OpenXr, serials
+from seerob.protocols.tracking.openxr_session import OpenXrSession
+from seerob.protocols.tracking.vive import MOST_DEVICES, decode, encode
 
 TOOL = Path(__file__).resolve().parents[2] / "tools/vive_sender/vive_sender.py"
 ROLE = "/user/vive_tracker_htcx/role/"

@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from live_story import wait_for
-from seerob.protocols.connection import CHUNK, MOST, connected
-from seerob.protocols.datagrams import listening
-from seerob.protocols.reception import Reception, instant
+from seerob.protocols.links.connection import CHUNK, MOST, connected
+from seerob.protocols.links.datagrams import listening
+from seerob.protocols.links.reception import Reception, instant
 
 CLOCKS = 5e-3
 """Between the wall clock and the monotonic one, while one is set to the time of a server [s]."""

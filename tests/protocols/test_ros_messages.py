@@ -7,11 +7,12 @@ import math
 
 import pytest
 
-from seerob.emulators.rosbridge import document
-from seerob.protocols import ProtocolError, rosbridge
-from seerob.protocols.ros_messages import Content, Joints, Plan, Point, Transform, read, same_type
-from seerob.protocols.ros_serialised import Edition, decode, encode
-from seerob.protocols.rosbridge import Published, Reader
+from seerob.app.emulators.rosbridge import document
+from seerob.protocols import ProtocolError
+from seerob.protocols.ros import rosbridge
+from seerob.protocols.ros.ros_messages import Content, Joints, Plan, Point, Transform, read, same_type
+from seerob.protocols.ros.ros_serialised import Edition, decode, encode
+from seerob.protocols.ros.rosbridge import Published, Reader
 
 SAID = {
     Content.JOINT_STATE: Joints(1000.5, ("a", "b"), (1.0, -2.0), (0.25, 0.5), (3.0, 4.0)),

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seerob.protocols import ProtocolError
-from seerob.protocols.rtde import (
+from seerob.protocols.robots.rtde import (
     LARGEST,
     Accepted,
     ControllerRequest,

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seerob.protocols import ProtocolError
-from seerob.protocols.json_pointer import at, document, parts
-from seerob.protocols.sparkplug import Kind, Node, Payload, decode, encode, topic
+from seerob.protocols.links.json_pointer import at, document, parts
+from seerob.protocols.plc.sparkplug import Kind, Node, Payload, decode, encode, topic
 
 TYPES = {"uint64": 4, "uint32": 13, "float": 2, "double": 1, "bool": 8, "string": 9, "message": 11}
 

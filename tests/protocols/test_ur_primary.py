@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.emulators.motions import swing
-from seerob.emulators.rtde import RtdeServer
+from seerob.app.emulators.motions import swing
+from seerob.app.emulators.rtde import RtdeServer
 from seerob.protocols import ProtocolError
-from seerob.protocols.ur_primary import (
+from seerob.protocols.robots.ur_primary import (
     Kinematics,
     decode_kinematics,
     encode_state,

@@ -10,8 +10,8 @@ from contextlib import aclosing
 
 import pytest
 
-from seerob.protocols.connection import connected
-from seerob.protocols.datagrams import listening, plain
+from seerob.protocols.links.connection import connected
+from seerob.protocols.links.datagrams import listening, plain
 
 
 async def heard(sender):
@@ -62,7 +62,7 @@ def test_a_machine_without_ipv6_gets_to_what_answers_there_and_here(monkeypatch)
                 return found
 
             monkeypatch.setattr(asyncio.get_running_loop(), "getaddrinfo", both)
-            monkeypatch.setattr("seerob.protocols.connection.socket.socket", without)
+            monkeypatch.setattr("seerob.protocols.links.connection.socket.socket", without)
             async with connected("localhost", port, 10.0) as connection:
                 monkeypatch.undo()
                 there, _ = server.accept()

@@ -5,9 +5,9 @@ from hashlib import sha256
 import pytest
 
 import seerob as sr
-from seerob.recordings import filing
-from seerob.recordings.filing import SOURCES, source_files
-from seerob.sinks.recorder import Recorder
+from seerob.outputs.sinks.recorder import Recorder
+from seerob.recording import filing
+from seerob.recording.filing import SOURCES, source_files
 
 
 @pytest.fixture

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from seerob.results.result_log import ResultLog
-from seerob.results.series import Series
-from seerob.station import Station, load
+from seerob.recording.result_log import ResultLog
+from seerob.recording.series import Series
+from seerob.session.station import Station, load
 
 LIBRARY = {
     "ur3e": (6, "tool0"),

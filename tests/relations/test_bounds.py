@@ -9,9 +9,8 @@ import pytest
 from random_cells import files, random_cell
 
 from made_cell import TWO_R, made, person, two_r
-from seerob.snapshot import Verdict
-from seerob.station import load
-from seerob.trajectories.path_map import (
+from seerob.core.snapshot import Verdict
+from seerob.files.trajectories.path_map import (
     GIVEN,
     PERMISSIBLE,
     PIECE,
@@ -22,6 +21,7 @@ from seerob.trajectories.path_map import (
     WHY,
     joint_columns,
 )
+from seerob.session.station import load
 from worst_between import worst_found
 
 JOINT = (

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from random_cells import Cell, faster, heavier, least_margin, random_cell, said, station, thicker
 
-from seerob.errors import Undecided
-from seerob.recordings.recording import Recording
-from seerob.results.result_log import ResultLog
-from seerob.snapshot import Verdict
+from seerob.core.errors import Undecided
+from seerob.core.snapshot import Verdict
+from seerob.recording.recording import Recording
+from seerob.recording.result_log import ResultLog
 
 EACH = 18
 """Random cells that each relation is asked of."""
@@ -107,7 +107,7 @@ def test_another_tick_does_not_contradict(seed, tmp_path):
 def test_replayed_and_in_arrays_it_says_the_same(seed, tmp_path):
     cell = random_cell(seed)
     made = station(cell, tmp_path)
-    from seerob.sinks.recorder import Recorder
+    from seerob.outputs.sinks.recorder import Recorder
 
     run = made.run(folder=tmp_path / "run", sinks=[Recorder()]).results
     (file,) = (tmp_path / "run").glob("*.mcap")

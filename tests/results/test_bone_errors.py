@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seerob.results.bone_errors import BoneErrors
+from seerob.recording.bone_errors import BoneErrors
 
 
 def test_percentiles_are_those_of_numpy_to_the_width_of_a_class():

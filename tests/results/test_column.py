@@ -7,11 +7,11 @@ import threading
 import numpy as np
 import pytest
 
-from seerob.results import column
-from seerob.results.column import BLOCK, Column, Spill
-from seerob.results.result_log import ResultLog, log_of
-from seerob.sink import KeepsResults
-from seerob.snapshot import Result, Snapshot, Verdict
+from seerob.core.snapshot import Result, Snapshot, Verdict
+from seerob.outputs.sink import KeepsResults
+from seerob.recording import column
+from seerob.recording.column import BLOCK, Column, Spill
+from seerob.recording.result_log import ResultLog, log_of
 
 
 def ticks(count):
@@ -96,8 +96,8 @@ def test_writers_that_share_a_log_add_each_tick_once():
 @pytest.mark.parametrize("kind", ["dossier", "excel"])
 def test_reports_use_the_log_of_the_run(tmp_path, kind):
     from made_cell import TWO_R, made, two_r
-    from seerob.sinks.dossier import Dossier
-    from seerob.sinks.excel import Excel
+    from seerob.outputs.sinks.dossier import Dossier
+    from seerob.outputs.sinks.excel import Excel
 
     text = TWO_R + '[[safety]]\nkind = "velocity"\nname = "speed"\nat = "arm"\n'
     station = made(tmp_path, text, {"arm.urdf": two_r()})

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, two_r
-from seerob.judging import UNBOUNDED
-from seerob.recordings.recording import Recording
-from seerob.results.result_log import ResultLog
-from seerob.results.series import STILL
-from seerob.run import pump
-from seerob.snapshot import CriterionInfo, Result, Snapshot, Verdict
+from seerob.core.snapshot import CriterionInfo, Result, Snapshot, Verdict
+from seerob.criteria.judging import UNBOUNDED
+from seerob.recording.recording import Recording
+from seerob.recording.result_log import ResultLog
+from seerob.recording.series import STILL
+from seerob.session.run import pump
 
 W, E, U = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from seerob.results.distribution import distribution
-from seerob.results.series import Series
-from seerob.snapshot import Level, Result
+from seerob.core.snapshot import Level, Result
+from seerob.recording.distribution import distribution
+from seerob.recording.series import Series
 
 LEVELS = (Level(up_to=2, name="one"), Level(up_to=4, name="two"), Level(up_to=7, name="three"))
 

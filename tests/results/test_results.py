@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seerob.errors import Undecided, UnknownName
-from seerob.results.result_log import ResultLog, log_of, result_named
-from seerob.results.series import CODES, MAX_REASONS, severity, worst_verdict
-from seerob.snapshot import CriterionInfo, Result, Snapshot, Verdict
+from seerob.core.errors import Undecided, UnknownName
+from seerob.core.snapshot import CriterionInfo, Result, Snapshot, Verdict
+from seerob.recording.result_log import ResultLog, log_of, result_named
+from seerob.recording.series import CODES, MAX_REASONS, severity, worst_verdict
 
 W, E, U = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 

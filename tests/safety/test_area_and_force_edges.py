@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, heard, made, results_at, two_r
-from seerob.engine import Engine
-from seerob.errors import InputError
-from seerob.judging import Judge
-from seerob.safety.force_polytope import ForcePolytope
+from seerob.core.errors import InputError
+from seerob.criteria.judging import Judge
+from seerob.criteria.safety.force_polytope import ForcePolytope
+from seerob.twin.engine import Engine
 
 BOX = '[[parts]]\nname = "{name}"\nshape = {{ box = [0.2, 0.2, 0.2] }}\nat = {{ position = {at} }}\n'
 ZONE = '[[areas]]\nname = "zone"\nshape = { sphere = 0.5 }\n'

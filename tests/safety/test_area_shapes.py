@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.errors import InputError
-from seerob.model import Model
-from seerob.station import load
-from seerob.volumes.voxels import VoxelGrid
+from seerob.core.errors import InputError
+from seerob.distance.voxels import VoxelGrid
+from seerob.model.model import Model
+from seerob.session.station import load
 
 BOX = '[[parts]]\nname = "{name}"\nshape = {{ box = [0.2, 0.2, 0.2] }}\nat = {{ position = {at} }}\n'
 AREA = '[[areas]]\nname = "{name}"\n{shape}\n'
@@ -198,8 +198,8 @@ def test_an_s_p_that_is_not_complete_makes_no_hull(tmp_path):
 
 
 def test_a_grid_is_dilated_by_at_least_the_margin():
-    from seerob.volumes.areas import _wider
-    from seerob.volumes.swept import Swept
+    from seerob.model.volumes.swept import Swept
+    from seerob.session.areas import _wider
 
     grid = VoxelGrid(0.05)
     grid.cover(np.zeros(3), np.full(3, 0.2))

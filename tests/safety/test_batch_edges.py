@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.errors import InputError
-from seerob.results.series import CODES, NO_VERDICT
-from seerob.safety.effective_mass import EffectiveMass
-from seerob.safety.force_polytope import ForcePolytope
-from seerob.safety.kinetic_energy import KineticEnergy
-from seerob.safety.tool_force import ToolForce
-from seerob.safety.velocity import Velocity
+from seerob.core.errors import InputError
+from seerob.criteria.safety.effective_mass import EffectiveMass
+from seerob.criteria.safety.force_polytope import ForcePolytope
+from seerob.criteria.safety.kinetic_energy import KineticEnergy
+from seerob.criteria.safety.tool_force import ToolForce
+from seerob.criteria.safety.velocity import Velocity
+from seerob.recording.series import CODES, NO_VERDICT
 
 WALL = '[[parts]]\nname = "wall"\nshape = {{ box = [0.1, 9, 9] }}\nat = {{ position = [{x}, 0, 0] }}\n'
 MASS = '[[safety]]\nkind = "effective_mass"\nname = "m"\nat = "arm"\nlimit = 1.5\n'

@@ -9,10 +9,10 @@ import pytest
 import trimesh
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob.contact.clamped_regions import FloorGap
+from seerob.core.snapshot import Origin, Result
+from seerob.criteria.contact.clamped_regions import FloorGap
 from seerob.kernels.approach import lowest_and_falling
-from seerob.snapshot import Origin, Result
-from seerob.station import Station, load
+from seerob.session.station import Station, load
 
 HAND = "Hands and fingers"
 

@@ -13,13 +13,13 @@ from made_capture import captured, frames_of, source, workstation
 from msgspec.structs import replace
 from test_touching import desk, pressing
 
-from seerob import run as road
-from seerob.engine import Engine
-from seerob.norms import body_limits
-from seerob.run import Judge
-from seerob.safety.contact_force import ContactForce, pressed, regions_of
-from seerob.snapshot import Origin, Verdict
-from seerob.station import Station
+from seerob.core.snapshot import Origin, Verdict
+from seerob.criteria.safety.contact_force import ContactForce, pressed, regions_of
+from seerob.description.norms import body_limits
+from seerob.session import run as road
+from seerob.session.run import Judge
+from seerob.session.station import Station
+from seerob.twin.engine import Engine
 
 
 def results(criterion, depth=0.7, **options):

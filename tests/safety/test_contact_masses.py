@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from made_cell import FLOATING, TWO_R, UR10, judged, made, results_at, state_at, two_r
-from seerob.snapshot import Verdict
+from seerob.core.snapshot import Verdict
 
 
 def test_mass_of_the_basis_is_without_the_fixed_base(tmp_path: Path) -> None:

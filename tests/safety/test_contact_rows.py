@@ -8,11 +8,11 @@ import pytest
 from msgspec.structs import replace
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob.contact.limits import Judged
-from seerob.contact.regions import REGIONS
-from seerob.safety.power_and_force import Contacts
-from seerob.snapshot import Result, Row, RowState, Verdict
-from seerob.station import Station
+from seerob.core.snapshot import Result, Row, RowState, Verdict
+from seerob.criteria.contact.limits import Judged
+from seerob.criteria.contact.regions import REGIONS
+from seerob.criteria.safety.power_and_force import Contacts
+from seerob.session.station import Station
 
 PFL = '[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\n'
 FLAT = "contact_area = { arm = 1e-4 }\n"

@@ -42,7 +42,7 @@ def test_permissible_speed_lies_between_those_of_the_ends(tmp_path):
     assert mass == pytest.approx(4.0)
 
     def speed(m, k, A):
-        from seerob.contact import collision
+        from seerob.criteria.contact import collision
 
         mu = collision.reduced_mass(40.0, m)
         by_force = collision.speed_at_force(280.0, mu, k * 25e3)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob.contact.regions import REGIONS
-from seerob.human.skeleton import BONES
-from seerob.judging import Judge
-from seerob.safety.power_and_force import STANDSTILL, PowerAndForce
-from seerob.snapshot import Result, RowState, Verdict
-from seerob.station import Station
+from seerob.core.snapshot import Result, RowState, Verdict
+from seerob.criteria.contact.regions import REGIONS
+from seerob.criteria.judging import Judge
+from seerob.criteria.safety.power_and_force import STANDSTILL, PowerAndForce
+from seerob.description.humans.skeleton import BONES
+from seerob.session.station import Station
 
 KEPT = 'excluded = ["Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"]\n'
 FLAT = 'mass = "simplified"\ncontact_area = { arm = 1e-4 }\n'

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob.criterion import Criterion
-from seerob.errors import InputError
-from seerob.judging import Judge
-from seerob.plugin import kinds, load
-from seerob.safety import device_distance
+from seerob.core.errors import InputError
+from seerob.core.plugin import kinds, load
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.judging import Judge
+from seerob.criteria.safety import device_distance
 
 ZERO = ((0.0, 0.0), (0.0, 0.0))
 BELOW = {

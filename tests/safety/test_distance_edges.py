@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from made_cell import TWO_R, made, results_at, state_at, two_r
-from seerob.human.skeleton import BONES
-from seerob.judging import Judge
-from seerob.results.series import CODES, NO_VERDICT
+from seerob.criteria.judging import Judge
+from seerob.description.humans.skeleton import BONES
+from seerob.recording.series import CODES, NO_VERDICT
 
 CELL = "engine = { gravity = [0, 0, 0], physics = false }\n" + TWO_R
 BOX = '[[parts]]\nname = "box"\nshape = {{ box = [0.2, 0.2, 0.2] }}\nat = {{ position = [{x}, 0, 0] }}\n'

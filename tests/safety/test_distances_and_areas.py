@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob.errors import InputError
-from seerob.run import Judge, bind
+from seerob.core.errors import InputError
+from seerob.session.run import Judge, bind
 
 ZERO = (0.0, 0.0)
 BOX = '[[parts]]\nname = "{name}"\nshape = {{ box = [0.2, 0.2, 0.2] }}\nat = {{ position = {at} }}\n'
@@ -139,7 +139,7 @@ def test_area_on_a_link_moves_with_it_and_is_not_part_of_the_robot(tmp_path):
 
 
 def test_area_that_moves_with_an_unheard_robot_is_undecided(tmp_path):
-    from seerob.engine import Engine
+    from seerob.twin.engine import Engine
 
     tables = (
         AREA.format(x=1.5, on='on = "arm/l2"\n')

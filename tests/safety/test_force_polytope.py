@@ -12,13 +12,13 @@ from scipy.spatial import HalfspaceIntersection
 
 from made_cell import FLOATING, TWO_R, UR10, made, results_at, state_at, two_r
 from oracles import pinocchio_oracle as oracle
-from seerob import joint_torques
-from seerob.errors import InputError, UnknownName
-from seerob.model_io import library
-from seerob.norms.body_limits import SHIPPED
-from seerob.polytope import zero_moment
-from seerob.snapshot import Hull, Origin, Sphere, Verdict
-from seerob.station import load
+from seerob.core.errors import InputError, UnknownName
+from seerob.core.snapshot import Hull, Origin, Sphere, Verdict
+from seerob.criteria.polytope import zero_moment
+from seerob.description.norms.body_limits import SHIPPED
+from seerob.description.robots import library
+from seerob.session.station import load
+from seerob.twin import joint_torques
 
 J = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 0.0]])
 """Of the planar arm at (0, 90°)."""
@@ -218,7 +218,7 @@ def test_torque_limits_that_cannot_be_are_named(tmp_path, wrong):
 
 # -- the sphere of a body region ----------------------------------------------------------------
 
-LIMITS = files("seerob.norms").joinpath(SHIPPED).read_text("utf-8")
+LIMITS = files("seerob.description.norms").joinpath(SHIPPED).read_text("utf-8")
 
 
 @pytest.mark.parametrize(

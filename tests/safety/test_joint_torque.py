@@ -8,12 +8,12 @@ import pytest
 
 from made_cell import heard, made
 from oracles.pinocchio_oracle import pinocchio_model
-from seerob.engine import Engine
-from seerob.errors import InputError
-from seerob.model_io import library
-from seerob.run import Judge
-from seerob.safety.joint_torque import shares
-from seerob.snapshot import Verdict
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Verdict
+from seerob.criteria.safety.joint_torque import shares
+from seerob.description.robots import library
+from seerob.session.run import Judge
+from seerob.twin.engine import Engine
 
 CELL = '[[robots]]\nname = "arm"\nmodel = "library:ur5e"\n[[safety]]\nkind = "joint_torque"\nrobot = "arm"\n'
 Q = np.array([0.3, -1.2, 1.3, -0.9, 0.7, 0.2])

@@ -10,15 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from made_cell import FLOATING, TWO_R, made, person, results_at, state_at, two_r
-from seerob.criterion import Criterion
-from seerob.errors import InputError, Undecided
-from seerob.mounting.mechanisms import stands_out
-from seerob.permissible.between_samples import BetweenSamples
-from seerob.permissible.ceilings import ceilings_of
-from seerob.permissible.given_motion import GivenMotion
-from seerob.planning.clearance import Clearance
-from seerob.run import Bound, Judge
-from seerob.snapshot import Basis, Result, Verdict
+from seerob.core.errors import InputError, Undecided
+from seerob.core.snapshot import Basis, Result, Verdict
+from seerob.criteria.criterion import Criterion
+from seerob.model.mounting.mechanisms import stands_out
+from seerob.session.permissible.between_samples import BetweenSamples
+from seerob.session.permissible.ceilings import ceilings_of
+from seerob.session.permissible.given_motion import GivenMotion
+from seerob.session.planning.clearance import Clearance
+from seerob.session.run import Bound, Judge
 
 LAST = re.compile(r'(<link name="l2">.*?)<collision>.*?</collision>')
 BARE = LAST.sub(r"\1", two_r())

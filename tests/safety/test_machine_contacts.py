@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, judged, made, state_at, two_r
-from seerob.contact.pushing import permissible_while_pushed
-from seerob.errors import InputError
-from seerob.verdict import Verdict
+from seerob.core.errors import InputError
+from seerob.core.verdict import Verdict
+from seerob.criteria.contact.pushing import permissible_while_pushed
 
 CART = """
 [[machines]]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, heard, judged, made, two_r
-from seerob.engine import Engine
-from seerob.permissible.bounds import motions_of, wanted_bounds
-from seerob.snapshot import Verdict
+from seerob.core.snapshot import Verdict
+from seerob.session.permissible.bounds import motions_of, wanted_bounds
+from seerob.twin.engine import Engine
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [7, 0, 0] }\n'
 GATE = """

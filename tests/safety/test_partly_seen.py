@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from made_cell import FLOATING, TWO_R, heard, made, two_r
-from seerob.engine import Engine
-from seerob.human.skeleton import BONES
-from seerob.run import Judge
+from seerob.description.humans.skeleton import BONES
+from seerob.session.run import Judge
+from seerob.twin.engine import Engine
 
 CELL = """[[humans]]
 name = "op"

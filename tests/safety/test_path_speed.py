@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.errors import InputError
-from seerob.safety.path_speed import passed
-from seerob.trajectories.path_map import (
+from seerob.core.errors import InputError
+from seerob.criteria.safety.path_speed import passed
+from seerob.files.trajectories.path_map import (
     GIVEN,
     PERMISSIBLE,
     PIECE,

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.errors import InputError, UnknownName
-from seerob.safety.effective_mass import inverse_effective_mass, principal_masses, projected_mass
-from seerob.safety.kinetic_energy import kinetic_energy
-from seerob.safety.manipulability import singular_values
-from seerob.safety.velocity import point_velocity
+from seerob.core.errors import InputError, UnknownName
+from seerob.criteria.safety.effective_mass import inverse_effective_mass, principal_masses, projected_mass
+from seerob.criteria.safety.kinetic_energy import kinetic_energy
+from seerob.criteria.safety.manipulability import singular_values
+from seerob.criteria.safety.velocity import point_velocity
 
 J = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 0.0]])
 M = np.array([[3.0, 1.0], [1.0, 1.0]])

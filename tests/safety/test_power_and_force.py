@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, heard, judged, made, results_at, state_at, two_r
-from seerob.contact.regions import FORBIDDEN, REGIONS
-from seerob.engine import Engine
-from seerob.errors import InputError
-from seerob.norms.body_limits import SHIPPED
-from seerob.snapshot import Origin, Result, Verdict
-from seerob.station import Station
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Origin, Result, Verdict
+from seerob.criteria.contact.regions import FORBIDDEN, REGIONS
+from seerob.description.norms.body_limits import SHIPPED
+from seerob.session.station import Station
+from seerob.twin.engine import Engine
 
 KEPT = '["Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"]'
 STRETCHED = [0.0, 0.0]
@@ -332,7 +332,7 @@ def test_marker_never_shows_an_exceeded_speed_as_equal(tmp_path: Path) -> None:
 
 
 def test_own_table_replaces_the_figures(tmp_path: Path) -> None:
-    text = files("seerob.norms").joinpath(SHIPPED).read_text("utf-8")
+    text = files("seerob.description.norms").joinpath(SHIPPED).read_text("utf-8")
     tmp_path.joinpath("mine.toml").write_text(
         text.replace('pressure = [120, "2S", "U T S"]', 'pressure = [60, "own", "T"]'), encoding="utf-8"
     )

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, heard, judged, made, results_at, state_at, two_r
-from seerob.engine import Engine
-from seerob.errors import InputError
-from seerob.run import Judge
+from seerob.core.errors import InputError
+from seerob.session.run import Judge
+from seerob.twin.engine import Engine
 
 PERSON = """
 [[humans]]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from made_cell import made, state_at
-from seerob.errors import InputError
-from seerob.judging import Judge
-from seerob.samples import SignalSample
+from seerob.core.errors import InputError
+from seerob.core.samples import SignalSample
+from seerob.criteria.judging import Judge
 
 STATION = """
 variables = "v.toml"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.errors import InputError
-from seerob.safety.separation import separation_bound
+from seerob.core.errors import InputError
+from seerob.criteria.safety.separation import separation_bound
 
 PERSON = """[[humans]]
 name = "op"
@@ -114,11 +114,11 @@ def test_it_takes_one_robot_and_one_human(tmp_path):
 
 def test_unheard_person_is_undecided_even_close_by(tmp_path):
     from made_cell import heard
-    from seerob.engine import Engine
-    from seerob.run import Judge, bind
+    from seerob.session.run import Judge, bind
+    from seerob.twin.engine import Engine
 
     separation(tmp_path, x=3.0)
-    from seerob.station import load
+    from seerob.session.station import load
 
     station = load(tmp_path)
     engine = Engine(station.model, driven={"op": 0.2, "arm": 0.2})

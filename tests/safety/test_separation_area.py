@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, person, results_at, state_at, two_r
-from seerob.engine import Engine
-from seerob.errors import InputError, UnknownName
-from seerob.judging import Judge
-from seerob.volumes.offset_shell import offset_shell
+from seerob.core.errors import InputError, UnknownName
+from seerob.criteria.judging import Judge
+from seerob.distance.offset_shell import offset_shell
+from seerob.twin.engine import Engine
 
 CELL = (
     FLOATING

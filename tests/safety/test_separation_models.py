@@ -20,8 +20,8 @@ from made_separation import (
     station,
     terms,
 )
-from seerob.engine import Engine
-from seerob.errors import InputError
+from seerob.core.errors import InputError
+from seerob.twin.engine import Engine
 
 
 @pytest.mark.parametrize(

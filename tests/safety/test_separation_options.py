@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from seerob.safety.separation import Detection, Separation, Stop
-from seerob.stopping.models import StopTolerance
+from seerob.criteria.safety.separation import Detection, Separation, Stop
+from seerob.criteria.stopping.models import StopTolerance
 
 STOP = Stop(acceleration=0.0, reaction=0.1, stopping=0.3)
 

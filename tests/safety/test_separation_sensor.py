@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, person, results_at, two_r
-from seerob.errors import InputError, UnknownName
+from seerob.core.errors import InputError, UnknownName
 
 CELL = (
     FLOATING

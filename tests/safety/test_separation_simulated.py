@@ -7,9 +7,9 @@ import pytest
 
 from made_cell import state_at, two_r
 from made_separation import ROTOR, SIMULATED, K, V, part, separation, station, terms
-from seerob.stopping import models as stop_models
-from seerob.stopping.simulated import StopSimulation
-from seerob.verdict import Verdict
+from seerob.core.verdict import Verdict
+from seerob.criteria.stopping import models as stop_models
+from seerob.criteria.stopping.simulated import StopSimulation
 
 
 def test_simulated_stop_of_one_joint_is_the_constant_deceleration(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 
 from made_cell import UR10, made, results_at
 from made_separation import JOINT, KNOWN, PERSON, TABLE, V, separation, terms
-from seerob.errors import InputError
+from seerob.core.errors import InputError
 
 
 def test_table_by_hand_with_levers(tmp_path):

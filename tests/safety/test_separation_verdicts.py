@@ -8,13 +8,13 @@ import pytest
 from made_cell import heard, results_at, state_at, two_r
 from made_separation import BOUND, TABLE, K, V, part, separation, station, terms
 from made_separation import KNOWN as TERMS
-from seerob.distances.least import Query
-from seerob.engine import Engine
-from seerob.errors import InputError
-from seerob.human.skeleton import BONES
-from seerob.judging import Judge
-from seerob.stopping.models import MOVING
-from seerob.verdict import Verdict
+from seerob.core.errors import InputError
+from seerob.core.verdict import Verdict
+from seerob.criteria.judging import Judge
+from seerob.criteria.stopping.models import MOVING
+from seerob.description.humans.skeleton import BONES
+from seerob.distance.least import Query
+from seerob.twin.engine import Engine
 
 KNOWN = TERMS + "human_speed = 1.6\n"
 V_H, T = 1.6, 0.4

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from made_cell import FLOATING, made, results_at, state_at
-from seerob.safety.manipulability import STEP, least_value_after
+from seerob.criteria.safety.manipulability import STEP, least_value_after
 
 
 def test_the_joint_that_leads_out_of_a_singularity_is_named(tmp_path):

@@ -5,12 +5,12 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, heard, made, two_r
 from made_sweep import inside
-from seerob.engine import Engine
-from seerob.errors import InputError
-from seerob.geometry import Mesh
-from seerob.run import Judge
-from seerob.snapshot import Verdict
-from seerob.volumes.swept import swept_volume
+from seerob.core.errors import InputError
+from seerob.core.shapes.geometry import Mesh
+from seerob.core.snapshot import Verdict
+from seerob.model.volumes.swept import swept_volume
+from seerob.session.run import Judge
+from seerob.twin.engine import Engine
 
 SWEPT = '[[safety]]\nkind = "swept_volume"\nname = "swept"\nof = "arm"\nvoxel = 0.05\n'
 

@@ -15,8 +15,8 @@ import pytest
 
 from made_cell import FLOATING, hinge_limits, made, state_at
 from oracles import pinocchio_oracle as oracle
-from seerob.safety.effective_mass import inverse_effective_mass, principal_masses, projected_mass
-from seerob.safety.kinetic_energy import kinetic_energy
+from seerob.criteria.safety.effective_mass import inverse_effective_mass, principal_masses, projected_mass
+from seerob.criteria.safety.kinetic_energy import kinetic_energy
 
 GANTRY = "".join(
     f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{name}_link"/>'
@@ -160,7 +160,7 @@ def test_mass_jacobian_energy_and_effective_mass_are_pinocchios(tmp_path, name):
 )
 def test_moving_masses_of_the_maker(tmp_path, name, mass):
     """Sums of the maker's files without the base; half of it is what Annex A counts of a bare arm."""
-    from seerob.contact.impact_mass import moving_masses, simplified_mass
+    from seerob.criteria.contact.impact_mass import moving_masses, simplified_mass
 
     model = made(tmp_path, f'[[robots]]\nname = "arm"\nmodel = "library:{name}"\n').model
     assert moving_masses(model, model.robot("arm")) == pytest.approx((mass, 0), abs=5e-5)

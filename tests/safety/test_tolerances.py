@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob.contact.impact_mass import simplified_mass
-from seerob.distances.least import Query
-from seerob.errors import InputError
-from seerob.human.skeleton import BONES
-from seerob.judging import Judge
-from seerob.mounting.mass_tolerances import MassTolerances
-from seerob.tolerances import Tolerance, deciding, spread
-from seerob.whereabouts.tracking_error import TrackingError
+from seerob.core.errors import InputError
+from seerob.core.tolerances import Tolerance, deciding, spread
+from seerob.criteria.contact.impact_mass import simplified_mass
+from seerob.criteria.judging import Judge
+from seerob.description.humans.skeleton import BONES
+from seerob.distance.least import Query
+from seerob.twin.accuracy.mass_tolerances import MassTolerances
+from seerob.twin.accuracy.tracking_error import TrackingError
 
 POSE = ((0.0, np.pi / 2), (1.0, -2.0))
 GRIP = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = {{ sphere = 0.02 }}\nmass = {mass}\n{more}\n'

@@ -8,12 +8,12 @@ import pytest
 
 from made_cell import FLOATING, TWO_R, heard, judged, made, two_r
 from oracles import pinocchio_oracle as oracle
-from seerob.engine import Engine
-from seerob.errors import InputError
-from seerob.model_io import library
-from seerob.run import Judge
-from seerob.safety.tool_force import ToolForce, largest_error, wrench_from_torques
-from seerob.snapshot import Verdict
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Verdict
+from seerob.criteria.safety.tool_force import ToolForce, largest_error, wrench_from_torques
+from seerob.description.robots import library
+from seerob.session.run import Judge
+from seerob.twin.engine import Engine
 
 TOOL = '[[safety]]\nkind = "tool_force"\nname = "force"\nat = "arm"\n'
 UR5E = '[[robots]]\nname = "arm"\nmodel = "library:ur5e"\n'

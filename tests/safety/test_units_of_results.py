@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.criterion import Criterion
-from seerob.plugin import load
+from seerob.core.plugin import load
+from seerob.criteria.criterion import Criterion
 
 CELL = """
 [[humans]]

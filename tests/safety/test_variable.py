@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
-from seerob.errors import InputError
-from seerob.judging import Judge
-from seerob.samples import SignalSample
+from seerob.core.errors import InputError
+from seerob.core.samples import SignalSample
+from seerob.criteria.judging import Judge
 
 PLC = 'variables = "v.toml"\n{}[[sources]]\nkind = "mqtt"\nname = "plc"\nhost = "127.0.0.1"\nport = 1\n'
 DICTIONARY = "".join(

@@ -12,26 +12,26 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob import joint_torques
-from seerob.answers import judge_many
-from seerob.contact.areas import area_results, margin
-from seerob.contact.limits import Judged, RegionArrays
-from seerob.contact.shape import ContactShape, force_at_pressure
-from seerob.contact.tolerances import area_verdict, ranks
-from seerob.criterion import judge, judge_interval, worst
-from seerob.errors import InputError
-from seerob.judging import Judge
-from seerob.norms.body_limits import SHIPPED, parse, shipped
-from seerob.norms.iso_13855 import Approach, Edition, intrusion, minimum_distance, speed_at
-from seerob.results.series import CODES
-from seerob.safety.effective_mass import inverse_effective_mass, principal_masses
-from seerob.safety.manipulability import Manipulability, singular_values
-from seerob.safety.minimum_distance import MinimumDistance
-from seerob.safety.separation import Separation
-from seerob.snapshot import Result, Verdict
-from seerob.tolerances import Spread
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Result, Verdict
+from seerob.core.tolerances import Spread
+from seerob.criteria.contact.areas import area_results, margin
+from seerob.criteria.contact.limits import Judged, RegionArrays
+from seerob.criteria.contact.shape import ContactShape, force_at_pressure
+from seerob.criteria.contact.tolerances import area_verdict, ranks
+from seerob.criteria.criterion import judge, judge_interval, worst
+from seerob.criteria.judging import Judge
+from seerob.criteria.safety.effective_mass import inverse_effective_mass, principal_masses
+from seerob.criteria.safety.manipulability import Manipulability, singular_values
+from seerob.criteria.safety.minimum_distance import MinimumDistance
+from seerob.criteria.safety.separation import Separation
+from seerob.description.norms.body_limits import SHIPPED, parse, shipped
+from seerob.description.norms.iso_13855 import Approach, Edition, intrusion, minimum_distance, speed_at
+from seerob.recording.answers import judge_many
+from seerob.recording.series import CODES
+from seerob.twin import joint_torques
 
-TEXT = files("seerob.norms").joinpath(SHIPPED).read_text("utf-8")
+TEXT = files("seerob.description.norms").joinpath(SHIPPED).read_text("utf-8")
 WITHIN, EXCEEDED, UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 EXCLUDED = '"Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"'
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.errors import InputError
+from seerob.core.errors import InputError
 
 SOURCE = """[[sources]]
 kind = "waypoints"

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, made, results_at
-from seerob.errors import InputError
-from seerob.reading import read
+from seerob.core.errors import InputError
+from seerob.session.reading import read
 
 BALL = '[[parts]]\nname = "ball"\nshape = { sphere = 0.1 }\nat = { position = [1.5, 0.5, 1.0] }\n'
 ROBOT = """

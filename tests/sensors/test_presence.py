@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob.sensors.sensing import Presence, Seen, Sight
+from seerob.criteria.sensors.sensing import Presence, Seen, Sight
 
 MAT = '[[sensors]]\nname = "mat"\n{more}pressure_mat = {{ corners = [[0, 0], [1, 0], [1, 1], [0, 1]] }}\n'
 BOX = '[[parts]]\nname = "{name}"\nshape = {{ box = [0.1, 0.1, 0.1] }}\n'

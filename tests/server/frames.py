@@ -8,8 +8,8 @@ import numpy as np
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from seerob import snapshot as wire
-from seerob.snapshot import Arrow, Basis, Command, CriterionInfo, Node, Result, Scene, Snapshot, Verdict
+from seerob.core import snapshot as wire
+from seerob.core.snapshot import Arrow, Basis, Command, CriterionInfo, Node, Result, Scene, Snapshot, Verdict
 
 PATIENCE = 60.0
 """With what comes for sure [s]."""

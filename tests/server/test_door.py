@@ -6,13 +6,13 @@ import httpx
 import pytest
 from websockets.exceptions import InvalidStatus
 
-from seerob.errors import InputError
-from seerob.host_name import is_loopback
-from seerob.server.door import HEADERS
-from seerob.server.live import Live
-from seerob.server.player import Player
-from seerob.server.serving import Server
-from seerob.snapshot import PROTOCOL, Snapshot
+from seerob.app.server.door import HEADERS
+from seerob.app.server.live import Live
+from seerob.app.server.player import Player
+from seerob.app.server.serving import Server
+from seerob.core.errors import InputError
+from seerob.core.host_name import is_loopback
+from seerob.core.snapshot import PROTOCOL, Snapshot
 from server.frames import MESHES, PATIENCE, Remembered, Visitor, raw, scene, snapshot, stripped
 
 TOKEN = "0123456789abcdef0123456789abcdef"

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from websockets.exceptions import InvalidStatus
 
-from seerob.human.estimated import estimated
-from seerob.human.mapping import conventions
-from seerob.live.headset_offers import LONGEST_NAME, MOST_NAMES, OFFERS, SHORTEST
-from seerob.live.listening import Listener
-from seerob.server.live import Live
-from seerob.server.serving import Server
-from seerob.snapshot import Tracked, Tracking
-from seerob.sources.headset import Headset
+from seerob.app.server.live import Live
+from seerob.app.server.serving import Server
+from seerob.core.snapshot import Tracked, Tracking
+from seerob.description.capture.estimated import estimated
+from seerob.description.capture.mapping import conventions
+from seerob.devices.live.headset_offers import LONGEST_NAME, MOST_NAMES, OFFERS, SHORTEST
+from seerob.devices.live.listening import Listener
+from seerob.devices.sources.headset import Headset
 from server.frames import MESHES, PATIENCE, Visitor, scene
 
 POINTS = ("viewer", "left-grip", "right-grip")

@@ -11,9 +11,9 @@ import msgspec
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from seerob.server.player import Player
-from seerob.server.serving import LARGEST_MESSAGE, Server
-from seerob.snapshot import PROTOCOL, Snapshot
+from seerob.app.server.player import Player
+from seerob.app.server.serving import LARGEST_MESSAGE, Server
+from seerob.core.snapshot import PROTOCOL, Snapshot
 from server.frames import MESHES, PATIENCE, Remembered, Visitor, raw, scene, snapshot, stripped
 
 

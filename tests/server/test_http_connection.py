@@ -8,10 +8,10 @@ import httpx
 import pytest
 from websockets.exceptions import WebSocketException
 
-from seerob.server.http_connection import PromptRequests
-from seerob.server.player import Player
-from seerob.server.serving import Server
-from seerob.snapshot import Snapshot
+from seerob.app.server.http_connection import PromptRequests
+from seerob.app.server.player import Player
+from seerob.app.server.serving import Server
+from seerob.core.snapshot import Snapshot
 from server.frames import MESHES, Remembered, Visitor, scene, snapshot, stripped
 
 DEADLINE = 30.0

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seerob.server.past import KEPT_PER_BUCKET, Past, keep, width_of
-from seerob.snapshot import Result, Snapshot, Verdict
+from seerob.app.server.past import KEPT_PER_BUCKET, Past, keep, width_of
+from seerob.core.snapshot import Result, Snapshot, Verdict
 
 CODES = {Verdict.WITHIN: 0, Verdict.EXCEEDED: 1, Verdict.UNDECIDED: 2, None: 255}
 

@@ -8,17 +8,17 @@ import pytest
 from msgspec.structs import replace as replaced
 
 from live_story import wait_for
-from seerob.recordings.recording import Recording
-from seerob.results.result_log import ResultLog
-from seerob.server import hub
-from seerob.server.client import WINDOW
-from seerob.server.live import Live, LiveView
-from seerob.server.player import Player
-from seerob.server.serving import Server
-from seerob.sink import Writer
-from seerob.sinks.recorder import Recorder
-from seerob.snapshot import Hello, History, Scene, Snapshot, SoFar, Transport, Verdict
-from seerob.wire import schema
+from seerob.app.server import hub
+from seerob.app.server.client import WINDOW
+from seerob.app.server.live import Live, LiveView
+from seerob.app.server.player import Player
+from seerob.app.server.serving import Server
+from seerob.app.wire import schema
+from seerob.core.snapshot import Hello, History, Scene, Snapshot, SoFar, Transport, Verdict
+from seerob.outputs.sink import Writer
+from seerob.outputs.sinks.recorder import Recorder
+from seerob.recording.recording import Recording
+from seerob.recording.result_log import ResultLog
 from server.frames import MESHES, Remembered, Visitor, scene, snapshot, stripped
 
 

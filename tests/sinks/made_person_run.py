@@ -4,10 +4,8 @@ import math
 
 import numpy as np
 
-from seerob.human import manikin
-from seerob.human.skeleton import BONES, JOINTS, bone_poses
-from seerob.samples import BodyPoint, BodySample, Quality
-from seerob.snapshot import (
+from seerob.core.samples import BodyPoint, BodySample, Quality
+from seerob.core.snapshot import (
     Aspect,
     CriterionInfo,
     JointInfo,
@@ -19,7 +17,9 @@ from seerob.snapshot import (
     Snapshot,
     Verdict,
 )
-from seerob.transforms import wxyz_from_rotation
+from seerob.core.transforms import wxyz_from_rotation
+from seerob.description.humans import manikin
+from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
 
 PERSON = manikin.build(name="op", stature=1.75, mass=75, sex="male")
 PERIOD = 0.01

@@ -7,8 +7,8 @@ import struct
 import numpy as np
 from msgspec.structs import replace
 
-from seerob.samples import JointSample, PoseSample, Quality, SignalSample
-from seerob.snapshot import (
+from seerob.core.samples import JointSample, PoseSample, Quality, SignalSample
+from seerob.core.snapshot import (
     Arrow,
     Basis,
     Box,

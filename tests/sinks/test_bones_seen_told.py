@@ -1,8 +1,8 @@
 """The report's table of tracking errors says of how many bones it speaks; a score says what it may be."""
 
-from seerob.figures import whatever_is_missing
-from seerob.results.bone_errors import BoneErrors
-from seerob.sinks._bone_errors import bones_told
+from seerob.core.figures import whatever_is_missing
+from seerob.outputs.report.bone_errors import bones_told
+from seerob.recording.bone_errors import BoneErrors
 
 
 def test_the_median_of_five_bones_is_not_called_that_of_the_person():

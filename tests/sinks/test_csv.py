@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from seerob.errors import InputError
-from seerob.human.skeleton import BONES, JOINTS
-from seerob.sinks import opensim
-from seerob.sinks.csv import CsvFiles
-from seerob.sinks.opensim import OpenSim
-from seerob.source import Target
-from seerob.sources.joint_angles import JointAngleFile
+from seerob.core.errors import InputError
+from seerob.description.humans.skeleton import BONES, JOINTS
+from seerob.devices.sources.joint_angles import JointAngleFile
+from seerob.outputs.sinks import opensim
+from seerob.outputs.sinks.csv import CsvFiles
+from seerob.outputs.sinks.opensim import OpenSim
+from seerob.workstation.source import Target
 
 N = 100
 

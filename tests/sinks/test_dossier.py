@@ -9,10 +9,10 @@ import made_run
 import pytest
 from msgspec.structs import replace
 
-from seerob.errors import InputError
-from seerob.results.result_log import ResultLog
-from seerob.sinks.dossier import Dossier
-from seerob.snapshot import Result, Verdict
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Result, Verdict
+from seerob.outputs.sinks.dossier import Dossier
+from seerob.recording.result_log import ResultLog
 
 VOID = {"meta", "img", "br", "col", "link", "input", "hr", "base"}
 
@@ -142,7 +142,7 @@ def test_pictures_are_drawn_for_the_worst_criteria_first(tmp_path, page):
 
 def test_the_file_is_replaced_whole_or_left(tmp_path, monkeypatch):
     before = write(tmp_path, 2, pictures=0)
-    monkeypatch.setattr("seerob.sinks._page.page", lambda _: 1 / 0)
+    monkeypatch.setattr("seerob.outputs.report.page.page", lambda _: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         write(tmp_path, 3, pictures=0)
     assert (tmp_path / "report.html").read_text() == before

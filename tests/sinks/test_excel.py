@@ -7,14 +7,14 @@ import msgspec
 import openpyxl
 import pytest
 
-from seerob.errors import InputError
-from seerob.figures import DECIMALS
-from seerob.norms.editions import editions
-from seerob.results.result_log import log_of
-from seerob.results.series import CODES
-from seerob.sinks import _sheets as sheets_module
-from seerob.sinks.excel import Excel
-from seerob.snapshot import Verdict
+from seerob.core.errors import InputError
+from seerob.core.figures import DECIMALS
+from seerob.core.snapshot import Verdict
+from seerob.description.norms.editions import editions
+from seerob.outputs.sinks.excel import Excel
+from seerob.outputs.workbook import sheets as sheets_module
+from seerob.recording.result_log import log_of
+from seerob.recording.series import CODES
 
 N = 120
 WORDS = {code: "" if v is None else v.value for v, code in CODES.items()}

@@ -6,10 +6,10 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from seerob.geometry import Mesh
-from seerob.model_io.glb import glb_bytes
-from seerob.sinks.recorder import Recorder
-from seerob.transforms import rotation_from_axis_angle, rotation_from_wxyz
+from seerob.core.shapes.geometry import Mesh
+from seerob.core.transforms import rotation_from_axis_angle, rotation_from_wxyz
+from seerob.description.shapes.glb import glb_bytes
+from seerob.outputs.sinks.recorder import Recorder
 
 
 def record(folder, n, *, meshes=made_run.MESHES):

@@ -5,13 +5,13 @@ import numpy as np
 import openpyxl
 import pytest
 
-from seerob.errors import InputError
-from seerob.results.result_log import log_of
-from seerob.sinks import _posture_safety
-from seerob.sinks._growing_table import GrowingTable
-from seerob.sinks._thinning import ThinnedTable
-from seerob.sinks.dossier import Dossier
-from seerob.sinks.excel import Excel
+from seerob.core.errors import InputError
+from seerob.outputs.report import posture_safety as _posture_safety
+from seerob.outputs.sinks.dossier import Dossier
+from seerob.outputs.sinks.excel import Excel
+from seerob.outputs.tables.growing_table import GrowingTable
+from seerob.outputs.tables.thinning import ThinnedTable
+from seerob.recording.result_log import log_of
 
 N = 100
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from seerob.errors import InputError
-from seerob.human.skeleton import BONES, JOINTS
-from seerob.motion_io import joint_angles, opensim_coordinates, trc
-from seerob.sinks import opensim
-from seerob.sinks._measured_coordinates import EstimatedCoordinates
-from seerob.sinks._people import people
-from seerob.sinks.opensim import OpenSim
+from seerob.core.errors import InputError
+from seerob.description.humans.skeleton import BONES, JOINTS
+from seerob.files.motion_capture import joint_angles, opensim_coordinates, trc
+from seerob.outputs.sinks import opensim
+from seerob.outputs.sinks.opensim import OpenSim
+from seerob.outputs.tables.measured_coordinates import EstimatedCoordinates
+from seerob.outputs.tables.people import people
 
 N = 100
 

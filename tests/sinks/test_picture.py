@@ -8,17 +8,28 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from seerob.errors import InputError
-from seerob.geometry import Mesh
+from seerob.core.errors import InputError
+from seerob.core.shapes.geometry import Mesh
+from seerob.core.snapshot import (
+    Arrow,
+    Box,
+    Highlight,
+    Label,
+    Node,
+    Result,
+    Segment,
+    Snapshot,
+    Sphere,
+    Verdict,
+)
+from seerob.description.shapes.glb import glb_bytes
 from seerob.kernels.raster import raster
-from seerob.model_io.glb import glb_bytes
-from seerob.sinks._camera import look_along
-from seerob.sinks._canvas import in_front
-from seerob.sinks._glb_reader import read_glb
-from seerob.sinks._palette import FILL
-from seerob.sinks._picture import Stage
-from seerob.sinks._stage_bodies import creases, tone
-from seerob.snapshot import Arrow, Box, Highlight, Label, Node, Result, Segment, Snapshot, Sphere, Verdict
+from seerob.outputs.palette import FILL
+from seerob.outputs.picture.camera import look_along
+from seerob.outputs.picture.canvas import in_front
+from seerob.outputs.picture.glb_reader import read_glb
+from seerob.outputs.picture.picture import Stage
+from seerob.outputs.picture.stage_bodies import creases, tone
 
 RED, GREEN = (0.8, 0.1, 0.1, 1), (0.1, 0.7, 0.1, 1)
 SIZE = (200, 150)

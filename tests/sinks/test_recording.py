@@ -18,12 +18,12 @@ from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
 import seerob
-from seerob.errors import InputError, SeerobError
-from seerob.recordings.format import BASIS, SAMPLES, SCENE, SNAPSHOT
-from seerob.recordings.recording import Recording
-from seerob.sinks import recorder as recorder_module
-from seerob.sinks.recorder import Recorder
-from seerob.snapshot import Scene, Snapshot
+from seerob.core.errors import InputError, SeerobError
+from seerob.core.snapshot import Scene, Snapshot
+from seerob.outputs.sinks import recorder as recorder_module
+from seerob.outputs.sinks.recorder import Recorder
+from seerob.recording.format import BASIS, SAMPLES, SCENE, SNAPSHOT
+from seerob.recording.recording import Recording
 
 N = 150
 
@@ -140,7 +140,7 @@ KILLED = """
 import sys, time
 from pathlib import Path
 import made_run
-from seerob.sinks.recorder import Recorder
+from seerob.outputs.sinks.recorder import Recorder
 writer = Recorder().open(made_run.scene(), made_run.MESHES, made_run.FILES, Path(sys.argv[1]))
 k = 0
 while True:
@@ -222,7 +222,7 @@ def test_checksums_are_in_the_file(path):
 
 
 def test_a_slow_disk_drops_snapshots_before_samples_and_says_so(tmp_path, monkeypatch):
-    from seerob.sinks._mcap_tape import McapTape
+    from seerob.outputs.mcap.tape import McapTape
 
     gate = Event()
     tick = McapTape.tick
@@ -256,7 +256,7 @@ def test_an_interrupt_while_the_thread_begins_leaves_none_and_a_whole_file(tmp_p
 
 
 def test_lossless_waits_instead_of_dropping(tmp_path, monkeypatch):
-    from seerob.sinks._mcap_tape import McapTape
+    from seerob.outputs.mcap.tape import McapTape
 
     tick = McapTape.tick
     monkeypatch.setattr(McapTape, "tick", lambda *a: (time.sleep(1e-3), tick(*a))[1])
@@ -267,7 +267,7 @@ def test_lossless_waits_instead_of_dropping(tmp_path, monkeypatch):
 
 
 def test_a_disk_that_refuses_stops_the_recording_not_the_run(tmp_path, monkeypatch):
-    from seerob.sinks._mcap_tape import McapTape
+    from seerob.outputs.mcap.tape import McapTape
 
     def refuse(*_):
         raise OSError(28, "No space left on device")
@@ -286,7 +286,7 @@ def test_a_disk_that_refuses_stops_the_recording_not_the_run(tmp_path, monkeypat
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the full disk of Linux")
 def test_a_full_disk_is_told_also_when_what_waits_cannot_be_written(tmp_path, monkeypatch):
     """Closing the file writes once more, and fails once more."""
-    monkeypatch.setattr("seerob.sinks.recorder.FLUSH_PERIOD", 0.0)
+    monkeypatch.setattr("seerob.outputs.sinks.recorder.FLUSH_PERIOD", 0.0)
     writer = Recorder(lossless=True).open(made_run.scene(), {}, {}, tmp_path)
     with open("/dev/full", "wb") as full:
         os.dup2(full.fileno(), writer._tape._file.fileno())
@@ -353,7 +353,7 @@ def test_wrong_files_are_refused_with_their_name(tmp_path):
 
 
 def test_poses_that_do_not_fit_the_scene_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("seerob.sinks._mcap_tape.VIEW_PERIOD", float("inf"))
+    monkeypatch.setattr("seerob.outputs.mcap.tape.VIEW_PERIOD", float("inf"))
     with Recorder(lossless=True).open(made_run.scene(), {}, {}, tmp_path) as writer:
         writer.write(made_run.snapshot(0), ())
         writer.write(msgspec.structs.replace(made_run.snapshot(1), poses=b"\0" * 28), ())

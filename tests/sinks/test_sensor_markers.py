@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from seerob.sinks._foxglove import marker_update
-from seerob.sinks._marker_shapes import label_of, points_of
-from seerob.snapshot import Polyline, Prism, Rays, Result, Snapshot, Verdict
+from seerob.core.snapshot import Polyline, Prism, Rays, Result, Snapshot, Verdict
+from seerob.outputs.mcap.foxglove import marker_update
+from seerob.outputs.picture.marker_shapes import label_of, points_of
 
 LINE = Polyline(points=((0, 0, 0), (1, 0, 0), (1, 1, 0)), closed=True, label="field")
 PRISM = Prism(outline=((0, 0), (2, 0), (2, 1), (0, 1)), lower=0.0, upper=3.0, verdict=Verdict.WITHIN)

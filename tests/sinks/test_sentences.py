@@ -1,6 +1,6 @@
 """Words of a report that are short keep what they are about."""
 
-from seerob.sinks._sentences import listed, shortened
+from seerob.outputs.sentences import listed, shortened
 
 
 def test_a_text_that_is_too_long_keeps_its_begin_and_its_end_where_the_figure_is():

@@ -13,8 +13,9 @@ import pytest
 from openpyxl.utils import column_index_from_string
 from openpyxl.utils.escape import unescape
 
-from seerob.sinks import _sheet_rows, _sheets
-from seerob.sinks._sheets import workbook
+from seerob.outputs.workbook import sheet_rows as _sheet_rows
+from seerob.outputs.workbook import sheets as _sheets
+from seerob.outputs.workbook.sheets import workbook
 
 
 def written(head, rows, **options):

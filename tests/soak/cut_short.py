@@ -7,8 +7,8 @@ import sys
 import time
 from pathlib import Path
 
-import seerob.errors
-from seerob.recordings.recording import Recording
+import seerob.core.errors
+from seerob.recording.recording import Recording
 
 CELL = """
 title = "Soak"
@@ -50,7 +50,7 @@ def run_and_kill(cell, folder, seconds):
     that write; unless the kill cut that write in two, and then the clock of the run tells.
     """
     environment = dict(os.environ, PYTHONPATH=str(Path(seerob.__file__).parents[1]))
-    command = [sys.executable, "-m", "seerob.cli", "run", str(cell), "-o", str(folder), "--port", "0"]
+    command = [sys.executable, "-m", "seerob.app.cli", "run", str(cell), "-o", str(folder), "--port", "0"]
     process = subprocess.Popen(
         command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
     )
@@ -84,7 +84,7 @@ def first_tick(path, process, patience=120.0):
         now = time.monotonic()
         try:
             recording = Recording.open(path)
-        except seerob.errors.InputError:
+        except seerob.core.errors.InputError:
             recording = None
         if recording is not None and any(True for _ in recording.snapshots()):
             return before - recording.end - 2 * recording.scene.period

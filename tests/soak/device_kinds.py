@@ -11,13 +11,13 @@ import msgspec
 import numpy as np
 
 from free_ports import free_port
-from seerob.emulators.background import Emulator
-from seerob.emulators.motions import swing
-from seerob.live.headset_offers import OFFERS, read
-from seerob.live.listening import LiveSource
-from seerob.page_messages import Tracking
-from seerob.source import Target
-from seerob.variables.dictionary import Variable
+from seerob.app.emulators.background import Emulator
+from seerob.app.emulators.motions import swing
+from seerob.core.page_messages import Tracking
+from seerob.devices.live.headset_offers import OFFERS, read
+from seerob.devices.live.listening import LiveSource
+from seerob.workstation.source import Target
+from seerob.workstation.variables.dictionary import Variable
 from soak.elsewhere import Elsewhere
 
 SILENCE = 0.2
@@ -40,7 +40,7 @@ def target(name, address, unit="mm/s", **more):
 
 
 def person():
-    from seerob.emulators.mvn_person import animated
+    from seerob.app.emulators.mvn_person import animated
 
     return animated("library:reach")
 
@@ -49,36 +49,36 @@ def person():
 
 
 def rtde(_):
-    from seerob.emulators.rtde import RtdeServer
-    from seerob.sources.rtde import Rtde
+    from seerob.app.emulators.rtde import RtdeServer
+    from seerob.devices.sources.rtde import Rtde
 
     server = RtdeServer(swing(SIX)).start()
     return Made(server, Rtde(robot="arm", host=HERE, port=server.port))
 
 
 def fri(patch):
-    from seerob.emulators.fri import FriServer
-    from seerob.sources.fri import Fri
+    from seerob.app.emulators.fri import FriServer
+    from seerob.devices.sources.fri import Fri
 
-    patch.setattr("seerob.sources.fri.SILENCE", SILENCE)
+    patch.setattr("seerob.devices.sources.fri.SILENCE", SILENCE)
     port = free_port()
     return Made(FriServer(swing(SEVEN), to=(HERE, port)).start(), Fri(robot="arm", host=HERE, port=port))
 
 
 def drfl(patch):
-    from seerob.emulators.drfl import DrflSender
-    from seerob.sources.drfl import Drfl
+    from seerob.app.emulators.drfl import DrflSender
+    from seerob.devices.sources.drfl import Drfl
 
-    patch.setattr("seerob.sources.drfl.SILENCE", SILENCE)
+    patch.setattr("seerob.devices.sources.drfl.SILENCE", SILENCE)
     port = free_port()
     return Made(DrflSender(swing(SIX), to=(HERE, port)).start(), Drfl(robot="arm", port=port))
 
 
 def modbus_robot(_):
-    from seerob.emulators.modbus import ModbusServer
-    from seerob.emulators.modbus_robot import program
-    from seerob.protocols.modbus_map import load
-    from seerob.sources.modbus_robot import ModbusRobot
+    from seerob.app.emulators.modbus import ModbusServer
+    from seerob.app.emulators.modbus_robot import program
+    from seerob.devices.sources.modbus_robot import ModbusRobot
+    from seerob.protocols.plc.modbus_map import load
 
     played = program(load("doosan", Path()), swing(SIX), {"robot_state": "moving", "servo_on": True})
     server = ModbusServer(played).start()
@@ -86,7 +86,7 @@ def modbus_robot(_):
 
 
 def opcua_robot(_):
-    from seerob.sources.opcua_robot import OpcuaRobot
+    from seerob.devices.sources.opcua_robot import OpcuaRobot
 
     server = Elsewhere("opcua_robot").start()
     return Made(server, OpcuaRobot(robot="arm", url=f"opc.tcp://{HERE}:{server.port}"))
@@ -96,16 +96,16 @@ def opcua_robot(_):
 
 
 def rosbridge(_):
-    from seerob.emulators.rosbridge import RosbridgeServer
-    from seerob.sources.rosbridge import Rosbridge
+    from seerob.app.emulators.rosbridge import RosbridgeServer
+    from seerob.devices.sources.rosbridge import Rosbridge
 
     server = RosbridgeServer(swing((0.0, 0.0)), ("a", "b"), rate=250.0).start()
     return Made(server, Rosbridge(robot="arm", host=HERE, port=server.port))
 
 
 def ros_tcp(_):
-    from seerob.emulators.ros_tcp import RosTcpEndpoint
-    from seerob.sources.ros_tcp import RosTcp
+    from seerob.app.emulators.ros_tcp import RosTcpEndpoint
+    from seerob.devices.sources.ros_tcp import RosTcp
 
     server = RosTcpEndpoint(swing((0.0, 0.0)), ("a", "b"), rate=250.0).start()
     return Made(server, RosTcp(robot="arm", host=HERE, port=server.port))
@@ -113,17 +113,17 @@ def ros_tcp(_):
 
 def ros_tcp_endpoint(patch):
     """The other side of it: Unity connects."""
-    from seerob.emulators.ros_tcp import UnityProject
-    from seerob.sources.ros_tcp import RosTcp, Side
+    from seerob.app.emulators.ros_tcp import UnityProject
+    from seerob.devices.sources.ros_tcp import RosTcp, Side
 
-    patch.setattr("seerob.sources._ros.SILENCE", SILENCE)
+    patch.setattr("seerob.devices.ros.live_source.SILENCE", SILENCE)
     port = free_port(socket.SOCK_STREAM)
     server = UnityProject(swing((0.0, 0.0)), ("a", "b"), port=port, rate=250.0).start()
     return Made(server, RosTcp(robot="arm", side=Side.ENDPOINT, port=port))
 
 
 def foxglove(_):
-    from seerob.sources.foxglove import Foxglove
+    from seerob.devices.sources.foxglove import Foxglove
 
     server = Elsewhere("foxglove").start()
     return Made(server, Foxglove(robot="arm", host=HERE, port=server.port))
@@ -133,9 +133,9 @@ def foxglove(_):
 
 
 def modbus(_):
-    from seerob.emulators.modbus import ModbusServer
-    from seerob.protocols.modbus import Place, Table, Type
-    from seerob.sources.modbus import Modbus
+    from seerob.app.emulators.modbus import ModbusServer
+    from seerob.devices.sources.modbus import Modbus
+    from seerob.protocols.plc.modbus import Place, Table, Type
 
     place = {"table": "holding", "at": 128, "type": "i16"}
     server = ModbusServer({Place(table=Table.HOLDING, at=128, type=Type.I16): lambda t: 250.0}).start()
@@ -144,8 +144,8 @@ def modbus(_):
 
 
 def siemens_web(patch):
-    from seerob.emulators.siemens_web import SiemensWebServer
-    from seerob.sources.siemens_web import SiemensWeb
+    from seerob.app.emulators.siemens_web import SiemensWebServer
+    from seerob.devices.sources.siemens_web import SiemensWeb
 
     patch.setenv("PLC_PASSWORD", "secret")
     server = SiemensWebServer({"speed": lambda t: 250.0}, user="twin", password="secret").start()
@@ -154,8 +154,8 @@ def siemens_web(patch):
 
 
 def web(_):
-    from seerob.emulators.web import WebServer
-    from seerob.sources.web import Web
+    from seerob.app.emulators.web import WebServer
+    from seerob.devices.sources.web import Web
 
     server = WebServer(lambda t: {"speed": 250.0}).start()
     return Made(server, Web(name="plc", url=server.live, timeout=1.0), target("speed", "/speed"))
@@ -163,16 +163,16 @@ def web(_):
 
 def web_http(_):
     """The other way: asked again and again."""
-    from seerob.emulators.web import STATE, WebServer
-    from seerob.sources.web import Web
+    from seerob.app.emulators.web import STATE, WebServer
+    from seerob.devices.sources.web import Web
 
     server = WebServer(lambda t: {"speed": 250.0}).start()
     return Made(server, Web(name="plc", url=server.url + STATE, every=0.02), target("speed", "/speed"))
 
 
 def opcua(_):
-    from seerob.emulators.opcua import URI
-    from seerob.sources.opcua import Opcua
+    from seerob.app.emulators.opcua import URI
+    from seerob.devices.sources.opcua import Opcua
 
     server = Elsewhere("opcua").start()
     source = Opcua(name="plc", url=f"opc.tcp://{HERE}:{server.port}")
@@ -180,7 +180,7 @@ def opcua(_):
 
 
 def mqtt(_):
-    from seerob.sources.mqtt import Mqtt
+    from seerob.devices.sources.mqtt import Mqtt
 
     server = Elsewhere("mqtt").start()
     return Made(server, Mqtt(name="plc", host=HERE, port=server.port), target("speed", "belt"))
@@ -190,58 +190,58 @@ def mqtt(_):
 
 
 def natnet(patch):
-    from seerob.emulators.natnet import NatnetServer
-    from seerob.sources.natnet import Natnet, Transmission
+    from seerob.app.emulators.natnet import NatnetServer
+    from seerob.devices.sources.natnet import Natnet, Transmission
 
-    patch.setattr("seerob.protocols.natnet_session.SILENCE", SILENCE)
-    patch.setattr("seerob.protocols.natnet_session.ASK_AGAIN", 0.02)
+    patch.setattr("seerob.protocols.tracking.natnet_session.SILENCE", SILENCE)
+    patch.setattr("seerob.protocols.tracking.natnet_session.ASK_AGAIN", 0.02)
     server = NatnetServer({"Anna": person()}, port=free_port()).start()
     options = {"human": "anna", "timeout": 1.0, "transmission": Transmission.UNICAST}
     return Made(server, Natnet(host=HERE, port=server.port, **options))
 
 
 def vrpn(patch):
-    from seerob.emulators.vive import FIVE, WORN
-    from seerob.emulators.vrpn import VrpnServer
-    from seerob.sources.vrpn import Vrpn
+    from seerob.app.emulators.vive import FIVE, WORN
+    from seerob.app.emulators.vrpn import VrpnServer
+    from seerob.devices.sources.vrpn import Vrpn
 
-    patch.setattr("seerob.sources.vrpn.GATHER", 0.02)
+    patch.setattr("seerob.devices.sources.vrpn.GATHER", 0.02)
     server = VrpnServer(person(), {role: WORN[role] for role in FIVE}, port=0).start()
     return Made(server, Vrpn(host=HERE, port=server.port, human="anna", timeout=1.0))
 
 
 def mvn(patch):
-    from seerob.emulators.mvn import MvnSender
-    from seerob.sources.mvn import Mvn
+    from seerob.app.emulators.mvn import MvnSender
+    from seerob.devices.sources.mvn import Mvn
 
-    patch.setattr("seerob.sources.mvn.SILENCE", SILENCE)
+    patch.setattr("seerob.devices.sources.mvn.SILENCE", SILENCE)
     port = free_port()
     return Made(MvnSender({0: person()}, to=(HERE, port)).start(), Mvn(human="anna", port=port, timeout=1.0))
 
 
 def rokoko(patch):
-    from seerob.emulators.rokoko import RokokoSender
-    from seerob.sources.rokoko import Rokoko
+    from seerob.app.emulators.rokoko import RokokoSender
+    from seerob.devices.sources.rokoko import Rokoko
 
-    patch.setattr("seerob.sources.rokoko.SILENCE", SILENCE)
+    patch.setattr("seerob.devices.sources.rokoko.SILENCE", SILENCE)
     port = free_port()
     server = RokokoSender({"Anna": person()}, to=(HERE, port)).start()
     return Made(server, Rokoko(human="anna", bind=HERE, port=port, timeout=1.0))
 
 
 def vive(patch):
-    from seerob.emulators.vive import ViveSender, worn
-    from seerob.sources.vive import Link, Vive
+    from seerob.app.emulators.vive import ViveSender, worn
+    from seerob.devices.sources.vive import Link, Vive
 
-    patch.setattr("seerob.sources.vive.GATHER", 0.02)
+    patch.setattr("seerob.devices.sources.vive.GATHER", 0.02)
     server = ViveSender(worn(person()), to=None, port=0).start()
     return Made(server, Vive(human="anna", link=Link.WEBSOCKET, host=HERE, port=server.port, timeout=1.0))
 
 
 def kinect(_):
-    from seerob.emulators.kinect import KinectSender
-    from seerob.emulators.kinect_person import animated
-    from seerob.sources.kinect import Kinect, Link
+    from seerob.app.emulators.kinect import KinectSender
+    from seerob.app.emulators.kinect_person import animated
+    from seerob.devices.sources.kinect import Kinect, Link
 
     server = KinectSender(animated("library:reach"), to=None, port=0, rate=60.0).start()
     return Made(server, Kinect(human="anna", link=Link.WEBSOCKET, host=HERE, port=server.port, timeout=1.0))
@@ -264,10 +264,10 @@ class Page(Emulator):
 
 
 def headset(patch):
-    from seerob.sources.headset import Headset
+    from seerob.devices.sources.headset import Headset
 
-    patch.setattr("seerob.sources.headset.SILENCE", SILENCE)
-    patch.setattr("seerob.sources.headset.GATHER", 0.02)
+    patch.setattr("seerob.devices.sources.headset.SILENCE", SILENCE)
+    patch.setattr("seerob.devices.sources.headset.GATHER", 0.02)
     return Made(Page().start(), Headset(human="anna", timeout=1.0))
 
 

@@ -79,20 +79,20 @@ Start = Callable[[], object]
 
 
 def opcua(port: int) -> Start:
-    from seerob.emulators.opcua import Emulated, OpcuaServer
+    from seerob.app.emulators.opcua import Emulated, OpcuaServer
 
     return OpcuaServer({"Belt/position": Emulated(lambda t: t, "mm")}, port=port).prepare().start
 
 
 def opcua_robot(port: int) -> Start:
-    from seerob.emulators.motions import swing
-    from seerob.emulators.opcua import OpcuaServer
+    from seerob.app.emulators.motions import swing
+    from seerob.app.emulators.opcua import OpcuaServer
 
     return OpcuaServer(robots={"arm": swing((0.0,) * 6)}, port=port).prepare().start
 
 
 def opcua_standing(port: int) -> Start:
-    from seerob.emulators.opcua import OpcuaServer
+    from seerob.app.emulators.opcua import OpcuaServer
 
     return OpcuaServer(robots={"arm": lambda t: ((0.1,) * 6, (0.0,) * 6)}, port=port).prepare().start
 

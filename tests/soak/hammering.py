@@ -12,7 +12,7 @@ from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 
-from seerob.errors import InputError
+from seerob.core.errors import InputError
 from soak.made_files import KINDS
 
 PATIENCE = 120.0

@@ -11,12 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from motion_io import made_pictures
-from seerob.emulators.mvn_person import animated
-from seerob.emulators.vive import recorded, worn
-from seerob.human import keyframes
-from seerob.human.captured import Seen
-from seerob.human.mapping import read_conventions
-from seerob.motion_io import (
+from seerob.app.emulators.mvn_person import animated
+from seerob.app.emulators.vive import recorded, worn
+from seerob.criteria.postures.zone_file import read_zones
+from seerob.description.capture.captured import Seen
+from seerob.description.capture.mapping import read_conventions
+from seerob.description.humans import keyframes
+from seerob.devices.sources import bvh, mvnx
+from seerob.files.motion_capture import (
     body_csv,
     c3d,
     joint_angles,
@@ -27,14 +29,12 @@ from seerob.motion_io import (
     tracker_file,
     trc,
 )
-from seerob.motion_io.frame_arrays import FAR
-from seerob.motion_io.kinect_recording import Reading
-from seerob.motion_io.kinect_text import FEWEST
-from seerob.motion_io.markers import MarkerReading
-from seerob.postures.zone_file import read_zones
-from seerob.protocols.kinect import LAYOUT
-from seerob.sources import bvh, mvnx
-from seerob.waypoints.reading import read_program
+from seerob.files.motion_capture.frame_arrays import FAR
+from seerob.files.motion_capture.kinect_recording import Reading
+from seerob.files.motion_capture.kinect_text import FEWEST
+from seerob.files.motion_capture.markers import MarkerReading
+from seerob.files.waypoints.reading import read_program
+from seerob.protocols.tracking.kinect import LAYOUT
 from soak.mutations import mutated, mutated_gzip, mutated_text, mutated_zip
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "sources"))

@@ -9,8 +9,8 @@ import pytest
 import trimesh.transformations as transforms
 
 from made_cell import FLOATING, made, results_at, two_r
-from seerob.snapshot import Verdict
-from seerob.station import Station
+from seerob.core.snapshot import Verdict
+from seerob.session.station import Station
 
 pytestmark = pytest.mark.soak
 

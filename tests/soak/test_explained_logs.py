@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seerob.explanation import explain
+from seerob.session.explanation import explain
 from test_explanation import COULOMB, TRUTH, VISCOUS, cell, figures, said
 
 pytestmark = pytest.mark.soak

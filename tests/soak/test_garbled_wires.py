@@ -13,8 +13,8 @@ from msgspec.structs import replace
 from free_ports import free_port
 from live_story import wait_for
 from relay import Datagrams, Garbled, Stream
-from seerob.live.listening import Listener
-from seerob.samples import Quality, SignalSample
+from seerob.core.samples import Quality, SignalSample
+from seerob.devices.live.listening import Listener
 from soak.device_kinds import KINDS
 
 SENDERS = {"fri", "drfl", "mvn", "rokoko"}
@@ -47,9 +47,9 @@ def wired(kind, made):
 @contextmanager
 def heard_through(monkeypatch, kind):
     """The wire, and how many good samples were heard."""
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.002)
-    monkeypatch.setattr("seerob.live.listening.LONGEST_PAUSE", 0.05)
-    monkeypatch.setattr("seerob.emulators.siemens_web.IDLE", 1.0)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.002)
+    monkeypatch.setattr("seerob.devices.live.listening.LONGEST_PAUSE", 0.05)
+    monkeypatch.setattr("seerob.app.emulators.siemens_web.IDLE", 1.0)
     made = KINDS[kind](monkeypatch)
     wire, source = wired(kind, made)
     good = []
@@ -98,7 +98,7 @@ def test_where_packets_end_does_not_matter(monkeypatch, kind, how):
 
 
 def test_what_is_cut_or_damaged_is_a_loss_and_no_mistake(monkeypatch):
-    monkeypatch.setattr("seerob.protocols.modbus_client.PATIENCE", 0.3)
+    monkeypatch.setattr("seerob.protocols.plc.modbus_client.PATIENCE", 0.3)
     with heard_through(monkeypatch, "modbus") as (wire, good):
         for how in (Garbled.CUT, Garbled.NOISE):
             garble(wire, good, how, 5)

@@ -17,11 +17,11 @@ from pkgutil import iter_modules
 import pytest
 
 from live_story import open_files, wait_for
-from seerob import sources
-from seerob.live.listening import Listener, LiveSource
-from seerob.samples import Quality, SignalSample
-from seerob.sources.opcua_robot import OpcuaRobot
-from seerob.whereabouts.hearing import Hearing
+from seerob.core.samples import Quality, SignalSample
+from seerob.devices import sources
+from seerob.devices.live.listening import Listener, LiveSource
+from seerob.devices.sources.opcua_robot import OpcuaRobot
+from seerob.twin.whereabouts.hearing import Hearing
 from soak.device_kinds import FOREIGN, KINDS, OWN
 from soak.elsewhere import Elsewhere
 
@@ -76,12 +76,12 @@ class Ears(logging.Filter):
 
 @pytest.fixture
 def ears(monkeypatch):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.002)
-    monkeypatch.setattr("seerob.live.listening.LONGEST_PAUSE", 0.02)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.002)
+    monkeypatch.setattr("seerob.devices.live.listening.LONGEST_PAUSE", 0.02)
     # A clock that starts again ten times a second is not relied on; here only whether it is heard is asked.
     for name, value in (("RESTART_HOLD", 0.0), ("AGAIN", 0.0), ("HOLD", 0.0), ("DRIFT", 1e9)):
-        monkeypatch.setattr(f"seerob.live.device_clock.{name}", value)
-    log, made = logging.getLogger("seerob.live.listening"), []
+        monkeypatch.setattr(f"seerob.devices.live.device_clock.{name}", value)
+    log, made = logging.getLogger("seerob.devices.live.listening"), []
 
     def make(source):
         made.append(Ears(source))
@@ -203,7 +203,7 @@ def test_a_robot_that_stands_still_is_known_as_long_as_its_server_is_there(ears)
 
 def test_every_live_kind_is_killed():
     kinds = [m.name for m in iter_modules(sources.__path__) if not m.name.startswith("_")]
-    modules = {kind: vars(import_module(f"seerob.sources.{kind}")) for kind in kinds}
+    modules = {kind: vars(import_module(f"seerob.devices.sources.{kind}")) for kind in kinds}
     live = {
         kind
         for kind, names in modules.items()

@@ -14,12 +14,12 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 import seerob as sr
-from seerob.recordings.recording import Recording
-from seerob.server.live import LiveView
-from seerob.sinks.dossier import Dossier
-from seerob.sinks.excel import Excel
-from seerob.sinks.recorder import Recorder
-from seerob.snapshot import Snapshot
+from seerob.app.server.live import LiveView
+from seerob.core.snapshot import Snapshot
+from seerob.outputs.sinks.dossier import Dossier
+from seerob.outputs.sinks.excel import Excel
+from seerob.outputs.sinks.recorder import Recorder
+from seerob.recording.recording import Recording
 from server.frames import Visitor
 from soak.cut_short import workstation
 

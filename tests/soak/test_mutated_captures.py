@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from seerob.emulators.kinect_person import animated
+from seerob.app.emulators.kinect_person import animated
 from seerob.protocols import ProtocolError
-from seerob.protocols.kinect import decode_message, encode_message
+from seerob.protocols.tracking.kinect import decode_message, encode_message
 from soak.mutations import mutated
 
 

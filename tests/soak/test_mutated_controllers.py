@@ -9,14 +9,16 @@ from pymodbus.pdu import DecodePDU
 from pymodbus.pdu.bit_message import ReadCoilsResponse
 from pymodbus.pdu.register_message import ReadHoldingRegistersResponse
 
-from seerob.emulators.drfl import DrflSender
-from seerob.emulators.fri import FriServer
-from seerob.emulators.motions import swing
-from seerob.protocols import ProtocolError, doosan_drfl, fri, rtde, s7_web, sparkplug, ur_primary
-from seerob.protocols.modbus import Block, Place, Table, Type, Words
-from seerob.protocols.modbus_client import Device, take
-from seerob.sources.mqtt import Plain, plain_change
-from seerob.sources.rtde import FIELDS
+from seerob.app.emulators.drfl import DrflSender
+from seerob.app.emulators.fri import FriServer
+from seerob.app.emulators.motions import swing
+from seerob.devices.sources.mqtt import Plain, plain_change
+from seerob.devices.sources.rtde import FIELDS
+from seerob.protocols import ProtocolError
+from seerob.protocols.plc import s7_web, sparkplug
+from seerob.protocols.plc.modbus import Block, Place, Table, Type, Words
+from seerob.protocols.plc.modbus_client import Device, take
+from seerob.protocols.robots import doosan_drfl, fri, rtde, ur_primary
 from soak.mutations import refusals
 
 COUNTS = [pytest.param(1000, id="short"), pytest.param(100_000, id="long", marks=pytest.mark.soak)]

@@ -6,16 +6,17 @@ import msgspec
 import numpy as np
 import pytest
 
-from seerob.emulators import natnet_datagrams
-from seerob.emulators.mvn_person import animated
-from seerob.emulators.natnet import NatnetServer
-from seerob.emulators.rokoko import RokokoSender
-from seerob.emulators.vive import FIVE, WORN, worn
-from seerob.emulators.vrpn import VrpnServer
-from seerob.live import headset_offers
-from seerob.protocols import ProtocolError, natnet, natnet_models, rokoko, vive, vrpn
-from seerob.server.hub import read_message
-from seerob.snapshot import Tracking
+from seerob.app.emulators import natnet_datagrams
+from seerob.app.emulators.mvn_person import animated
+from seerob.app.emulators.natnet import NatnetServer
+from seerob.app.emulators.rokoko import RokokoSender
+from seerob.app.emulators.vive import FIVE, WORN, worn
+from seerob.app.emulators.vrpn import VrpnServer
+from seerob.app.server.hub import read_message
+from seerob.core.snapshot import Tracking
+from seerob.devices.live import headset_offers
+from seerob.protocols import ProtocolError
+from seerob.protocols.tracking import natnet, natnet_models, rokoko, vive, vrpn
 from soak.mutations import refusals
 
 COUNTS = [pytest.param(1500, id="short"), pytest.param(100_000, id="long", marks=pytest.mark.soak)]

@@ -14,11 +14,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "sources"))
 
 from made_mvnx import Q  # tests/sources
 
-from seerob.emulators.mvn_datagrams import datagrams
-from seerob.emulators.mvn_person import Pose, segments
+from seerob.app.emulators.mvn_datagrams import datagrams
+from seerob.app.emulators.mvn_person import Pose, segments
+from seerob.devices.capture.mvn_frames import Frames
 from seerob.protocols import ProtocolError
-from seerob.protocols.mvn import HEADER, Kind, Splitter, decode
-from seerob.sources._mvn_frames import Frames
+from seerob.protocols.tracking.mvn import HEADER, Kind, Splitter, decode
 
 COUNTS = [pytest.param(1000, id="short"), pytest.param(100_000, id="long", marks=pytest.mark.soak)]
 

@@ -4,9 +4,9 @@ import random
 
 import pytest
 
-from seerob.errors import InputError
-from seerob.recordings.recording import Recording
-from seerob.sinks.recorder import Recorder
+from seerob.core.errors import InputError
+from seerob.outputs.sinks.recorder import Recorder
+from seerob.recording.recording import Recording
 from sinks import made_run
 from soak.mutations import mutated
 

@@ -12,19 +12,19 @@ import pytest
 from free_ports import free_port
 from live_story import listening, wait_for
 from relay import HERE, LOOP, Datagrams, Garbled, Stream
-from seerob.emulators.kinect import KinectSender
-from seerob.emulators.kinect_person import animated as seen
-from seerob.emulators.motions import swing
-from seerob.emulators.mvn import MvnSender
-from seerob.emulators.mvn_person import animated
-from seerob.emulators.rokoko import RokokoSender
-from seerob.emulators.rtde import RtdeServer
-from seerob.samples import SignalSample
-from seerob.sources.kinect import Kinect
-from seerob.sources.mvn import Mvn
-from seerob.sources.rokoko import Rokoko
-from seerob.sources.rtde import Rtde
-from seerob.workstation import Pose
+from seerob.app.emulators.kinect import KinectSender
+from seerob.app.emulators.kinect_person import animated as seen
+from seerob.app.emulators.motions import swing
+from seerob.app.emulators.mvn import MvnSender
+from seerob.app.emulators.mvn_person import animated
+from seerob.app.emulators.rokoko import RokokoSender
+from seerob.app.emulators.rtde import RtdeServer
+from seerob.core.samples import SignalSample
+from seerob.devices.sources.kinect import Kinect
+from seerob.devices.sources.mvn import Mvn
+from seerob.devices.sources.rokoko import Rokoko
+from seerob.devices.sources.rtde import Rtde
+from seerob.workstation.workstation import Pose
 
 SOME = 60
 """Samples before anything is wrong."""

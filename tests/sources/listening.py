@@ -2,7 +2,7 @@
 
 import time
 
-from seerob.live.listening import Listener
+from seerob.devices.live.listening import Listener
 
 PATIENCE = 120.0
 

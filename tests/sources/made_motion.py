@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from seerob.source import Target
+from seerob.workstation.source import Target
 
 DOF = 6
 INF = float("inf")

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.motion_io.ros_bag import TimeBase
-from seerob.protocols.ros_messages import Content, Joints, Plan, Point, Transform
-from seerob.protocols.ros_serialised import Edition, encode, store
-from seerob.source import Target
-from seerob.sources._pose_frame import PoseFrame
-from seerob.sources.bag import Bag
+from seerob.core.errors import InputError
+from seerob.devices.motion_files.pose_frame import PoseFrame
+from seerob.devices.sources.bag import Bag
+from seerob.files.motion_capture.ros_bag import TimeBase
+from seerob.protocols.ros.ros_messages import Content, Joints, Plan, Point, Transform
+from seerob.protocols.ros.ros_serialised import Edition, encode, store
+from seerob.workstation.source import Target
 
 NAMES = ("j1", "j2")
 INF = (math.inf, math.inf)

@@ -10,10 +10,10 @@ import pybvh
 import pytest
 from scipy.spatial.transform import Rotation
 
-from seerob.errors import InputError
-from seerob.human.captured import Seen
-from seerob.sources import _bvh_file
-from seerob.sources.bvh import METRES, Unit, Up, guess_unit, read
+from seerob.core.errors import InputError
+from seerob.description.capture.captured import Seen
+from seerob.devices.capture import bvh_file as _bvh_file
+from seerob.devices.sources.bvh import METRES, Unit, Up, guess_unit, read
 
 BODY = {  # joint → parent, offset [m] with y up, facing z
     "Hips": (None, (0, 0, 0)),
@@ -151,7 +151,7 @@ def test_a_tree_and_its_lengths(tmp_path):
 
 def test_chunks_do_not_show(tmp_path, monkeypatch):
     whole = [f.positions for f in read(made(tmp_path / "x.bvh")).frames]
-    monkeypatch.setattr("seerob.sources.bvh.CHUNK", 5)
+    monkeypatch.setattr("seerob.devices.sources.bvh.CHUNK", 5)
     np.testing.assert_array_equal([f.positions for f in read(tmp_path / "x.bvh").frames], whole)
 
 

@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from seerob.errors import InputError
-from seerob.human import manikin
-from seerob.human.captured import Captured, CaptureFrame, Layout, Seen
-from seerob.human.mapping import choose, places
-from seerob.human.observing import bind
-from seerob.human.posture import posture
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.reading import convert_workstation
-from seerob.samples import BodySample, Quality
-from seerob.source import Target
-from seerob.sources._capture_file import CaptureFile
-from seerob.sources._capture_options import Calibration, Mapped, Weights
-from seerob.sources._capture_stream import CaptureStream
-from seerob.transforms import rotation_from_axis_angle, rotation_from_wxyz, wxyz_from_rotation
+from seerob.core.errors import InputError
+from seerob.core.samples import BodySample, Quality
+from seerob.core.transforms import rotation_from_axis_angle, rotation_from_wxyz, wxyz_from_rotation
+from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
+from seerob.description.capture.mapping import choose, places
+from seerob.description.capture.observing import bind
+from seerob.description.humans import manikin
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.devices.capture.file_source import CaptureFile
+from seerob.devices.capture.options import Calibration, Mapped, Weights
+from seerob.devices.capture.stream_source import CaptureStream
+from seerob.session.reading import convert_workstation
+from seerob.workstation.source import Target
 
 PERSON = manikin.build(name="operator", stature=1.75, mass=75, sex="male")
 LAYOUT = Layout(Seen.SEGMENTS, BONES, "seerob")

@@ -6,21 +6,21 @@ from math import inf
 import numpy as np
 import pytest
 
-from seerob.emulators.kinect_person import CAMERA, animated
-from seerob.human import keyframes, manikin, motion
-from seerob.human.skeleton import BONES, JOINTS, bone_poses
-from seerob.motion_io import opensim_coordinates as opensim
-from seerob.motion_io import storage, trc
-from seerob.protocols.kinect import JOINTS as KINECT
-from seerob.protocols.kinect import body_object
-from seerob.samples import Quality
-from seerob.source import Target
-from seerob.sources.body_csv import BodyCsv
-from seerob.sources.joint_angles import JointAngleFile
-from seerob.sources.kinect_recording import KinectRecording
-from seerob.sources.trc import Trc
-from seerob.transforms import wxyz_from_rotation
-from seerob.workstation import Pose
+from seerob.app.emulators.kinect_person import CAMERA, animated
+from seerob.core.samples import Quality
+from seerob.core.transforms import wxyz_from_rotation
+from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
+from seerob.devices.sources.body_csv import BodyCsv
+from seerob.devices.sources.joint_angles import JointAngleFile
+from seerob.devices.sources.kinect_recording import KinectRecording
+from seerob.devices.sources.trc import Trc
+from seerob.files.motion_capture import opensim_coordinates as opensim
+from seerob.files.motion_capture import storage, trc
+from seerob.protocols.tracking.kinect import JOINTS as KINECT
+from seerob.protocols.tracking.kinect import body_object
+from seerob.workstation.source import Target
+from seerob.workstation.workstation import Pose
 
 PERSON = manikin.build(name="anna", stature=1.75, mass=75, sex="male")
 OWN = PERSON.joints()

@@ -8,11 +8,11 @@ from made_mvnx import PERSON, Q, made
 from test_bvh import FRAMES, expected
 from test_bvh import made as made_bvh
 
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.source import Target
-from seerob.sources.bvh import Bvh
-from seerob.sources.mvnx import Mvnx
-from seerob.transforms import rotation_from_wxyz
+from seerob.core.transforms import rotation_from_wxyz
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.devices.sources.bvh import Bvh
+from seerob.devices.sources.mvnx import Mvnx
+from seerob.workstation.source import Target
 
 TARGET = Target(name="op", joints=(), units=(), lower=(), upper=(), velocity=(), description=PERSON)
 BLENDED = {"lumbar", "thorax"}
@@ -51,7 +51,7 @@ def test_a_bvh_file_puts_every_joint_where_it_was(tmp_path):
 
 
 def test_another_person_than_the_one_in_the_file(tmp_path):
-    from seerob.errors import InputError
+    from seerob.core.errors import InputError
 
     made(tmp_path / "x.mvnx", Q)
     with pytest.raises(InputError, match="it has 'Anna'"):

@@ -16,15 +16,15 @@ from hypothesis import strategies as st
 
 from live_story import Story, lived, wait_for
 from made_cell import made
-from seerob import cli
-from seerob.commands.emulating import drfl as emulating
-from seerob.emulators.drfl import DrflSender
-from seerob.errors import InputError
-from seerob.live.listening import Listener
+from seerob.app import cli
+from seerob.app.emulating import drfl as emulating
+from seerob.app.emulators.drfl import DrflSender
+from seerob.core.errors import InputError
+from seerob.core.samples import JointSample, Quality, SignalSample
+from seerob.devices.live.listening import Listener
+from seerob.devices.sources.drfl import Drfl, is_older, joint_sample, states
 from seerob.protocols import ProtocolError
-from seerob.protocols.doosan_drfl import LENGTH, Message, RobotState, decode, encode
-from seerob.samples import JointSample, Quality, SignalSample
-from seerob.sources.drfl import Drfl, is_older, joint_sample, states
+from seerob.protocols.robots.doosan_drfl import LENGTH, Message, RobotState, decode, encode
 
 BRIDGE = Path(__file__).resolve().parents[2] / "bridges/doosan_drfl"
 HOME, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([0.4, 0.2, 0.3, 0.2, 0.4, 0.3])

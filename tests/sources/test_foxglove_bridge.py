@@ -24,12 +24,12 @@ from foxglove.messages import (
 from listening import heard
 
 from live_story import wait_for
-from seerob.emulators.rosbridge import document
-from seerob.live.listening import Listener
-from seerob.protocols.ros_messages import Content, Joints
-from seerob.protocols.ros_serialised import Edition, encode
-from seerob.samples import JointSample, PoseSample
-from seerob.sources.foxglove import Foxglove
+from seerob.app.emulators.rosbridge import document
+from seerob.core.samples import JointSample, PoseSample
+from seerob.devices.live.listening import Listener
+from seerob.devices.sources.foxglove import Foxglove
+from seerob.protocols.ros.ros_messages import Content, Joints
+from seerob.protocols.ros.ros_serialised import Edition, encode
 
 NAMES = ("a", "b")
 TURN = 0.3
@@ -155,7 +155,7 @@ def test_the_tool_comes_out_of_transforms(make):
     ],
 )
 def test_what_is_not_offered_is_said(monkeypatch, caplog, topic, said):
-    monkeypatch.setattr("seerob.sources._ros.SILENCE", 0.5)
+    monkeypatch.setattr("seerob.devices.ros.live_source.SILENCE", 0.5)
     with serving(protobuf) as port:
         content = Content.JOINT_STATE if topic == "/nobody" else Content.TF
         listener = Listener(source(port, topic=topic, content=content), None, lambda _: None)
@@ -166,7 +166,7 @@ def test_what_is_not_offered_is_said(monkeypatch, caplog, topic, said):
 
 
 def test_a_bridge_that_is_restarted_is_heard_again(monkeypatch):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.005)
     samples = []
     context = Context()
     server = foxglove.start_server(host="127.0.0.1", port=0, context=context)

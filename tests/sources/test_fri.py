@@ -10,12 +10,12 @@ import pytest
 
 from live_story import Story, lived, open_files, wait_for
 from made_cell import made
-from seerob.emulators.fri import FriServer
-from seerob.errors import InputError
-from seerob.live.listening import Listener
-from seerob.protocols.fri import Edition, Monitoring, encode_monitoring
-from seerob.samples import JointSample, SignalSample
-from seerob.sources.fri import DeviceTime, Fri
+from seerob.app.emulators.fri import FriServer
+from seerob.core.errors import InputError
+from seerob.core.samples import JointSample, SignalSample
+from seerob.devices.live.listening import Listener
+from seerob.devices.sources.fri import DeviceTime, Fri
+from seerob.protocols.robots.fri import Edition, Monitoring, encode_monitoring
 
 HOME, AMPLITUDE = np.array([0, 0.5, 0, -1.4, 0, 1.2, 0]), np.array([0.4, 0.2, 0.3, 0.2, 0.4, 0.3, 0.5])
 
@@ -119,8 +119,8 @@ def test_strangers_are_not_listened_to(port):
 
 
 def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch, port):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
-    monkeypatch.setattr("seerob.sources.fri.SILENCE", 0.05)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.devices.sources.fri.SILENCE", 0.05)
     files, threads = open_files(), threading.active_count()
     server, heard = FriServer(motion, to=("127.0.0.1", port)), []
     listener = Listener(Fri(robot="arm", host="127.0.0.1", port=port), None, heard.append)

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from seerob import plugin
-from seerob.errors import InputError
-from seerob.human import manikin
-from seerob.human.posture import lowest_sole, posture
-from seerob.source import Source, Target
-from seerob.sources.keyframes import Keyframes
+from seerob.core import plugin
+from seerob.core.errors import InputError
+from seerob.description.humans import manikin
+from seerob.description.humans.posture import lowest_sole, posture
+from seerob.devices.sources.keyframes import Keyframes
+from seerob.workstation.source import Source, Target
 
 PERSON = manikin.build(name="p", stature=1.75, mass=75, sex="male")
 

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from free_ports import free_port
-from seerob.emulators.kinect import KinectSender
-from seerob.emulators.kinect_person import CAMERA, animated
-from seerob.errors import InputError
-from seerob.live.listening import Listener
+from seerob.app.emulators.kinect import KinectSender
+from seerob.app.emulators.kinect_person import CAMERA, animated
+from seerob.core.errors import InputError
+from seerob.core.samples import Quality
+from seerob.core.transforms import wxyz_from_rotation
+from seerob.devices.live.listening import Listener
+from seerob.devices.sources.kinect import Kinect, Link
 from seerob.protocols import ProtocolError
-from seerob.protocols.kinect import BODY_FROM_OPTICAL, Body, Picture, decode_message, encode_message
-from seerob.protocols.kinect_link import NONSENSE, Sieve
-from seerob.samples import Quality
-from seerob.sources.kinect import Kinect, Link
-from seerob.transforms import wxyz_from_rotation
-from seerob.workstation import Pose
+from seerob.protocols.tracking.kinect import BODY_FROM_OPTICAL, Body, Picture, decode_message, encode_message
+from seerob.protocols.tracking.kinect_link import NONSENSE, Sieve
+from seerob.workstation.workstation import Pose
 
 PATIENCE = 120.0
 AT = Pose(position=tuple(CAMERA[:3, 3]), wxyz=tuple(wxyz_from_rotation(CAMERA[:3, :3])))

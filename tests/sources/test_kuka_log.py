@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from made_motion import arrays, motion, target
 
-from seerob.errors import InputError
-from seerob.sources.kuka_log import KukaLog
+from seerob.core.errors import InputError
+from seerob.devices.sources.kuka_log import KukaLog
 
 ROBOT = "LBR_iiwa_7_R800_1"
 

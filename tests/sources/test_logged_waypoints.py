@@ -8,12 +8,12 @@ from made_motion import target
 
 import seerob
 from kept_run import Kept
-from seerob.errors import InputError
-from seerob.samples import JointSample
-from seerob.snapshot import Polyline, Sphere
-from seerob.sources.waypoints import Waypoints
-from seerob.trajectories.trajectory import Trajectory
-from seerob.waypoints.reduction import reduced
+from seerob.core.errors import InputError
+from seerob.core.samples import JointSample
+from seerob.core.snapshot import Polyline, Sphere
+from seerob.devices.sources.waypoints import Waypoints
+from seerob.files.trajectories.trajectory import Trajectory
+from seerob.files.waypoints.reduction import reduced
 
 GIVEN = {"joint_speed": 1.0, "joint_acceleration": 2.0, "joint_jerk": 20.0}
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from made_motion import DOF, arrays, motion, target, write_csv, write_delmia_like, write_sheet
 
-from seerob.errors import InputError
-from seerob.plugin import load
-from seerob.source import Source
-from seerob.sources.csv import Csv
-from seerob.sources.excel import Excel
-from seerob.tables.mapping import Mapping
+from seerob.core.errors import InputError
+from seerob.core.plugin import load
+from seerob.devices.sources.csv import Csv
+from seerob.devices.sources.excel import Excel
+from seerob.files.tables.mapping import Mapping
+from seerob.workstation.source import Source
 
 HEADER = ["Time [s]", *[f"J{i + 1} [rad]" for i in range(DOF)]]
 
@@ -238,19 +238,19 @@ def test_thousands_of_columns_are_no_trouble_and_more_are_refused(tmp_path):
 
 
 def test_more_rows_than_are_taken_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("seerob.tables.grid.MAX_SAMPLES", 10)
+    monkeypatch.setattr("seerob.files.tables.grid.MAX_SAMPLES", 10)
     write_csv(tmp_path / "a.csv", HEADER, rows(20))
     assert "more than 10 rows" in refused(Csv, tmp_path, file="a.csv")
 
 
 def test_larger_files_and_longer_lines_than_are_taken_are_refused(tmp_path, monkeypatch):
     write_csv(tmp_path / "a.csv", HEADER, rows(20))
-    monkeypatch.setattr("seerob.tables.text.MAX_LINE", 50)
+    monkeypatch.setattr("seerob.files.tables.text.MAX_LINE", 50)
     assert "longer than 50 characters" in refused(Csv, tmp_path, file="a.csv")
     write_sheet(tmp_path / "a.xlsx", [HEADER, *rows(20)])
-    monkeypatch.setattr("seerob.tables.workbook.MAX_UNPACKED", 1000)
+    monkeypatch.setattr("seerob.files.tables.workbook.MAX_UNPACKED", 1000)
     assert "more than is taken" in refused(Excel, tmp_path, file="a.xlsx")
-    monkeypatch.setattr("seerob.tables.workbook.MAX_BYTES", 1000)
+    monkeypatch.setattr("seerob.files.tables.workbook.MAX_BYTES", 1000)
     assert "bytes, more than 1000" in refused(Excel, tmp_path, file="a.xlsx")
 
 
@@ -291,7 +291,7 @@ def test_every_kind_is_found_by_its_name_and_describes_its_table(kind):
 def test_naming_a_kind_loads_no_heavy_package():
     code = (
         "import sys, seerob; before = set(sys.modules)\n"
-        "from seerob.plugin import kinds, load; from seerob.source import Source\n"
+        "from seerob.core.plugin import kinds, load; from seerob.workstation.source import Source\n"
         "for kind in kinds('sources'): load('sources', kind, Source)\n"
         "heavy = {'openpyxl', 'mcap', 'scipy', 'mujoco', 'trimesh', 'numba'}\n"
         "print(sorted(heavy & (set(sys.modules) - before)))"

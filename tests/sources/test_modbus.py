@@ -18,20 +18,20 @@ from pymodbus.client import ModbusTcpClient
 
 from live_story import Story, listening, lived, open_files, wait_for
 from made_cell import made
-from seerob import cli
-from seerob.commands.emulating import modbus as emulating
-from seerob.emulators.modbus import ModbusServer
-from seerob.emulators.modbus_robot import program
-from seerob.errors import InputError, UnknownName
-from seerob.protocols.modbus import MOST, Block, Place, Table, Type, Words, blocks, decode, encode
-from seerob.protocols.modbus_map import load, names
-from seerob.recordings.recording import Recording
-from seerob.samples import JointSample, Quality, SignalSample
-from seerob.sinks.recorder import Recorder
-from seerob.source import Target
-from seerob.sources.modbus import Modbus
-from seerob.sources.modbus_robot import ModbusRobot
-from seerob.variables.dictionary import Kind, Variable
+from seerob.app import cli
+from seerob.app.emulating import modbus as emulating
+from seerob.app.emulators.modbus import ModbusServer
+from seerob.app.emulators.modbus_robot import program
+from seerob.core.errors import InputError, UnknownName
+from seerob.core.samples import JointSample, Quality, SignalSample
+from seerob.devices.sources.modbus import Modbus
+from seerob.devices.sources.modbus_robot import ModbusRobot
+from seerob.outputs.sinks.recorder import Recorder
+from seerob.protocols.plc.modbus import MOST, Block, Place, Table, Type, Words, blocks, decode, encode
+from seerob.protocols.plc.modbus_map import load, names
+from seerob.recording.recording import Recording
+from seerob.workstation.source import Target
+from seerob.workstation.variables.dictionary import Kind, Variable
 
 HOME, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([0.4, 0.2, 0.3, 0.2, 0.4, 0.3])
 DOOSAN = load("doosan", Path())
@@ -126,8 +126,8 @@ def test_variables_arrive_and_a_wrong_address_takes_none_with_it():
 
 
 def test_at_start_it_is_told_what_the_device_does_not_have(monkeypatch):
-    monkeypatch.setattr("seerob.live.listening.ASK_WITHIN", 30.0)
-    monkeypatch.setattr("seerob.sources._variables.COVER_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.devices.live.listening.ASK_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.devices.variables.live_source.COVER_WITHIN", 30.0)
     with plc() as server:
         findings = Modbus(host="127.0.0.1", port=server.port).open(Path(), TARGET).findings
     told = {f.subject: f.text for f in findings if f.level == "warning"}
@@ -136,7 +136,7 @@ def test_at_start_it_is_told_what_the_device_does_not_have(monkeypatch):
 
 
 def test_a_device_that_is_switched_off_and_on_is_asked_again(monkeypatch):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.02)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.02)
     server = plc().start()
     files, threads = open_files(), threading.active_count()
     try:
@@ -172,7 +172,7 @@ def test_nobody_can_ask_a_device_what_it_has():
 
 @pytest.mark.parametrize("answer", [b"", b"\x00" * 7, b"HTTP/1.1 400 Bad Request\r\n\r\n", b"\xff" * 300])
 def test_an_answer_that_is_no_modbus_ends_the_connection_and_not_the_source(answer, monkeypatch):
-    monkeypatch.setattr("seerob.protocols.modbus_client.PATIENCE", 0.2)
+    monkeypatch.setattr("seerob.protocols.plc.modbus_client.PATIENCE", 0.2)
 
     def serve():
         link, _ = server.accept()

@@ -11,10 +11,10 @@ from threading import Thread
 import pytest
 
 from live_story import wait_for
-from seerob.live.listening import Listener
-from seerob.protocols.modbus_client import TRIES
-from seerob.samples import JointSample
-from seerob.sources.modbus_robot import ModbusRobot
+from seerob.core.samples import JointSample
+from seerob.devices.live.listening import Listener
+from seerob.devices.sources.modbus_robot import ModbusRobot
+from seerob.protocols.plc.modbus_client import TRIES
 
 POSITION, VELOCITY = 270, 280
 REGISTERS = {259: 2, 260: 1} | {POSITION + k: 100 * k for k in range(6)}
@@ -95,13 +95,13 @@ def test_who_is_busy_is_asked_again():
 
 
 def test_who_stays_busy_is_one_line_of_the_log(monkeypatch, caplog):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
-    monkeypatch.setattr("seerob.protocols.modbus_client.PAUSE", 0.001)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.protocols.plc.modbus_client.PAUSE", 0.001)
     with controller(busy=lambda question: True) as (port, asked):
         listener = Listener(robot(port), None, lambda sample: pytest.fail("nothing was said"))
         listener.start()
         wait_for(lambda: len(asked) > 3 * TRIES)
         listener.ask_to_stop()
         assert listener.join(10)
-    (line,) = [r.getMessage() for r in caplog.records if r.name == "seerob.live.listening"]
+    (line,) = [r.getMessage() for r in caplog.records if r.name == "seerob.devices.live.listening"]
     assert line == f"arm: not heard: busy {TRIES} times in a row"

@@ -16,11 +16,11 @@ from paho.mqtt import publish
 
 from amqtt_broker import broker
 from live_story import listening, open_files, wait_for
-from seerob.errors import InputError
-from seerob.protocols.sparkplug import Metric, Payload, encode
-from seerob.source import Target
-from seerob.sources.mqtt import Mqtt, Plain, address, plain_change
-from seerob.variables.dictionary import Kind, Variable
+from seerob.core.errors import InputError
+from seerob.devices.sources.mqtt import Mqtt, Plain, address, plain_change
+from seerob.protocols.plc.sparkplug import Metric, Payload, encode
+from seerob.workstation.source import Target
+from seerob.workstation.variables.dictionary import Kind, Variable
 
 pytest.importorskip("aiomqtt")
 
@@ -80,8 +80,8 @@ def test_values_arrive_in_si_and_grow_old(port):
 
 
 def test_topics_that_nobody_publishes_to_are_told_at_start(port, monkeypatch, tmp_path):
-    monkeypatch.setattr("seerob.live.listening.ASK_WITHIN", 30.0)
-    monkeypatch.setattr("seerob.sources._variables.COVER_WITHIN", 0.2)
+    monkeypatch.setattr("seerob.devices.live.listening.ASK_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.devices.variables.live_source.COVER_WITHIN", 0.2)
     target = Target(variables=(SPEED, COUNT))
     with broker(port):
         findings = Mqtt(name="plc", host="127.0.0.1", port=port).open(tmp_path, target).findings
@@ -114,8 +114,8 @@ def test_a_sparkplug_device_is_known_from_birth_to_death(port):
 
 
 def test_a_broker_that_is_killed_is_found_again(port, monkeypatch):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.02)
-    monkeypatch.setattr("seerob.live.listening.LONGEST_PAUSE", 0.1)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.02)
+    monkeypatch.setattr("seerob.devices.live.listening.LONGEST_PAUSE", 0.1)
     files, threads = open_files(), threading.active_count()
     with listening_to(port, DOOR) as heard:
         for _ in range(3):
@@ -154,8 +154,8 @@ def test_why_a_broker_left_is_no_riddle_in_the_log(port, caplog):
 
 
 def test_a_broker_that_falls_over_again_and_again_is_tried_again_and_again(port, monkeypatch):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.01)
-    monkeypatch.setattr("seerob.protocols.broker_pulse.PATIENCE", 0.1)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.01)
+    monkeypatch.setattr("seerob.protocols.plc.broker_pulse.PATIENCE", 0.1)
 
     async def wait():
         async with rude(port) as clients:

@@ -15,20 +15,20 @@ from test_bvh import ROOT
 from test_bvh import made as made_bvh
 
 from free_ports import free_port
-from seerob import cli
-from seerob.commands.emulating.mvn import emulated
-from seerob.emulators.mvn import MvnSender
-from seerob.emulators.mvn_datagrams import datagrams
-from seerob.emulators.mvn_person import Pose, animated, followed, recorded, segments
-from seerob.errors import InputError
-from seerob.human.skeleton import BONES, bone_poses
-from seerob.live.listening import Listener
-from seerob.protocols.mvn import Header, Items, Kind, decode, encode, pack_items
-from seerob.protocols.mvn_segments import SEGMENTS, names
-from seerob.source import Target
-from seerob.sources._mvn_frames import BETTER_GONE, MOST_CHARACTERS, Frames, Unit
-from seerob.sources.mvn import Mvn, Transport
-from seerob.transforms import rotation_from_wxyz, wxyz_from_rotation
+from seerob.app import cli
+from seerob.app.emulating.mvn import emulated
+from seerob.app.emulators.mvn import MvnSender
+from seerob.app.emulators.mvn_datagrams import datagrams
+from seerob.app.emulators.mvn_person import Pose, animated, followed, recorded, segments
+from seerob.core.errors import InputError
+from seerob.core.transforms import rotation_from_wxyz, wxyz_from_rotation
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.devices.capture.mvn_frames import BETTER_GONE, MOST_CHARACTERS, Frames, Unit
+from seerob.devices.live.listening import Listener
+from seerob.devices.sources.mvn import Mvn, Transport
+from seerob.protocols.tracking.mvn import Header, Items, Kind, decode, encode, pack_items
+from seerob.protocols.tracking.mvn_segments import SEGMENTS, names
+from seerob.workstation.source import Target
 
 PATIENCE = 120.0
 TARGET = Target(name="op", joints=(), units=(), lower=(), upper=(), velocity=(), description=PERSON)

@@ -9,13 +9,14 @@ import pytest
 from made_mvnx import PERSON, Q, angles, made, segments
 from scipy.spatial.transform import Rotation
 
-from seerob.errors import InputError
-from seerob.human.captured import Seen
-from seerob.protocols.mvn_segments import JOINTS, SEGMENTS
-from seerob.sources import _mvnx_stream, mvnx
-from seerob.sources._mvnx_head import lengths
-from seerob.sources._xsens import anatomical, differences, joint_angles, turns
-from seerob.sources.mvnx import read
+from seerob.core.errors import InputError
+from seerob.description.capture.captured import Seen
+from seerob.devices.capture import mvnx_stream as _mvnx_stream
+from seerob.devices.capture.mvnx_head import lengths
+from seerob.devices.capture.xsens import anatomical, differences, joint_angles, turns
+from seerob.devices.sources import mvnx
+from seerob.devices.sources.mvnx import read
+from seerob.protocols.tracking.mvn_segments import JOINTS, SEGMENTS
 
 CLEAR = np.abs(angles(Q)[..., 0]) < 85
 """Away from the singular pose, where two of three angles are anything, shape (40, 22)."""
@@ -78,7 +79,7 @@ def test_the_clinical_signs():
         ("left_elbow_flexion_deg", "jLeftElbow", 2),
         ("right_ankle_dorsiflexion_deg", "jRightAnkle", 2),
     ):
-        from seerob.human.posture import posture
+        from seerob.description.humans.posture import posture
 
         q = posture(PERSON, {joint: 10.0})
         _, rotations = segments(PERSON, q)

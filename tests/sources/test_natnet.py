@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 
 from free_ports import free_port
-from seerob.emulators import natnet_datagrams
-from seerob.emulators.mvn_person import animated
-from seerob.emulators.natnet import BONES, NatnetServer
-from seerob.motion_io.upright import world_from_file
-from seerob.protocols import ProtocolError, natnet
-from seerob.protocols.natnet import Message
-from seerob.protocols.natnet_models import models
-from seerob.samples import Quality
-from seerob.sources.natnet import Coordinates, Natnet, Tracked, Transmission, _composed
-from seerob.transforms import inverse, rotation_from_wxyz, transform, wxyz_from_rotation
+from seerob.app.emulators import natnet_datagrams
+from seerob.app.emulators.mvn_person import animated
+from seerob.app.emulators.natnet import BONES, NatnetServer
+from seerob.core.samples import Quality
+from seerob.core.transforms import inverse, rotation_from_wxyz, transform, wxyz_from_rotation
+from seerob.devices.sources.natnet import Coordinates, Natnet, Tracked, Transmission, _composed
+from seerob.files.motion_capture.upright import world_from_file
+from seerob.protocols import ProtocolError
+from seerob.protocols.tracking import natnet
+from seerob.protocols.tracking.natnet import Message
+from seerob.protocols.tracking.natnet_models import models
 from sources.listening import by_name, heard
 
 VERSIONS = [(2, 0), (2, 1), (2, 3), (2, 6), (2, 7), (2, 9), (2, 11), (3, 0), (3, 1), (4, 0), (4, 1), (4, 2)]

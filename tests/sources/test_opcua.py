@@ -16,19 +16,19 @@ pytest.importorskip("asyncua")
 from live_story import Story, listening, lived, wait_for
 from made_cell import made
 from relay import Stream
-from seerob.emulators.opcua import URI, Emulated, OpcuaServer
-from seerob.errors import InputError, SeerobError
-from seerob.live.listening import Listener
-from seerob.protocols.opcua_address import Address, address, browse_name, node_name, written
-from seerob.protocols.opcua_client import Security
-from seerob.protocols.opcua_robotics import natural
-from seerob.protocols.opcua_units import number, unit
-from seerob.samples import JointSample, SignalSample
-from seerob.source import Target
-from seerob.sources.opcua import Opcua
-from seerob.sources.opcua_robot import OpcuaRobot
-from seerob.variables.dictionary import Kind, Variable
-from seerob.variables.units import UNITS
+from seerob.app.emulators.opcua import URI, Emulated, OpcuaServer
+from seerob.core.errors import InputError, SeerobError
+from seerob.core.samples import JointSample, SignalSample
+from seerob.devices.live.listening import Listener
+from seerob.devices.sources.opcua import Opcua
+from seerob.devices.sources.opcua_robot import OpcuaRobot
+from seerob.protocols.plc.opcua_address import Address, address, browse_name, node_name, written
+from seerob.protocols.plc.opcua_client import Security
+from seerob.protocols.plc.opcua_robotics import natural
+from seerob.protocols.plc.opcua_units import number, unit
+from seerob.workstation.source import Target
+from seerob.workstation.variables.dictionary import Kind, Variable
+from seerob.workstation.variables.units import UNITS
 
 pytestmark = pytest.mark.xdist_group("opcua")
 """One server for all: starting one takes seconds."""
@@ -58,7 +58,7 @@ def target(*variables, folder=""):
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """A machine under load answers late."""
-    monkeypatch.setattr("seerob.live.listening.ASK_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.devices.live.listening.ASK_WITHIN", 30.0)
 
 
 @pytest.fixture(scope="module")
@@ -106,8 +106,8 @@ def test_what_arrives_late_is_as_old_as_the_newest_question_that_was_answered(se
 
 
 def test_a_server_that_is_killed_is_found_again(monkeypatch):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.05)
-    monkeypatch.setattr("seerob.live.listening.LONGEST_PAUSE", 0.2)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.05)
+    monkeypatch.setattr("seerob.devices.live.listening.LONGEST_PAUSE", 0.2)
     server = OpcuaServer({"Belt/speed": PLC["Belt/speed"]}).start()
     try:
         with listening(Opcua(name="plc", url=server.url), target(SPEED)) as heard:
@@ -148,7 +148,7 @@ def test_a_bool_that_may_be_written_is_and_nothing_else(server, tmp_path):
 
 
 def test_at_start_it_is_told_what_the_server_does_not_have_or_states_otherwise(server, tmp_path, monkeypatch):
-    monkeypatch.setattr("seerob.sources._variables.COVER_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.devices.variables.live_source.COVER_WITHIN", 30.0)
     same = Variable(name="same", source="plc", unit="mm/s", address=f"nsu={URI};s=Belt/speed")
     scaled = Variable(name="scaled", source="plc", unit="m/s", scale=1e-3, address=same.address)
     wrong = Variable(name="wrong", source="plc", unit="kg", scale=1e-3, address=same.address)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from foreign_opcua import URI, foreign_opcua
-from seerob.protocols.opcua_robotics import AXIS, DEVICE, DEVICES, ROBOTICS, SYSTEM
-from seerob.sources.opcua_robot import OpcuaRobot
+from seerob.devices.sources.opcua_robot import OpcuaRobot
+from seerob.protocols.plc.opcua_robotics import AXIS, DEVICE, DEVICES, ROBOTICS, SYSTEM
 from sources.listening import heard
 
 UNIT_DEG = 17476

@@ -1,11 +1,11 @@
 import pytest
 from made_motion import motion, target
 
-from seerob.errors import InputError
-from seerob.samples import JointSample, PoseSample, Quality
-from seerob.sinks.recorder import Recorder
-from seerob.snapshot import Scene, Snapshot
-from seerob.sources.recording import RecordedMotion
+from seerob.core.errors import InputError
+from seerob.core.samples import JointSample, PoseSample, Quality
+from seerob.core.snapshot import Scene, Snapshot
+from seerob.devices.sources.recording import RecordedMotion
+from seerob.outputs.sinks.recorder import Recorder
 
 SCENE = Scene(title="t", edition="", version="0", workstation_hash="0", period=0.01, nodes=())
 

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_motion import DOF, arrays, motion, target, write_csv
 
-from seerob.errors import InputError
-from seerob.sources.robodk import Robodk, error_bits
+from seerob.core.errors import InputError
+from seerob.devices.sources.robodk import Robodk, error_bits
 
 JOINTS = [f"J{i + 1}" for i in range(DOF)]
 SPEEDS = [f"Speed_J{i + 1}" for i in range(DOF)]

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from free_ports import free_port
-from seerob.emulators.mvn_person import animated
-from seerob.emulators.rokoko import RokokoSender
+from seerob.app.emulators.mvn_person import animated
+from seerob.app.emulators.rokoko import RokokoSender
+from seerob.core.samples import Quality
+from seerob.core.transforms import rotation_from_axis_angle, wxyz_from_rotation
+from seerob.devices.sources.rokoko import Rokoko, remarks
 from seerob.protocols import ProtocolError
-from seerob.protocols.rokoko import SEGMENTS, WORLD_FROM_UNITY, Actor, Scene, decode, encode
-from seerob.samples import Quality
-from seerob.sources.rokoko import Rokoko, remarks
-from seerob.transforms import rotation_from_axis_angle, wxyz_from_rotation
+from seerob.protocols.tracking.rokoko import SEGMENTS, WORLD_FROM_UNITY, Actor, Scene, decode, encode
 from sources.listening import by_name, heard
 
 

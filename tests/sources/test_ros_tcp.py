@@ -15,16 +15,17 @@ from listening import heard
 
 from free_ports import free_port
 from live_story import wait_for
-from seerob.commands.emulating import ros_tcp as emulating
-from seerob.emulators.ros_tcp import RosTcpEndpoint, UnityProject
-from seerob.errors import InputError
-from seerob.live.listening import Listener
-from seerob.protocols import ProtocolError, ros_tcp
-from seerob.protocols.ros_messages import Content, Joints, Transform
-from seerob.protocols.ros_serialised import Edition, decode, encode
-from seerob.protocols.ros_tcp import Frame, Splitter
-from seerob.samples import PoseSample
-from seerob.sources.ros_tcp import RosTcp, Side
+from seerob.app.emulating import ros_tcp as emulating
+from seerob.app.emulators.ros_tcp import RosTcpEndpoint, UnityProject
+from seerob.core.errors import InputError
+from seerob.core.samples import PoseSample
+from seerob.devices.live.listening import Listener
+from seerob.devices.sources.ros_tcp import RosTcp, Side
+from seerob.protocols import ProtocolError
+from seerob.protocols.ros import ros_tcp
+from seerob.protocols.ros.ros_messages import Content, Joints, Transform
+from seerob.protocols.ros.ros_serialised import Edition, decode, encode
+from seerob.protocols.ros.ros_tcp import Frame, Splitter
 
 NAMES = ("a", "b", "c")
 

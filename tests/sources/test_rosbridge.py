@@ -14,15 +14,15 @@ from listening import heard
 
 from live_story import Story, lived, open_files, wait_for
 from made_cell import made
-from seerob.emulators.rosbridge import RosbridgeServer
-from seerob.errors import InputError
-from seerob.live.listening import Listener
-from seerob.protocols.ros_messages import Content, Joints, Plan, Point, Transform
-from seerob.protocols.ros_serialised import Edition
-from seerob.protocols.rosbridge import Compression
-from seerob.samples import JointSample, PoseSample, Quality
-from seerob.sources import _ros
-from seerob.sources.rosbridge import Rosbridge
+from seerob.app.emulators.rosbridge import RosbridgeServer
+from seerob.core.errors import InputError
+from seerob.core.samples import JointSample, PoseSample, Quality
+from seerob.devices.live.listening import Listener
+from seerob.devices.ros import live_source as _ros
+from seerob.devices.sources.rosbridge import Rosbridge
+from seerob.protocols.ros.ros_messages import Content, Joints, Plan, Point, Transform
+from seerob.protocols.ros.ros_serialised import Edition
+from seerob.protocols.ros.rosbridge import Compression
 
 UR10 = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 NAMES = tuple(f"{name}_joint" for name in UR10)
@@ -43,8 +43,8 @@ def sorted_motion(t):
 @pytest.fixture(autouse=True)
 def _patient(monkeypatch):
     """A busy machine may take its time to answer at start."""
-    monkeypatch.setattr("seerob.live.listening.ASK_WITHIN", 30.0)
-    monkeypatch.setattr("seerob.sources._ros.ASKED", 20.0)
+    monkeypatch.setattr("seerob.devices.live.listening.ASK_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.devices.ros.live_source.ASKED", 20.0)
 
 
 def cell(folder, server, more="", timeout=0.2):
@@ -83,7 +83,7 @@ def test_joints_come_by_name_in_every_form(edition, compression, caplog):
 
 
 def test_a_server_of_ros_1_that_fails_at_cbor_is_asked_for_json(monkeypatch, caplog):
-    monkeypatch.setattr("seerob.sources._ros.SILENCE", 0.3)
+    monkeypatch.setattr("seerob.devices.ros.live_source.SILENCE", 0.3)
     with RosbridgeServer(motion, NAMES, edition=Edition.ROS1) as server:
         said = source(server, edition=Edition.ROS1, compression=Compression.CBOR)
         assert len(heard(said, lambda s: len(s) > 5)) > 5
@@ -229,7 +229,7 @@ def test_another_robots_joints_and_wrong_counts_are_errors(tmp_path):
 
 
 def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.005)
     server = RosbridgeServer(motion, NAMES, rate=250.0).start()
     samples = []
     files, threads = open_files() if sys.platform == "linux" else 0, threading.active_count()

@@ -13,16 +13,16 @@ import pytest
 
 from live_story import Story, lived, open_files, wait_for
 from made_cell import TWO_R, made, two_r
-from seerob.emulators.rtde import RtdeServer
-from seerob.errors import InputError
-from seerob.live.listening import Listener
+from seerob.app.emulators.rtde import RtdeServer
+from seerob.core.errors import InputError
+from seerob.core.samples import Quality, SignalSample
+from seerob.devices.live.listening import Listener
+from seerob.devices.sources.rtde import Rtde, figures, joint_sample, states
+from seerob.outputs.sinks.recorder import Recorder
 from seerob.protocols import ProtocolError
-from seerob.protocols.rtde_states import RobotMode, SafetyStatus, quality
-from seerob.recorded_station import load_recorded
-from seerob.recordings.recording import Recording
-from seerob.samples import Quality, SignalSample
-from seerob.sinks.recorder import Recorder
-from seerob.sources.rtde import Rtde, figures, joint_sample, states
+from seerob.protocols.robots.rtde_states import RobotMode, SafetyStatus, quality
+from seerob.recording.recording import Recording
+from seerob.session.recorded_station import load_recorded
 
 HOME, AMPLITUDE = np.array([0, -1.2, 1.4, -1.5, -1.5, 0]), np.array([0.5, 0.3, -0.3, 0.4, -0.4, 0.5])
 FASTEST = 1.5
@@ -191,7 +191,7 @@ def test_only_real_time_will_do(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="counts open files in /proc")
 def test_kills_and_restarts_leave_no_thread_and_no_socket(monkeypatch, caplog):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.005)
     server = RtdeServer(motion).start()
     heard = []
     files, threads = open_files(), threading.active_count()
@@ -274,7 +274,7 @@ class Counted(RtdeServer):
 
 def test_a_controller_that_has_lost_its_joints_is_one_line_of_the_log(monkeypatch, caplog):
     """After a change of firmware, say: there is nothing to hear, however often it is tried."""
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.005)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.005)
     samples = []
     with Counted(motion, without=frozenset({"actual_q"})) as server:
         source = Rtde(name="ur", robot="ur10", host="127.0.0.1", port=server.port)
@@ -284,5 +284,5 @@ def test_a_controller_that_has_lost_its_joints_is_one_line_of_the_log(monkeypatc
         listener.ask_to_stop()
         assert listener.join(10)
     assert samples == []
-    (line,) = [r for r in caplog.records if r.name == "seerob.live.listening"]
+    (line,) = [r for r in caplog.records if r.name == "seerob.devices.live.listening"]
     assert "the controller has no actual_q" in line.getMessage()

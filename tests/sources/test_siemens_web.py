@@ -17,13 +17,13 @@ from hypothesis import strategies as st
 
 from live_story import listening, wait_for
 from relay import Stream
-from seerob.emulators.siemens_web import SiemensWebServer
-from seerob.errors import InputError
+from seerob.app.emulators.siemens_web import SiemensWebServer
+from seerob.core.errors import InputError
+from seerob.devices.sources.siemens_web import SiemensWeb
 from seerob.protocols import ProtocolError
-from seerob.protocols.s7_web import PATH, reading, result, results
-from seerob.source import Target
-from seerob.sources.siemens_web import SiemensWeb
-from seerob.variables.dictionary import Kind, Variable
+from seerob.protocols.plc.s7_web import PATH, reading, result, results
+from seerob.workstation.source import Target
+from seerob.workstation.variables.dictionary import Kind, Variable
 
 SPEED = Variable(name="belt/speed", source="plc", address='"Belt".speed', unit="mm/s", timeout=1)
 RUNS = Variable(name="belt/runs", source="plc", address='"Belt".runs', type=Kind.BOOL, timeout=1)
@@ -67,7 +67,7 @@ def test_variables_arrive_and_the_session_is_given_back():
 
 
 def test_a_plc_that_is_switched_off_and_on_is_asked_again(monkeypatch):
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.02)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.02)
     server = plc().start()
     try:
         with listening(source(server), TARGET) as heard:

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from seerob.errors import InputError
-from seerob.source import Target
-from seerob.sources.signals_csv import SignalsCsv
-from seerob.variables.dictionary import Kind, Variable
+from seerob.core.errors import InputError
+from seerob.devices.sources.signals_csv import SignalsCsv
+from seerob.workstation.source import Target
+from seerob.workstation.variables.dictionary import Kind, Variable
 
 SPEED = Variable(name="belt/speed", source="plc", address="v", unit="mm/s", range=(0, 1000))
 CLEAR = Variable(name="clear", source="plc", address="c", type=Kind.BOOL, inverted=True)

@@ -11,16 +11,16 @@ from scipy.spatial.transform import Rotation
 import seerob as sr
 from kept_run import Kept
 from oracles.pinocchio_oracle import pinocchio_model
-from seerob.errors import InputError
-from seerob.model_io.loader import load_robot
-from seerob.plugin import load
-from seerob.run import pump
-from seerob.samples import PoseSample
-from seerob.snapshot import Verdict
-from seerob.source import Source
-from seerob.sources.tool_path import ToolPath
-from seerob.tables.mapping import Mapping
-from seerob.tables.motion import read_motion, read_tool_motion
+from seerob.core.errors import InputError
+from seerob.core.plugin import load
+from seerob.core.samples import PoseSample
+from seerob.core.snapshot import Verdict
+from seerob.description.loader import load_robot
+from seerob.devices.sources.tool_path import ToolPath
+from seerob.files.tables.mapping import Mapping
+from seerob.files.tables.motion import read_motion, read_tool_motion
+from seerob.session.run import pump
+from seerob.workstation.source import Source
 
 HEADER = ["Time [s]", "X [m]", "Y [m]", "Z [m]", "qw", "qx", "qy", "qz"]
 IDENTITY = tuple(tuple(row) for row in np.eye(4).tolist())

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from made_motion import arrays, motion, target, write_csv
 
-from seerob.errors import InputError
-from seerob.samples import Quality
-from seerob.sources.ur_record import UrRecord
+from seerob.core.errors import InputError
+from seerob.core.samples import Quality
+from seerob.devices.sources.ur_record import UrRecord
 
 START = 4029.539
 

@@ -12,20 +12,21 @@ import numpy as np
 import pytest
 
 from free_ports import free_port
-from seerob.emulators.mvn_person import animated
-from seerob.emulators.vive import FIVE, WORN, ViveSender, recorded, worn
-from seerob.errors import InputError
-from seerob.human import manikin
-from seerob.motion_io import tracker_file
-from seerob.protocols import ProtocolError, mvn_segments
-from seerob.protocols.openvr_devices import OpenVr
-from seerob.protocols.vive import Device, Devices, decode, encode, missing, plain_role
-from seerob.samples import Quality
-from seerob.source import Target
-from seerob.sources._worn_trackers import OriginWatch
-from seerob.sources.vive import Link, Vive
-from seerob.sources.vive_recording import ViveRecording
-from seerob.transforms import rotation_from_axis_angle
+from seerob.app.emulators.mvn_person import animated
+from seerob.app.emulators.vive import FIVE, WORN, ViveSender, recorded, worn
+from seerob.core.errors import InputError
+from seerob.core.samples import Quality
+from seerob.core.transforms import rotation_from_axis_angle
+from seerob.description.humans import manikin
+from seerob.devices.capture.worn_trackers import OriginWatch
+from seerob.devices.sources.vive import Link, Vive
+from seerob.devices.sources.vive_recording import ViveRecording
+from seerob.files.motion_capture import tracker_file
+from seerob.protocols import ProtocolError
+from seerob.protocols.tracking import mvn_segments
+from seerob.protocols.tracking.openvr_devices import OpenVr
+from seerob.protocols.tracking.vive import Device, Devices, decode, encode, missing, plain_role
+from seerob.workstation.source import Target
 from sources.listening import by_name, heard
 
 PERSON = animated("library:reach")

@@ -8,13 +8,14 @@ import threading
 import numpy as np
 import pytest
 
-from seerob.emulators.mvn_person import animated
-from seerob.emulators.vive import FIVE, WORN
-from seerob.emulators.vrpn import VrpnServer
-from seerob.motion_io.upright import Up
-from seerob.protocols import ProtocolError, mvn_segments, vrpn
-from seerob.samples import Quality
-from seerob.sources.vrpn import Vrpn, names_of
+from seerob.app.emulators.mvn_person import animated
+from seerob.app.emulators.vive import FIVE, WORN
+from seerob.app.emulators.vrpn import VrpnServer
+from seerob.core.samples import Quality
+from seerob.devices.sources.vrpn import Vrpn, names_of
+from seerob.files.motion_capture.upright import Up
+from seerob.protocols import ProtocolError
+from seerob.protocols.tracking import mvn_segments, vrpn
 from sources.listening import by_name, heard
 
 PERSON = animated("library:reach")

@@ -7,14 +7,14 @@ import zipfile
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.model_io import library
-from seerob.quantities import Pose
-from seerob.reading import convert_workstation
-from seerob.samples import JointSample
-from seerob.source import Target
-from seerob.sources.waypoints import Waypoints
-from seerob.waypoints.reading import read_program
+from seerob.core.errors import InputError
+from seerob.core.quantities import Pose
+from seerob.core.samples import JointSample
+from seerob.description.robots import library
+from seerob.devices.sources.waypoints import Waypoints
+from seerob.files.waypoints.reading import read_program
+from seerob.session.reading import convert_workstation
+from seerob.workstation.source import Target
 
 A = (0.0, -70.0, 80.0, -100.0, -90.0, 0.0)
 B = (20.0, -60.0, 70.0, -95.0, -90.0, 10.0)

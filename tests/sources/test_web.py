@@ -9,13 +9,13 @@ import time
 import pytest
 
 from live_story import listening, open_files, wait_for
-from seerob import cli
-from seerob.commands.emulating import web as emulating
-from seerob.emulators.web import STATE, WebServer
-from seerob.errors import InputError
-from seerob.source import Target
-from seerob.sources.web import Web, leaves
-from seerob.variables.dictionary import Kind, Variable
+from seerob.app import cli
+from seerob.app.emulating import web as emulating
+from seerob.app.emulators.web import STATE, WebServer
+from seerob.core.errors import InputError
+from seerob.devices.sources.web import Web, leaves
+from seerob.workstation.source import Target
+from seerob.workstation.variables.dictionary import Kind, Variable
 
 SPEED = Variable(name="speed", source="plc", address="/belt/speed", unit="mm/s", timeout=5)
 RUNS = Variable(name="runs", source="plc", address="/belt/runs", type=Kind.BOOL, timeout=5)
@@ -31,8 +31,8 @@ def told(t):
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """A machine under load answers late."""
-    monkeypatch.setattr("seerob.live.listening.ASK_WITHIN", 30.0)
-    monkeypatch.setattr("seerob.live.listening.FIRST_PAUSE", 0.02)
+    monkeypatch.setattr("seerob.devices.live.listening.ASK_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.02)
     monkeypatch.setenv("PLC_TOKEN", "secret")
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.results.series import CODES
+from seerob.recording.series import CODES
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [6, 0, -1] }\n'
 ASKED = (

@@ -8,14 +8,14 @@ import pytest
 
 from made_cell import UR10, heard, made, person, state_at, two_r
 from made_separation import KNOWN, TABLE, K, V, part, separation, station, terms
-from seerob.engine import Engine
-from seerob.judging import Judge
-from seerob.run import looks_ahead
-from seerob.safety.separation import MORE
-from seerob.source import Opened, Pump
-from seerob.stopping.onset import Levers, accelerated, by_joints, from_torques, held
-from seerob.stopping.terms import braking, course
-from seerob.verdict import Verdict
+from seerob.core.verdict import Verdict
+from seerob.criteria.judging import Judge
+from seerob.criteria.safety.separation import MORE
+from seerob.criteria.stopping.onset import Levers, accelerated, by_joints, from_torques, held
+from seerob.criteria.stopping.terms import braking, course
+from seerob.session.run import looks_ahead
+from seerob.twin.engine import Engine
+from seerob.workstation.source import Opened, Pump
 
 T_R, T_S, V_H = 0.1, 0.3, 1.6
 OPEN = f"reaction = {T_R}, stopping = {T_S}"

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
-from seerob.contact.impact_mass import Behind
-from seerob.moving_base import RESTS
-from seerob.stopping.models import Stop, bind_stop
-from seerob.stopping.simulated import StopSimulation
+from seerob.criteria.contact.impact_mass import Behind
+from seerob.criteria.stopping.models import Stop, bind_stop
+from seerob.criteria.stopping.simulated import StopSimulation
+from seerob.twin.moving_base import RESTS
 
 AXIS = """
 [[machines]]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, state_at, two_r
-from seerob.stopping.models import Stop, bind_stop
-from seerob.stopping.table import JointStop, StoppingTable
+from seerob.criteria.stopping.models import Stop, bind_stop
+from seerob.criteria.stopping.table import JointStop, StoppingTable
 
 V = np.hypot(2, 0.05)
 """Farthest that a corner of the stretched arm is from its base [m]."""

@@ -5,14 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.errors import Undecided
-from seerob.stopping import search, table
-from seerob.stopping.largest import LargestSeparation
-from seerob.stopping.search import factor_by_search
-from seerob.stopping.table import interpolate, joint_stop
-from seerob.stopping.terms import BOUND, CONSTANT, course, largest_factor, largest_scale, way_of_person
-from seerob.stopping.tolerances import SeparationEnds, intervals
-from seerob.tolerances import Spread, Tolerance
+from seerob.core.errors import Undecided
+from seerob.core.tolerances import Spread, Tolerance
+from seerob.criteria.stopping import search, table
+from seerob.criteria.stopping.largest import LargestSeparation
+from seerob.criteria.stopping.search import factor_by_search
+from seerob.criteria.stopping.table import interpolate, joint_stop
+from seerob.criteria.stopping.terms import (
+    BOUND,
+    CONSTANT,
+    course,
+    largest_factor,
+    largest_scale,
+    way_of_person,
+)
+from seerob.criteria.stopping.tolerances import SeparationEnds, intervals
 
 
 def test_full_speed_until_standstill_is_the_bound_and_half_of_it_a_constant_deceleration():

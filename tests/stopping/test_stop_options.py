@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.snapshot import Origin
-from seerob.stopping.inputs import approach_speed, intrusion
-from seerob.stopping.models import MOVING, SHARE, Stop, StopTolerance, bind_stop
-from seerob.stopping.onset import accelerated
-from seerob.stopping.terms import (
+from seerob.core.snapshot import Origin
+from seerob.core.tolerances import Tolerance
+from seerob.criteria.stopping.inputs import approach_speed, intrusion
+from seerob.criteria.stopping.models import MOVING, SHARE, Stop, StopTolerance, bind_stop
+from seerob.criteria.stopping.onset import accelerated
+from seerob.criteria.stopping.terms import (
     BOUND,
     CONSTANT,
     braking,
@@ -17,8 +18,7 @@ from seerob.stopping.terms import (
     largest_speed_in_time,
     separation_distance,
 )
-from seerob.stopping.tolerances import shifted, tolerances
-from seerob.tolerances import Tolerance
+from seerob.criteria.stopping.tolerances import shifted, tolerances
 
 KNOWN = {"acceleration": 0.0, "reaction": 0.1, "stopping": 0.3}
 HALF = {**KNOWN, "model": "constant_deceleration"}

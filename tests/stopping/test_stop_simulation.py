@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
-from seerob.errors import Undecided
+from seerob.core.errors import Undecided
+from seerob.criteria.stopping.simulated import STEP, StopSimulation
 from seerob.kernels.braking import braked
-from seerob.stopping.simulated import STEP, StopSimulation
 
 M, L, G = 2.0, 0.8, 9.81
 INERTIA = M * L**2
@@ -225,7 +225,7 @@ def test_the_error_falls_with_the_square_of_the_step(tmp_path, monkeypatch):
     """Where it stands, against a sixteenth of the step."""
     ends = []
     for k, step in enumerate((4e-3, 2e-3, 2.5e-4)):
-        monkeypatch.setattr("seerob.stopping.simulated.STEP", step)
+        monkeypatch.setattr("seerob.criteria.stopping.simulated.STEP", step)
         stopped, _, _ = stop(tmp_path / str(k), ONE, [0.8], [-2.0], [25.0], reaction=1e-9)
         at = round(0.2 / step) + 1
         assert stopped.qd[at] < 0

@@ -7,16 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.errors import InputError, Undecided
-from seerob.norms.iso_13855 import (
-    Approach,
-    Edition,
-    intrusion,
-    least_distance,
-    minimum_distance,
-    speed_at,
-)
-from seerob.stopping.terms import (
+from seerob.core.errors import InputError, Undecided
+from seerob.criteria.stopping.terms import (
     BOUND,
     CONSTANT,
     course,
@@ -28,6 +20,14 @@ from seerob.stopping.terms import (
     separation_distance,
     travel,
     worst_case,
+)
+from seerob.description.norms.iso_13855 import (
+    Approach,
+    Edition,
+    intrusion,
+    least_distance,
+    minimum_distance,
+    speed_at,
 )
 
 positive = st.floats(0.01, 5)

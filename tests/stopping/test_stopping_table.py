@@ -8,8 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.errors import Undecided, UnknownName
-from seerob.stopping.table import MOST, JointStop, StoppingTable, interpolate, joint_stop, shipped, table
+from seerob.core.errors import Undecided, UnknownName
+from seerob.criteria.stopping.table import (
+    MOST,
+    JointStop,
+    StoppingTable,
+    interpolate,
+    joint_stop,
+    shipped,
+    table,
+)
 
 THIRDS = (0.33, 0.66, 1.0)
 rng = np.random.default_rng(0)

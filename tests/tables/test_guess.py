@@ -6,10 +6,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from seerob.errors import InputError
-from seerob.tables.guess import guess
-from seerob.tables.mapping import Mapping
-from seerob.tables.motion import read_motion
+from seerob.core.errors import InputError
+from seerob.files.tables.guess import guess
+from seerob.files.tables.mapping import Mapping
+from seerob.files.tables.motion import read_motion
 
 
 def table(path, header, columns, *, delimiter=";", comma=False, above=()):
@@ -195,7 +195,7 @@ def test_a_comma_that_could_separate_thousands_is_asked(tmp_path):
 
 
 def test_linear_joints_have_their_own_unit_and_must_fit_the_robot(tmp_path):
-    from seerob.source import Target
+    from seerob.workstation.source import Target
 
     path = table(tmp_path / "a.csv", ["Time [s]", "J1 [mm]", "J2 [deg]"], [T, Q[:, 0], Q[:, 1]])
     names = {"name": "gantry", "joints": ("x", "c"), "lower": (-9.0, -9.0), "upper": (9.0, 9.0)}

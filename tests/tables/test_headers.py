@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.tables.headers import Role, understand, unit_of
+from seerob.files.tables.headers import Role, understand, unit_of
 
 J, V, A, Q = Role.JOINT, Role.VELOCITY, Role.ACCELERATION, Role.TORQUE
 

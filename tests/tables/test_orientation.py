@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from seerob.tables.orientation import is_convention, wxyz_from
+from seerob.core.orientation import is_convention, wxyz_from
 
 ANGLES = np.random.default_rng(0).uniform(-3, 3, (50, 3))
 SEQUENCES = ["".join(s) for s in product("xyz", repeat=3) if s[0] != s[1] != s[2]]
@@ -25,7 +25,7 @@ def test_rotation_vectors_equal_scipys_down_to_zero():
 
 
 def test_rpy_is_the_fixed_axes_of_urdf():
-    from seerob.transforms import rotation_from_rpy, rotation_from_wxyz
+    from seerob.core.transforms import rotation_from_rpy, rotation_from_wxyz
 
     for angles, wxyz in zip(ANGLES, wxyz_from("rpy", ANGLES), strict=True):
         np.testing.assert_allclose(rotation_from_wxyz(wxyz), rotation_from_rpy(angles), atol=1e-12)

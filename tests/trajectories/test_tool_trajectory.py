@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from seerob.errors import InputError
-from seerob.trajectories.tool_trajectory import PoseSamples, ToolTrajectory, plausible
-from seerob.transforms import transform
+from seerob.core.errors import InputError
+from seerob.core.transforms import transform
+from seerob.files.trajectories.tool_trajectory import PoseSamples, ToolTrajectory, plausible
 
 RNG = np.random.default_rng(3)
 

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.errors import InputError
-from seerob.samples import Quality
-from seerob.trajectories.trajectory import (
+from seerob.core.errors import InputError
+from seerob.core.samples import Quality
+from seerob.files.trajectories.trajectory import (
     MotionOrigin,
     Trajectory,
     TrajectorySamples,

@@ -2,16 +2,16 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from seerob.errors import InputError
-from seerob.source import Target
-from seerob.trajectories.checks import (
+from seerob.core.errors import InputError
+from seerob.files.trajectories.checks import (
     Beyond,
     larger_velocities,
     limit_check,
     sampling_findings,
     velocity_check,
 )
-from seerob.trajectories.trajectory import Trajectory, derive_velocities
+from seerob.files.trajectories.trajectory import Trajectory, derive_velocities
+from seerob.workstation.source import Target
 
 TARGET = Target(
     name="ur10",

@@ -5,10 +5,10 @@ import tomllib
 
 import msgspec
 
-from seerob.protocols import sparkplug
-from seerob.sources.mqtt import Metric, Plain, _nodes, address
-from seerob.variables.dictionary import Variable
-from seerob.variables.skeleton import skeleton
+from seerob.devices.sources.mqtt import Metric, Plain, _nodes, address
+from seerob.devices.variables.skeleton import skeleton
+from seerob.protocols.plc import sparkplug
+from seerob.workstation.variables.dictionary import Variable
 
 
 def test_what_is_browsed_is_an_address_whatever_its_name():

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.errors import InputError
-from seerob.variables.dictionary import BadValue, Kind, Variable, read
-from seerob.variables.units import UNITS, unit
+from seerob.core.errors import InputError
+from seerob.workstation.variables.dictionary import BadValue, Kind, Variable, read
+from seerob.workstation.variables.units import UNITS, unit
 
 
 def variable(**more):

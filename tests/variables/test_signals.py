@@ -11,12 +11,12 @@ import pytest
 from live_story import listening, wait_for
 from made_cell import person
 from seerob import load
-from seerob.run import engine_of
-from seerob.samples import SignalSample
-from seerob.source import Target
-from seerob.sources.web import Web
-from seerob.variables.dictionary import Variable
-from seerob.variables.signals import Signals
+from seerob.core.samples import SignalSample
+from seerob.devices.sources.web import Web
+from seerob.session.run import engine_of
+from seerob.twin.signals import Signals
+from seerob.workstation.source import Target
+from seerob.workstation.variables.dictionary import Variable
 
 SPEED = Variable(name="belt/speed", source="plc", address=1, unit="m/s", timeout=0.5)
 

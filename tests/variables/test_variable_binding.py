@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from seerob import load
-from seerob.errors import InputError
-from seerob.opening import source_target
+from seerob.core.errors import InputError
+from seerob.session.opening import source_target
 
 STATION = """
 variables = "variables.toml"

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.model_io.mesh_bodies import is_closed
-from seerob.model_io.moments import signed_volume
-from seerob.volumes.floor_polygon import (
+from seerob.core.shapes.floor_polygon import (
     check_polygon,
     contains,
     prism_mesh,
     signed_area,
     triangulate,
 )
+from seerob.description.shapes.mesh_bodies import is_closed
+from seerob.description.shapes.moments import signed_volume
 
 L = [(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)]
 

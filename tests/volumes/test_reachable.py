@@ -6,8 +6,8 @@ import pytest
 
 from made_cell import TWO_R, made, two_r
 from made_sweep import inside, outside, points_of
-from seerob.errors import InputError
-from seerob.volumes.reachable import reachable_volume
+from seerob.core.errors import InputError
+from seerob.model.volumes.reachable import reachable_volume
 
 SLIDE = """<robot name="arm"><link name="base"/><link name="a"><collision><geometry><box size="1 1 1"/></geometry>
 </collision></link><joint name="j" type="prismatic"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>

@@ -7,8 +7,8 @@ import pytest
 
 from made_cell import TWO_R, made
 from made_sweep import outside
-from seerob.errors import InputError
-from seerob.volumes.reachable import reachable_volume
+from seerob.core.errors import InputError
+from seerob.model.volumes.reachable import reachable_volume
 
 BOX = '<collision><origin xyz="0.1 0.1 0"/><geometry><box size="{}"/></geometry></collision>'
 LIMIT = '<limit lower="{}" upper="{}" effort="1" velocity="1"/>'

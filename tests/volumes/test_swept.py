@@ -8,9 +8,9 @@ import pytest
 
 from made_cell import TWO_R, made, two_r
 from made_sweep import inside, missed
-from seerob.errors import InputError
-from seerob.volumes.moving import posed
-from seerob.volumes.swept import Sweep, swept_volume
+from seerob.core.errors import InputError
+from seerob.model.volumes.moving import posed
+from seerob.model.volumes.swept import Sweep, swept_volume
 
 GRIPPED = """
 [[tools]]

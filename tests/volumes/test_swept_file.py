@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from made_cell import TWO_R, made, two_r
-from seerob.commands import swept
-from seerob.errors import InputError
-from seerob.geometry import Mesh
-from seerob.model_io.mesh_out import write_mesh
+from seerob.app.commands import swept
+from seerob.core.errors import InputError
+from seerob.core.shapes.geometry import Mesh
+from seerob.description.shapes.mesh_out import write_mesh
 
 
 def options(folder, *more):

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seerob.errors import InputError
-from seerob.model_io import library
-from seerob.waypoints.arm import Arm
-from seerob.waypoints.branches import parse
-from seerob.waypoints.continuous import Wish, continuous
-from seerob.waypoints.inverse import rotation_vectors, solutions
-from seerob.waypoints.joint_limits import JointLimits
-from seerob.waypoints.timing import Limits, needed, profile, reachable
-from seerob.waypoints.waypoint import Move, Program, ToolPose, Waypoint
+from seerob.core.errors import InputError
+from seerob.description.robots import library
+from seerob.files.waypoints.arm import Arm
+from seerob.files.waypoints.branches import parse
+from seerob.files.waypoints.continuous import Wish, continuous
+from seerob.files.waypoints.inverse import rotation_vectors, solutions
+from seerob.files.waypoints.joint_limits import JointLimits
+from seerob.files.waypoints.timing import Limits, needed, profile, reachable
+from seerob.files.waypoints.waypoint import Move, Program, ToolPose, Waypoint
 
 HOME = (0.0, -1.2, 1.4, -1.7, -1.57, 0.0)
 DOWN = (0.0, 1.0, 0.0, 0.0)

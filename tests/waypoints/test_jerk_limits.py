@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from seerob.model_io import library
-from seerob.transforms import rotation_from_rpy, wxyz_from_rotation
-from seerob.waypoints.arm import Arm
-from seerob.waypoints.continuous import Wish, continuous
-from seerob.waypoints.joint_limits import JointLimits
-from seerob.waypoints.waypoint import Move, Program, ToolPose, Waypoint
+from seerob.core.transforms import rotation_from_rpy, wxyz_from_rotation
+from seerob.description.robots import library
+from seerob.files.waypoints.arm import Arm
+from seerob.files.waypoints.continuous import Wish, continuous
+from seerob.files.waypoints.joint_limits import JointLimits
+from seerob.files.waypoints.waypoint import Move, Program, ToolPose, Waypoint
 
 HOME = np.array([0.0, -1.2, 1.4, -1.7, -1.57, 0.0])
 JOINT, TOOL = (1.0, 2.0, 20.0), (0.25, 1.0, 10.0)

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seerob.errors import InputError
-from seerob.waypoints.script_values import FUNCTIONS, NotConstant, PoseValue, Reader, tokens
-from seerob.waypoints.urscript import read_urscript
-from seerob.waypoints.waypoint import Move
+from seerob.core.errors import InputError
+from seerob.files.waypoints.script_values import FUNCTIONS, NotConstant, PoseValue, Reader, tokens
+from seerob.files.waypoints.urscript import read_urscript
+from seerob.files.waypoints.waypoint import Move
 
 PROGRAM = """
 def cell():

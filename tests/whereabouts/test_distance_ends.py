@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, state_at, two_r
-from seerob.distances.least import Query
-from seerob.human.skeleton import BONES
-from seerob.whereabouts.distance_ends import DistanceEnds
-from seerob.whereabouts.tracking_error import TrackingError
+from seerob.description.humans.skeleton import BONES
+from seerob.distance.least import Query
+from seerob.twin.accuracy.distance_ends import DistanceEnds
+from seerob.twin.accuracy.tracking_error import TrackingError
 
 PEOPLE = "".join(
     f'[[humans]]\nname = "{name}"\nstature = 1.75\nmass = 75\nsex = "male"\n'

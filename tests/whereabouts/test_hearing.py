@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, heard, made, recorded, two_r
-from seerob.engine import Engine
-from seerob.errors import InputError, UnknownName
-from seerob.live.device_clock import AFTER
-from seerob.run import Judge, bind, pump, ticks
-from seerob.samples import Quality
-from seerob.source import Opened, Source
-from seerob.whereabouts.hearing import Hearing
+from seerob.core.errors import InputError, UnknownName
+from seerob.core.samples import Quality
+from seerob.devices.live.device_clock import AFTER
+from seerob.session.run import Judge, bind, pump, ticks
+from seerob.twin.engine import Engine
+from seerob.twin.whereabouts.hearing import Hearing
+from seerob.workstation.source import Opened, Source
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 ENERGY = '[[safety]]\nkind = "kinetic_energy"\nname = "energy"\nrobot = "arm"\nlimit = 2000.0\n'

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.human.skeleton import BONES
-from seerob.whereabouts.hearing import SLACK, Hearing
+from seerob.description.humans.skeleton import BONES
+from seerob.twin.whereabouts.hearing import SLACK, Hearing
 
 
 def heard(*instants: float, timeout: float = 0.5) -> Hearing:

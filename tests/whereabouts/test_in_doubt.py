@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from made_cell import FLOATING, TWO_R, heard, made, state_at, two_r
-from seerob.engine import Engine
-from seerob.errors import Undecided
-from seerob.human.skeleton import BONES
-from seerob.run import Judge, bind, ticks
-from seerob.whereabouts.in_doubt import in_doubt
+from seerob.core.errors import Undecided
+from seerob.description.humans.skeleton import BONES
+from seerob.session.in_doubt import in_doubt
+from seerob.session.run import Judge, bind, ticks
+from seerob.twin.engine import Engine
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 KNIFE = '[[tools]]\nname = "knife"\non = "op/right_hand"\nshape = { box = [0.02, 0.02, 0.2] }\nmass = 0.1\n'

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.human.skeleton import BONES, PARENTS
-from seerob.whereabouts.told_bones import told_between, told_bound, told_errors
+from seerob.description.humans.skeleton import BONES, PARENTS
+from seerob.twin.whereabouts.told_bones import told_between, told_bound, told_errors
 
 
 def elbow(P, C, a, b, angle, rng):

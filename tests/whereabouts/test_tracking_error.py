@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, person, state_at, two_r
-from seerob.distances.least import Query
-from seerob.human.skeleton import BONES
-from seerob.judging import Judge
-from seerob.whereabouts.tracking_error import TrackingError, tracking
+from seerob.criteria.judging import Judge
+from seerob.description.humans.skeleton import BONES
+from seerob.distance.least import Query
+from seerob.twin.accuracy.tracking_error import TrackingError, tracking
 
 PEOPLE = person("op", 3, 0, 0) + person("other", -9, 0, 0)
 AREA = '[[areas]]\nname = "zone"\nshape = { box = [1, 1, 3] }\n'

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from made_cell import made
-from seerob.snapshot import Result, Snapshot
+from seerob.core.snapshot import Result, Snapshot
 
 STATION = """
 allow_writing = true

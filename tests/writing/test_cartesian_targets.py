@@ -10,17 +10,17 @@ import pytest
 
 from live_story import wait_for
 from made_cell import made
-from seerob.emulators.motions import swing
-from seerob.emulators.ros_tcp import RosTcpEndpoint
-from seerob.emulators.rosbridge import RosbridgeServer
-from seerob.errors import InputError
-from seerob.protocols.ros_serialised import Edition
-from seerob.samples import PoseSample, Quality
-from seerob.snapshot import Snapshot
-from seerob.transforms import rotation_from_wxyz, transform
-from seerob.writing.cartesian_targets import CartesianTargets, message, targets_allowed
-from seerob.writing.target_table import CartesianTarget, TargetMessage, TargetWire
-from seerob.writing.target_wires import serialised
+from seerob.app.emulators.motions import swing
+from seerob.app.emulators.ros_tcp import RosTcpEndpoint
+from seerob.app.emulators.rosbridge import RosbridgeServer
+from seerob.core.errors import InputError
+from seerob.core.samples import PoseSample, Quality
+from seerob.core.snapshot import Snapshot
+from seerob.core.transforms import rotation_from_wxyz, transform
+from seerob.protocols.ros.ros_serialised import Edition
+from seerob.session.writing.cartesian_targets import CartesianTargets, message, targets_allowed
+from seerob.session.writing.target_wires import serialised
+from seerob.workstation.tables.targets import CartesianTarget, TargetMessage, TargetWire
 
 HALF = math.sqrt(0.5)
 STATION = """

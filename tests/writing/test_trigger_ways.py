@@ -16,15 +16,15 @@ from foreign_opcua import URI, foreign_opcua
 from free_ports import free_port
 from in_a_loop import in_a_loop
 from live_story import wait_for
-from seerob.errors import InputError
-from seerob.snapshot import Verdict
-from seerob.writing.triggers import Triggers, allowed
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Verdict
+from seerob.session.writing.triggers import Triggers, allowed
 
 
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """A machine under load answers late."""
-    monkeypatch.setattr("seerob.writing.triggers.WITHIN", 20.0)
+    monkeypatch.setattr("seerob.session.writing.triggers.WITHIN", 20.0)
 
 
 def edges(station, *verdicts):

@@ -9,13 +9,13 @@ import pytest
 from made_trigger import STATION, said, triggering
 
 from live_story import wait_for
-from seerob import cli
-from seerob.commands import Exit
-from seerob.emulators.siemens_web import SiemensWebServer
-from seerob.errors import InputError
+from seerob.app import cli
+from seerob.app.console.terminal import Exit
+from seerob.app.emulators.siemens_web import SiemensWebServer
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Verdict
 from seerob.protocols import ProtocolError
-from seerob.snapshot import Verdict
-from seerob.writing.triggers import Triggers, allowed
+from seerob.session.writing.triggers import Triggers, allowed
 
 SOURCE = 'kind = "siemens_web"\nurl = "URL"\nuser = "twin"\npassword_env = "PLC_PASSWORD"'
 

@@ -14,10 +14,10 @@ import sys
 import time
 
 from seerob.protocols import ProtocolError
-from seerob.protocols.openvr_devices import OpenVr
-from seerob.protocols.openxr_devices import OpenXr, Runtime
-from seerob.protocols.openxr_session import OpenXrSession
-from seerob.protocols.vive import PORT, encode
+from seerob.protocols.tracking.openvr_devices import OpenVr
+from seerob.protocols.tracking.openxr_devices import OpenXr, Runtime
+from seerob.protocols.tracking.openxr_session import OpenXrSession
+from seerob.protocols.tracking.vive import PORT, encode
 
 
 def main(arguments: list[str] | None = None, *, openvr: object = None, openxr: Runtime | None = None) -> int:

@@ -1,4 +1,4 @@
-// Numbers as text that is never kinder than the number: the page's twin of seerob/figures.py, which terminal
+// Numbers as text that is never kinder than the number: the page's twin of seerob/core/figures.py, which terminal
 // and report write with. A value beside its limit keeps its side; where rounding must choose, it chooses
 // against whoever hopes for *within*.
 

@@ -1,8 +1,8 @@
-// Written by `python -m seerob.wire` from src/seerob/snapshot.py. Do not edit.
+// Written by `python -m seerob.app.wire` from src/seerob/core/snapshot.py. Do not edit.
 /**
  * What goes out: plain frozen data that a recorder, a browser and a report can read.
  *
- * `web/src/wire.ts` is generated from this file by `seerob.wire`; docstrings go along.
+ * `web/src/wire.ts` is generated from this file by `seerob.app.wire`; docstrings go along.
  * World frame: right-handed, z up, metres. Quaternions: unit, w first.
  */
 

@@ -31,7 +31,7 @@ test("figures and limits are written as the report writes them", async () => {
   const all = [...cases()];
   const told = await askPython(
     `import json, sys
-from seerob.figures import against, figure
+from seerob.core.figures import against, figure
 print(json.dumps([[*against(v, l, u, at_most=m), figure(v, "")] for v, l, u, m in json.load(sys.stdin)]))`,
     JSON.stringify(all),
   );

@@ -7,9 +7,7 @@ import math
 import made_up_person
 import numpy as np
 
-from seerob.model_io.glb import glb_bytes, mesh_hash
-from seerob.model_io.shapes import box_mesh, capsule_mesh
-from seerob.snapshot import (
+from seerob.core.snapshot import (
     Arrow,
     Basis,
     Box,
@@ -31,6 +29,8 @@ from seerob.snapshot import (
     Sphere,
     Verdict,
 )
+from seerob.description.shapes.glb import glb_bytes, mesh_hash
+from seerob.description.shapes.shapes import box_mesh, capsule_mesh
 
 PERIOD = 0.01
 TCP_LIMIT = 0.7

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from seerob.snapshot import (
+from seerob.core.snapshot import (
     Aspect,
     Basis,
     CriterionInfo,

@@ -19,11 +19,11 @@ import msgspec
 import numpy as np
 from made_up_cell import PERIOD, snapshot, workstation
 
-from seerob.results.result_log import ResultLog
-from seerob.server.live import Live
-from seerob.server.player import Player
-from seerob.server.serving import Server
-from seerob.snapshot import Scene, Snapshot
+from seerob.app.server.live import Live
+from seerob.app.server.player import Player
+from seerob.app.server.serving import Server
+from seerob.core.snapshot import Scene, Snapshot
+from seerob.recording.result_log import ResultLog
 
 
 class Remembered:

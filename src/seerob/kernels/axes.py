@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
-from seerob.transforms import Array
+from seerob.core.transforms import Array
 
 SWEEPS = 30
 """At most; five or six are usual."""

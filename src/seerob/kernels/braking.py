@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from seerob.transforms import Array
+from seerob.core.transforms import Array
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numba import njit
 
+from seerob.core.transforms import Array
 from seerob.kernels.axes import principal_axes
 from seerob.kernels.polytope import Indices, corners, faces, inscribed, merged, unit_slabs
-from seerob.transforms import Array
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

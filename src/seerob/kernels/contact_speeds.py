@@ -1,4 +1,4 @@
-r"""Permissible speeds of many surfaces against many body regions: `seerob.contact.collision` in one loop."""
+r"""Permissible speeds of many surfaces against many body regions: `contact.collision` in one loop."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from seerob.transforms import Array
+from seerob.core.transforms import Array
 
 ROUNDING = 1 - 1e-12
 """Where the energy limit is that of the force, rounding must not say that energy governs."""
@@ -38,8 +38,8 @@ def permissible_speeds(
         energy: Printed transient energy [J], NaN when there is none, shape (r,).
 
     Returns:
-        The least [m/s]; which it is (`seerob.contact.collision.Governing`); by force, pressure, energy [m/s];
-        reduced mass [kg]; shape (b, r) each.
+        The least [m/s]; which it is (`seerob.criteria.contact.collision.Governing`); by force, pressure,
+        energy [m/s]; reduced mass [kg]; shape (b, r) each.
     """
     b, r = clamped.shape
     least, by_force, by_pressure, by_energy, reduced = (

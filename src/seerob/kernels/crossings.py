@@ -14,9 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.core.transforms import Array
 from seerob.kernels.primitives import FLAT
 from seerob.kernels.winding import contains
-from seerob.transforms import Array
 
 Links = NDArray[np.int32]
 

@@ -23,9 +23,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.core.transforms import Array
 from seerob.kernels.pairs import CORNERS, MESH
 from seerob.kernels.signed_distance import bounds_of, place_one, signed_distance
-from seerob.transforms import Array
 
 Links = NDArray[np.int32]
 Indices = NDArray[np.int64]

@@ -20,9 +20,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.core.transforms import Array
 from seerob.kernels.search import mesh_segment
 from seerob.kernels.winding import contains
-from seerob.transforms import Array
 
 Field = NDArray[np.float32]
 Cells = NDArray[np.uint8]

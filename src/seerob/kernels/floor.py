@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from seerob.transforms import Array
+from seerob.core.transforms import Array
 
 Indices = NDArray[np.int64]
 

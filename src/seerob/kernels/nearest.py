@@ -23,10 +23,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.core.transforms import Array
 from seerob.kernels.lanes import WIDTH
 from seerob.kernels.pairs import CLOSED, VOLUME, core_distance, inside, place, root_bound
 from seerob.kernels.wide import STACK
-from seerob.transforms import Array
 
 Boxes = NDArray[np.float32]
 Links = NDArray[np.int32]

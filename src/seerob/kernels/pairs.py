@@ -13,12 +13,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.core.transforms import Array
 from seerob.kernels.boxes import box_box, segment_box
 from seerob.kernels.crossings import encloses
 from seerob.kernels.primitives import segment_segment
 from seerob.kernels.search import first_crossing
 from seerob.kernels.wide import nearest_of_meshes, nearest_to_segment
-from seerob.transforms import Array
 
 Boxes = NDArray[np.float32]
 Links = NDArray[np.int32]

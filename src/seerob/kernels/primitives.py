@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from seerob.transforms import Array
+from seerob.core.transforms import Array
 
 TOUCH = 1e-24
 """Squared distance below which two primitives touch [m²]."""

@@ -1,6 +1,7 @@
 """What the engine does at every step of the physics, compiled: where the twin is to be, and the pull there.
 
-Two samples are joined by the cubic of `seerob.reference`; the commands are those of `seerob.engine`.
+Two samples are joined by the cubic of `seerob.twin.control.reference`; the commands are those of
+`seerob.twin.engine`.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from seerob.transforms import Array
+from seerob.core.transforms import Array
 
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]

@@ -15,10 +15,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.core.transforms import Array
 from seerob.kernels.crossings import encloses
 from seerob.kernels.pairs import CLOSED, CORNERS, MESH, NODE, NODE_END, TRIANGLE, TRIANGLE_END, VOLUME
 from seerob.kernels.search import mesh_segment
-from seerob.transforms import Array
 
 Links = NDArray[np.int32]
 Indices = NDArray[np.int64]

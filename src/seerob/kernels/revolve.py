@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.core.transforms import Array
 from seerob.kernels.fields import Cells
 from seerob.kernels.voxels import MARGIN, TOP
-from seerob.transforms import Array
 
 Sums = NDArray[np.int64]
 

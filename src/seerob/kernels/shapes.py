@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.errors import InputError, Problem, UnknownName
-from seerob.geometry import Solid
+from seerob.core.errors import InputError, Problem, UnknownName
+from seerob.core.shapes.geometry import Solid
+from seerob.core.transforms import Array
 from seerob.kernels.lanes import WIDTH
 from seerob.kernels.pairs import COLUMNS
 from seerob.kernels.tree_file import Tree, tree_of
 from seerob.kernels.wide import NONE
-from seerob.transforms import Array
 
 Indices = NDArray[np.int64]
 

@@ -17,8 +17,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.core.transforms import Array
 from seerob.kernels.fields import Cells
-from seerob.transforms import Array
 
 Faces = NDArray[np.int32]
 Indices = NDArray[np.int64]

@@ -15,8 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.core.transforms import Array
 from seerob.kernels.posture_fit import logarithm
-from seerob.transforms import Array
 
 Indices = NDArray[np.int64]
 

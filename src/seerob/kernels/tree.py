@@ -12,9 +12,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.core.transforms import Array
 from seerob.kernels.boxes import fit_box
 from seerob.kernels.primitives import FLAT, LINE, THIN
-from seerob.transforms import Array
 
 Links = NDArray[np.int32]
 Indices = NDArray[np.int64]

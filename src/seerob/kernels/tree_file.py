@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.core.files.whole_file import whole_file
 from seerob.kernels.tree import build_tree, component_of
 from seerob.kernels.wide import widen
-from seerob.whole_file import whole_file
 
 VERSION = b"seerob tree 2"
 """Changes whenever `build_tree`, `widen` or the layout does."""

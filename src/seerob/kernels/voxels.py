@@ -16,8 +16,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.core.transforms import Array
 from seerob.kernels.fields import Cells, Field, signed_at_most, square_at_least
-from seerob.transforms import Array
 
 TOP = 8
 """Edge of the blocks that a pose's box is cut into [voxels]; a power of 2."""

@@ -24,11 +24,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from seerob.core.transforms import Array
 from seerob.kernels.boxes import fit_box
 from seerob.kernels.lanes import WIDTH, Lanes, of_rows
 from seerob.kernels.primitives import segment_triangle, triangle_triangle
 from seerob.kernels.search import cut_of, row_in
-from seerob.transforms import Array
 
 Boxes = NDArray[np.float32]
 Links = NDArray[np.int32]

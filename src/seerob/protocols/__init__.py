@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from seerob.errors import SeerobError
+from seerob.core.errors import SeerobError
 
 
 class ProtocolError(SeerobError):

@@ -1,0 +1,92 @@
+"""What a plug-in of your own is made from: criteria, rules, sources, sinks, and what they give.
+
+Names here stay; where they live inside may change. A plug-in imports nothing else of seerob.
+"""
+
+from seerob.core.errors import InputError, SeerobError, Undecided, UnknownName
+from seerob.core.markers import (
+    Arrow,
+    Box,
+    Ellipsoid,
+    Highlight,
+    Hull,
+    Label,
+    Marker,
+    Polyline,
+    Prism,
+    Rays,
+    Segment,
+    Sphere,
+)
+from seerob.core.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
+from seerob.core.snapshot import Basis, Finding, Input, Origin, Result, Row, Scene, Snapshot
+from seerob.core.verdict import Verdict
+from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval, worst
+from seerob.criteria.postures.ergonomic_posture import bind_posture
+from seerob.criteria.postures.rule import PostureRule as Rule
+from seerob.criteria.scoring.spans import beyond
+from seerob.devices.live.listening import LiveSource
+from seerob.model.model import Model
+from seerob.outputs.sink import Closing, Sink, Writer
+from seerob.recording.answers import Answers
+from seerob.twin.spans import Falls, Points, approaching
+from seerob.twin.state import State
+from seerob.twin.states import States
+from seerob.workstation.source import Opened, Source, Target
+
+__all__ = [
+    "Answers",
+    "Arrow",
+    "Basis",
+    "BodySample",
+    "Box",
+    "Closing",
+    "Criterion",
+    "Ellipsoid",
+    "Evaluate",
+    "EvaluateMany",
+    "Falls",
+    "Finding",
+    "Highlight",
+    "Hull",
+    "Input",
+    "InputError",
+    "JointSample",
+    "Label",
+    "LiveSource",
+    "Marker",
+    "Model",
+    "Opened",
+    "Origin",
+    "Points",
+    "Polyline",
+    "PoseSample",
+    "Prism",
+    "Quality",
+    "Rays",
+    "Result",
+    "Row",
+    "Rule",
+    "Sample",
+    "Scene",
+    "SeerobError",
+    "Segment",
+    "SignalSample",
+    "Sink",
+    "Snapshot",
+    "Source",
+    "Sphere",
+    "State",
+    "States",
+    "Target",
+    "Undecided",
+    "UnknownName",
+    "Verdict",
+    "Writer",
+    "approaching",
+    "beyond",
+    "bind_posture",
+    "judge",
+    "judge_interval",
+    "worst",
+]

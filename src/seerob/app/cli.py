@@ -1,0 +1,128 @@
+"""The command line: ``seerob run``, ``seerob assess`` and the rest; see ``seerob --help``."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import re
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.metadata import version
+from typing import Any, NoReturn
+
+from seerob.app.console.interruption import Interrupts
+from seerob.app.console.printable import PrintableLines, printable
+from seerob.app.console.terminal import Exit
+from seerob.core.errors import SeerobError
+from seerob.core.interrupted import stopped
+
+COMMANDS = (
+    "new",
+    "check_file",
+    "run",
+    "assess",
+    "replay",
+    "report",
+    "swept",
+    "permissible",
+    "plan",
+    "kinds",
+    "schema",
+    "emulate",
+    "probe",
+    "variables",
+    "explain",
+    "measure",
+    "capture",
+    "import_aml",
+)
+"""One module each in `seerob.app.commands`, with ``HELP``, ``EXAMPLE``, ``add`` and ``run``."""
+_NEGATIVE, _OPTION = re.compile(r"-\.?\d"), re.compile(r"--[a-z][a-z-]*")
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose mistakes end with `Exit.ERROR`: argparse's own 2 means undecided here."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the usage and the mistake, and leave."""
+        self.print_usage(sys.stderr)
+        self.exit(Exit.ERROR, f"{self.prog}: {message}\n")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Also values that begin with a minus, ``--to -60,70``: argparse takes them for options."""
+        return super().parse_known_args(_joined(sys.argv[1:] if args is None else args), namespace)
+
+
+def _joined(words: Sequence[str]) -> list[str]:
+    """Words of which a negative number is one with the option before it; no option begins with a digit."""
+    found: list[str] = []
+    for word in words:
+        if found and _NEGATIVE.match(word) and _OPTION.fullmatch(found[-1]) and "--" not in found:
+            found[-1] += f"={word}"
+        else:
+            found.append(word)
+    return found
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    top = Parser(
+        prog="seerob",
+        description="Evaluate the safety and ergonomics of a cobotic workstation with a physics-based twin.",
+        epilog="exit code: 0 within, 1 exceeded, 2 undecided, 3 error\nexample: seerob new my_cell",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    top.add_argument("--version", action="version", version=f"seerob {version('seerob')}")
+    commands = top.add_subparsers(dest="command", required=True, metavar="command")
+    for name in COMMANDS:
+        module = import_module(f"seerob.app.commands.{name}")
+        sub = commands.add_parser(
+            name.replace("_", "-"),
+            help=module.HELP,
+            description=module.HELP,
+            epilog=f"example: {module.EXAMPLE}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add(sub)
+        sub.set_defaults(run=module.run)
+    return top
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code; errors end in a message, never in a traceback."""
+    interrupts = Interrupts()
+    if logging.lastResort is not None:
+        logging.lastResort.setFormatter(PrintableLines())
+    try:
+        with interrupts:
+            options = parser().parse_args(arguments)
+            code = int(options.run(options))
+            sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        return stopped()
+    except Exception as error:
+        if interrupts.came:
+            return stopped()
+        if not isinstance(error, SeerobError | OSError):
+            raise
+        return _failed(error)
+
+
+def _failed(error: SeerobError | OSError) -> Exit:
+    if isinstance(error, BrokenPipeError):
+        # Whoever read has gone; the interpreter must not try to write the rest at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    elif isinstance(error, OSError):
+        remedy = "; check that it exists and may be read and written" if error.filename else ""
+        text = f"{error.filename or 'seerob'}: {error.strerror or error}{remedy}"
+        sys.stderr.write(f"{printable(text)}\n")
+    else:
+        sys.stderr.write(f"{printable(str(error))}\n")
+    return Exit.ERROR
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,147 @@
+"""``seerob capture``: a recording of a person in; a twin that follows it, scores and tables out."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from seerob.app.commands.measure import add_person, measured, person_table, reader
+from seerob.app.console.terminal import line
+from seerob.app.console.whole_folder import whole_folder
+from seerob.core.errors import InputError
+from seerob.workstation.workstation import FILE_NAME
+
+if TYPE_CHECKING:
+    from seerob.description.capture.marker_stature import MarkerStature
+    from seerob.description.capture.observing import Observer
+    from seerob.description.description import Description
+    from seerob.devices.capture.file_source import CaptureFile
+
+COMMAND = "seerob capture"
+HELP = "make a workstation of a recorded person, let the twin follow it, and export the motion and its scores"
+EXAMPLE = "seerob capture bvh session.bvh --mass 72 --sex female -o my_session"
+
+_TABLES = """
+# Scores ask for what no posture shows (loads, support, repetition): give it in [[phases]].
+[[ergonomics]]
+kind = "rula"
+human = {human}
+
+[[ergonomics]]
+kind = "reba"
+human = {human}
+
+[[sinks]]
+kind = "csv"
+
+[[sinks]]
+kind = "opensim"
+"""
+
+
+def add(sub: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    add_person(sub)
+    sub.add_argument("-o", "--output", type=Path, required=True, help="folder to make the workstation in")
+    sub.add_argument("--json", action="store_true", help="results as JSON on standard output")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Make the workstation, and assess it.
+
+    Raises:
+        InputError: The folder exists, or the recording or the person cannot be used.
+    """
+    from seerob.app.commands import assess
+
+    if options.output.exists():
+        raise InputError.at(options.output, "", "exists already", "give another folder with -o")
+    text = _workstation(options, Path(options.file))
+    try:
+        with whole_folder(options.output) as working:
+            (working / FILE_NAME).write_text(text, encoding="utf-8")
+    except OSError as error:
+        what = f"cannot be made: {error.strerror}"
+        raise InputError.at(options.output, "", what, "give a folder that may be written") from error
+    if not options.json:
+        line("wrote", str(options.output / FILE_NAME))
+    # By its own parser: it knows its options and their defaults.
+    same = argparse.ArgumentParser()
+    assess.add(same)
+    return assess.run(same.parse_args([str(options.output), *(["--json"] if options.json else [])]))
+
+
+def _workstation(options: argparse.Namespace, recording: Path) -> str:
+    """The workstation file; what is wrong with the options is said before anything is made."""
+    import tomllib
+
+    from seerob.app.commands.probe import options_of
+    from seerob.files.tables.mapping import toml_value
+    from seerob.session.reading import convert_workstation
+
+    table = _person(options, recording)
+    given = {"kind": options.kind, "human": options.name, "file": _path(recording, options.output)}
+    given |= {"subject": options.subject} if options.subject else {}
+    given |= options_of(options.set, COMMAND)
+    source = [f"{key} = {toml_value(value)}" for key, value in given.items()]
+    head = [f"title = {toml_value(recording.stem)}", "", table, "", "[[sources]]", *source, ""]
+    text = "\n".join(head) + _TABLES.format(human=toml_value(options.name))
+    _, problems = convert_workstation(tomllib.loads(text), COMMAND)
+    if problems:
+        raise InputError(problems)
+    return text
+
+
+def _person(options: argparse.Namespace, recording: Path) -> str:
+    """The person as it was measured; of markers, which show no joint centres, as the tables have it."""
+    source = reader(options, COMMAND)
+    source.read(recording)  # what is wrong with it is said first
+    try:
+        found, findings = measured(source, recording, options)
+    except InputError as error:
+        if not any(p.key == "morphology" for p in error.problems):
+            raise
+        stature = options.stature
+        if stature is None:
+            told = _marker_stature(source, recording, options)
+            stature = told.stature
+            if not options.json:
+                line("assumed", told.finding(options.name).text, "yellow")
+        if not options.json:
+            text = (
+                f"the bones of {options.name} are not measured ({error.problems[0].what}): usual proportions"
+            )
+            line("assumed", text, "yellow")
+        return person_table(options, stature, {})
+    if not options.json:
+        for finding in (*findings, *found.findings):
+            line(finding.level, finding.text, "" if finding.level == "note" else "yellow")
+    return person_table(options, found.stature, found.lengths)
+
+
+def _marker_stature(source: CaptureFile, recording: Path, options: argparse.Namespace) -> MarkerStature:
+    """The stature that markers tell.
+
+    Raises:
+        InputError: They do not tell it.
+    """
+    from seerob.description.capture.marker_stature import marker_stature
+    from seerob.description.humans import manikin
+    from seerob.devices.capture.options import observer
+
+    captured = source.read(recording)
+
+    def bound(stature: float) -> tuple[Description, Observer]:
+        person = manikin.build(name=options.name, stature=stature, mass=options.mass, sex=options.sex)
+        return person, observer(source, captured.layout, person, file=recording.name)[0]
+
+    return marker_stature(captured, bound, name=options.name)
+
+
+def _path(recording: Path, folder: Path) -> str:
+    try:
+        return os.path.relpath(recording, folder).replace(os.sep, "/")
+    except ValueError:  # another drive
+        return str(recording.resolve())

@@ -1,0 +1,38 @@
+"""``seerob new``: a commented workstation folder to start from."""
+
+from __future__ import annotations
+
+import argparse
+from importlib import resources
+from pathlib import Path
+
+from seerob.app.console.terminal import Exit, line
+from seerob.app.console.whole_folder import whole_folder
+from seerob.core.errors import InputError
+
+HELP = "make a commented workstation folder to start from"
+EXAMPLE = "seerob new my_cell"
+
+
+def add(sub: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    sub.add_argument("folder", type=Path, help="folder to make")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Copy the starter; nothing that exists is touched.
+
+    Raises:
+        InputError: The folder exists and is not empty, or cannot be made.
+    """
+    folder: Path = options.folder
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError.at(folder, "", "exists already", "give the name of a new folder")
+    starter = resources.files("seerob.app.commands") / "starter"
+    with whole_folder(folder) as working:
+        for entry in starter.iterdir():
+            (working / entry.name).write_bytes(entry.read_bytes())
+    for entry in starter.iterdir():
+        line("wrote", str(folder / entry.name))
+    line("next", f"seerob assess {folder}   or   seerob run {folder}")
+    return Exit.WITHIN

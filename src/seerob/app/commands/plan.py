@@ -1,0 +1,234 @@
+"""``seerob plan``: a path of a robot that keeps a distance from everything, as a file of waypoints."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from seerob.app.commands.planned_around import OTHERS, STILL, around, others
+from seerob.app.console.loading import compiled
+from seerob.app.console.progress import spinner
+from seerob.app.console.terminal import Exit, add_workstation, describe, line, seconds
+from seerob.core.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from seerob.session.planning.plan import Plan
+    from seerob.session.station import Station
+
+HELP = "plan a robot's path through postures that keeps a distance from everything"
+EXAMPLE = "seerob plan my_cell --to-deg 60,-70,80,-100,-90,0 --margin 0.05 -o planned.toml"
+
+
+def posture(text: str) -> list[float]:
+    """Numbers with commas between them."""
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = [math.nan]
+    if not all(map(math.isfinite, values)):
+        raise argparse.ArgumentTypeError(f"{text!r} are no numbers with commas between them")
+    return values
+
+
+def distance(text: str) -> float:
+    """A length of 0 or more [m]."""
+    (value, *more) = posture(text)
+    if more or value < 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no length of 0 m or more")
+    return value
+
+
+def edge(text: str) -> float:
+    """Edge of a voxel [m]."""
+    value = distance(text)
+    if not 0.005 <= value <= 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no edge of 0.005 m to 1 m")
+    return value
+
+
+def add(sub: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    add_workstation(sub)
+    sub.add_argument("--robot", help="who moves (default: the only robot)")
+    sub.add_argument(
+        "--to", type=posture, action="append", default=[], help="posture to go to [rad or m], repeatable"
+    )
+    sub.add_argument(
+        "--to-deg", type=posture, action="append", default=[], help="likewise in degrees, after --to"
+    )
+    sub.add_argument(
+        "--waypoints",
+        type=Path,
+        help="file of waypoints reached by joint moves to go through, after --to-deg",
+    )
+    sub.add_argument(
+        "--from", dest="start", type=posture, help="posture to begin in (default: q of the file)"
+    )
+    sub.add_argument(
+        "--margin", type=distance, default=0.02, help="least distance to anything [m] (default: 0.02)"
+    )
+    sub.add_argument(
+        "--keep-out", action="append", default=[], metavar="AREA", help="area to keep away from, repeatable"
+    )
+    sub.add_argument("--others", type=others, default=STILL, metavar="HOW", help=OTHERS)
+    sub.add_argument(
+        "--voxel", type=edge, default=0.05, help="of what others sweep [m] (default: 0.05; at most 1)"
+    )
+    sub.add_argument("--seed", type=int, default=1, help="the same seed gives the same path (default: 1)")
+    sub.add_argument("--seconds", type=seconds, default=60.0, help="longest time per posture (default: 60)")
+    sub.add_argument(
+        "-o", "--output", type=Path, default=Path("planned.toml"), help="file of waypoints to write"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Plan, write the waypoints, say what is proven.
+
+    Raises:
+        InputError: A posture that cannot be, or a file that exists already.
+    """
+    _refuse_existing(options.output)
+    if not options.output.parent.is_dir():
+        raise InputError.at(options.output, "", "its folder does not exist", "make it, or give another place")
+    station = compiled(options.workstation, sources=False)
+    from seerob.app.console.interruption import Stopped as Asked
+    from seerob.outputs.sinks.dossier import write_whole
+    from seerob.session.planning.plan import plan
+    from seerob.session.planning.search import NoPath, Stopped
+
+    names = [robot.name for robot in station.workstation.robots]
+    if options.robot is None and len(names) != 1:
+        what = f"there are {len(names)} robots"
+        raise InputError.at(options.workstation, "--robot", what, f"name one of {', '.join(names) or 'none'}")
+    robot = options.robot or names[0]
+    asked = Asked()
+    describe(station)
+    goals: list[ArrayLike] = [*options.to, *([math.radians(x) for x in goal] for goal in options.to_deg)]
+    given = None
+    if options.waypoints is not None:
+        given = _Given(station, robot, options.waypoints)
+        goals += given.goals(options.start)
+    try:
+        with spinner() as show:
+            place = around(
+                station,
+                robot,
+                options.others,
+                options.keep_out,
+                voxel=options.voxel,
+                stopped=asked,
+                say=show,
+            )
+
+            def say(tried: int) -> bool:
+                show(f"planning: {tried} postures tried")
+                return asked()
+
+            found = plan(
+                place.station.model,
+                robot,
+                goals,
+                start=options.start,
+                margin=options.margin,
+                seed=options.seed,
+                seconds=options.seconds,
+                keep_out=place.keep_out,
+                places=place.places,
+                swept=place.swept,
+                say=say,
+            )
+    except (NoPath, Stopped) as error:
+        line("no path", str(error), "yellow")
+        return Exit.UNDECIDED
+    _refuse_existing(options.output)
+    write_whole(options.output, found.toml().encode())
+    text = (
+        f"{len(found.q)} postures; between them nothing comes nearer than "
+        f"{found.least:.3f} m to {found.robot} (margin {found.margin:g} m, {found.asked} postures looked at)"
+    )
+    line("planned", text)
+    if given is not None:
+        given.tell(found, first=1 + len(options.to) + len(options.to_deg))
+    if found.nearest:
+        line("nearest", found.nearest)
+    for pair in found.left_out:
+        line("assumed", f"{pair} touch at the start and are not watched", "yellow")
+    for text in found.around:
+        line("others", text)
+    line("note", "preliminary: planned, and executed by nobody")
+    line("wrote", str(options.output))
+    line(
+        "next",
+        f'kind = "waypoints", robot = "{found.robot}", file = "{options.output.name}" with joint_speed …',
+    )
+    return Exit.WITHIN
+
+
+def _refuse_existing(path: Path) -> None:
+    if path.exists():
+        raise InputError.at(path, "", "exists already", "give another file with -o")
+
+
+class _Given:
+    """Waypoints of a file as goals, and which way of reaching each was taken."""
+
+    def __init__(self, station: Station, robot: str, path: Path) -> None:
+        from seerob.devices.sources.waypoints import Waypoints
+        from seerob.workstation.source import Target
+
+        self._mechanism = station.model.robot(robot)
+        self._path = path
+        source = Waypoints(robot=robot, file=str(path))
+        self._program = source.program(path)
+        target = Target(name=robot, description=self._mechanism.description)
+        self._arm, said = source.arm(self._program, target)
+        for text in said:
+            line("assumed", text, "yellow")
+        self._ways: dict[int, int] = {}
+
+    def goals(self, start: list[float] | None) -> list[ArrayLike]:
+        """Joint positions; of a pose every way of reaching it that was found, the nearest first."""
+        import numpy as np
+
+        from seerob.core.transforms import rotation_from_wxyz
+        from seerob.files.waypoints.inverse import solutions
+        from seerob.files.waypoints.unreachable import why_not
+
+        near = self._mechanism.home if start is None else np.array(start)
+        goals: list[ArrayLike] = []
+        for k, waypoint in enumerate(self._program.waypoints):
+            if waypoint.move.of_tool:
+                what = f"{waypoint.shown} is reached by a {waypoint.move} move"
+                raise InputError.at(self._path, waypoint.place, what, "only joint moves are planned")
+            if waypoint.pose is None:
+                goals.append(waypoint.q or ())
+                continue
+            pose = rotation_from_wxyz(waypoint.pose.wxyz), np.array(waypoint.pose.position)
+            ways = solutions(self._arm, *pose, near)
+            if not ways:
+                what = why_not(self._arm, *pose, near)
+                remedy = "is the base or the tool point another one?"
+                raise InputError.at(self._path, waypoint.shown, what, remedy)
+            self._ways[k] = len(ways)
+            goals.append(np.array([way.q for way in ways]))
+        return goals
+
+    def tell(self, plan: Plan, *, first: int) -> None:
+        """Say of every pose which way of reaching it the plan took; ``first`` is where goals begin."""
+        from seerob.files.waypoints.branches import branch, is_classic
+
+        classic, n = is_classic(self._arm), self._arm.n
+        for k, count in self._ways.items():
+            q = plan.q[plan.at[first + k]]
+            shown = self._program.waypoints[k].shown
+            if classic:
+                which = f"branch {branch(self._arm.posture(q))}, the first of {count} that is clear"
+            elif n > 6:
+                which = f"{n} joints for a pose of 6: of infinitely many ways the one nearest to the start"
+            else:
+                which = f"the first of {count} ways found that is clear"
+            line("reached", f"{shown}: {which}")

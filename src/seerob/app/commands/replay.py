@@ -1,0 +1,80 @@
+"""``seerob replay``: a recording in the page, with a timeline to seek in."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from seerob.app.console.interruption import Stopped
+from seerob.app.console.terminal import WORDS, Exit, add_page, exit_code, line, seconds
+from seerob.core.snapshot import Verdict
+
+if TYPE_CHECKING:
+    from seerob.app.server.player import Player
+    from seerob.recording.recording import Recording
+
+HELP = "show a recording in the page: play, pause, seek; the exit code is the verdict that was recorded"
+EXAMPLE = "seerob replay runs/2026-11-21T10-12-00/run.mcap"
+
+
+def add(sub: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    sub.add_argument("recording", type=Path, help="an MCAP file that seerob wrote")
+    add_page(sub)
+    sub.add_argument("--seconds", type=seconds, help="end after this time, once all was read")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Serve the recording until Ctrl-C, and return the exit code of the verdict that was recorded."""
+    return show(options.recording, options)
+
+
+def show(path: Path, options: argparse.Namespace) -> int:
+    """Serve a recording until Ctrl-C, and return the exit code of the verdict that was recorded.
+
+    One of which something is missing, or that was not read through, is not within.
+    """
+    from seerob.app.server.player import Player
+    from seerob.app.server.serving import Server
+    from seerob.recording.recording import Recording
+
+    recording = Recording.open(path)
+    line("recording", f"{recording.scene.title}: {recording.duration:.1f} s", "bold")
+    for finding in recording.findings:
+        line(finding.level, finding.text, "yellow")
+    player = Player(recording)
+    server = Server(
+        scene=recording.scene,
+        meshes=recording.meshes,
+        feed=player,
+        host=options.host,
+        port=options.port,
+        token=options.token,
+    )
+    stopped = Stopped()
+    with server:
+        if server.notice:
+            line("note", server.notice)
+        line("page", f"{server.url}  (Ctrl-C ends)", "bold")
+        end = time.monotonic() + (options.seconds if options.seconds is not None else float("inf"))
+        while not stopped() and (time.monotonic() < end or player.reading):
+            time.sleep(0.1)
+    return _verdict(recording, player)
+
+
+def _verdict(recording: Recording, player: Player) -> Exit:
+    """Say what the recorded run came to, and the exit code of that."""
+    found = player.so_far()
+    verdict, why = found.verdict, ""
+    if not found.whole:
+        why = "not all of the recording was read"
+    elif recording.findings:
+        why = recording.findings[0].text
+    if why and verdict is not Verdict.EXCEEDED:
+        verdict = Verdict.UNDECIDED
+    word, style = WORDS[verdict]
+    rest = f" ({why})" if why else "; seerob report computes it again"
+    line(word or "no verdict", f"as it was recorded{rest}", style)
+    return exit_code(verdict)

@@ -1,0 +1,155 @@
+"""``seerob run``: live, with the page, a recording, and a report at the end."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from seerob.app.console.interruption import Stopped
+from seerob.app.console.loading import compiled
+from seerob.app.console.progress import announced, spinner
+from seerob.app.console.sinks import file_of, opened_sinks, refuse_existing, sinks_of, tell_files
+from seerob.app.console.terminal import (
+    add_page,
+    describe,
+    exit_code,
+    line,
+    run_folder,
+    seconds,
+    tell,
+    tell_results,
+)
+from seerob.core.errors import InputError
+
+if TYPE_CHECKING:
+    from seerob.core.snapshot import Scene
+    from seerob.session.station import Station
+    from seerob.session.writing.cartesian_targets import CartesianTargets
+    from seerob.session.writing.triggers import Triggers
+
+HELP = "run a workstation live: sources connect, the page opens, recording starts"
+EXAMPLE = "seerob run my_cell            (then open the address it prints; Ctrl-C ends the run)"
+
+
+def add(sub: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    sub.add_argument(
+        "workstation", type=Path, nargs="?", help="folder with a workstation.toml, or the file itself"
+    )
+    add_page(sub)
+    sub.add_argument(
+        "-o", "--output", type=Path, help="folder to write to (default: runs/<time> beside the workstation)"
+    )
+    sub.add_argument("--no-record", action="store_true", help="no recording and no report")
+    sub.add_argument(
+        "--allow-writing",
+        action="store_true",
+        help="let the workstation's triggers write to machines, where its file allows it too",
+    )
+    sub.add_argument("--seconds", type=seconds, help="end the run after this time")
+    sub.add_argument("--replay", type=Path, metavar="FILE", help="show this recording, as seerob replay does")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run until Ctrl-C, then write the report.
+
+    Raises:
+        InputError: There is nothing to run, or it cannot be used as it is.
+    """
+    if options.replay is not None:
+        from seerob.app.commands import replay
+
+        return replay.show(options.replay, options)
+    if options.workstation is None:
+        raise InputError.at("seerob run", "workstation", "missing", "name a folder, or --replay FILE")
+    station = compiled(options.workstation)
+    scene = station.scene()
+    describe(station)
+    tell(scene.findings)
+    return live(station, scene, options)
+
+
+def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
+    """Show, judge and record until Ctrl-C or the time is over."""
+    from seerob.app.server.live import LiveView
+
+    folder = run_folder(station.model.folder, options.output)
+    sinks = [] if options.no_record else sinks_of(station.workstation, lossless=False)
+    refuse_existing(sinks, folder)
+    stopped = Stopped()
+    with LiveView(
+        scene=scene, meshes=station.model.meshes, host=options.host, port=options.port, token=options.token
+    ) as view:
+        if view.server.notice:
+            line("note", view.server.notice)
+        now = 0.0
+
+        def over() -> bool:
+            return stopped() or (options.seconds is not None and now >= options.seconds)
+
+        def note(t: float) -> None:
+            nonlocal now
+            now = t
+
+        with spinner() as say, opened_sinks(station, sinks, folder, scene) as opened:
+            writers = announced(opened, list(map(file_of, sinks)), say)
+            line("page", f"{view.url}  (Ctrl-C ends the run)", "bold")
+            _tell_ends(station)
+            writers += _triggers(station, allow=options.allow_writing)
+            writers += _targets(station, allow=options.allow_writing)
+            summary = station.run(writers=[view, *writers], live=True, scene=scene, stop=over, progress=note)
+    line("ran", f"{summary.duration:.1f} s" + _slipped(summary.slipped))
+    for name, (late, bound) in summary.late.items():
+        text = f"{name}: heard up to {1e3 * late:.0f} ms later than at its best; {1e3 * bound:.0f} ms may be"
+        line("late", text, "yellow" if late > bound else "")
+    tell_results(summary)
+    tell_files(sinks, folder)
+    return exit_code(summary.verdict)
+
+
+def _tell_ends(station: Station) -> None:
+    """Say whose file ends while the run goes on: nobody says where they are from then on."""
+    for source, opened in station.sources:
+        if source.target() and opened.duration > 0 and not source.loop:
+            text = (
+                f"{source.target()}: {source.name} ends at {opened.duration:.1f} s; what depends on it "
+                "is undecided from then on (loop = true in its source starts it again)"
+            )
+            line("note", text)
+
+
+def _triggers(station: Station, *, allow: bool) -> list[Triggers]:
+    """What writes to machines; nothing unless file and command line both allow it, which is said."""
+    from seerob.session.writing.triggers import Triggers, allowed
+
+    names = ", ".join(trigger.variable for trigger in station.workstation.triggers)
+    if allowed(station.model, on_command_line=allow):
+        line("writes", f"{names}: workstation file and command line both allow it", "yellow")
+        return [Triggers(station.model, on_command_line=allow)]
+    if names:
+        line("note", f"writes nothing: {names} would need {_missing(station)}")
+    elif allow and not station.workstation.targets:
+        line("note", "writes nothing: the workstation has no triggers")
+    return []
+
+
+def _targets(station: Station, *, allow: bool) -> list[CartesianTargets]:
+    """What publishes Cartesian targets; nothing unless file and command line both allow it, which is said."""
+    from seerob.session.writing.cartesian_targets import CartesianTargets, targets_allowed
+
+    topics = ", ".join(f"{target.topic} ({target.host})" for target in station.workstation.targets)
+    if targets_allowed(station.model, on_command_line=allow):
+        line("targets", f"{topics}: workstation file and command line both allow it", "yellow")
+        return [CartesianTargets(station.model, on_command_line=allow)]
+    if topics:
+        line("note", f"publishes no targets: {topics} would need {_missing(station)}")
+    return []
+
+
+def _missing(station: Station) -> str:
+    return "--allow-writing" if station.workstation.allow_writing else "allow_writing = true in the file"
+
+
+def _slipped(lost: float) -> str:
+    return f", {lost:.1f} s behind real time: this machine is too slow for the workstation" if lost else ""

@@ -1,0 +1,148 @@
+"""``seerob variables``: what the dictionary covers, what is heard of it, and a skeleton by browsing."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from seerob.app.console.interruption import Stopped
+from seerob.app.console.loading import compiled
+from seerob.app.console.terminal import OUT, Exit, add_workstation, line, seconds, tell
+from seerob.core.errors import InputError, SeerobError
+
+if TYPE_CHECKING:
+    from seerob.core.samples import Sample
+    from seerob.devices.variables.live_source import Node, VariablesSource
+    from seerob.session.station import Station
+    from seerob.workstation.variables.dictionary import Variable
+
+HELP = "what the variable dictionary covers, what is heard of it, and a skeleton by browsing a device"
+EXAMPLE = "seerob variables my_cell --browse plc   > variables.toml"
+WITHIN = 60.0
+"""For browsing [s]."""
+
+
+def add(sub: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    add_workstation(sub)
+    sub.add_argument("--listen", type=seconds, metavar="SECONDS", help="connect, and tell what is heard")
+    sub.add_argument("--browse", metavar="SOURCE", help="print a dictionary of what this source has")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the coverage; `Exit.UNDECIDED` when something of it is not heard.
+
+    Raises:
+        InputError: The workstation is wrong, or the device cannot be browsed.
+    """
+    if options.browse is not None:
+        return _browse(options.workstation, options.browse)
+    station = compiled(options.workstation)
+    variables = tuple(station.model.dictionary.values())
+    if not variables:
+        what = "the workstation names no dictionary"
+        raise InputError.at(options.workstation, "variables", what, 'add variables = "variables.toml"')
+    from seerob.model.variables import uses
+
+    used: dict[str, list[str]] = {}
+    for key, name, _ in uses(station.workstation):
+        used.setdefault(name, []).append(key)
+    heard = {} if options.listen is None else _listen(station, options.listen)
+    for variable in variables:
+        by = ", ".join(used.get(variable.name, ())) or ("a trigger" if variable.write else "nothing")
+        line(variable.source, f"{variable.name} = {variable.address}, {_sort(variable)}; used by {by}")
+        if options.listen is not None and not variable.write:
+            text = heard.get(variable.name, "nothing heard")
+            line("", text, "" if text.startswith("heard") else "yellow")
+    tell(station.model.findings)
+    return Exit.UNDECIDED if any(not text.startswith("heard") for text in heard.values()) else Exit.WITHIN
+
+
+def _sort(variable: Variable) -> str:
+    return str(variable.type) if variable.unit is None else f"[{variable.unit}]"
+
+
+def _listen(station: Station, wait: float) -> dict[str, str]:
+    """What was heard of each variable, in words."""
+    from seerob.core.samples import SignalSample
+    from seerob.devices.live.listening import Listener, LiveSource
+    from seerob.session.opening import source_target
+
+    newest: dict[str, SignalSample] = {}
+
+    def hear(sample: Sample) -> None:
+        if isinstance(sample, SignalSample):
+            newest[sample.source] = sample
+
+    listeners = [
+        Listener(source, source_target(station.model, source), hear)
+        for source in station.workstation.sources
+        if isinstance(source, LiveSource) and source.reads_variables
+    ]
+    stopped = Stopped()
+    for listener in listeners:
+        listener.start()
+    end = time.monotonic() + wait
+    while time.monotonic() < end and not stopped():
+        time.sleep(0.02)
+    for listener in listeners:
+        listener.ask_to_stop()
+    for listener in listeners:
+        listener.join(1.0)
+    told: dict[str, str] = {}
+    for variable in station.model.dictionary.values():
+        picture = newest.get(variable.source)
+        if variable.write:
+            continue
+        if picture is None:
+            told[variable.name] = f"nothing heard from {variable.source}"
+        elif variable.name in picture.doubts:
+            told[variable.name] = picture.doubts[variable.name]
+        else:
+            value = picture.values[variable.name]
+            figure = f"{value:.6g}" if isinstance(value, float) else str(value)
+            told[variable.name] = f"heard: {figure} {variable.si_unit}".rstrip()
+    return told
+
+
+def _browse(path: Path, name: str) -> int:
+    import asyncio
+
+    from seerob.core.errors import suggestion
+    from seerob.devices.live.listening import because
+    from seerob.devices.variables.live_source import VariablesSource
+    from seerob.devices.variables.skeleton import skeleton
+    from seerob.session.reading import readable
+
+    # The dictionary may not be there yet, or may not be right yet.
+    found = readable(path)
+    sources = {s.name: s for s in found.entries["sources"].values() if isinstance(s, VariablesSource)}
+    if name not in sources:
+        what = f"no source named {name!r} that can be browsed"
+        raise InputError.at(path, "--browse", what, suggestion(name, sources))
+    source = sources[name].beside(Path(found.head.folder))
+    try:
+        nodes = asyncio.run(asyncio.wait_for(nodes_of(source), WITHIN))
+    except InputError:
+        raise
+    except (OSError, EOFError, SeerobError, NotImplementedError) as error:
+        raise InputError.at(name, "", because(error), "is it switched on, is the address right?") from error
+    OUT.print(skeleton(nodes, name), markup=False, end="")
+    return Exit.WITHIN
+
+
+async def nodes_of(source: VariablesSource) -> list[Node]:
+    """What a device says it has; raises as `VariablesSource.browse` does."""
+    from contextlib import aclosing
+
+    from seerob.workstation.variables.dictionary import MOST_VARIABLES
+
+    nodes: list[Node] = []
+    async with aclosing(source.browse()) as found:
+        async for node in found:
+            nodes.append(node)
+            if len(nodes) >= MOST_VARIABLES:
+                break
+    return nodes

@@ -1,0 +1,122 @@
+"""What a long command shows on a terminal while it works, and how long its parts took."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Self
+
+from seerob.app.console.terminal import STATUS
+from seerob.core.samples import Sample
+from seerob.core.snapshot import Snapshot
+from seerob.outputs.sink import KeepsResults, Writer
+from seerob.recording.result_log import ResultLog
+
+
+class Progress:
+    """Told the run time of each tick, and then what is being written."""
+
+    def __init__(self, show: Callable[[float], None], say: Callable[[str], None]) -> None:
+        """Use `progress`."""
+        self._show, self.say = show, say
+        self._begun = self._last = time.perf_counter()
+
+    def __call__(self, t: float) -> None:
+        """Run time reached [s]."""
+        self._last = time.perf_counter()
+        self._show(t)
+
+    @property
+    def moving(self) -> float:
+        """Wall time from the start to the last tick [s]."""
+        return self._last - self._begun
+
+    @property
+    def writing(self) -> float:
+        """Wall time since the last tick [s]: closing files, drawing the report."""
+        return time.perf_counter() - self._last
+
+
+@contextmanager
+def progress(duration: float, what: str) -> Iterator[Progress]:
+    """A bar over run time on a terminal; silence elsewhere.
+
+    Args:
+        duration: Run time that the bar is full at [s].
+        what: Beside the bar.
+    """
+    if not STATUS.is_terminal or duration <= 0:
+        yield Progress(lambda _: None, lambda _: None)
+        return
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bars
+
+    columns = (BarColumn(), TextColumn("{task.description}"), TimeRemainingColumn())
+    with Bars(*columns, console=STATUS, transient=True) as bars:
+        task = bars.add_task(what, total=duration)
+        yield Progress(
+            lambda t: bars.update(task, completed=t),
+            # Nobody knows how long the drawing takes: the bar moves to and fro.
+            lambda text: bars.update(task, description=text, total=None),
+        )
+
+
+class Announced:
+    """A writer that says what it writes while it is closed: a report takes seconds."""
+
+    def __init__(self, writer: Writer, file: str, say: Callable[[str], None]) -> None:
+        self._writer, self._file, self._say = writer, file, say
+
+    def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
+        """See `Writer.write`."""
+        self._writer.write(snapshot, samples)
+
+    def share(self, log: ResultLog) -> None:
+        """See `KeepsResults.share`."""
+        if isinstance(self._writer, KeepsResults):
+            self._writer.share(log)
+
+    def close(self) -> None:
+        """See `Writer.close`."""
+        self._announce()
+        self._writer.close()
+
+    def __enter__(self) -> Self:
+        self._writer.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._announce()
+        self._writer.__exit__(kind, error, trace)
+
+    def _announce(self) -> None:
+        self._say(f"writing {self._file}")
+        if hasattr(self._writer, "progress"):
+            self._writer.progress = lambda done, total: self._say(f"writing {self._file}: {done} of {total}")
+
+
+def announced(writers: Sequence[Writer], files: Sequence[str], say: Callable[[str], None]) -> list[Writer]:
+    """Writers that say which file they are writing."""
+    return [Announced(writer, file, say) for writer, file in zip(writers, files, strict=True)]
+
+
+@contextmanager
+def spinner(*, quiet: bool = False) -> Iterator[Callable[[str], None]]:
+    """Yields what shows a text and a spinner on a terminal, from its first call on; silence elsewhere."""
+    if quiet or not STATUS.is_terminal:
+        yield lambda _: None
+        return
+    status = STATUS.status("")
+
+    def say(text: str) -> None:
+        status.update(text)
+        status.start()
+
+    try:
+        yield say
+    finally:
+        status.stop()

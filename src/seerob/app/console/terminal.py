@@ -1,0 +1,283 @@
+"""The commands of the command line, one file each, and the words they share."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from datetime import datetime
+from enum import IntEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console as RichConsole
+
+from seerob.app.console.printable import printable
+from seerob.core.figures import against, with_unit
+from seerob.core.snapshot import Finding, Verdict
+
+if TYPE_CHECKING:
+    from seerob.recording.bone_errors import BoneErrors
+    from seerob.recording.result_log import Series
+    from seerob.session.run import Summary
+    from seerob.session.station import Station
+
+
+class Console(RichConsole):
+    """A console that leaves a closed pipe to `seerob.app.cli.main`: rich would exit with 1, exceeded."""
+
+    def on_broken_pipe(self) -> None:
+        """Called while a `BrokenPipeError` is handled."""
+        raise BrokenPipeError
+
+
+OUT = Console(highlight=False, soft_wrap=True)
+STATUS = Console(highlight=False, soft_wrap=True, stderr=True)
+"""For progress: what is piped on stays clean."""
+
+WORDS = {
+    Verdict.WITHIN: ("within", "cyan"),
+    Verdict.EXCEEDED: ("EXCEEDED", "bold red"),
+    Verdict.UNDECIDED: ("undecided", "yellow"),
+    None: ("", "dim"),
+}
+
+_WIDEST_NAME = 60
+"""Characters of a name that results are lined up behind; a longer one moves only its own."""
+
+
+class Exit(IntEnum):
+    """Exit codes."""
+
+    WITHIN = 0
+    EXCEEDED = 1
+    UNDECIDED = 2
+    ERROR = 3
+
+
+def seconds(text: str) -> float:
+    """A duration on the command line [s]; more than nothing, and finite."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
+    return value
+
+
+def port(text: str) -> int:
+    """A TCP port on the command line; 0 is any free one."""
+    if not text.isascii() or not text.isdigit() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port: give 1…65535, or 0 for any free one")
+    return int(text)
+
+
+def exit_code(verdict: Verdict | None) -> Exit:
+    """Exit code of a verdict; a run in which nothing is judged is not within."""
+    return {
+        Verdict.WITHIN: Exit.WITHIN,
+        Verdict.EXCEEDED: Exit.EXCEEDED,
+        Verdict.UNDECIDED: Exit.UNDECIDED,
+        None: Exit.UNDECIDED,
+    }[verdict]
+
+
+def line(word: str, text: str, style: str = "") -> None:
+    """One line of calm output: a word, then what it is about."""
+    OUT.print(f"{word:<12} ", style=style, end="", markup=False)
+    OUT.print(printable(" ".join(text.splitlines())), markup=False)
+
+
+def cache_folder() -> Path:
+    """Where distance trees and convex pieces are kept between starts."""
+    from platformdirs import user_cache_path
+
+    return user_cache_path("seerob", appauthor=False)
+
+
+def add_workstation(sub: argparse.ArgumentParser) -> None:
+    """The argument that nearly every command takes."""
+    sub.add_argument("workstation", type=Path, help="folder with a workstation.toml, or the file itself")
+
+
+def add_output(sub: argparse.ArgumentParser, *, beside: str = "workstation") -> None:
+    """Options of commands that write files."""
+    text = f"folder to write to (default: runs/<time> beside the {beside})"
+    sub.add_argument("-o", "--output", type=Path, help=text)
+    sub.add_argument("--json", action="store_true", help="results as JSON on standard output")
+
+
+def add_page(sub: argparse.ArgumentParser) -> None:
+    """Arguments of commands that serve the page."""
+    sub.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine only)")
+    sub.add_argument("--port", type=port, default=8080, help="port of the page; 0 is any free one")
+    sub.add_argument("--token", help="what visitors must know; needed when not only this machine may visit")
+
+
+def run_folder(near: Path, wanted: Path | None) -> Path:
+    """A new folder for the files of one run."""
+    if wanted is not None:
+        return wanted
+    stamp = datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
+    folder = near / "runs" / stamp
+    n = 1
+    while folder.exists():
+        n += 1
+        folder = near / "runs" / f"{stamp}-{n}"
+    return folder
+
+
+def describe(station: Station) -> None:
+    """What was loaded, and what was assumed."""
+    w = station.workstation
+    parts = [
+        f"{len(entries)} {noun}{'' if len(entries) == 1 else 's'}"
+        for entries, noun in (
+            (w.robots, "robot"),
+            (w.humans, "human"),
+            (w.tools, "tool"),
+            (w.workpieces, "workpiece"),
+            (w.parts, "part"),
+            (w.machines, "machine"),
+            (w.areas, "area"),
+            (w.sensors, "sensor"),
+            (w.sources, "source"),
+        )
+        if entries
+    ]
+    n = len(w.safety) + len(w.ergonomics)
+    parts.append("1 criterion" if n == 1 else f"{n} criteria")
+    line("workstation", f"{w.title}: {', '.join(parts)}", "bold")
+
+
+def tell(findings: tuple[Finding, ...]) -> None:
+    """Warnings and assumptions, one line each; notes are in the report."""
+    for finding in findings:
+        if finding.level != "note":
+            line(
+                finding.level,
+                f"{finding.subject}: {finding.text}",
+                "dim" if finding.level == "assumed" else "yellow",
+            )
+
+
+def tell_results(summary: Summary) -> None:
+    """One line per criterion, in the order of the file; and when none of them has a verdict."""
+    from seerob.outputs.sentences import covered
+
+    width = min(max((len(name) for name in summary.results), default=0), _WIDEST_NAME)
+    for name, series in summary.results.items():
+        word, style = WORDS[series.verdict]
+        text = extreme(series)
+        if "of the time" not in text and (share := covered(series)):
+            text += f"; {share}"
+        line(word, f"{name:<{width}}  {text}", style)
+    for person, errors in summary.results.bones.items():
+        line("bones", f"{person}: {_missing(errors)}")
+    if summary.verdict is None:
+        line("nothing judged", _why_nothing(summary), WORDS[Verdict.UNDECIDED][1])
+
+
+def _why_nothing(summary: Summary) -> str:
+    """What is missing where no criterion has a verdict: what those without a value say, else a limit."""
+    known = {name: series for name, series in summary.results.items() if series.known}
+    if known and all(series.worst().value is None for series in known.values()):
+        reasons = {name: list(dict.fromkeys(series.reasons))[:3] for name, series in known.items()}
+        said = [f"{name}: {', '.join(texts)}" for name, texts in reasons.items()]
+        return f"no criterion has a verdict: {'; '.join(said)}"
+    return "no criterion has a verdict: give one a limit"
+
+
+def _missing(errors: BoneErrors) -> str:
+    """How far bones are from where devices see them: ``9.2 mm median, P95 23 mm, worst right_hand …``."""
+    parts = []
+    for whole in errors.all():
+        worst = max((e for e in errors.bones() if e.what == whole.what), key=lambda e: e.median)
+        unit, factor = ("mm", 1e3) if whole.unit == "m" else ("°", math.degrees(1.0))
+        shown = [f"{factor * value:.3g} {unit}" for value in (whole.median, whole.p95, worst.median)]
+        parts.append(
+            f"{whole.what} {shown[0]} median, {shown[1]} P95, worst {worst.bone} with {shown[2]} median"
+        )
+    return "; ".join(parts)
+
+
+def extreme(series: Series) -> str:
+    """The figure that matters: ``max 0.84 m/s at 12.31 s, limit 1``.
+
+    It is ``worst`` where a limit that moves decides at another instant than that of the extreme value.
+    """
+    if not series.known:
+        return "never gave a result"
+    worst = series.worst()
+    if worst.reason and (worst.value is None or series.verdict is Verdict.UNDECIDED):
+        first = f"{worst.reason} (first at {worst.t:.2f} s)" if worst.t is not None else worst.reason
+        return first + _otherwise(series)
+    if worst.value is None:
+        return "no value"
+    what, most = ("max", series.max()) if series.at_most else ("min", series.min())
+    what = what if worst.value == most else "worst"
+    shown = against(worst.value, worst.limit, series.unit, at_most=series.at_most)
+    text = f"{what} {with_unit(shown.value, series.unit)} at {worst.t:.2f} s"
+    if worst.limit is not None:
+        text += f", limit {shown.limit}"
+    return text + (f" ({worst.reason})" if worst.reason else "")
+
+
+def _otherwise(series: Series) -> str:
+    """Of what is undecided at times only, the rest: ``; undecided 5 % of the time, else max 6 at 6.62 s``."""
+    import numpy as np
+
+    from seerob.outputs.sentences import percent
+    from seerob.recording.series import CODES
+
+    share = series.shares().get(Verdict.UNDECIDED, 0.0)
+    values = np.where(series.verdicts == CODES[Verdict.UNDECIDED], np.nan, series.values)
+    if series.verdict is not Verdict.UNDECIDED or np.isnan(values).all():
+        return ""
+    what, k = ("max", np.nanargmax(values)) if series.at_most else ("min", np.nanargmin(values))
+    shown = against(float(values[k]), None, series.unit, at_most=series.at_most).value
+    text = f"{what} {with_unit(shown, series.unit)} at {series.t[k]:.2f} s"
+    return f"; undecided {percent(share)} of the time, else {text}"
+
+
+def results_json(summary: Summary, **more: Any) -> str:
+    """The results for machines."""
+    criteria = []
+    for name, series in summary.results.items():
+        worst = series.worst() if series.known else None
+        criteria.append(
+            {
+                "name": name,
+                "verdict": series.verdict,
+                "times": series.times()._asdict(),
+                "between": series.between,
+                "unit": series.unit,
+                "worst": worst
+                and {
+                    "t": worst.t,
+                    "value": worst.value,
+                    "limit": worst.limit,
+                    "interval": worst.interval
+                    and [end if math.isfinite(end) else None for end in worst.interval],
+                    "reason": worst.reason,
+                },
+            }
+        )
+    whole = {
+        "verdict": summary.verdict,
+        "decided": summary.results.decided,
+        "duration": summary.duration,
+        "ticks": summary.ticks,
+        "workstation_hash": summary.scene.workstation_hash,
+        "criteria": criteria,
+        "bones": {
+            name: [error._asdict() for error in (*errors.all(), *errors.bones())]
+            for name, errors in summary.results.bones.items()
+        },
+        "findings": [
+            {"level": f.level, "subject": f.subject, "text": f.text} for f in summary.scene.findings
+        ],
+        **more,
+    }
+    return json.dumps(whole, ensure_ascii=False, indent=1, allow_nan=False)

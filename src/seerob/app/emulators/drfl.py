@@ -1,0 +1,52 @@
+"""The bridge of a Doosan controller without either: its messages, sent over a real socket."""
+
+from __future__ import annotations
+
+import math
+
+from seerob.app.emulators.message_sender import MessageSender, Way
+from seerob.app.emulators.motions import Motion
+from seerob.protocols.robots.doosan_drfl import JOINTS, Message, RobotMode, RobotState, encode
+
+
+class DrflSender(MessageSender):
+    """What the bridge sends while the robot plays a motion, in a thread of its own.
+
+    Args:
+        motion: What the robot does.
+        to: Address and port that is sent to.
+        rate: Messages per second [Hz].
+        torques: Measured joint torques [N·m], always the same; none are sent when not given.
+        way: What happens to each message on the way.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        *,
+        to: tuple[str, int],
+        rate: float = 100.0,
+        torques: tuple[float, ...] | None = None,
+        way: Way | None = None,
+    ) -> None:
+        super().__init__(to=to, port=to[1], rate=rate, way=way)
+        self.motion, self.torques = motion, torques
+        self.state: int = RobotState.MOVING
+
+    def message(self, k: int) -> bytes:
+        """The message number ``k``."""
+        t = k / self.rate
+        q, qd = self.motion(t)
+        return encode(
+            Message(
+                number=k & 0xFFFF_FFFF,
+                time=t,
+                positions=tuple(map(math.degrees, q)),
+                speeds=tuple(map(math.degrees, qd)),
+                torques=self.torques,
+                external=(0.0,) * JOINTS,
+                mode=RobotMode.AUTONOMOUS,
+                state=self.state,
+                control=0,
+            )
+        )

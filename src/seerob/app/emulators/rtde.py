@@ -1,0 +1,265 @@
+"""An RTDE server that plays a motion: what a Universal Robots controller sends, over a real socket.
+
+It speaks for a robot that is switched on and does what the motion says. Fields that would need physics
+(currents, forces, tool pose) it does not have, as an old controller does not. It moves nothing and
+takes no inputs.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import time
+from collections.abc import Callable, Mapping
+
+from seerob.app.emulators.background import LoopEmulator
+from seerob.app.emulators.motions import Motion
+from seerob.protocols import ProtocolError
+from seerob.protocols.robots.rtde import (
+    NOT_FOUND,
+    Accepted,
+    ControllerRequest,
+    ControllerVersion,
+    Data,
+    InputsRequest,
+    Kind,
+    Level,
+    OutputsReply,
+    OutputsRequest,
+    PauseRequest,
+    Recipe,
+    Reply,
+    Request,
+    Splitter,
+    StartRequest,
+    TextMessage,
+    Value,
+    VersionRequest,
+    decode_request,
+    encode_reply,
+    pack,
+)
+from seerob.protocols.robots.rtde_states import RobotMode, SafetyStatus
+from seerob.protocols.robots.ur_primary import Kinematics, encode_state
+
+_log = logging.getLogger(__name__)
+
+TYPES = {
+    "timestamp": "DOUBLE",
+    "target_q": "VECTOR6D",
+    "target_qd": "VECTOR6D",
+    "actual_q": "VECTOR6D",
+    "actual_qd": "VECTOR6D",
+    "robot_mode": "INT32",
+    "safety_mode": "INT32",
+    "safety_status": "INT32",
+    "runtime_state": "UINT32",
+    "speed_scaling": "DOUBLE",
+    "target_speed_fraction": "DOUBLE",
+    "actual_digital_input_bits": "UINT64",
+    "actual_digital_output_bits": "UINT64",
+    "robot_status_bits": "UINT32",
+    "safety_status_bits": "UINT32",
+}
+E_SERIES = ControllerVersion(5, 12, 4, 0)
+PLAYING = 2
+MAX_CLIENTS = 8
+MAX_RECIPES = 16
+FULL = 1 << 16
+"""Bytes that wait for a client who does not read; then the connection is closed."""
+PRIMARY_SENDS = 100
+"""Packages of the primary interface to one client."""
+LATE = 0.5
+"""Time that is not made up for when this machine was too slow [s]."""
+
+
+class RtdeServer(LoopEmulator):
+    """A controller's RTDE port, in a thread of its own.
+
+    Args:
+        motion: What the robot does; time counts from the start of the server.
+        host: Address to listen on.
+        port: 0 is any free one.
+        controller: Version of the software that it says it has; CB3 sends at 125 Hz, later ones at 500.
+        version: Highest version of the protocol.
+        without: Fields that it does not have.
+        values: Fields with another value than that of a robot at work.
+        messages: Said to every client that connects, before anything else.
+        kinematics: What the primary interface says of how it was built; there is none when not given.
+        primary_port: Of that interface; 0 is any free one.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        controller: ControllerVersion = E_SERIES,
+        version: int = 2,
+        without: frozenset[str] = frozenset(),
+        values: Mapping[str, Value] | None = None,
+        messages: tuple[str, ...] = (),
+        kinematics: Kinematics | None = None,
+        primary_port: int = 0,
+    ) -> None:
+        super().__init__()
+        self.host, self.port = host, port
+        self.motion, self.controller, self.version, self.messages = motion, controller, version, messages
+        self.kinematics, self.primary_port = kinematics, primary_port
+        self.types = {name: kind for name, kind in TYPES.items() if name not in without}
+        self.values = dict(values or {})
+        """May be changed while it runs."""
+        self.rate = 125.0 if controller.major < 5 else 500.0
+        """The most that it sends [Hz]."""
+        self.connections = 0
+        """Clients at present."""
+        self._begun = 0.0
+
+    def at(self, t: float) -> dict[str, Value]:
+        """Every field at a time since the start [s]."""
+        q, qd = self.motion(t)
+        return {
+            "timestamp": t,
+            "target_q": q,
+            "target_qd": qd,
+            "actual_q": q,
+            "actual_qd": qd,
+            "robot_mode": int(RobotMode.RUNNING),
+            "safety_mode": int(SafetyStatus.NORMAL),
+            "safety_status": int(SafetyStatus.NORMAL),
+            "runtime_state": PLAYING,
+            "speed_scaling": 1.0,
+            "target_speed_fraction": 1.0,
+            "actual_digital_input_bits": 0,
+            "actual_digital_output_bits": 0,
+            "robot_status_bits": 0b11,
+            "safety_status_bits": 0b1,
+            **self.values,
+        }
+
+    def now(self) -> float:
+        """Time since the start [s]."""
+        return time.monotonic() - self._begun
+
+    async def serve(self, ready: Callable[[], None], over: asyncio.Event) -> None:
+        """Listen, and serve whoever connects."""
+        server = await asyncio.start_server(self._welcome, self.host, self.port)
+        self.port = server.sockets[0].getsockname()[1]
+        self._begun = time.monotonic()
+        primary = None
+        if self.kinematics is not None:
+            primary = await asyncio.start_server(self._say_kinematics, self.host, self.primary_port)
+            self.primary_port = primary.sockets[0].getsockname()[1]
+        ready()
+        await over.wait()
+        server.close()
+        if primary is not None:
+            primary.close()
+        # What is left, the clients' tasks, asyncio.run cancels.
+
+    async def _say_kinematics(self, _: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """The primary interface, as far as it goes: the same state ten times a second."""
+        try:
+            for _k in range(PRIMARY_SENDS):
+                if self.kinematics is not None:
+                    writer.write(encode_state(self.kinematics))
+                await writer.drain()
+                await asyncio.sleep(0.1)
+        except (OSError, asyncio.CancelledError):
+            pass
+        finally:
+            writer.transport.abort()
+
+    async def _welcome(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.connections += 1
+        try:
+            if self.connections <= MAX_CLIENTS:
+                await _Client(self, writer).serve(reader)
+        except (OSError, ProtocolError) as error:
+            _log.info("client left: %s", error)
+        except asyncio.CancelledError:
+            pass  # the server stops; asyncio would log what is no mistake
+        finally:
+            self.connections -= 1
+            writer.transport.abort()
+
+
+class _Client:
+    def __init__(self, server: RtdeServer, writer: asyncio.StreamWriter) -> None:
+        self._server, self._writer = server, writer
+        self._version = 1
+        self._recipes: list[tuple[Recipe, float]] = []
+        self._sending: list[asyncio.Task[None]] = []
+
+    async def serve(self, reader: asyncio.StreamReader) -> None:
+        """Answer until the client leaves."""
+        splitter = Splitter()
+        try:
+            while data := await reader.read(1 << 16):
+                for package in splitter.feed(data):
+                    for reply in self._answer(decode_request(package, self._version)):
+                        self._say(reply)
+                await self._writer.drain()
+        finally:
+            self._pause()
+
+    def _say(self, reply: Reply) -> None:
+        # The version that is asked for is granted in the version before it: both look the same.
+        self._writer.write(encode_reply(reply, self._version))
+
+    def _answer(self, request: Request) -> list[Reply]:
+        match request:
+            case VersionRequest():
+                granted = 1 <= request.version <= self._server.version
+                self._version = request.version if granted else self._version
+                said = [TextMessage(text, "emulator", Level.WARNING) for text in self._server.messages]
+                return [*said, Accepted(Kind.VERSION, granted)]
+            case ControllerRequest():
+                return [self._server.controller]
+            case OutputsRequest():
+                return [self._outputs(request)]
+            case InputsRequest():
+                self._writer.write(
+                    pack(Kind.INPUTS, b"\0" + ",".join("IN_USE" for _ in request.fields).encode())
+                )
+                return []
+            case StartRequest():
+                self._pause()
+                self._sending = [asyncio.create_task(self._send(*recipe)) for recipe in self._recipes]
+                return [Accepted(Kind.START, bool(self._recipes))]
+            case PauseRequest():
+                self._pause()
+                return [Accepted(Kind.PAUSE, accepted=True)]
+
+    def _outputs(self, request: OutputsRequest) -> OutputsReply:
+        types = tuple(self._server.types.get(name, NOT_FOUND) for name in request.fields)
+        rate = self._server.rate if request.frequency is None else request.frequency
+        known = NOT_FOUND not in types and len(self._recipes) < MAX_RECIPES
+        if not (known and types and math.isfinite(rate) and rate > 0):
+            return OutputsReply(0, types)
+        number = len(self._recipes) + 1
+        self._recipes.append((Recipe(request.fields, types, number), min(rate, self._server.rate)))
+        return OutputsReply(number, types)
+
+    def _pause(self) -> None:
+        for task in self._sending:
+            task.cancel()
+        self._sending = []
+
+    async def _send(self, recipe: Recipe, rate: float) -> None:
+        """Data at a steady rate, on a grid of device time."""
+        k = math.ceil(self._server.now() * rate)
+        while not self._writer.transport.is_closing():
+            late = self._server.now() - k / rate
+            if late < 0:
+                await asyncio.sleep(-late)
+            elif late > LATE:
+                k = math.ceil(self._server.now() * rate)
+            if self._writer.transport.get_write_buffer_size() > FULL:
+                _log.info("client does not read: connection closed")
+                self._writer.transport.abort()
+                return
+            self._say(Data(recipe.number, recipe.pack(self._server.at(k / rate))))
+            k += 1

@@ -1,0 +1,76 @@
+"""A machine that tells its variables as a JSON document, over real HTTP(S) and by WebSocket."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from seerob.app.emulators.http import HttpEmulator
+
+Document = Callable[[float], Mapping[str, Any]]
+"""What it tells at a time since the start [s]."""
+STATE, LIVE = "/state", "/live"
+
+
+class WebServer(HttpEmulator):
+    """A machine with a web server, in a thread of its own.
+
+    Args:
+        document: What it tells at ``/state``, and again and again at ``/live`` (WebSocket).
+        token: That must come in the header ``Authorization: Bearer …``; anybody may ask when empty.
+        host: Address to listen on.
+        port: 0 is any free one.
+        period: Between two documents of the WebSocket [s].
+        certificate: Certificate and key files (PEM); unencrypted without.
+    """
+
+    def __init__(
+        self,
+        document: Document,
+        *,
+        token: str = "",
+        host: str = "127.0.0.1",
+        port: int = 0,
+        period: float = 0.05,
+        certificate: tuple[Path, Path] | None = None,
+    ) -> None:
+        super().__init__(host, port, certificate)
+        self.document, self.period, self._token = document, period, token
+
+    @property
+    def live(self) -> str:
+        """Where its WebSocket is."""
+        return f"ws{self.url.removeprefix('http')}{LIVE}"
+
+    def routes(self) -> Sequence[Any]:
+        """The document, and the WebSocket."""
+        from starlette.routing import Route, WebSocketRoute
+
+        return Route(STATE, self._answer), WebSocketRoute(LIVE, self._push)
+
+    def _known(self, headers: Mapping[str, str]) -> bool:
+        return not self._token or headers.get("authorization") == f"Bearer {self._token}"
+
+    async def _answer(self, request: Any) -> Any:
+        from starlette.responses import JSONResponse, PlainTextResponse
+
+        if not self._known(request.headers):
+            return PlainTextResponse("who are you?", status_code=401)
+        return JSONResponse(dict(self.document(self.now())))
+
+    async def _push(self, socket: Any) -> None:
+        from starlette.websockets import WebSocketDisconnect
+
+        if not self._known(socket.headers):
+            await socket.close()
+            return
+        await socket.accept()
+        try:
+            while not self._over.is_set():
+                await socket.send_text(json.dumps(dict(self.document(self.now()))))
+                await asyncio.sleep(self.period)
+        except (WebSocketDisconnect, RuntimeError):
+            return

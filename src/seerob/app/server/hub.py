@@ -1,0 +1,197 @@
+"""All connected pages: each message is encoded once and offered to every one of them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from math import isfinite
+from typing import Any
+
+import msgspec
+from msgspec.structs import replace
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from seerob.app.server.client import Client, Closing
+from seerob.app.server.feed import KNOWN_ACTIONS, Feed
+from seerob.app.wire import schema
+from seerob.core.snapshot import (
+    PROTOCOL,
+    Command,
+    Hello,
+    History,
+    Scene,
+    Snapshot,
+    SoFar,
+    Tracked,
+    Tracking,
+    Transport,
+)
+from seerob.devices.live import headset_offers
+from seerob.devices.live.headset_offers import OFFERS
+
+MOST_CLIENTS = 64
+PATIENCE = 10.0
+"""How long a page may leave a frame waiting [s]."""
+
+_encode = msgspec.msgpack.Encoder().encode
+_decode: Callable[[bytes], Command | Tracking] = msgspec.msgpack.Decoder(Command | Tracking).decode
+LARGEST_COMMAND = 512
+"""[B]; one has less than 100."""
+
+
+def on_the_wire(snapshot: Snapshot) -> Snapshot:
+    """A snapshot without what was sent once with the scene: the basis of each result."""
+    if all(result.basis is None for result in snapshot.results):
+        return snapshot
+    return replace(snapshot, results=tuple(replace(r, basis=None) for r in snapshot.results))
+
+
+def read_message(data: bytes) -> Command | Tracking:
+    """Decode what a page sent.
+
+    Raises:
+        ValueError: It is no message of a page, an unknown command, or a value is missing or not finite.
+    """
+    try:
+        command = _decode(data)
+    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
+        raise ValueError(f"not a command: {error}") from None
+    if isinstance(command, Tracking):
+        return command
+    if len(data) > LARGEST_COMMAND:
+        raise ValueError(f"a command of {len(data)} bytes")
+    if command.action not in KNOWN_ACTIONS | {"ack"}:
+        raise ValueError("unknown action")
+    if command.action not in ("play", "pause") and (command.value is None or not isfinite(command.value)):
+        raise ValueError(f"{command.action} needs a finite value")
+    return command
+
+
+class Hub:
+    """Sends what a feed shows to every page, and tells the feed what pages ask for.
+
+    Everything here runs in the server's loop.
+    """
+
+    def __init__(self, *, scene: Scene, feed: Feed, patience: float = PATIENCE) -> None:
+        self._feed, self._patience = feed, patience
+        hello = Hello(server=_name(), mode=feed.mode, duration=feed.duration, schema=schema())
+        self._hello, self._scene = _encode(hello), _encode(scene)
+        self._newest: Snapshot | None = None
+        self._ended: Closing | None = None
+        self.clients: set[Client] = set()
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Send a snapshot to every page."""
+        self._newest = snapshot
+        if not self.clients:
+            return
+        payload = _encode(on_the_wire(snapshot))
+        for client in self.clients:
+            client.offer_frame(snapshot.seq, payload)
+
+    def tell(self, message: Transport | History | SoFar) -> None:
+        """Send a change to every page."""
+        payload = _encode(message)
+        for client in self.clients:
+            client.offer(type(message).__name__, payload)
+
+    def end(self, closing: Closing) -> None:
+        """End all connections, and those that come later, because there is nothing to show any more."""
+        self._ended = closing
+        for client in tuple(self.clients):
+            client.end(closing)
+
+    async def attend(self, socket: WebSocket) -> None:
+        """Serve one page from the first message to the last."""
+        with suppress(WebSocketDisconnect):  # gone before it was answered
+            await self._attend(socket)
+
+    async def _attend(self, socket: WebSocket) -> None:
+        offered: list[str] = socket.scope["subprotocols"]
+        if PROTOCOL not in offered:
+            # Accepted in the page's own words first: a browser tells a page nothing of a refusal.
+            await socket.accept(subprotocol=offered[0] if offered else None)
+            await _close(socket, Closing(1002, f"this server speaks {PROTOCOL} only"))
+            return
+        await socket.accept(subprotocol=PROTOCOL)
+        if self._ended is not None:
+            await _close(socket, self._ended)
+            return
+        if len(self.clients) >= MOST_CLIENTS:
+            await _close(socket, Closing(1013, f"{MOST_CLIENTS} pages are connected already"))
+            return
+        client = Client(socket, patience=self._patience)
+        client.offer("Hello", self._hello)
+        client.offer("Scene", self._scene)
+        client.offer("History", _encode(self._feed.history()))
+        if (so_far := self._feed.so_far()) is not None:
+            client.offer("SoFar", _encode(so_far))
+        client.offer("Transport", _encode(self._feed.transport()))
+        if self._newest is not None:
+            client.offer_frame(self._newest.seq, _encode(on_the_wire(self._newest)))
+        self.clients.add(client)
+        tasks = [asyncio.create_task(client.send()), asyncio.create_task(self._listen(client, socket))]
+        try:
+            closing = await client.over
+        finally:
+            self.clients.discard(client)
+            OFFERS.gone(client)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+        await _close(socket, closing)
+
+    async def _listen(self, client: Client, socket: WebSocket) -> None:
+        told: Tracked | None = None
+        try:
+            while True:
+                command = read_message(await socket.receive_bytes())
+                if isinstance(command, Tracking):
+                    told = _offer(client, command, told)
+                    continue
+                if command.action == "ack":
+                    client.acknowledge(int(command.value or 0))
+                    continue
+                self._feed.command(command)
+                client.offer("Transport", _encode(self._feed.transport()))
+        except ValueError as error:
+            client.end(Closing(1007, str(error)))
+        except (WebSocketDisconnect, RuntimeError):
+            client.end(Closing(1006, "gone"))
+
+
+def _offer(client: Client, tracking: Tracking, told: Tracked | None) -> Tracked:
+    """Pass on what a headset sees; the page is told what became of it when that changes.
+
+    Raises:
+        ValueError: It contradicts itself.
+    """
+    offer = headset_offers.read(tracking, headset_offers.now())
+    refusal = OFFERS.offer(tracking.human, client, offer)
+    answer = Tracked(human=tracking.human, accepted=not refusal, reason=refusal)
+    if answer != told:
+        client.offer("Tracked", _encode(answer))
+    return answer
+
+
+def _name() -> str:
+    try:
+        return f"seerob {version('seerob')}"
+    except PackageNotFoundError:  # run from a checkout that is not installed
+        return "seerob"
+
+
+async def _close(socket: WebSocket, closing: Closing) -> None:
+    """Close politely; cut when the page does not even take that."""
+    abort: Any = socket.scope["state"]["abort"]
+    if closing.code != 1006:
+        reason = closing.reason.encode(errors="replace")[:120].decode(errors="ignore")
+        try:
+            async with asyncio.timeout(1.0):
+                await socket.close(closing.code, reason)
+        except (TimeoutError, WebSocketDisconnect, RuntimeError):
+            abort()
+    asyncio.get_running_loop().call_later(2.0, abort)

@@ -1,0 +1,199 @@
+"""Plays a recording: run time follows the wall clock times a speed; all pages share one player."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Iterator
+from itertools import islice
+from math import inf, nextafter
+from time import monotonic
+from typing import Protocol
+
+from seerob.app.server.feed import Audience
+from seerob.core.snapshot import Command, History, Scene, Snapshot, SoFar, Transport
+from seerob.recording.result_log import ResultLog
+
+SLOWEST, FASTEST = 0.01, 100.0
+"""Speeds are brought into this range."""
+LONGEST_STEP = 1000
+"""Snapshots moved by one ``step`` at most."""
+POINTS = 4000
+"""Per criterion in the history of a whole recording, at most."""
+_TELL_EVERY = 1.0
+
+
+class Recorded(Protocol):
+    """What the player needs of a recording; `seerob.recording.recording.Recording` is one."""
+
+    start: float
+    """Run time of the first tick [s]."""
+    end: float
+    """Run time of the last tick [s]."""
+
+    @property
+    def scene(self) -> Scene:
+        """What did not change during the run."""
+
+    def snapshots(self, start: float | None = None, end: float | None = None) -> Iterator[Snapshot]:
+        """Snapshots with ``start <= t <= end`` [s], in order."""
+
+    def snapshot_at(self, t: float) -> Snapshot:
+        """The last snapshot at or before ``t`` [s]; the first one when all are later."""
+
+
+class Player:
+    """Shows recorded snapshots as they are; nothing is computed again.
+
+    Args:
+        recording: What to play; it is read in the server's thread and in another one.
+        playing: Whether it starts by itself.
+        loop: Whether it starts again at the end; otherwise it pauses there.
+        rate: Frames sent per second at most [1/s].
+    """
+
+    mode = "replay"
+
+    def __init__(
+        self, recording: Recorded, *, playing: bool = False, loop: bool = False, rate: float = 60.0
+    ) -> None:
+        self._recording = recording
+        self._playing, self._loop, self._speed = playing, loop, 1.0
+        self._pause = 1.0 / rate
+        self._anchor = recording.start, monotonic()
+        self._steps = 0
+        self._dirty = True
+        self._shown: float | None = None
+        self._wake = asyncio.Event()
+        self._log = ResultLog(recording.scene.criteria)
+        self._history = self._log.history(POINTS)
+        self._so_far = self._log.so_far(whole=False)
+        self.reading = True
+        """Whether the recording is still read through; then `so_far` is ``whole``, or reading failed."""
+
+    @property
+    def duration(self) -> float:
+        """Length of the recording [s]."""
+        return self._recording.end - self._recording.start
+
+    def history(self) -> History:
+        """The whole recording, or as much of it as was read by now."""
+        return self._history
+
+    def so_far(self) -> SoFar:
+        """What the recorded run came to, as far as it was read by now."""
+        return self._so_far
+
+    def transport(self) -> Transport:
+        """State of the player."""
+        return Transport(playing=self._playing, t=self._now(), speed=self._speed, loop=self._loop)
+
+    def command(self, command: Command) -> None:
+        """Play, pause, seek, speed, step or loop.
+
+        Raises:
+            ValueError: A ``step`` that is no whole number.
+        """
+        value = command.value or 0.0
+        match command.action:
+            case "play":
+                self._set(self._recording.start if self._at_end() else self._now())
+                self._playing = True
+            case "pause":
+                self._set(self._now())
+                self._playing = False
+            case "seek":
+                self._set(value)
+                self._steps = 0
+            case "speed":
+                self._set(self._now())
+                self._speed = min(max(value, SLOWEST), FASTEST)
+            case "step":
+                if value != int(value):
+                    raise ValueError("step needs a whole number")
+                self._set(self._now())
+                self._playing = False
+                self._steps = max(-LONGEST_STEP, min(LONGEST_STEP, self._steps + int(value)))
+            case "loop":
+                self._loop = bool(value)
+        self._dirty = True
+        self._wake.set()
+
+    async def run(self, audience: Audience) -> None:
+        """Show snapshots until cancelled.
+
+        Raises:
+            InputError: The recording cannot be read where it was wanted.
+        """
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._read_all(audience))
+            tasks.create_task(self._show(audience))
+
+    async def _show(self, audience: Audience) -> None:
+        while True:
+            self._wake.clear()
+            self._turn(audience)
+            # Never faster than pages draw, however many commands come.
+            await asyncio.sleep(self._pause)
+            if not self._playing:
+                await self._wake.wait()
+
+    def _turn(self, audience: Audience) -> None:
+        if self._playing and self._at_end():
+            self._set(self._recording.start if self._loop else self._recording.end)
+            self._playing = self._loop and self.duration > 0.0
+            self._dirty = True
+        snapshot = self._recording.snapshot_at(self._now())
+        if self._steps:
+            snapshot = self._stepped(snapshot, self._steps)
+            self._steps = 0
+            self._set(snapshot.t)
+        if self._dirty:
+            self._dirty = False
+            audience.tell(self.transport())
+        if snapshot.t != self._shown:
+            self._shown = snapshot.t
+            audience.show(snapshot)
+
+    def _stepped(self, snapshot: Snapshot, steps: int) -> Snapshot:
+        if steps > 0:
+            later = deque(islice(self._recording.snapshots(nextafter(snapshot.t, inf)), steps), maxlen=1)
+            return later[0] if later else snapshot
+        for _ in range(-steps):
+            snapshot = self._recording.snapshot_at(nextafter(snapshot.t, -inf))
+        return snapshot
+
+    def _now(self) -> float:
+        t, then = self._anchor
+        if self._playing:
+            t += (monotonic() - then) * self._speed
+        return min(t, self._recording.end)
+
+    def _set(self, t: float) -> None:
+        self._anchor = min(max(t, self._recording.start), self._recording.end), monotonic()
+
+    def _at_end(self) -> bool:
+        return self._now() >= self._recording.end
+
+    async def _read_all(self, audience: Audience) -> None:
+        """Fill the history; a long recording comes in parts, which all begin at its start."""
+        snapshots = self._recording.snapshots()
+        more = True
+        try:
+            while more:
+                more = await asyncio.to_thread(self._read_some, snapshots, monotonic() + _TELL_EVERY)
+                audience.tell(self._history)
+                audience.tell(self._so_far)
+        finally:
+            self.reading = False
+
+    def _read_some(self, snapshots: Iterator[Snapshot], until: float) -> bool:
+        more = False
+        for snapshot in snapshots:
+            self._log.add(snapshot)
+            if monotonic() > until:
+                more = True
+                break
+        self._history = self._log.history(POINTS)
+        self._so_far = self._log.so_far(whole=not more)
+        return more

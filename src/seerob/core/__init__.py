@@ -1,0 +1,1 @@
+"""What everything speaks: samples, snapshots, verdicts, markers, units, errors."""

@@ -1,0 +1,1 @@
+"""Files as users write them, and as a run leaves them: whole or not at all."""

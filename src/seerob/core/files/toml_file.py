@@ -1,0 +1,42 @@
+"""TOML files as users write them: read whole, and every way in which they can be wrong in one line."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from seerob.core.errors import InputError
+
+MAX_FILE_SIZE = 4 << 20
+"""A file larger than this [byte] is none that a user wrote."""
+
+
+def read_toml(path: Path) -> tuple[dict[str, Any], bytes]:
+    """Content of a TOML file, parsed and raw.
+
+    Raises:
+        InputError: Too large, not readable, not UTF-8, or not TOML; names line and column.
+    """
+    try:
+        with path.open("rb") as file:
+            raw = file.read(MAX_FILE_SIZE + 1)
+    except OSError as error:
+        raise InputError.at(path, "", f"cannot be read: {error.strerror}", "check its permissions") from error
+    if len(raw) > MAX_FILE_SIZE:
+        raise InputError.at(
+            path,
+            "",
+            f"larger than {MAX_FILE_SIZE >> 20} MiB",
+            "give a workstation file, which is far smaller",
+        )
+    try:
+        return tomllib.loads(raw.decode("utf-8-sig").replace("\r\n", "\n")), raw
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise InputError.at(path, f"line {line}", "not UTF-8", "save it as UTF-8 text") from error
+    except (tomllib.TOMLDecodeError, ValueError) as error:
+        # Also what tomllib lets through: a date that does not exist, a number of 10 000 digits.
+        raise InputError.at(path, "", f"not TOML: {error}", "see https://toml.io for the syntax") from error
+    except RecursionError as error:
+        raise InputError.at(path, "", "nested too deeply", "no table needs more than four levels") from error

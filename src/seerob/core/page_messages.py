@@ -1,0 +1,113 @@
+"""What the page and the server say to each other beside scene and snapshots; see `seerob.core.snapshot`."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from seerob.core.verdict import Verdict
+
+
+class Hello(Struct, frozen=True, kw_only=True, tag="hello"):
+    """First message of the server."""
+
+    server: str
+    mode: str
+    """``live`` or ``replay``."""
+    duration: float | None = None
+    """Length of the recording [s]; None when live."""
+    schema: str = ""
+    """Hash of the message types; a page built for another one must be built anew."""
+
+
+class Trace(Struct, frozen=True, kw_only=True):
+    """One criterion over a stretch of time, for plots and the timeline's lanes."""
+
+    name: str
+    t: bytes
+    """Little-endian float64 run times [s]."""
+    values: bytes
+    """Little-endian float32, NaN where there was no value."""
+    limits: bytes
+    """Little-endian float32, NaN where there was none."""
+    verdicts: bytes
+    """One byte each: 0 within, 1 exceeded, 2 undecided, 255 none."""
+
+
+class History(Struct, frozen=True, kw_only=True, tag="history"):
+    """What happened so far (live) or all of it (replay), thinned without losing an extremum."""
+
+    traces: tuple[Trace, ...]
+
+
+class CriterionSoFar(Struct, frozen=True, kw_only=True):
+    """What one criterion came to."""
+
+    verdict: Verdict | None
+    decided: float
+    """Share of the run in which it was within or exceeded, 0…1."""
+    undecided: float
+    muted: float
+    """It did not apply."""
+    nothing: float
+    """It was asked, and there was nothing to judge, or no limit to judge by."""
+    open: float
+    """It was not asked, and nothing says what it would have said."""
+    reason: str = ""
+    """Why what was within whenever it was asked is not known to be within throughout."""
+
+
+class SoFar(Struct, frozen=True, kw_only=True, tag="so_far"):
+    """What the run came to by now (live) or as far as the recording was read; sent when it changes."""
+
+    verdict: Verdict | None
+    decided: float | None
+    """Least share that a criterion with a verdict decided of the time in which it applied, 0…1."""
+    criteria: dict[str, CriterionSoFar]
+    whole: bool = False
+    """Whether that is all of the run."""
+
+
+class Transport(Struct, frozen=True, kw_only=True, tag="transport"):
+    """State of the player; sent on every change."""
+
+    playing: bool
+    t: float
+    speed: float = 1.0
+    live: bool = False
+    loop: bool = False
+    """Whether the player starts again at the end."""
+
+
+class Tracking(Struct, frozen=True, kw_only=True, tag="tracking"):
+    """What a page's headset sees of the person who wears it; only a live run that waits for it takes it."""
+
+    human: str
+    """Name of the person in the workstation file."""
+    t: float
+    """On the page's clock [s]."""
+    names: tuple[str, ...]
+    """``viewer``, ``left-grip``, ``right-grip``, and joints as WebXR Body Tracking names them."""
+    poses: bytes
+    """Little-endian float32, seven per name: x, y, z [m], w, x, y, z in ``local-floor`` (x right, y up,
+    z backward); NaN for what is not tracked."""
+    guessed: bytes = b""
+    """One byte per name, 1 where the headset itself only estimates the position; empty for nowhere."""
+
+
+class Tracked(Struct, frozen=True, kw_only=True, tag="tracked"):
+    """What became of a page's `Tracking`; sent at its first, and when that changes."""
+
+    human: str
+    accepted: bool
+    reason: str = ""
+    """Why not."""
+
+
+class Command(Struct, frozen=True, kw_only=True, tag="command"):
+    """What a page asks of the server."""
+
+    action: str
+    """``play``, ``pause``, ``seek``, ``speed``, ``step``, ``loop`` or ``ack``."""
+    value: float | None = None
+    """``seek``: run time [s]; ``speed``: factor; ``step``: recorded snapshots forward or back;
+    ``loop``: 1 or 0; ``ack``: `Snapshot.seq` that was received."""

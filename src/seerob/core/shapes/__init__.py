@@ -1,0 +1,1 @@
+"""Shapes with one meaning each, on the floor and in the room."""

@@ -1,0 +1,146 @@
+r"""Polygons on a floor plan: whether one is simple, what is inside, its triangles and the prism over it.
+
+A polygon is a ring of corners (x, y) in either sense, convex or not; the last corner joins the first.
+Orientation of three points is decided in floating point where that is beyond doubt and in exact
+fractions where it is not, so that a corner *on* another edge is found as such.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.shapes.geometry import Mesh
+from seerob.core.transforms import Array
+
+Corner = tuple[float, float]
+
+DOUBT = 1e-14
+"""Share of its terms below which a determinant's sign is computed exactly: rounding makes 4e-16."""
+
+
+def check_polygon(corners: Sequence[Corner]) -> None:
+    """Refuse what is no simple polygon.
+
+    Args:
+        corners: At least 3, [m].
+
+    Raises:
+        ValueError: Too few corners, equal ones, no area, or edges that touch; says which.
+    """
+    n = len(corners)
+    if n < 3:
+        raise ValueError(f"a polygon has at least 3 corners, not {n}")
+    if corners[0] == corners[-1]:
+        raise ValueError("the last corner of a polygon is the first again: leave it out, it closes by itself")
+    for i in range(n):
+        if corners[i] == corners[(i + 1) % n]:
+            raise ValueError(f"corners {i} and {(i + 1) % n} of the polygon are equal: leave one out")
+    for i in range(n):
+        before, at, after = corners[i - 1], corners[i], corners[(i + 1) % n]
+        ahead = (at[0] - before[0]) * (after[0] - at[0]) + (at[1] - before[1]) * (after[1] - at[1])
+        if turn(before, at, after) == 0 and ahead < 0:
+            raise ValueError(f"the polygon turns back on itself at corner {i}: leave the spike out")
+    for i in range(n):
+        for j in range(i + 2, n):
+            if (i == 0 and j == n - 1) or not _touch(
+                corners[i], corners[i + 1], corners[j], corners[(j + 1) % n]
+            ):
+                continue
+            raise ValueError(
+                f"the polygon crosses or touches itself: edge {i} from {list(corners[i])} and edge {j} from "
+                f"{list(corners[j])}; list the corners in order around it, or use two polygons"
+            )
+
+
+def turn(a: Corner, b: Corner, c: Corner) -> int:
+    """1 when a, b, c turn left, -1 right, 0 when they lie on one line; exact."""
+    left, right = (b[0] - a[0]) * (c[1] - a[1]), (b[1] - a[1]) * (c[0] - a[0])
+    value = left - right
+    # Differences of coordinates of up to 1000 m are themselves rounded: their error counts too.
+    size = (abs(b[0]) + abs(a[0])) * (abs(c[1]) + abs(a[1])) + (abs(b[1]) + abs(a[1])) * (
+        abs(c[0]) + abs(a[0])
+    )
+    if abs(value) <= DOUBT * size:
+        (ax, ay), (bx, by), (cx, cy) = ((Fraction(x), Fraction(y)) for x, y in (a, b, c))
+        exact = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        return (exact > 0) - (exact < 0)
+    return (value > 0) - (value < 0)
+
+
+def _touch(a: Corner, b: Corner, c: Corner, d: Corner) -> bool:
+    """Whether two closed segments have a point in common."""
+    if max(a[0], b[0]) < min(c[0], d[0]) or max(c[0], d[0]) < min(a[0], b[0]):
+        return False
+    if max(a[1], b[1]) < min(c[1], d[1]) or max(c[1], d[1]) < min(a[1], b[1]):
+        return False
+    return turn(a, b, c) * turn(a, b, d) <= 0 and turn(c, d, a) * turn(c, d, b) <= 0
+
+
+def signed_area(corners: Sequence[Corner]) -> float:
+    """Area [m²], negative when the corners go clockwise."""
+    x, y = np.asarray(corners, float).T
+    # About the first corner, so that far from the origin nothing cancels.
+    x, y = x - x[0], y - y[0]
+    return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2)
+
+
+def contains(corners: Sequence[Corner] | Array, points: Array) -> NDArray[np.bool_]:
+    """Whether each point (n, 2) [m] lies inside a simple polygon; on its edge may be either."""
+    ring = np.asarray(corners, float)
+    a, b = ring, np.roll(ring, -1, axis=0)
+    x, y = points[:, :1], points[:, 1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crosses = ((a[:, 1] > y) != (b[:, 1] > y)) & (
+            x < (b[:, 0] - a[:, 0]) * (y - a[:, 1]) / (b[:, 1] - a[:, 1]) + a[:, 0]
+        )
+    return np.asarray(crosses.sum(axis=1) % 2 == 1)
+
+
+def triangulate(corners: Sequence[Corner]) -> NDArray[np.int32]:
+    """Triangles of a simple polygon by ear clipping [Meisters1975]_, counter-clockwise, shape (n - 2, 3).
+
+    Corners on a straight edge are kept, so that the prism over it is closed.
+    """
+    left = list(range(len(corners)))
+    if signed_area(corners) < 0:
+        left.reverse()
+    triangles = []
+    while len(left) > 3:
+        i = _ear(corners, left)
+        triangles.append((left[i - 1], left[i], left[(i + 1) % len(left)]))
+        del left[i]
+    return np.array([*triangles, left], np.int32)
+
+
+def _ear(corners: Sequence[Corner], left: Sequence[int]) -> int:
+    for i in range(len(left)):
+        a, b, c = (corners[left[k % len(left)]] for k in (i - 1, i, i + 1))
+        if turn(a, b, c) <= 0:
+            continue
+        rest = (corners[k] for k in left if corners[k] not in (a, b, c))
+        if not any(turn(a, b, p) >= 0 and turn(b, c, p) >= 0 and turn(c, a, p) >= 0 for p in rest):
+            return i
+    raise ValueError("the polygon is not simple")
+
+
+def prism_mesh(
+    corners: Sequence[Corner],
+    low: float,
+    high: float,
+    color: tuple[float, float, float, float] = (0.7, 0.72, 0.75, 1.0),
+) -> Mesh:
+    """The closed prism over a simple polygon between two heights [m]; faces outward, exact."""
+    n = len(corners)
+    ring = np.asarray(corners, float)
+    vertices = np.vstack([np.column_stack([ring, np.full(n, z)]) for z in (low, high)])
+    top = triangulate(corners)
+    i = np.arange(n)
+    j = (i + 1) % n
+    if signed_area(corners) < 0:
+        i, j = j, i
+    sides = np.vstack([np.column_stack([i, j, j + n]), np.column_stack([i, j + n, i + n])])
+    return Mesh(vertices, np.vstack([top[:, ::-1], top + n, sides]).astype(np.int32), color)

@@ -1,0 +1,378 @@
+"""What goes out: plain frozen data that a recorder, a browser and a report can read.
+
+``web/src/wire.ts`` is generated from this file by `seerob.app.wire`; docstrings go along.
+World frame: right-handed, z up, metres. Quaternions: unit, w first.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from msgspec import Struct
+
+from seerob.core.markers import (
+    Arrow,
+    Box,
+    Ellipsoid,
+    Highlight,
+    Hull,
+    Label,
+    Marker,
+    Polyline,
+    Prism,
+    Rays,
+    Segment,
+    Sphere,
+    Vec3,
+    Vec4,
+)
+from seerob.core.page_messages import (
+    Command,
+    CriterionSoFar,
+    Hello,
+    History,
+    SoFar,
+    Trace,
+    Tracked,
+    Tracking,
+    Transport,
+)
+from seerob.core.verdict import Verdict
+
+__all__ = [
+    "PROTOCOL",
+    "Arrow",
+    "Aspect",
+    "Basis",
+    "Box",
+    "Command",
+    "CriterionInfo",
+    "CriterionSoFar",
+    "Ellipsoid",
+    "Finding",
+    "Hello",
+    "Highlight",
+    "History",
+    "Hull",
+    "Input",
+    "JointInfo",
+    "Label",
+    "Level",
+    "LinkMass",
+    "Marker",
+    "MechanismInfo",
+    "Node",
+    "Origin",
+    "Polyline",
+    "Prism",
+    "Rays",
+    "Result",
+    "Row",
+    "RowState",
+    "Scene",
+    "Segment",
+    "Snapshot",
+    "SoFar",
+    "Sphere",
+    "Trace",
+    "Tracked",
+    "Tracking",
+    "Transport",
+    "Vec3",
+    "Vec4",
+    "Verdict",
+]
+
+PROTOCOL = "seerob.v1.msgpack"
+"""WebSocket sub-protocol; the server refuses any other."""
+
+
+class Origin(StrEnum):
+    """Where a number comes from, best first."""
+
+    MEASURED = "measured"
+    """Heard from the real thing."""
+    STATED = "stated"
+    """Published by the maker or by a norm; the source is named."""
+    GIVEN = "given"
+    """Written by the user in the workstation file."""
+    COMPUTED = "computed"
+    """Follows from the others by the formula."""
+    ESTIMATED = "estimated"
+    """By a stated method with a stated error, asked for by the user."""
+    CHOICE = "choice"
+    """What a method leaves open, decided by seerob in the open; the workstation file can choose otherwise."""
+    ASSUMED = "assumed"
+    """Nobody gave it; a verdict that needs it is UNDECIDED."""
+    MISSING = "missing"
+
+
+class Input(Struct, frozen=True, kw_only=True):
+    """One number that a result was made from."""
+
+    name: str
+    value: float | str | None = None
+    unit: str = ""
+    origin: Origin
+    source: str = ""
+    """Document, file or device; for norms with edition, clause and confidence."""
+
+
+class Basis(Struct, frozen=True, kw_only=True):
+    """Why a result is what it is; enough to defend it line by line."""
+
+    formula: str
+    source: str
+    """Clause and edition of the norm, or equation of the paper."""
+    inputs: tuple[Input, ...] = ()
+    not_modelled: tuple[str, ...] = ()
+    """What this number leaves out."""
+
+
+class Finding(Struct, frozen=True, kw_only=True):
+    """Something noticed while a model was built that whoever reads a result must know."""
+
+    level: str
+    """``note``, ``assumed`` or ``warning``."""
+    subject: str
+    """Full name of the thing it is about."""
+    text: str
+    holds: tuple[str, ...] = ()
+    """Robots, people, machines, parts, variables (``variable door``), or ``*`` for everything, of which no
+    criterion is WITHIN as long as it stands."""
+
+
+# -- results ------------------------------------------------------------------------------------
+
+
+class RowState(StrEnum):
+    """Why a row has, or has not, a figure to compare."""
+
+    JUDGED = "judged"
+    FORBIDDEN = "forbidden"
+    """Contact is not permitted, whatever the figure."""
+    NO_LIMIT = "no_limit"
+    """No limit is available for this place."""
+    EXCLUDED = "excluded"
+    """Kept out by measures that are not evaluated here."""
+    NOT_ASSESSED = "not_assessed"
+    """What it needs is not measured or was not entered; never a least score."""
+
+
+class Aspect(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One figure behind a row: an angle of a component, the speed that one of several limits allows."""
+
+    name: str
+    value: float | None = None
+    """None when it is not known or not measured."""
+    unit: str = ""
+    limit: float | None = None
+    band: str = ""
+    """Of the method, that the value falls into, with its thresholds: ``20° to 45°``."""
+
+
+class Row(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One line about a place of a person's body: for body map, posture panel and manikin.
+
+    A component of a score (with `scale`) or a body area with a limit of its own.
+    """
+
+    name: str
+    """Without its side: ``upper arm``, ``Palm``; ``score`` for the total of a side or of the whole."""
+    group: str = ""
+    """Body region or table of the method that it belongs to."""
+    side: str = ""
+    """``left`` or ``right``; empty for the middle or where both sides are meant."""
+    state: RowState = RowState.JUDGED
+    value: float | None = None
+    unit: str = ""
+    limit: float | None = None
+    """Greatest admissible value, in ``unit``."""
+    scale: tuple[float, float] | None = None
+    """Best and worst score that there can be; None for a quantity."""
+    interval: tuple[float, float] | None = None
+    verdict: Verdict | None = None
+    reason: str = ""
+    """What governs, or why there is no verdict."""
+    areas: tuple[int, ...] = ()
+    """Numbers of specific body areas, ISO/TS 15066:2016 Table A.2, 1 to 29."""
+    bones: tuple[str, ...] = ()
+    """Full names of the nodes that it speaks of: ``operator/right_hand``."""
+    aspects: tuple[Aspect, ...] = ()
+    inputs: tuple[str, ...] = ()
+    """Names of the inputs of the basis that its limit comes from."""
+
+
+class Result(Struct, frozen=True, kw_only=True):
+    """What one criterion says at one instant.
+
+    A result with a figure and without a limit has no verdict: it informs. UNDECIDED always carries a reason.
+    One that says nothing is UNDECIDED, unless it says that there is nothing to judge, and why.
+    """
+
+    name: str
+    value: float | None = None
+    """The figure, in ``unit``; None when it could not be had."""
+    unit: str = ""
+    limit: float | None = None
+    """Admissible value, in ``unit``."""
+    at_most: bool = True
+    """Whether the limit bounds from above (a speed) or from below (a distance)."""
+    verdict: Verdict | None = None
+    reason: str = ""
+    """Why UNDECIDED, or what governs: ``forearm_link ↔ right hand``."""
+    interval: tuple[float, float] | None = None
+    """Where the true value lies, given the tolerances of the inputs."""
+    parts: tuple[Result, ...] = ()
+    """The same per link or body area; the worst one gives the verdict."""
+    markers: tuple[Marker, ...] = ()
+    rows: tuple[Row, ...] = ()
+    """The same by places of a person's body, where a criterion has them."""
+    basis: Basis | None = None
+    """None on parts, which share their parent's, and on the wire, where it is sent once."""
+    t: float | None = None
+    """Instant it speaks of [s] when that is not the snapshot's (a criterion with a period)."""
+    muted: bool = False
+    """Whether the criterion does not apply now, as a variable says: then it says nothing."""
+    nothing: bool = False
+    """Whether there is nothing to judge now, and ``reason`` says why: nobody is near."""
+
+
+class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot"):
+    """The twin and its results at one tick."""
+
+    seq: int
+    t: float
+    """Run time [s]."""
+    poses: bytes
+    """Little-endian float32, seven per node of `Scene.nodes`: x, y, z [m], w, x, y, z."""
+    joints: dict[str, tuple[float, ...]] = {}
+    """Joint positions of the twin per robot and human [rad or m]."""
+    tracking: dict[str, float] = {}
+    """Largest joint error between the twin and what was heard, per robot and human [rad or m]."""
+    bones: dict[str, dict[str, tuple[float | None, float | None]]] = {}
+    """Of people that devices see: bone → how far the twin's bone is from the device's, position [m] and
+    angle [rad]; null where the device has none."""
+    late: dict[str, tuple[float, float]] = {}
+    """Of what live sources drive whose devices send their time: how much later than the fastest sample the
+    newest one arrived, and how late it may be to count [s]."""
+    results: tuple[Result, ...] = ()
+    looks: dict[str, tuple[float, float, float] | None] = {}
+    """Nodes whose look follows a variable: red, green, blue in 0…1; null where one is not drawn."""
+    doubts: dict[str, str] = {}
+    """Robots, humans, machines (with all that they move, `Node.mover`) and single nodes that may not be where
+    `poses` has them, with the reason."""
+
+
+# -- what does not change during a run ----------------------------------------------------------
+
+
+class Node(Struct, frozen=True, kw_only=True):
+    """One body of the scene; its index is its slot in `Snapshot.poses`."""
+
+    name: str
+    """Unique full name, such as ``ur10/forearm_link`` or ``line/fixture/pin_2``."""
+    role: str
+    """``robot``, ``human``, ``tool``, ``workpiece``, ``part``, ``machine`` or ``area``."""
+    owner: str
+    """The table entry of the workstation file it belongs to."""
+    mover: str = ""
+    """The robot, human or machine that decides where it is; empty for what stands."""
+    mesh: str | None = None
+    """Hash of its display mesh (binary glTF, metres, z up, in the body's frame), at ``/mesh/<hash>.glb``."""
+    triangles: int = 0
+    moves: bool = True
+    mass: float | None = None
+    """[kg]; None when nobody gave it."""
+    mass_origin: Origin = Origin.MISSING
+    note: str = ""
+    """What to know of its geometry: ``envelope, not the maker's mesh``."""
+
+
+class Level(Struct, frozen=True, kw_only=True):
+    """A class of scores that a method acts upon, such as an action level."""
+
+    up_to: float
+    """Highest score that belongs to it."""
+    name: str
+    """``action level 2``."""
+
+
+class CriterionInfo(Struct, frozen=True, kw_only=True):
+    """A criterion of this run."""
+
+    name: str
+    kind: str
+    group: str
+    """``safety`` or ``ergonomics``."""
+    title: str
+    """First line of the criterion's documentation."""
+    subjects: tuple[str, ...] = ()
+    """Full names it speaks of."""
+    unit: str = ""
+    limit: float | None = None
+    at_most: bool = True
+    basis: Basis | None = None
+    between: str = ""
+    """What is known of the time between the instants at which it is asked: empty where it is bounded there,
+    ``accepted: …`` with the reason, or why nothing is known; then the verdict of a run stays undecided."""
+    levels: tuple[Level, ...] = ()
+    """Classes of the scores, the lowest first; empty when the method has none."""
+
+
+class JointInfo(Struct, frozen=True, kw_only=True):
+    """One joint of a robot or human."""
+
+    name: str
+    unit: str
+    """``rad`` or ``m``."""
+    lower: float | None = None
+    upper: float | None = None
+
+
+class LinkMass(Struct, frozen=True, kw_only=True):
+    """What one link of a robot, or one thing mounted on it, weighs: a row of its mass table."""
+
+    name: str
+    """Full name."""
+    mass: float | None = None
+    """[kg]; None where nobody knows it."""
+    origin: Origin
+    source: str = ""
+    moves: bool = True
+    merged: str = ""
+    """Link that it is fixed to and moves as one with; empty for that one itself."""
+    note: str = ""
+    """Why it weighs nothing, or why its mass is not known."""
+
+
+class MechanismInfo(Struct, frozen=True, kw_only=True):
+    """A robot or a human, as the page lists it."""
+
+    name: str
+    role: str
+    """``robot`` or ``human``."""
+    joints: tuple[JointInfo, ...]
+    coarse: str = ""
+    """Why what its source says is too coarse for energies and forces; empty when it is not."""
+    masses: tuple[LinkMass, ...] = ()
+    """Of a robot or machine: what each link and each thing on it weighs."""
+
+
+class Scene(Struct, frozen=True, kw_only=True, tag="scene"):
+    """Everything about a run that does not change while it runs; sent once."""
+
+    title: str
+    edition: str
+    """Editions of norms that figures are from, as the bases of the criteria say; and the one that the file
+    asks for, where no figure is from it."""
+    version: str
+    """Version of seerob that wrote this."""
+    workstation_hash: str
+    """SHA-256 of the workstation file and of every file it names."""
+    period: float
+    """Tick period [s]."""
+    nodes: tuple[Node, ...]
+    mechanisms: tuple[MechanismInfo, ...] = ()
+    criteria: tuple[CriterionInfo, ...] = ()
+    findings: tuple[Finding, ...] = ()

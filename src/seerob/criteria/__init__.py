@@ -1,0 +1,1 @@
+"""What is judged: safety, ergonomics, and what they share."""

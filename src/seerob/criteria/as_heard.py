@@ -1,0 +1,94 @@
+"""Where live sources, and devices that saw people, put robots and people: is that plausible?
+
+Where a file puts somebody is asked before a run (`seerob.model.mounting.in_place`); where a device does is
+known only once it was heard. What is implausible then (nobody within 10 m, feet off the floor, a person
+inside a thing) is held until it is plausible once: a wrong unit or frame stays, a step on a chair does not.
+It is confirmed for all that is no farther beyond than the value in the file: no two sessions tell the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from seerob.core.snapshot import Finding
+from seerob.core.transforms import Array
+from seerob.devices.live.listening import LiveSource
+from seerob.model.model import Model
+from seerob.model.mounting.in_place import placed
+from seerob.twin.state import State
+from seerob.workstation.plausibility.of_file import findings
+from seerob.workstation.plausibility.ranges import Quantity, canonical, scaled
+
+AGAIN = 1.0
+"""Period at which what is implausible is asked again [s] of run time."""
+
+
+class AsHeard:
+    """Findings about where robots and people were heard to be, bound once.
+
+    Args:
+        model: The compiled workstation.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        people = {human.name for human in model.workstation.humans}
+        self._waiting = {
+            source.target(): source.target() in people
+            for source in model.workstation.sources
+            if (isinstance(source, LiveSource) or source.captured)
+            and source.target() in {*people, *(robot.name for robot in model.workstation.robots)}
+        }
+        """Whom such a source moves, and whether that is a person; once they were heard, nobody."""
+        self._where: dict[str, Array] = {}
+        self._plausible: set[str] = set()
+        self._found: tuple[Finding, ...] = ()
+        self._due = 0.0
+
+    def at(self, state: State) -> tuple[Finding, ...] | None:
+        """What is implausible now; None where nothing is new."""
+        if not self._waiting and not self._found:
+            return None
+        new = [name for name in self._waiting if _placed(state, name)]
+        if not new and not (self._found and state.t >= self._due):
+            return None
+        for name in new:
+            del self._waiting[name]
+            self._where[name] = state.joint_positions(self._model.mechanisms[name])
+        before, self._due = self._found, state.t + AGAIN
+        self._found = tuple(self._implausible(self._now(state)))
+        return None if self._found == before else self._found
+
+    def _now(self, state: State) -> Mapping[str, Array]:
+        """Joint positions of everybody who was heard; as they were, of whom nothing is heard now."""
+        for name in self._where:
+            if _placed(state, name):
+                captured = state.hearings[name].captured
+                here = state.joint_positions(self._model.mechanisms[name])
+                self._where[name] = here if captured is None else captured
+        return self._where
+
+    def _implausible(self, q: Mapping[str, Array]) -> list[Finding]:
+        found: list[Finding] = []
+        for quantity in placed(self._model, q):
+            if quantity.key in self._plausible:
+                continue
+            told = [f for f in findings([quantity], ()) if f.holds]
+            if not told or self._confirmed(quantity):
+                told = []
+                self._plausible.add(quantity.key)
+            found += told
+        return found
+
+    def _confirmed(self, quantity: Quantity) -> bool:
+        return any(
+            isinstance(one.value, float | int) and abs(scaled(one.value, factor)) >= abs(quantity.values[0])
+            for one in self._model.workstation.confirmed
+            for key, factor in canonical(one.key)
+            if key == quantity.key
+        )
+
+
+def _placed(state: State, name: str) -> bool:
+    """Whether it was heard where it is."""
+    return not state.heard_doubt(name) and not state.hearings[name].unplaced(state.t)

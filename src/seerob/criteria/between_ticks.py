@@ -1,0 +1,313 @@
+"""What criteria say of the time between two ticks: what may have been exceeded there is not within.
+
+At every tick the way since the last one is bounded (`seerob.twin.spans`). Where the margin that a criterion
+has at both ends is more than what it can lose on the way, all of it is within, and no instant of it is looked
+at. Else spans are halved, the one with the worst bound first, and the criterion is asked of the twin in the
+middle, until every span is cleared, an instant is met that exceeds, or the instants are used up.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from msgspec.structs import replace
+
+from seerob.core.errors import Undecided, UnknownName
+from seerob.core.snapshot import Result, Verdict
+from seerob.core.transforms import Array
+from seerob.criteria.criterion import Criterion, Evaluate, Lowest
+from seerob.model.model import Model
+from seerob.twin.spans import Fall, Falls, Indices, Margin, Path, Points, Span
+from seerob.twin.state import State
+
+MOST = 32
+"""Instants that are looked at between two ticks, of one criterion: spans of 10 ms are halved to less than
+1 ms everywhere; more would hold up a live run."""
+FEW = 8
+"""The same of one whose bound is a judgement of its own (`Criterion.lowest`)."""
+
+_WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+
+
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """How a criterion is judged between two ticks."""
+
+    criterion: Criterion
+    points: Points
+    """Shared by all criteria of a workstation."""
+    falls: Falls | None
+    lowest: Lowest | None
+    """Either of them."""
+    remembers: bool
+    """Whether it is asked in the order of time only."""
+    again: Callable[[], Evaluate]
+    """Makes another one of it, which is asked of instants in any order."""
+    people: tuple[str, ...]
+    """Whose place it depends on: how well devices know that changes from tick to tick."""
+
+
+def watched(criterion: Criterion, model: Model, points: Points) -> Watch | None:
+    """How a criterion is judged between two ticks; None when nothing bounds it."""
+    falls, lowest = criterion.falls(model, points), criterion.lowest(model, points)
+    if falls is None and lowest is None:
+        return None
+    remembers, people = criterion.remembers(model), _people(criterion, model)
+    return Watch(criterion, points, falls, lowest, remembers, lambda: criterion.bind(model), people)
+
+
+def _people(criterion: Criterion, model: Model) -> tuple[str, ...]:
+    found = set(criterion.depends(model))
+    for name in tuple(found):
+        with suppress(UnknownName):
+            found |= {model.bodies[i].mover for i in model.select(name)}
+    return tuple(h.name for h in model.workstation.humans if h.name in found)
+
+
+class End(NamedTuple):
+    """What is known of one end of a span."""
+
+    t: float
+    verdict: Verdict | None
+    margin: Margin | None
+    """None unless it is within."""
+    speeds: Array
+    """Of every body [m/s]."""
+    idle: bool = False
+    """Nothing was there to judge."""
+
+
+class Asking(NamedTuple):
+    """What only who asks the criteria can do."""
+
+    now: Callable[[int], Result]
+    """Asks a criterion now, before its period is over."""
+    at: Callable[[int, Evaluate, State], Result]
+    """What another one of it says of a state, by the same rules."""
+    take_back: Callable[[Result, str], Result]
+    """Makes what is within undecided, with a reason."""
+
+
+class Told(NamedTuple):
+    """What a way between two instants came to."""
+
+    exceeded: Result | None = None
+    """At an instant between."""
+    open: str = ""
+    """Why it is not known; empty when all of it is within or something is exceeded."""
+
+
+class BetweenTicks:
+    """Judges the way from tick to tick.
+
+    Args:
+        watches: Of every criterion, None where nothing bounds it.
+    """
+
+    def __init__(self, watches: Sequence[Watch | None]) -> None:
+        self._watches = watches
+        self._before: list[End | None] = [None] * len(watches)
+        self._ids: Indices | None = None
+        self._speeds: Array | None = None
+        self._shadow: State | None = None
+        self._whole: Span | None = None
+        """Of the way from tick to tick, which all criteria ask for."""
+        self._again: dict[int, Evaluate] = {}
+        self._failed: dict[int, str] = {}
+        """Why nothing bounds a criterion any more in this run."""
+        self.looks = 0
+        """Instants between ticks that were looked at so far."""
+
+    def __call__(
+        self,
+        state: State,
+        results: Sequence[Result],
+        asking: Asking,
+    ) -> tuple[Result, ...]:
+        """The results of a tick, each with what happened since the last one.
+
+        Args:
+            state: The twin at this tick.
+            results: Of every criterion at it; one with a period may speak of an earlier instant.
+            asking: See there.
+        """
+        found = list(results)
+        if not any(self._watches):
+            return tuple(found)
+        speeds, ids, path = state.largest_speeds(), state.bearers.ids, state.path
+        if path is None or self._ids is None or self._speeds is None:
+            path, self._before = None, [None] * len(found)
+        self._way, self._asking, self._whole = path, asking, None
+        for i, watch in enumerate(self._watches):
+            if watch is None:
+                continue
+            try:
+                if i not in self._failed:
+                    found[i] = self._one(i, watch, found[i], state, speeds)
+            except Exception as error:
+                # One's own bound that fails must not end a run that others are judged in.
+                self._failed[i] = f"what bounds it between two ticks failed: {type(error).__name__}: {error}"
+            if i in self._failed:
+                found[i] = asking.take_back(found[i], self._failed[i])
+        self._ids, self._speeds = ids.copy(), speeds
+        return tuple(found)
+
+    def _one(self, i: int, watch: Watch, result: Result, state: State, speeds: Array) -> Result:
+        """What a criterion says of a tick, with what happened since the last one."""
+        before = self._before[i]
+        if result.t is not None and result.t != state.t and before is not None:
+            self._before[i] = self._falling(watch, before, state, speeds)
+            if self._before[i] is not None:
+                return result
+            result = self._asking.now(i)
+        now = _end(watch.criterion, result, state.t, speeds)
+        if self._way is not None and before is not None:
+            told = self._judge(i, watch, (before, now), state)
+            if told.exceeded is not None:
+                result = told.exceeded
+            elif told.open and (now.verdict is _WITHIN or (now.idle and watch.lowest is not None)):
+                result = self._asking.take_back(result, told.open)
+        self._before[i] = now
+        return result
+
+    def _falling(self, watch: Watch, before: End, state: State, speeds: Array) -> End | None:
+        """What is left at this tick of a margin that was not asked for; None when that is not enough."""
+        path = self._way
+        if path is None or self._ids is None or not np.array_equal(self._ids, state.bearers.ids):
+            return None  # what was picked up has the speed of the hand at once
+        if watch.lowest is not None:
+            now = before._replace(t=state.t, speeds=speeds)
+            some = before.margin is not None or before.idle
+            return now if not some or self._low(watch, path, (before, now), state) >= 0 else None
+        if any(state.hearings[person].bones for person in watch.people):
+            return None  # how far devices are off now is not known from then
+        if before.margin is None:
+            return End(state.t, before.verdict, None, speeds)
+        fall = self._fall(watch, path, (before, before._replace(t=state.t, speeds=speeds)), state)
+        margin, off = before.margin
+        left = margin - fall.fall
+        return End(state.t, _WITHIN, (left, off), speeds) if np.all(left - off >= 0) else None
+
+    def _judge(self, i: int, watch: Watch, ends: tuple[End, End], state: State) -> Told:
+        """The way between two instants at which a criterion was asked."""
+        before, now = ends
+        idle = watch.lowest is not None and (before.idle or now.idle)
+        if _EXCEEDED in (before.verdict, now.verdict) or not (before.margin or now.margin or idle):
+            return Told()
+        assert self._way is not None
+        low = self._low(watch, self._way, ends, state)
+        if low >= 0:
+            return Told()
+        if not np.isfinite(low) and not (before.margin and now.margin) and watch.lowest is None:
+            # Nothing was known at one end, which is said there, and from the other nothing follows.
+            return Told()
+        if not np.isfinite(low) and self._way.broken:
+            return Told(open=f"{', '.join(self._way.broken)} jumped: its way between two ticks is not known")
+        return self._search(i, watch, ends, low, state)
+
+    def _span(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Span:
+        a, b = ends
+        assert self._ids is not None
+        whole = a.t == path.t[0] and b.t == path.t[-1]
+        span = self._whole if whole else None
+        if span is None:
+            span = watch.points.span(path, a.t, b.t, self._ids, state.model.mj)
+            span.between_speeds(a.speeds, b.speeds)
+            span.foresee = state.foresee
+            self._whole = span if whole else self._whole
+        return span
+
+    def _fall(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Fall:
+        assert watch.falls is not None
+        span = self._span(watch, path, ends, state)
+        least = [end.margin[0] - end.margin[1] for end in ends if end.margin is not None]
+        if len(least) == 1:
+            return watch.falls(span, least[0])
+        m, other = least
+        return watch.falls(span, min(m, other) if type(m) is float is type(other) else np.minimum(m, other))
+
+    def _low(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> float:
+        """Bound on the margin everywhere between two ends, of which one is within at least.
+
+        Args:
+            watch: Of the criterion.
+            path: The way from tick to tick.
+            ends: Of a part of it.
+            state: The twin at one of them.
+        """
+        if watch.lowest is not None:
+            if self._ids is None or not np.array_equal(self._ids, state.bearers.ids):
+                return -np.inf
+            try:
+                return float(watch.lowest(state, self._span(watch, path, ends, state)))
+            except Undecided:
+                return -np.inf
+        fall, bend = self._fall(watch, path, ends, state)
+        (m, off), *rest = [end.margin for end in ends if end.margin is not None]
+        if not rest:
+            return float(np.min(m - fall - off))
+        ((other, also),) = rest
+        if all(type(x) is float for x in (m, other, fall, bend)):
+            return float(max((m + other - fall) / 2, min(m, other) - bend) - max(off, also))
+        low = np.maximum((m + other - fall) / 2, np.minimum(m, other) - bend)
+        return float(np.min(low - np.maximum(off, also)))
+
+    def _search(self, i: int, watch: Watch, ends: tuple[End, End], low: float, state: State) -> Told:
+        path = self._way
+        assert path is not None
+        begin, end = (f"{each.t:.4g} s" for each in ends)
+        assert self._ids is not None
+        if watch.remembers or not np.array_equal(self._ids, state.bearers.ids):
+            what = "it remembers" if watch.remembers else "something was picked up or let go"
+            return Told(open=f"not known to be within from {begin} to {end}: {what}")
+        spans = [(low, ends[0].t, *ends)]
+        doubt = ""
+        for _ in range(MOST if watch.lowest is None else FEW):
+            if not spans:
+                break
+            _, _, a, b = heapq.heappop(spans)
+            t = path.middle(a.t, b.t)
+            result, middle, shadow = self._look(i, watch, path, t, state)
+            if middle.verdict is _EXCEEDED:
+                reason = f"between two ticks, at {t:.4f} s: {result.reason}".removesuffix(": ")
+                return Told(exceeded=replace(result, t=t, reason=reason))
+            for pair in ((a, middle), (middle, b)):
+                if pair[0].margin or pair[1].margin or (watch.lowest and (pair[0].idle or pair[1].idle)):
+                    low = self._low(watch, path, pair, shadow)
+                    if not low >= 0:
+                        heapq.heappush(spans, (low, pair[0].t, *pair))
+                elif _UNDECIDED in (pair[0].verdict, pair[1].verdict):
+                    doubt = doubt or result.reason
+        if not spans and not doubt:
+            return Told()
+        if not spans:
+            return Told(open=f"between two ticks: {doubt}")
+        _, _, a, b = spans[0]
+        return Told(open=f"not known to be within from {a.t:.4f} s to {b.t:.4f} s, between two ticks")
+
+    def _look(self, i: int, watch: Watch, path: Path, t: float, state: State) -> tuple[Result, End, State]:
+        """A criterion at an instant between two ticks; what is in doubt at the tick is in doubt there."""
+        self.looks += 1
+        if i not in self._again:
+            self._again[i] = watch.again()
+        if self._shadow is None:
+            data = mujoco.MjData(state.model.mj)
+            self._shadow = State(state.model, data, state.hearings, state.signals)
+            self._shadow.bearers = state.bearers
+        shadow = self._shadow
+        shadow.columns, shadow.foresee = state.columns, state.foresee
+        shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)
+        shadow.refresh(t)
+        result = self._asking.at(i, self._again[i], shadow)
+        return result, _end(watch.criterion, result, t, shadow.largest_speeds()), shadow
+
+
+def _end(criterion: Criterion, result: Result, t: float, speeds: Array) -> End:
+    margin = criterion.margin(result) if result.verdict is _WITHIN else None
+    return End(t, result.verdict, margin, speeds, result.nothing)

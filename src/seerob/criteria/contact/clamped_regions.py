@@ -1,0 +1,178 @@
+"""Which body regions each moving body of a robot clamps: against surfaces, itself and the floor.
+
+People stand on z = 0 by definition, whether or not a part of the workstation is drawn there: unless told
+otherwise it is a surface like any other, endless and horizontal. A body that moves clamps against it where
+its lowest point is no higher than the body part is thick, or may be by the next tick at its present speed;
+see `seerob.criteria.contact.clamping`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from seerob.core.snapshot import Input, Origin
+from seerob.core.transforms import Array
+from seerob.criteria.contact.clamping import AHEAD, Flags, robot_pinch_pairs, thickest
+from seerob.criteria.contact.closing_gaps import ClosingGaps
+from seerob.criteria.contact.joint_gaps import JointGaps
+from seerob.description.norms.crushing_gaps import crushing_gaps, openings, sizes
+from seerob.kernels.approach import lowest_and_falling
+from seerob.kernels.speed import stacked
+from seerob.model.model import Mechanism, Model
+from seerob.model.provenance import given
+from seerob.twin.spans import Span
+from seerob.twin.state import State
+
+ROOM = 0.1
+"""How far beyond the thickest body part gaps are told [m]."""
+
+
+class FloorGap:
+    """The gap between the moving bodies of a robot and the floor, bound once."""
+
+    def __init__(self, model: Model, moving: Sequence[int], height: float, *, period: float) -> None:
+        """Bind.
+
+        Args:
+            model: The compiled workstation.
+            moving: Bodies that the robot's joints move.
+            height: Of the floor, z in the world [m].
+            period: At which it is asked for [s].
+        """
+        bodies = [model.bodies[i] for i in moving]
+        self._height, self._moving, self._bodies = height, np.array(moving, np.int64), tuple(moving)
+        self._corners = stacked([body.corners for body in bodies])
+        self._radius = np.array([body.radius for body in bodies], float)
+        self._period = period
+
+    def lowest_and_falling(self, state: State) -> Array:
+        """Gap to the floor [m] and largest downward speed [m/s] of each moving body, shape (b, 2)."""
+        found = np.empty((len(self._moving), 2))
+        lowest_and_falling(
+            self._moving, *state.placed(self._bodies), *state.body_velocities(self._bodies),
+            *self._corners, self._radius, found,
+        )  # fmt: skip
+        found[:, 0] -= self._height
+        return found
+
+    def clamped(self, state: State, thickness: Array, wanted: Flags) -> Flags:
+        """Which moving bodies clamp which body parts.
+
+        Args:
+            state: The twin.
+            thickness: Of body parts [m], shape (r,).
+            wanted: Of which bodies and body parts that matters, shape (b, r).
+        """
+        gap, fall = self.lowest_and_falling(state).T
+        return self._clamped(gap, fall, thickness, wanted)
+
+    def ever(self, state: State, span: Span, thickness: Array, wanted: Flags) -> Flags:
+        """The same at any instant of a span of which the twin is at one end."""
+        fast = span.fast[self._moving]
+        gap = self.lowest_and_falling(state)[:, 0] - fast * span.T
+        return self._clamped(gap, fast, thickness, wanted)
+
+    def _clamped(self, gap: Array, fall: Array, thickness: Array, wanted: Flags) -> Flags:
+        # As for other surfaces: where it may be no wider by the next tick, whatever way it goes.
+        ahead = gap - np.clip(fall * self._period, 0.0, AHEAD)
+        return np.asarray((ahead[:, None] <= thickness) & wanted)
+
+
+class Clamping:
+    """What clamps which body region, bound once."""
+
+    def __init__(
+        self,
+        model: Model,
+        robot: Mechanism,
+        gaps: dict[str, float],
+        regions: Sequence[str],
+        floor: float | None,
+        *,
+        every: float | None = None,
+    ) -> None:
+        """Bind.
+
+        Args:
+            model: The compiled workstation.
+            robot: The robot.
+            gaps: Thickness of body regions by name [m], instead of those of ISO 13854.
+            regions: Body regions in the order of the answers.
+            floor: Height of the floor [m]; None when it is no surface.
+            every: Period at which it is asked for [s]; None: at every tick.
+        """
+        known = {**crushing_gaps()[0], **gaps}
+        others = [b for b in model.bodies if b.role not in ("human", "area")]
+        # The real surfaces may be nearer than the shapes, or farther apart.
+        deviation = 2 * max((body.deviation for body in others), default=0.0)
+        plain = np.array([known[name] for name in regions])
+        fits = np.minimum([openings()[0][name] for name in regions], plain)
+        self._thickness = plain + deviation
+        cap = float(self._thickness.max(initial=0.0)) + ROOM
+        pairs, widest, by_one = robot_pinch_pairs(model, robot, cap=cap)
+        period = max(model.workstation.engine.tick, every or 0.0)
+        least = min(openings()[0].values())
+        between = thickest(widest + deviation, fits, plain, sizes(), least=least) + deviation
+        self._gaps = ClosingGaps(model.shapes, pairs, between, period=period)
+        self._relative = self._gaps.relative(model)
+        self._joints = JointGaps(
+            model, robot, by_one, self._thickness, np.maximum(fits - deviation, 0.0),
+            least=least, period=period,
+        )  # fmt: skip
+        self._moving = robot.moving
+        self._floor = None if floor is None else FloorGap(model, robot.moving, floor, period=period)
+        self._asked = tuple(b.index for b in others)
+        # All that carries a surface: where a machine is not known, nor are the gaps to it.
+        self._carriers = [name for name, m in model.mechanisms.items() if m.role != "human"]
+
+    def at(self, state: State, wanted: Flags) -> tuple[Flags, Flags, Array]:
+        """Which moving bodies clamp which regions, which of those against the floor, and how fast.
+
+        That is against what moves itself [m/s], shape (b, r): both sides may be slower than they close.
+
+        Args:
+            state: The twin.
+            wanted: Of which bodies, that move now, and which regions that matters, shape (b, r).
+
+        Raises:
+            Undecided: A robot or a machine that was not heard.
+        """
+        state.require(*self._carriers)
+        if not wanted.any():
+            return np.zeros_like(wanted), np.zeros_like(wanted), np.zeros(wanted.shape)
+        v, twists = state.fastest_points(self._moving)[0], state.body_velocities(self._asked)
+        clamped, speeds = self._gaps.clamped(*state.placed(self._asked), twists, v, wanted)
+        at_joints = self._joints.speeds(state, wanted)
+        clamped |= at_joints > 0
+        speeds = np.maximum(speeds, at_joints)
+        if self._floor is None:
+            return clamped, np.zeros_like(clamped), speeds
+        floor = self._floor.clamped(state, self._thickness, wanted)
+        return clamped | floor, floor, speeds
+
+    def ever(self, state: State, span: Span, wanted: Flags) -> tuple[Flags, Array]:
+        """What may clamp at any instant of a span of which the twin is at one end, and how fast; see `at`.
+
+        Raises:
+            Undecided: A robot or a machine that was not heard.
+        """
+        state.require(*self._carriers)
+        poses, twists = state.placed(self._asked), state.body_velocities(self._asked)
+        clamped, speeds = self._gaps.ever(*poses, twists, span, self._relative, wanted)
+        at_joints = self._joints.speeds(state, wanted, span)
+        clamped |= at_joints > 0
+        if self._floor is not None:
+            clamped |= self._floor.ever(state, span, self._thickness, wanted)
+        return clamped, np.maximum(speeds, at_joints)
+
+
+def floor_input(height: float | None) -> Input:
+    """Whether the floor is a surface, and at which height."""
+    name = "floor as a surface that clamps"
+    if height is None:
+        return Input(name=name, value="left out", origin=Origin.GIVEN, source="workstation file")
+    if height:
+        return given(name, height, "m")
+    return Input(name=name, value=0.0, unit="m", origin=Origin.STATED, source="people stand on z = 0")

@@ -1,0 +1,320 @@
+r"""Where a part of a person could be clamped: in a gap no wider than the body part, of parts that move.
+
+A gap :math:`g` between a moving part of a robot and another surface clamps a body part of the
+thickness :math:`D` where it is no wider than it, or may be by the next tick, while its sides move against
+each other:
+
+.. math:: |v| > 0, \qquad g - |v| T \le D
+
+with T the period of a tick. Whether the *least* distance closes does not count: a nearer surface at a
+constant distance, or a part that tilts, hides another place where the gap closes. A part that moves past a
+surface or away from it counts as well: the rule errs on the side of clamping, and one more surface never
+permits more. Nothing is remembered: the answer at an instant follows from the poses and speeds then.
+
+Between the robot's own parts nothing gets where they are always near. Which body parts do is settled once,
+from the shapes and the ranges of the joints:
+
+- of two parts that several joints move against each other (a tool and the upper arm), a body part counts as
+  thick as the widest of the sizes that fit between them in some position of these joints;
+- of two parts that one joint moves against each other (an elbow, two fingers), which touch at the joint
+  wherever it stands, every place is looked at by itself; see `seerob.criteria.contact.joint_gaps`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.transforms import Array
+from seerob.distance.least import Per, Query
+from seerob.kernels.shapes import Shapes
+from seerob.model.model import Mechanism, Model
+
+Flags = NDArray[np.bool_]
+Coordinate = tuple[str, int]
+"""A commanded joint: mechanism and column."""
+
+STILL = 1e-3
+"""Parts of a robot that move more slowly against each other stay as they are [m/s]."""
+AHEAD = 0.09
+"""Largest way that is looked ahead to the next instant [m]."""
+SAMPLED = 64
+"""Positions of several joints in which it is looked how far two parts can be apart."""
+MISSED = 0.1
+"""By which share they may be farther apart in a position in between."""
+ENDLESS = 1.0
+"""How far to either side a slide without ends is looked at [m]."""
+
+
+def clamps(gaps: Array, speed: Array, period: float, thickness: Array) -> Flags:
+    """Which gaps clamp which body parts.
+
+    Args:
+        gaps: Distances of pairs of surfaces [m], shape (..., g).
+        speed: Of one side seen from the other [m/s], shape (..., g).
+        period: Until it is asked again [s].
+        thickness: Of body parts in each gap [m], -infinity of one that does not get in, shape (g, r).
+
+    Returns:
+        Shape (..., g, r).
+    """
+    ahead = np.asarray(gaps, float) - np.minimum(speed * period, AHEAD)
+    # What is not a number clamps: nobody knows that it does not.
+    return np.asarray(~(speed <= STILL)[..., None] & ~(ahead[..., None] > thickness))
+
+
+def thickest(widest: Array, fits: Array, thickness: Array, sizes: Sequence[float], *, least: float) -> Array:
+    """Thickest of the sizes that fit between two parts, and that are of the body part [m], shape (g, r).
+
+    Never as wide as the parts can be apart: what is there when they are is not yet clamped.
+
+    Args:
+        widest: How far the parts can be apart [m], shape (g,).
+        fits: Thinnest that a body part is [m], shape (r,).
+        thickness: Thickest likewise [m], shape (r,).
+        sizes: Between them, thinnest first [m].
+        least: By how much a gap changes that closes at all [m].
+    """
+    found = np.full((len(widest), len(thickness)), -np.inf)
+    for size in (*sizes, *thickness.tolist()):
+        counts = (fits <= size) & (size <= thickness) & (widest[:, None] >= size * (1 - MISSED))
+        found = np.where(counts, np.maximum(found, size), found)
+    return np.asarray(np.minimum(found, widest[:, None] - least))
+
+
+@dataclass(frozen=True, eq=False)
+class PinchPairs:
+    """The gaps in which the moving parts of a robot could clamp somebody, bound once."""
+
+    moving: tuple[int, ...]
+    """Bodies of the robot that its joints move."""
+    queries: tuple[tuple[Query, Per], ...]
+    first: NDArray[np.int64]
+    """Row in ``moving`` of each gap, shape (g,)."""
+    second: NDArray[np.int64]
+    """Row in ``moving`` of the other side, -1 when it does not move or is a surface, shape (g,)."""
+    across: NDArray[np.int64]
+    """Body of the other side, -1 of the gaps to any of the surfaces that stand, shape (g,)."""
+    inner: Flags
+    """Whether it is between two parts of the robot, shape (g,)."""
+
+    def gaps(self, rotations: Array, positions: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Gaps [m] and the body on the other side (-1 beyond the cap), shape (g,).
+
+        Args:
+            rotations: world_from_body of every body, shape (n, 3, 3).
+            positions: Likewise [m], shape (n, 3).
+        """
+        distances, others = [np.zeros(0)], [np.zeros(0, np.int64)]
+        for query, per in self.queries:
+            found = query.ask(rotations, positions, per)
+            distances.append(found.distance)
+            others.append(found.body_a)
+        return np.concatenate(distances), np.concatenate(others)
+
+    def batch(self, rotations: Array, positions: Array) -> Array:
+        """Gaps of many samples [m], shape (N, g). Poses as of `Query.batch`."""
+        found = [query.batch(rotations, positions, per).distance for query, per in self.queries]
+        return np.concatenate([np.zeros((len(rotations), 0)), *found], axis=1)
+
+    def fastest(self, clamped: Flags, speed: Array) -> Array:
+        """Of gaps (g, r) and their speeds (g,) the largest that a moving body clamps at, 0: none, (b, r)."""
+        found = np.zeros((len(self.moving), clamped.shape[1]))
+        for side in (self.first, self.second):
+            for gap in np.flatnonzero((side >= 0) & (self.across >= 0) & clamped.any(axis=1)):
+                found[side[gap]] = np.maximum(found[side[gap]], np.where(clamped[gap], speed[gap], 0.0))
+        return found
+
+    def per_body(self, clamped: Flags) -> Flags:
+        """Of gaps (..., g, r), which moving bodies clamp: shape (..., b, r)."""
+        found = np.zeros((*clamped.shape[:-2], len(self.moving), clamped.shape[-1]), bool)
+        if not clamped.any():
+            return found
+        for side in (self.first, self.second):
+            for gap in np.flatnonzero(side >= 0):
+                found[..., side[gap], :] |= clamped[..., gap, :]
+        return found
+
+
+def pinch_pairs(
+    shapes: Shapes,
+    moving: Sequence[int],
+    surfaces: Sequence[int],
+    apart: frozenset[tuple[int, int]],
+    *,
+    others: Sequence[int] = (),
+    still: Sequence[int] = (),
+    cap: float,
+) -> PinchPairs:
+    """Bind the gaps of a robot.
+
+    Args:
+        shapes: Of the model.
+        moving: Bodies that the robot's joints move.
+        surfaces: Bodies around that stand.
+        others: Bodies of other robots and of machines, which move.
+        apart: Pairs of the robot's own bodies that are one, or that are judged place by place.
+        still: The robot's own bodies that its joints do not move.
+        cap: Largest gap that matters [m].
+    """
+    queries: list[tuple[Query, Per]] = []
+    first: list[int] = []
+    second: list[int] = []
+    across: list[int] = []
+    if moving and surfaces:
+        queries.append((Query(shapes, surfaces, moving, cap=cap), Per.BODY))
+        first += range(len(moving))
+        second += [-1] * len(moving)
+        across += [-1] * len(moving)
+    if moving and others:
+        queries.append((Query(shapes, others, moving, cap=cap), Per.PAIR))
+        first += [*range(len(moving))] * len(others)
+        second += [-1] * (len(moving) * len(others))
+        across += [other for other in dict.fromkeys(others) for _ in moving]
+    outside = len(first)
+    own = [*moving, *still]
+    for row, body in enumerate(moving):
+        others = [
+            k for k in range(row + 1, len(own)) if (body, own[k]) not in apart and (own[k], body) not in apart
+        ]
+        if others:
+            queries.append((Query(shapes, [own[k] for k in others], [body], cap=cap), Per.PAIR))
+            first += [row] * len(others)
+            second += [k if k < len(moving) else -1 for k in others]
+            across += [own[k] for k in others]
+    return PinchPairs(
+        tuple(moving), tuple(queries), np.array(first, np.int64), np.array(second, np.int64),
+        np.array(across, np.int64), np.arange(len(first)) >= outside,
+    )  # fmt: skip
+
+
+class OwnJoints:
+    """Which commanded joints move two bodies of a robot against each other, and poses by where they stand.
+
+    Args:
+        model: The compiled workstation.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._model, self._data = model, mujoco.MjData(model.mj)
+        self._bodies = [body.mj for body in model.bodies]
+        self._of_joint: dict[int, set[Coordinate]] = {}
+        for name, m in model.mechanisms.items():
+            for row, dof in enumerate(m.v_address.tolist()):
+                columns = np.flatnonzero(m.coupling[row]).tolist()
+                self._of_joint.setdefault(dof, set()).update((name, column) for column in columns)
+
+    def between(self, a: int, b: int) -> frozenset[Coordinate]:
+        """Commanded joints between two bodies; empty when they are one."""
+        mj = self._model.mj
+        ways = []
+        for body in (a, b):
+            at, dofs = int(self._bodies[body]), set()
+            while at:
+                start, count = int(mj.body_dofadr[at]), int(mj.body_dofnum[at])
+                dofs |= set(range(start, start + count)) if count else set()
+                at = int(mj.body_parentid[at])
+            ways.append(dofs)
+        found = (self._of_joint.get(dof, set()) for dof in ways[0] ^ ways[1])
+        return frozenset(coordinate for each in found for coordinate in each)
+
+    def in_order(self, coordinates: Iterable[Coordinate]) -> list[Coordinate]:
+        """From the ground outward, whatever the robot and its machines are called."""
+        mj = self._model.mj
+
+        def depth(coordinate: Coordinate) -> tuple[int, int]:
+            name, column = coordinate
+            m = self._model.mechanisms[name]
+            at, above = int(mj.dof_bodyid[m.v_address[m.own[column]]]), 0
+            while at:
+                at, above = int(mj.body_parentid[at]), above + 1
+            return above, column
+
+        return sorted(coordinates, key=depth)
+
+    def range(self, coordinate: Coordinate) -> tuple[float, float]:
+        """Ends of a joint [rad or m]; a turn that has none goes round once, a slide some way."""
+        name, column = coordinate
+        m = self._model.mechanisms[name]
+        low, high, home = float(m.lower[column]), float(m.upper[column]), float(m.home[column])
+        some = np.pi if m.joints[column].kind == "revolute" else ENDLESS
+        low = home - some if not np.isfinite(low) else low
+        return low, max(home + some, low) if not np.isfinite(high) else high
+
+    def endless(self, coordinate: Coordinate) -> bool:
+        """Whether it slides without ends: then no range of it says what gets between two parts."""
+        name, column = coordinate
+        m = self._model.mechanisms[name]
+        ends = np.isfinite([m.lower[column], m.upper[column]])
+        return m.joints[column].kind != "revolute" and not bool(ends.all())
+
+    def poses(self, positions: Mapping[Coordinate, Array]) -> tuple[Array, Array]:
+        """Poses of all bodies with some joints there and all others at home.
+
+        Args:
+            positions: Of each joint [rad or m], shape (N,) each.
+
+        Returns:
+            world_from_body, shapes (N, n, 3, 3) and (N, n, 3) [m].
+        """
+        count = len(next(iter(positions.values())))
+        rotations, places = [], []
+        for k in range(count):
+            for name, m in self._model.mechanisms.items():
+                q = m.home.copy()
+                for (who, column), values in positions.items():
+                    if who == name:
+                        q[column] = values[k]
+                self._data.qpos[m.q_address] = m.coupling @ q + m.offset
+            mujoco.mj_kinematics(self._model.mj, self._data)
+            rotations.append(self._data.xmat[self._bodies].reshape(-1, 3, 3).copy())
+            places.append(self._data.xpos[self._bodies].copy())
+        return np.array(rotations), np.array(places)
+
+
+def robot_pinch_pairs(
+    model: Model, robot: Mechanism, *, cap: float
+) -> tuple[PinchPairs, Array, list[tuple[int, int, Coordinate]]]:
+    """The gaps of a robot to parts and other robots, and between its own parts.
+
+    Args:
+        model: The compiled workstation.
+        robot: The robot.
+        cap: Largest gap that matters [m].
+
+    Returns:
+        Its gaps; how far their sides can be apart [m], infinity of surfaces, shape (g,); and pairs of its own
+        bodies, one of them moving, that one joint alone moves against each other.
+    """
+    own = (*robot.bodies, *robot.carried)
+    still = [i for i in own if i not in robot.moving]
+    around = [b for b in model.bodies if b.role not in ("human", "area") and b.index not in own]
+    surfaces = [b.index for b in around if not b.mover]
+    others = [b.index for b in around if b.mover]
+    joints = OwnJoints(model)
+    between = {(i, j): joints.between(i, j) for i in own for j in own if i < j}
+    endless = {pair for pair, of in between.items() if any(map(joints.endless, of))}
+    one = [(i, j, next(iter(of))) for (i, j), of in between.items() if len(of) == 1 and (i, j) not in endless]
+    apart = frozenset(pair for pair, of in between.items() if len(of) < 2 and pair not in endless)
+    pairs = pinch_pairs(model.shapes, robot.moving, surfaces, apart, others=others, still=still, cap=cap)
+    inner = pairs.inner
+    widest = np.full(len(pairs.first), np.inf)
+    if inner.any():
+        every = joints.in_order(set().union(*between.values()))
+        draws = np.random.default_rng(0).random((SAMPLED, len(every)))
+        ends = [joints.range(coordinate) for coordinate in every]
+        poses = joints.poses(
+            {c: lo + draws[:, k] * (hi - lo) for k, (c, (lo, hi)) in enumerate(zip(every, ends, strict=True))}
+        )
+        own_pairs = [query for query, per in pairs.queries if per is Per.PAIR and query.a[0] in own]
+        widest[inner] = np.concatenate([q.batch(*poses, Per.PAIR).distance.max(axis=0) for q in own_pairs])
+        # Without ends anything may get between, and may be clamped wherever they are near.
+        ends_of = zip(np.array(pairs.moving)[pairs.first[inner]], pairs.across[inner], strict=True)
+        widest[inner] = np.where(
+            [tuple(sorted((int(a), int(b)))) in endless for a, b in ends_of], np.inf, widest[inner]
+        )
+    return pairs, widest, one

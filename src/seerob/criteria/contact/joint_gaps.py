@@ -1,0 +1,324 @@
+r"""Gaps between two parts that one joint moves against each other: an elbow that folds, fingers that close.
+
+Such parts touch at their joint wherever it stands, so how near they are says nothing. Each place on the
+surface of the one is looked at by itself, over the whole range of the joint: it has the gap :math:`g(q)` to
+the other part. A place clamps a body part of the thickness D while it faces the other part, while
+
+.. math:: \dot g < 0, \qquad g \le D
+
+and where something of the body part gets in at all: where the joint opens it as wide as the thinnest of
+the body part, and by more than a fingertip. What slides in its bearing never closes (a housing that is not
+quite round comes nearer by a hair, see `SLOWEST`), and what is always in touch never opens. Nothing is
+remembered: the range of the joint is part of the model.
+
+All of this depends on one joint, so it is settled once, on a grid of its positions; between two of them the
+nearer gap counts, and the mean rate.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from seerob.core.shapes.geometry import Solid
+from seerob.core.transforms import Array
+from seerob.criteria.contact.clamping import STILL, Coordinate, Flags, OwnJoints
+from seerob.distance.least import Query, Shapes
+from seerob.model.model import Mechanism, Model
+from seerob.twin.spans import Span
+from seerob.twin.state import State
+
+STEPS = 72
+"""Positions on the grid of a whole turn, or of a slide."""
+DETAIL = 8
+"""Into so many pieces the largest extent of a part is divided."""
+FINEST, COARSEST = 0.01, 0.06
+"""Smallest and largest piece [m]: half a fingertip, half a hand."""
+SLOWEST = 0.025
+"""What closes by less than the thickness of a finger in a radian or metre only slides [m/rad or m/m]."""
+ASIDE = 0.05
+"""Cosine of the largest angle at which a place faces another surface: whatever is not beside it."""
+ROUNDING = 1e-9
+"""What bounds give away against rounding."""
+ROUND = 8
+"""Places around a capsule."""
+MOST_KNOWN = 256
+"""Pairs that are remembered, since a cell is often bound several times."""
+_KNOWN: dict[bytes, Array] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places on the surface of a body, in its own frame."""
+
+    points: Array
+    """[m], shape (k, 3)."""
+    normals: Array
+    """Outward unit vectors, shape (k, 3)."""
+
+
+def places(solids: Sequence[Solid]) -> Places:
+    """Places all over the surface of a body, none inside another of its solids."""
+    points = np.concatenate([s.points if s.mesh is None else s.mesh.vertices for s in solids])
+    size = float(np.ptp(points, axis=0).max() + 2 * max(s.radius for s in solids))
+    h = float(np.clip(size / DETAIL, FINEST, COARSEST))
+    found = [_of_solid(solid, h) for solid in solids]
+    if len(solids) > 1:
+        found = [_outside(of, k, solids) for k, of in enumerate(found)]
+    return Places(np.concatenate([p for p, _ in found]), np.concatenate([n for _, n in found]))
+
+
+def closing(gaps: Array, faces: Flags, steps: Array, thickness: Array, fits: Array, *, least: float) -> Array:
+    """How fast places close that clamp, between the positions of a grid.
+
+    Args:
+        gaps: Of each place at each position [m], not below 0, shape (m, p).
+        faces: Whether it faces the other part there, shape (m, p).
+        steps: From each position to the next [rad or m], shape (m - 1,).
+        thickness: Of body parts [m], shape (r,).
+        fits: Thinnest that a body part is [m], shape (r,).
+        least: By how much a gap changes that closes at all [m].
+
+    Returns:
+        Per unit of the joint, as it grows and as it falls, 0 where nothing clamps, shape (2, m - 1, r).
+    """
+    if not gaps.shape[1]:
+        return np.zeros((2, len(steps), len(thickness)))
+    widest = gaps.max(axis=0)
+    opens = (widest - gaps.min(axis=0) >= least - ROUNDING)[:, None] & (widest[:, None] >= fits - ROUNDING)
+    faced = faces[1:] | faces[:-1]
+    nearest = np.minimum(gaps[1:], gaps[:-1])
+    rate = np.diff(gaps, axis=0) / steps[:, None]
+    faced &= np.abs(rate) >= SLOWEST - ROUNDING
+    counts = opens & faced[..., None] & (nearest[..., None] <= thickness + ROUNDING)
+    return np.stack(
+        [np.where(counts, np.maximum(way * rate, 0)[..., None], 0).max(axis=1) for way in (-1, 1)]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """Of a pair of bodies and the joint between them."""
+
+    mechanism: str
+    column: int
+    rows: tuple[int, ...]
+    """Of the moving bodies of the pair."""
+    low: float
+    step: float
+    turns: bool
+    """Whether it goes round without end."""
+    rates: Array
+    """See `closing`, shape (2, m - 1, r)."""
+
+    def at(self, start: float, end: float, qd: tuple[float, float]) -> Array:
+        """How fast the pair clamps each body part [m/s], 0 where it does not, shape (r,).
+
+        Args:
+            start: From where on the joint is looked at [rad or m].
+            end: To where, likewise.
+            qd: Its least and largest speed [rad/s or m/s].
+        """
+        count = self.rates.shape[1]
+        ends = sorted(int((q - self.low) // self.step) for q in (start, end))
+        seen = np.arange(ends[0], min(ends[1], ends[0] + count) + 1)
+        seen = seen % count if self.turns else np.clip(seen, 0, count - 1)
+        ways = [way for way, moves in enumerate((qd[1] > 0, qd[0] < 0)) if moves]
+        speed = self.rates[ways][:, seen].max(axis=(0, 1), initial=0.0) * max(abs(qd[0]), abs(qd[1]))
+        return np.where(speed > STILL, speed, 0.0)
+
+
+class JointGaps:
+    """The gaps of all such pairs of a robot, bound once."""
+
+    def __init__(
+        self,
+        model: Model,
+        robot: Mechanism,
+        pairs: Sequence[tuple[int, int, Coordinate]],
+        thickness: Array,
+        fits: Array,
+        *,
+        least: float,
+        period: float,
+    ) -> None:
+        """Bind.
+
+        Args:
+            model: The compiled workstation.
+            robot: The robot.
+            pairs: Two of its bodies and the joint between them.
+            thickness: Of body parts [m], shape (r,).
+            fits: Thinnest that a body part is [m], shape (r,).
+            least: See `closing`.
+            period: At which it is asked for [s].
+        """
+        self._period = period
+        row = {body: k for k, body in enumerate(robot.moving)}
+        joints = OwnJoints(model)
+        self._tables: list[_Table] = []
+        for a, b, coordinate in pairs:
+            rows = tuple(row[i] for i in (a, b) if i in row)
+            if not rows:
+                continue
+            low, high = joints.range(coordinate)
+            mechanism = model.mechanisms[coordinate[0]]
+            whole = mechanism.coupling[:, coordinate[1]]
+            turns = (
+                mechanism.joints[coordinate[1]].kind == "revolute"
+                and high - low >= 2 * np.pi - 1e-9
+                and bool((whole == np.round(whole)).all())
+            )
+            high = low + 2 * np.pi if turns else high
+            grid = np.linspace(low, high, STEPS + 1)
+            rotations, positions = joints.poses({coordinate: grid})
+            poses = [(rotations[:, i], positions[:, i]) for i in (a, b)]
+            solids = [model.bodies[i].solids for i in (a, b)]
+            rates = _rates(solids, poses, np.diff(grid), thickness, fits, least)
+            if rates.any():
+                step = max((high - low) / STEPS, 1e-12)
+                self._tables.append(_Table(*coordinate, rows, low, step, turns, rates))
+
+    def speeds(self, state: State, wanted: Flags, span: Span | None = None) -> Array:
+        """At which speed moving bodies clamp body parts now [m/s], 0 where they do not, shape (b, r).
+
+        Args:
+            state: The twin.
+            wanted: Of which bodies, that move now, and which body parts that matters, shape (b, r).
+            span: At any instant of that instead, of which the twin is at one end.
+        """
+        found = np.zeros(wanted.shape)
+        for table in self._tables:
+            rows = list(table.rows)
+            if not wanted[rows].any():
+                continue
+            mechanism = state.model.mechanisms[table.mechanism]
+            q, qd = (float(each(mechanism)[table.column]) for each in (state.q, state.qd))
+            least, most, way = qd, qd, 0.0
+            if span is not None:
+                dof = mechanism.v_address[mechanism.own[table.column]]
+                way, change = span.qd[dof] * span.T, span.qdd[dof] * span.T
+                least, most = qd - change, qd + change
+            if least or most:
+                start, end = q - way + min(least, 0.0) * self._period, q + way + max(most, 0.0) * self._period
+                at = table.at(start, end, (least, most))
+                found[rows] = np.maximum(found[rows], at)
+        return found * wanted
+
+
+def _rates(
+    solids: Sequence[Sequence[Solid]],
+    poses: Sequence[tuple[Array, Array]],
+    steps: Array,
+    thickness: Array,
+    fits: Array,
+    least: float,
+) -> Array:
+    """See `closing`: of the places of each of two bodies against the other, remembered by content."""
+    cores = [_core(solid) for of in solids for solid in of]
+    radii = [[s.radius for s in of] for of in solids]
+    of_pair = repr((radii, [core.shape for core in cores], least)).encode()
+    arrays = [*cores, *(part for pose in poses for part in pose), steps, thickness, fits]
+    key = hashlib.sha256(
+        b"".join([of_pair, *(np.ascontiguousarray(array).tobytes() for array in arrays)])
+    ).digest()
+    if key not in _KNOWN:
+        found = np.zeros((2, len(steps), len(thickness)))
+        for one, other in ((0, 1), (1, 0)):
+            on = places(solids[one])
+            gaps, faces = _gaps(on, solids[other], (poses[one], poses[other]))
+            found = np.maximum(found, closing(gaps, faces, steps, thickness, fits, least=least))
+        if len(_KNOWN) >= MOST_KNOWN:
+            _KNOWN.clear()
+        _KNOWN[key] = found
+    return _KNOWN[key]
+
+
+def _core(solid: Solid) -> Array:
+    if solid.mesh is not None:
+        return np.asarray(solid.mesh.vertices[solid.mesh.faces])
+    assert solid.points is not None
+    return solid.points
+
+
+def _gaps(on: Places, other: Sequence[Solid], poses: Sequence[tuple[Array, Array]]) -> tuple[Array, Flags]:
+    """Gap [m] of each place to another body and whether it faces it, shape (m, p) each."""
+    (R, x), (S, y) = poses
+    count = len(on.points)
+    if not count:
+        return np.zeros((len(R), 0)), np.zeros((len(R), 0), bool)
+    # As seen from the other body, place by place: from one position of the joint to the next little changes.
+    across = np.swapaxes(S, 1, 2)
+    points = np.einsum("mij,mpj->pmi", across, np.einsum("mij,pj->mpi", R, on.points) + (x - y)[:, None])
+    normals = np.einsum("mij,pj->pmi", across @ R, on.normals)
+    distance, nearest = _distances(other, points.reshape(-1, 3))
+    distance, nearest = distance.reshape(count, -1).T, nearest.reshape(points.shape)
+    towards = ((nearest - points) * normals).sum(axis=2).T
+    return np.maximum(distance, 0.0), (distance > 0) & (towards > ASIDE * distance)
+
+
+def _distances(solids: Sequence[Solid], points: Array) -> tuple[Array, Array]:
+    """How far points are from a body, shape (k,), and where it is nearest, (k, 3) [m]."""
+    shapes = Shapes.build([("body", solids), ("point", [Solid(points=np.zeros((2, 3)))])])
+    positions = np.zeros((len(points), 2, 3))
+    positions[:, 1] = points
+    found = Query(shapes, [0], [1]).batch(np.broadcast_to(np.eye(3), (len(points), 2, 3, 3)), positions)
+    return found.distance[:, 0], found.point_a[:, 0]
+
+
+def _of_solid(solid: Solid, h: float) -> tuple[Array, Array]:
+    """Places on a solid and their normals."""
+    if solid.mesh is not None:
+        return _on_triangles(solid.mesh.vertices[solid.mesh.faces], h, solid.radius)
+    assert solid.points is not None
+    if len(solid.points) == 3:
+        a, b, c = solid.points
+        both = np.array([[a, b, c], [b, b + c - a, c], [a, c, b], [b, c, b + c - a]])
+        return _on_triangles(both, h, solid.radius)
+    start, end = solid.points
+    length = float(np.linalg.norm(end - start))
+    axis = (end - start) / length if length > 0 else np.array([0.0, 0, 1])
+    side = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    side /= np.linalg.norm(side)
+    angles = 2 * np.pi * np.arange(ROUND) / ROUND
+    around = np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * np.cross(axis, side)
+    along = np.linspace(0, 1, int(np.ceil(length / h)) + 1)[:, None] * (end - start) + start
+    points = (along[:, None] + solid.radius * around).reshape(-1, 3)
+    caps = np.array([start - solid.radius * axis, end + solid.radius * axis])
+    normals = np.concatenate([np.tile(around, (len(along), 1)), [-axis, axis]])
+    return np.concatenate([points, caps]), normals
+
+
+def _on_triangles(triangles: Array, h: float, radius: float) -> tuple[Array, Array]:
+    """One place for every piece of about the size h of a surface that looks one way."""
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area = np.linalg.norm(normals, axis=1)
+    triangles, normals = triangles[area > 0], normals[area > 0] / area[area > 0, None]
+    done, of = [], []
+    while len(triangles):
+        edges = np.linalg.norm(triangles[:, [1, 2, 0]] - triangles, axis=2)
+        long = edges.max(axis=1) > h
+        done.append(triangles[~long].mean(axis=1))
+        of.append(normals[~long])
+        k, triangles, normals = edges[long].argmax(axis=1), triangles[long], normals[long]
+        i = np.arange(len(triangles))
+        a, b, c = (triangles[i, (k + s) % 3] for s in range(3))
+        middle = (a + b) / 2
+        triangles = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
+        normals = np.concatenate([normals, normals])
+    points, normals = np.concatenate(done or [np.zeros((0, 3))]), np.concatenate(of or [np.zeros((0, 3))])
+    key = np.column_stack([np.floor(points / h), np.round(normals)])
+    _, first = np.unique(key, axis=0, return_index=True)
+    return points[first] + radius * normals[first], normals[first]
+
+
+def _outside(found: tuple[Array, Array], k: int, solids: Sequence[Solid]) -> tuple[Array, Array]:
+    """Those of the places of solid k that lie inside no other of the solids."""
+    points, normals = found
+    if not len(points):
+        return found
+    free = _distances([solid for i, solid in enumerate(solids) if i != k], points)[0] >= 0
+    return points[free], normals[free]

@@ -1,0 +1,198 @@
+"""What power and force limiting says of each body area, as rows for the page's body map.
+
+Force and energy belong to a body region, pressure to each of its specific areas (ISO/TS 15066:2016
+Table A.2): so there is a row per area, and each says which speed every one of the three allows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from msgspec.structs import replace
+
+from seerob.core.snapshot import Aspect, Result, Row, RowState, Verdict
+from seerob.core.transforms import Array
+from seerob.core.verdict import keeps
+from seerob.criteria.contact.collision import speed_at_force
+from seerob.criteria.contact.limits import Judged, RegionArrays
+from seerob.criteria.contact.measured import worse
+from seerob.criteria.contact.regions import FORBIDDEN, REGIONS
+from seerob.criteria.contact.tolerances import area_verdict
+from seerob.description.humans.skeleton import SIDES
+from seerob.description.norms.body_limits import BodyArea, BodyLimits, BodyRegion
+
+
+class _Place(NamedTuple):
+    name: str
+    areas: tuple[int, ...]
+    side: str
+    inputs: tuple[str, ...]
+
+
+class Bound(Protocol):
+    """What power and force limiting resolves once."""
+
+    limits: BodyLimits
+    arrays: RegionArrays
+    """Its regions where contact is permitted."""
+    forces: Array
+    """That the pressure limits allow each moving body, free and clamped [N], shape (b, 2, a)."""
+    unknown: list[str]
+    """Why a moving body's contact area is not known, per body."""
+    names: list[str]
+    """Of the moving bodies."""
+
+
+class ContactRows:
+    """Rows of the regions of a table, bound once.
+
+    Args:
+        bound: What is judged by.
+        hand: Dominant hand of the person, ``right`` or ``left``; None without a person: then areas of the
+            dominant and of the other hand have no side.
+    """
+
+    def __init__(self, bound: Bound, *, hand: str | None) -> None:
+        arrays = bound.arrays
+        self._arrays, self._forces, self._unknown = arrays, bound.forces, bound.unknown
+        self._bodies = bound.names
+        self._columns = {region.name: k for k, region in enumerate(arrays.regions)}
+        self._first = np.searchsorted(arrays.owner, np.arange(len(arrays.regions))).tolist()
+        self._in_regions = [REGIONS.index(region.name) for region in arrays.regions]
+        self._areas = np.arange(len(arrays.owner))
+        self._places = {
+            region.name: tuple(_place(region, area, hand) for area in region.areas)
+            for region in bound.limits.regions.values()
+        }
+
+    def of(
+        self,
+        found: Iterable[tuple[Result, int]],
+        judged: Judged,
+        bones: Callable[[str], tuple[str, ...]],
+        *,
+        measured: Mapping[str, Sequence[Result]] | None = None,
+    ) -> tuple[Row, ...]:
+        """Rows of all areas of the regions that can be hit.
+
+        Args:
+            found: Result of a region, and the row of the moving body that governs it.
+            judged: What they were made from.
+            bones: Full names of the bones of a region that can be hit; none without a person.
+            measured: What was measured of regions by name: of each row the worse counts.
+        """
+        pressed = self._speeds_by_pressure(judged)
+        rows: list[Row] = []
+        for part, row in found:
+            column = self._columns.get(part.name)
+            if column is None or part.limit is None:
+                rows += self._unlimited(part, bones(part.name))
+            else:
+                told = (measured or {}).get(part.name, ())
+                for one in self._limited(part, row, column, judged, pressed, bones(part.name)):
+                    verdict, reason = worse(one.verdict, one.reason, told)
+                    rows.append(replace(one, verdict=verdict, reason=reason) if told else one)
+        return tuple(rows)
+
+    def _speeds_by_pressure(self, judged: Judged) -> list[float]:
+        """At the body that governs each region: permissible speed by the pressure of each area [m/s]."""
+        owner = self._arrays.owner
+        row = judged.rows[self._in_regions][owner]
+        clamped = judged.clamped[row, owner].astype(int)
+        mu = judged.speeds.mu[row, owner]
+        speeds: list[float] = speed_at_force(
+            self._forces[row, clamped, self._areas], mu, self._arrays.stiffness[owner]
+        ).tolist()
+        return speeds
+
+    def _limited(
+        self,
+        part: Result,
+        row: int,
+        column: int,
+        judged: Judged,
+        pressed: Sequence[float],
+        bones: tuple[str, ...],
+    ) -> Iterable[Row]:
+        v_F, v_E = float(judged.speeds.force[row, column]), float(judged.speeds.energy[row, column])
+        how = "clamped" if judged.clamped[row, column] else "free"
+        value, unit = 0.0 if part.value is None else part.value, part.unit
+        others = min(v_F, v_E)
+        by_others = f"{'force' if others == v_F else 'energy'}, {how}, {self._bodies[row]}"
+        shared = (Aspect(name="contact", band=how), Aspect(name="allowed by force", value=v_F, unit=unit))
+        last = Aspect(name="allowed by energy", value=v_E, unit=unit)
+        for i, place in enumerate(self._places[part.name], self._first[column]):
+            v_P = pressed[i]
+            open_ = math.isnan(v_P)
+            limit = others if open_ else min(others, v_P)
+            verdict = Verdict.UNDECIDED if open_ else Verdict.WITHIN
+            if not keeps(value, limit):
+                verdict = Verdict.EXCEEDED
+            verdict = area_verdict(verdict, part.verdict, judged.ends)
+            if verdict is Verdict.UNDECIDED and not open_:
+                reason = part.reason
+            elif verdict is Verdict.UNDECIDED:
+                reason = f"contact pressure of {self._bodies[row]} ({how}): {self._unknown[row]}"
+            else:
+                reason = f"pressure, {how}, {self._bodies[row]}" if limit == v_P else by_others
+            yield Row(
+                name=place.name,
+                group=part.name,
+                side=_side(place, bones),
+                value=value,
+                unit=unit,
+                limit=limit,
+                verdict=verdict,
+                reason=reason,
+                areas=place.areas,
+                bones=bones,
+                aspects=(
+                    *shared,
+                    Aspect(name="allowed by pressure", value=None if open_ else v_P, unit=unit),
+                    last,
+                ),
+                inputs=place.inputs,
+            )
+
+    def _unlimited(self, part: Result, bones: tuple[str, ...]) -> Iterable[Row]:
+        for place in self._places.get(part.name, (_Place(part.name, (), "", ()),)):
+            yield Row(
+                name=place.name,
+                group=part.name,
+                side=_side(place, bones),
+                state=_state(part),
+                value=part.value,
+                unit=part.unit,
+                verdict=part.verdict,
+                reason=part.reason,
+                areas=place.areas,
+                bones=bones,
+                inputs=(part.name,) if part.name in self._places else (),
+            )
+
+
+def _state(part: Result) -> RowState:
+    if part.verdict is None:
+        return RowState.EXCLUDED
+    return RowState.FORBIDDEN if part.name in FORBIDDEN else RowState.NO_LIMIT
+
+
+def _place(region: BodyRegion, area: BodyArea, hand: str | None) -> _Place:
+    side = ""
+    if hand is not None and "dominant" in area.name:
+        other = SIDES[1 - SIDES.index(hand)]
+        side = other if "non-dominant" in area.name else hand
+    inputs = tuple(f"{region.name}: {name}" for name in ("F_s", f"p_s {area.name}", "transient multiplier"))
+    return _Place(area.name, (area.number,), side, inputs)
+
+
+def _side(place: _Place, bones: Sequence[str]) -> str:
+    """Of the area, or the one side of the body that can be hit."""
+    if place.side or not bones:
+        return place.side
+    sides = {side for bone in bones for side in SIDES if f"/{side}_" in bone}
+    central = any(not any(f"/{side}_" in bone for side in SIDES) for bone in bones)
+    return sides.pop() if len(sides) == 1 and not central else ""

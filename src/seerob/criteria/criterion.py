@@ -1,0 +1,190 @@
+"""What a criterion or a rule is: options in, a function of `State` out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from msgspec import Meta, Struct
+
+from seerob.core.errors import UnknownName
+from seerob.core.quantities import Seconds
+from seerob.core.snapshot import Basis, Result, Verdict
+from seerob.core.verdict import keeps
+
+if TYPE_CHECKING:
+    from seerob.model.model import Model
+    from seerob.recording.answers import Answers
+    from seerob.twin.spans import Falls, Margin, Points, Span
+    from seerob.twin.state import State
+    from seerob.twin.states import States
+
+Evaluate = Callable[["State"], Result]
+"""Called at each tick (or each ``every``); may raise `Undecided`."""
+Lowest = Callable[["State", "Span"], float]
+"""Below its margin at every instant of a span, negative where that is not known, given the twin at one end of
+the span; may raise `Undecided`."""
+EvaluateMany = Callable[["States"], "Answers"]
+"""The same of many instants; may raise `Undecided`, of all of them."""
+
+
+# To ask an enumeration for a member takes longer than all the rest of a judgement.
+_WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+
+
+class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of every safety criterion and ergonomics rule: one file, one class, one ``kind``.
+
+    The fields are the table of the workstation file. The first line of the class's docstring is
+    what `seerob kinds` and the report print.
+    """
+
+    unit: ClassVar[str] = ""
+    """Unit of its results."""
+    at_most: ClassVar[bool] = True
+    """Whether its limit bounds from above."""
+    by_torque: ClassVar[bool] = False
+    """Whether it rests on torques that a source measured."""
+    by_speed: ClassVar[bool] = False
+    """Whether its interval holds how far speeds may be off that were derived from noisy positions
+    (`State.speed_error`)."""
+    by_shape: ClassVar[bool] = True
+    """Whether it is about the shapes of its subjects, so that what no shape shows of a robot could make it
+    worse; False only where no distance, area, volume or point of a surface is in it."""
+    heavier_is_worse: ClassVar[bool] = False
+    """Whether more mass of a robot is never better, so that what the known masses exceed is exceeded."""
+    whole: ClassVar[bool] = True
+    """Whether all that it depends on must be where the twin shows it before it is asked. One that judges
+    people bone by bone, or for which what is known may suffice, says False: what it asks of must be still."""
+
+    instants: ClassVar[str] = ""
+    """``accepted: why`` of a method that speaks of instants by its nature: nothing need bound it between."""
+
+    name: str = ""
+    """What results are called; made from the kind and the subject when not given."""
+    every: Seconds | None = None
+    """Period [s]; each tick when not given."""
+    between_samples: (
+        Annotated[str, Meta(pattern="^accepted: .*[^ ]", description="`accepted: ` and why")] | None
+    ) = None
+    """``accepted: why``: that nobody knows what happens between the instants at which it is asked, where
+    nothing bounds it, is accepted for the verdict of a run; it stays undecided there when not given."""
+    active: str | None = None
+    """Variable of the dictionary, a bool: while it is false, it is not asked (muted, another mode of
+    operation); while nobody knows, it is undecided."""
+
+    def bind(self, model: Model) -> Evaluate:
+        """Resolve every name once and return the function that judges a state.
+
+        Raises:
+            UnknownName: A robot, body or human that the workstation does not have.
+            InputError: An option that cannot be, such as a negative limit.
+        """
+        raise NotImplementedError
+
+    def batch(self, model: Model) -> EvaluateMany | None:
+        """The function that judges many states at once, where there is one.
+
+        It depends on no instant but the one it speaks of, and says of it what that of `bind` says.
+        """
+        return None
+
+    def remembers(self, model: Model) -> bool:
+        """Whether what it says depends on earlier instants: then it is asked in the order of time only."""
+        return False
+
+    def falls(self, model: Model, points: Points) -> Falls | None:
+        """What bounds its margin between two instants at which it is asked; None where nothing does.
+
+        Then the verdict of a run stays undecided, unless the file accepts that (`between_samples`).
+
+        Args:
+            model: The compiled workstation.
+            points: Of which the motion is bounded: those of the bodies, and what it adds.
+        """
+        return None
+
+    def lowest(self, model: Model, points: Points) -> Lowest | None:
+        """Instead of `falls`: what bounds its margin within a span of which the twin at one end is given."""
+        return None
+
+    def margin(self, result: Result) -> Margin:
+        """How far a result that is within is from its limit, and how much of that its tolerances take.
+
+        In its unit; in the order of what `falls` says, when that speaks of several figures.
+        """
+        assert result.value is not None
+        assert result.limit is not None
+        far = result.limit - result.value if result.at_most else result.value - result.limit
+        if result.interval is None:
+            return far, 0.0
+        low, high = result.interval
+        return far, (high - result.value if result.at_most else result.value - low)
+
+    def basis(self, model: Model) -> Basis:
+        """Formula, source and inputs of what `bind` computes."""
+        raise NotImplementedError
+
+    def looks_ahead(self, model: Model) -> Mapping[str, float]:
+        """Of robots, how far ahead it asks what their recorded motions do [s], `State.foresee`."""
+        return {}
+
+    def variables(self) -> dict[str, str]:
+        """Variables of the dictionary that it asks, and the SI unit that each must have, or ``bool``."""
+        return {} if self.active is None else {self.active: "bool"}
+
+    def subjects(self) -> tuple[str, ...]:
+        """Names from the workstation file that this criterion speaks of."""
+        return ()
+
+    def depends(self, model: Model) -> tuple[str, ...]:
+        """Names of all whose place or motion its results depend on; its subjects when not said."""
+        return self.subjects()
+
+    def judged(self, model: Model) -> set[int]:
+        """Bodies whose motion or place it judges: who moves and is judged by nobody is a finding."""
+        found: set[int] = set()
+        for name in self.subjects():
+            mechanism = model.mechanisms.get(name)
+            if mechanism is not None and not self.by_shape:
+                # Of what carries it only criteria speak that are about shapes.
+                found |= {*mechanism.bodies, *mechanism.carried}
+                continue
+            with suppress(UnknownName):
+                found |= set(model.select(name))
+        return found
+
+    def unseen(self, model: Model) -> str:
+        """Why nothing is within: what no shape shows of the robots that it speaks of; empty for nothing."""
+        return model.unseen(self.depends(model)) if self.by_shape else ""
+
+
+def judge(value: float, limit: float | None, *, at_most: bool = True) -> Verdict | None:
+    """Verdict of a value against a limit, by the rule of `seerob.core.verdict.keeps`; no limit is no verdict.
+
+    A value that is not a number is UNDECIDED, whatever the limit.
+    """
+    if math.isnan(value):
+        return _UNDECIDED
+    if limit is None:
+        return None
+    return _WITHIN if keeps(value, limit, at_most=at_most) else _EXCEEDED
+
+
+def judge_interval(
+    interval: tuple[float, float], limit: float | None, *, at_most: bool = True
+) -> Verdict | None:
+    """Verdict when the true value lies in ``interval``: UNDECIDED when the limit lies inside it."""
+    low, high = interval
+    verdict = judge(low, limit, at_most=at_most)
+    return verdict if verdict is judge(high, limit, at_most=at_most) else _UNDECIDED
+
+
+def worst(verdicts: list[Verdict | None]) -> Verdict | None:
+    """The verdict of a whole: EXCEEDED before UNDECIDED before WITHIN before none."""
+    for verdict in (_EXCEEDED, _UNDECIDED, _WITHIN):
+        if verdict in verdicts:
+            return verdict
+    return None

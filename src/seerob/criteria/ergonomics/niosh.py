@@ -1,0 +1,268 @@
+"""The revised NIOSH lifting equation for lifts that the workstation file describes; Waters et al. 1993."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+from msgspec import Meta, Struct, structs
+
+from seerob.core.errors import InputError, Problem, UnknownName
+from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
+from seerob.criteria.criterion import Criterion, Evaluate, judge
+from seerob.criteria.scoring import niosh as method
+from seerob.criteria.scoring.phases import Kilograms, Seconds
+from seerob.model.model import Model
+from seerob.model.provenance import given, limit
+from seerob.twin.state import State
+
+Height = Annotated[float, Meta(ge=0, extra={"unit": "m"})]
+Distance = Annotated[float, Meta(ge=0, extra={"unit": "m"})]
+Turn = Annotated[float, Meta(ge=-math.pi, le=math.pi, extra={"unit": "rad"})]
+
+Exclusion = Literal[
+    "one_handed",
+    "seated_or_kneeling",
+    "restricted_space",
+    "unstable_load",
+    "carrying_pushing_or_pulling",
+    "wheelbarrow_or_shovel",
+    "fast_lifting",
+    "slippery_floor",
+    "unfavourable_climate",
+]
+"""Where the equation does not apply. Fast: above 0.76 m/s. Slippery: friction below 0.4. Climate: outside
+19 to 26 °C or 35 to 50 % relative humidity."""
+
+
+class LiftEnd(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where the hands are at one end of a lift."""
+
+    horizontal: Distance
+    """H: from the middle between the ankles to the middle between the hands, along the floor [m]."""
+    vertical: Height
+    """V: hands above the floor [m]."""
+    asymmetry: Turn
+    """A: turn of the load out of the sagittal plane [rad]."""
+
+
+class Lift(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One lifting task."""
+
+    phase: str = ""
+    """Title of one of ``[[phases]]``: load and coupling are taken from it where they are not given here."""
+    load: Kilograms | None = None
+    """Mass on average [kg]."""
+    heaviest: Kilograms | None = None
+    """Greatest mass [kg]; the average when not given. A lift on its own is judged by it."""
+    origin: LiftEnd
+    """Where the lift begins."""
+    destination: LiftEnd
+    """Where it ends."""
+    control: bool
+    """The load is held back or placed with care at the destination: both ends count."""
+    per_minute: Annotated[float, Meta(ge=0)]
+    """Lifts per minute, averaged over 15 min."""
+    coupling: method.Grip | None = None
+    """How well the object can be held."""
+
+    def missing(self) -> tuple[str, ...]:
+        """What nobody entered."""
+        return tuple(name for name in ("load", "coupling") if getattr(self, name) is None)
+
+    def task(self) -> method.Task:
+        """As the equation takes it, of a lift of which nothing is missing."""
+        assert self.load is not None
+        assert self.coupling is not None
+        ends = [
+            method.End(H=e.horizontal, V=e.vertical, A=e.asymmetry) for e in (self.origin, self.destination)
+        ]
+        return method.Task(
+            average=self.load,
+            heaviest=self.load if self.heaviest is None else self.heaviest,
+            origin=ends[0],
+            destination=ends[1],
+            control=self.control,
+            frequency=self.per_minute,
+            grip=self.coupling,
+        )
+
+
+class Niosh(Criterion, frozen=True, kw_only=True):
+    """Lifting index of the revised NIOSH equation, composite when there are several lifts."""
+
+    instants: ClassVar[str] = "accepted: lifts are entered, and what is entered does not change during a run"
+    whole: ClassVar[bool] = False  # lifts are entered, whoever is seen
+
+    human: str
+    """Who lifts."""
+    lifts: tuple[Lift, ...]
+    """The lifting tasks; several are alternated by the same person."""
+    work: Annotated[float, Meta(gt=0, le=28800, extra={"unit": "s"})]
+    """How long they last, spells with too short a recovery in between added up [s]."""
+    recovery: Seconds
+    """Light work or rest that follows [s]."""
+    exclusions: tuple[Exclusion, ...]
+    """What of this is the case; the equation then does not apply. An empty list says that nothing is."""
+    limit: Annotated[float, Meta(gt=0)] | None = None
+    """Greatest admissible lifting index; the equation's authors aim at 1."""
+
+    def subjects(self) -> tuple[str, ...]:
+        """The person."""
+        return (self.human,)
+
+    def depends(self, model: Model) -> tuple[str, ...]:
+        """Nobody: lifts are entered."""
+        return ()
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`.
+
+        Raises:
+            InputError: The equation does not apply.
+        """
+        model.human(self.human)
+        lifts = self.entered(model)
+        self._refuse(lifts)
+        result = self._result(lifts)
+
+        def evaluate(state: State) -> Result:
+            return result
+
+        return evaluate
+
+    def entered(self, model: Model) -> tuple[Lift, ...]:
+        """The lifts with what they take from the phases that every rule shares.
+
+        Raises:
+            UnknownName: A lift names a phase that does not exist.
+        """
+        phases = {
+            phase.title: phase
+            for phase in reversed(model.workstation.phases)
+            if phase.title and phase.human in ("", self.human)
+        }
+        found = []
+        for lift in self.lifts:
+            if not lift.phase:
+                found.append(lift)
+                continue
+            if lift.phase not in phases:
+                raise UnknownName("phase", lift.phase, phases)
+            phase = phases[lift.phase]
+            grip = next((grip for grip in method.Grip if grip == phase.coupling), None)
+            load = phase.load if lift.load is None else lift.load
+            coupling = grip if lift.coupling is None else lift.coupling
+            found.append(structs.replace(lift, load=load, coupling=coupling))
+        return tuple(found)
+
+    def _refuse(self, lifts: tuple[Lift, ...]) -> None:
+        problems = [
+            Problem(
+                self.name,
+                "exclusions",
+                f"the revised NIOSH equation does not apply: {what.replace('_', ' ')}",
+                "use another method for this lift",
+            )
+            for what in self.exclusions
+        ]
+        if not lifts:
+            problems.append(Problem(self.name, "lifts", "there is none", "describe at least one lift"))
+        for i, lift in enumerate(lifts):
+            if lift.heaviest is not None and lift.load is not None and lift.heaviest < lift.load:
+                what = f"{lift.heaviest:g} kg is less than the average of {lift.load:g} kg"
+                problems.append(Problem(self.name, f"lifts[{i}].heaviest", what, "give the greatest mass"))
+        if problems:
+            raise InputError(problems)
+
+    def _result(self, lifts: tuple[Lift, ...]) -> Result:
+        absent = [f"{what} of lift {i + 1}" for i, lift in enumerate(lifts) for what in lift.missing()]
+        if absent:
+            reason = f"not entered: {', '.join(absent)}"
+            return Result(name=self.name, limit=self.limit, verdict=Verdict.UNDECIDED, reason=reason)
+        spell = method.duration(self.work, self.recovery)
+        tasks = [lift.task() for lift in lifts]
+        if len(tasks) == 1:
+            # The composite index takes the greatest mass only from the second task on.
+            tasks = [replace(tasks[0], average=tasks[0].heaviest)]
+        index = method.composite_index(tasks, spell)
+        parts, zero = [], []
+        for i, task in enumerate(tasks):
+            weight, end = method.recommended_weight(task, spell), method.governing(task)[1]
+            own = method.composite_index([task], spell)
+            if weight == 0:
+                zero.append(f"lift {i + 1}")
+            parts.append(
+                Result(
+                    name=f"lift {i + 1}",
+                    value=own if math.isfinite(own) else None,
+                    limit=self.limit,
+                    verdict=judge(own, self.limit),
+                    reason=f"recommended weight {weight:.1f} kg, governed by the {end}",
+                )
+            )
+        if math.isinf(index):
+            why = f"of {', '.join(zero)} " if zero else "at the frequency of all lifts together "
+            reason = f"the recommended weight {why}is 0: beyond the reach of the equation's tables"
+            # An infinite index exceeds each limit, but is no figure.
+            verdict = Verdict.UNDECIDED if self.limit is None else Verdict.EXCEEDED
+            return Result(
+                name=self.name, limit=self.limit, verdict=verdict, reason=reason, parts=tuple(parts)
+            )
+        return Result(
+            name=self.name,
+            value=index,
+            limit=self.limit,
+            verdict=judge(index, self.limit),
+            reason=parts[0].reason if len(parts) == 1 else f"composite index of {len(parts)} lifts",
+            parts=tuple(parts) if len(parts) > 1 else (),
+        )
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        spell = method.duration(self.work, self.recovery)
+        found = [
+            Input(
+                name="duration class",
+                value=spell.value,
+                origin=Origin.COMPUTED,
+                source=f"{self.work / 60:g} min of lifting, {self.recovery / 60:g} min of recovery",
+            ),
+            Input(
+                name="load constant",
+                value=23.0,
+                unit="kg",
+                origin=Origin.STATED,
+                source="DHHS (NIOSH) 94-110, revised 9/2021, public sources that agree (2+)",
+            ),
+        ]
+        for i, lift in enumerate(self.entered(model)):
+            of = f" of lift {i + 1}" if len(self.lifts) > 1 else ""
+            origin = f"phase {lift.phase!r}" if lift.phase else "workstation file"
+            heaviest = lift.load if lift.heaviest is None else lift.heaviest
+            for name, value, unit in (
+                ("load", lift.load, "kg"),
+                ("heaviest", heaviest, "kg"),
+                ("coupling", None if lift.coupling is None else lift.coupling.value, ""),
+            ):
+                known = Origin.MISSING if value is None else Origin.GIVEN
+                found.append(Input(name=name + of, value=value, unit=unit, origin=known, source=origin))
+            for name, end in (("origin", lift.origin), ("destination", lift.destination)):
+                found += [
+                    given(f"H at the {name}{of}", end.horizontal, "m"),
+                    given(f"V at the {name}{of}", end.vertical, "m"),
+                    given(f"A at the {name}{of}", end.asymmetry, "rad"),
+                ]
+            found.append(given(f"lifts per minute{of}", lift.per_minute, "1/min"))
+        return Basis(
+            formula="LI = L/RWL, RWL = 23 kg · HM · VM · DM · AM · FM · CM; CLI = STLI_1 + Σ FILI_n "
+            "(1/FM_1..n - 1/FM_1..n-1)",
+            source="Waters et al. 1993; DHHS (NIOSH) 94-110, revised 9/2021 (public sources that agree, 2+)",
+            inputs=(*found, *limit(self.limit, "")),
+            not_modelled=(
+                "the twin's motion: heights, distances and frequencies are those of the workstation file",
+                "next to a 0 of the frequency table the multiplier is 0, a choice",
+                "for summed frequencies the table's column is that of the task that is added, a choice",
+            ),
+        )

@@ -1,0 +1,28 @@
+"""A company's own posture rule, written as a table by whoever knows the work: no program needed."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from seerob.criteria.postures.zone_file import ZoneTable, read_zones
+from seerob.criteria.postures.zone_rule import ZoneRule
+from seerob.model.model import Model
+
+
+class PostureTable(ZoneRule, frozen=True, kw_only=True):
+    """Score of a posture by a table of angles, ranges and points."""
+
+    table: str
+    """The table: an Excel, CSV or TOML file beside the workstation file."""
+    sheet: str | None = None
+    """Sheet of a workbook; the first that has the columns when not given."""
+    combine: Literal["max", "sum"] = "max"
+    """The worst angle counts, or the sum of all; of the worse side."""
+
+    def zones(self, model: Model) -> ZoneTable:
+        """See `ZoneRule.zones`."""
+        return read_zones(model.folder / self.table, self.table, sheet=self.sheet)
+
+    def combination(self) -> Literal["max", "sum"]:
+        """See `ZoneRule.combination`."""
+        return self.combine

@@ -1,0 +1,451 @@
+"""Asking the criteria: each at its period, and what it cannot know becomes UNDECIDED."""
+
+from __future__ import annotations
+
+import logging
+import math
+import traceback
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from msgspec.structs import replace
+
+from seerob.core.errors import SeerobError, Undecided, UnknownName, Unweighed
+from seerob.core.plugin import PluginError, kind_of
+from seerob.core.snapshot import Basis, Finding, Result, Row, Verdict
+from seerob.core.verdict import ROUNDING, keeps
+from seerob.criteria.as_heard import AsHeard
+from seerob.criteria.between_ticks import Asking, BetweenTicks, Watch
+from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.model.model import Model
+from seerob.twin.state import State
+from seerob.twin.whereabouts.hearing import SLACK
+
+_log = logging.getLogger(__name__)
+# To ask an enumeration for a member takes longer than all the rest of a judgement.
+_WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
+
+
+UNBOUNDED = "nothing bounds it between the instants at which it was asked; between_samples can accept that"
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A criterion whose names are resolved."""
+
+    criterion: Criterion
+    group: str
+    evaluate: Evaluate
+    basis: Basis
+    watch: Watch | None = None
+    """How it is judged between two ticks; None where nothing bounds it."""
+
+    @property
+    def between(self) -> str:
+        """See `seerob.core.snapshot.CriterionInfo.between`."""
+        if self.watch is not None:
+            return ""
+        return self.criterion.between_samples or self.criterion.instants or UNBOUNDED
+
+
+def bound_to(model: Model, criterion: Criterion, group: str) -> Bound:
+    """A criterion with its names resolved.
+
+    Raises:
+        SeerobError: It cannot be, and why; whatever a criterion of one's own raises, with the place.
+    """
+    kind = type(criterion)
+    for method, gives in (("bind", "the function that judges a state"), ("basis", "formula, source, inputs")):
+        if getattr(kind, method) is getattr(Criterion, method):
+            raise PluginError(
+                f"{kind.__name__} of {kind.__module__} has no {method}: define {method}(self, model), "
+                f"which returns {gives} (CONTRIBUTING.md, “A criterion”)"
+            )
+    method = "bind"
+    try:
+        evaluate = criterion.bind(model)
+        method = "basis"
+        basis = criterion.basis(model)
+    except SeerobError:
+        raise
+    except Exception as error:
+        raise PluginError(f"{method} of {kind.__module__} fails: {told(error)}") from error
+    for what, returned, right in (
+        ("bind", evaluate, callable(evaluate)),
+        ("basis", basis, isinstance(basis, Basis)),
+    ):
+        if not right:
+            wanted = "a function of State" if what == "bind" else "a seerob.api.Basis"
+            raise PluginError(f"{what} of {kind.__module__} returns {type(returned).__name__}, not {wanted}")
+    return Bound(criterion, group, evaluate, basis)
+
+
+def needed(criterion: Criterion, model: Model) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    """Robots, people and machines, and bodies, that must be where the twin shows them before it is asked."""
+    names: dict[str, None] = {}
+    bodies: dict[int, None] = {}
+    for name in criterion.depends(model) if criterion.whole else ():
+        meant = () if name in model.mechanisms else _meant(model, name)
+        if name in model.mechanisms:
+            names[name] = None
+        elif meant:
+            bodies |= dict.fromkeys(meant)
+        elif name in model.frames:
+            at = model.frames[name].mj
+            moving = (m for m in model.mechanisms.values() if at in m.mj_bodies)
+            names |= dict.fromkeys(m.name for m in moving)
+    return tuple(names), tuple(bodies)
+
+
+def contradiction(result: Result, criterion: Criterion) -> str:
+    """Why a result cannot be what it says; empty where it can.
+
+    Only what makes it greener than it is: nothing is within without a value and a limit that it keeps, or
+    beside a part that is not.
+    """
+    if result.name != criterion.name:
+        return f"its result is called {result.name!r}, not {criterion.name!r}"
+    verdict = result.verdict
+    if verdict is not _WITHIN:
+        known = verdict is None or type(verdict) is Verdict
+        return "" if known else f"its verdict is {verdict!r}, not a seerob.Verdict"
+    value, limit = result.value, result.limit
+    if result.nothing:
+        return "it is within, and says that there is nothing to judge"
+    if value is None or limit is None:
+        return f"it is within, and has no {'value' if value is None else 'limit'}"
+    ends = (value,) if result.interval is None else (value, *result.interval)
+    for end in ends:
+        # A value that is not a number keeps no limit.
+        if not keeps(end, limit, at_most=result.at_most):
+            side = "above" if result.at_most else "below"
+            side = "but for rounding on" if abs(end - limit) <= ROUNDING * max(1.0, abs(limit)) else side
+            return f"it is within, and {end:g} {result.unit} lies {side} its limit of {limit:g} {result.unit}"
+    if result.at_most and not criterion.at_most:
+        return "it bounds from the other side than its kind says (at_most)"
+    return _worse_part(result)
+
+
+def unsaid(result: Result) -> str:
+    """Why a result without a verdict is not passed over; empty where it may be.
+
+    It may where it informs of a figure that has no limit, or says that there is nothing to judge, and why.
+    """
+    if result.verdict is not None:
+        return ""
+    if result.nothing:
+        return "" if result.reason else "it says that there is nothing to judge, and not why"
+    what = "" if result.limit is None else "it has a limit and no verdict"
+    if result.value is None and result.interval is None:
+        what = "it says nothing, neither a figure nor a verdict"
+    return f"{what}: where there is nothing to judge, say nothing=True with a reason" if what else ""
+
+
+def _worse_part(result: Result) -> str:
+    inner: tuple[Result | Row, ...] = (*result.parts, *result.rows)
+    for row in inner:
+        if row.verdict is _EXCEEDED or row.verdict is _UNDECIDED:
+            return f"it is within, and its part {row.name} is {row.verdict}"
+    return next(filter(None, map(_worse_part, result.parts)), "")
+
+
+def _unknown(criterion: Criterion, reason: str) -> Result:
+    """What is said of a criterion that could not be asked."""
+    return Result(
+        name=criterion.name,
+        unit=criterion.unit,
+        limit=getattr(criterion, "limit", None),
+        at_most=criterion.at_most,
+        verdict=_UNDECIDED,
+        reason=reason,
+    )
+
+
+def _where(bound: Bound) -> str:
+    return kind_of(bound.group, bound.criterion)
+
+
+def told(error: Exception) -> str:
+    """An error in a sentence, with the place in the code where it came from."""
+    last = traceback.extract_tb(error.__traceback__)[-1:]
+    place = "".join(f" ({Path(frame.filename).name}, line {frame.lineno})" for frame in last)
+    return f"{type(error).__name__}: {error}{place}"
+
+
+def undecided(result: Result, reason: str) -> Result:
+    """The same without anything that is within: its verdict, parts, rows and markers are undecided instead.
+
+    The one way in which what a criterion said is taken back, whoever has reason to. What is exceeded stays,
+    for what is known suffices; a figure without a verdict informs as before. That there is nothing to judge
+    (neither a figure nor a verdict: nobody is near) is taken back too.
+    """
+    nothing = result.verdict is None and result.value is None
+    taken_back = nothing or result.verdict is Verdict.WITHIN
+    return replace(
+        result,
+        verdict=Verdict.UNDECIDED if taken_back else result.verdict,
+        nothing=result.nothing and not taken_back,
+        reason=f"{reason}; {result.reason}".removesuffix("; ") if taken_back else result.reason,
+        parts=tuple(_open(part, reason) for part in result.parts),
+        rows=tuple(
+            replace(row, verdict=Verdict.UNDECIDED, reason=f"{reason}; {row.reason}".removesuffix("; "))
+            if row.verdict is Verdict.WITHIN
+            else row
+            for row in result.rows
+        ),
+        markers=tuple(
+            replace(marker, verdict=Verdict.UNDECIDED) if marker.verdict is Verdict.WITHIN else marker
+            for marker in result.markers
+        ),
+    )
+
+
+def _open(part: Result, reason: str) -> Result:
+    return part if part.verdict is None and part.value is None else undecided(part, reason)
+
+
+def held(criterion: Criterion, model: Model, findings: Iterable[Finding]) -> str:
+    """Why nothing that a criterion says of its subjects is within; empty for nothing.
+
+    Shapes that are missing (`Criterion.unseen`), and findings that hold a name (`Finding.holds`) that means
+    some of what the criterion's subjects mean.
+    """
+    reasons = [criterion.unseen(model)]
+    subjects = criterion.subjects()
+    bodies = {i for name in subjects for i in _meant(model, name)}
+    for finding in findings:
+        if any(
+            name in ("*", criterion.name, *subjects) or not bodies.isdisjoint(_meant(model, name))
+            for name in finding.holds
+        ):
+            reasons.append(finding.text)
+    return "; ".join(dict.fromkeys(filter(None, reasons)))
+
+
+def unmentioned(criterion: Criterion, model: Model) -> dict[str, str]:
+    """By robot that no subject means, what no shape shows of it: should it be asked all the same."""
+    if not criterion.by_shape:
+        return {}
+    subjects = criterion.depends(model)
+    meant = {model.bodies[i].carrier for name in subjects for i in _meant(model, name)}
+    meant |= {name.partition("/")[0] for name in subjects}
+    every = {name: model.unseen((name,)) for name in model.mechanisms if name not in meant}
+    return {name: text for name, text in every.items() if text}
+
+
+def held_names(findings: Iterable[Finding], model: Model) -> dict[str, str]:
+    """By name that findings hold, why nothing that depends on it is within."""
+    found: dict[str, list[str]] = {}
+    for finding in findings:
+        for name in finding.holds:
+            found.setdefault(name, []).append(finding.text)
+    for mechanism in model.mechanisms.values():
+        above = mechanism.on
+        while above:  # whatever is known of it is known of where its carrier is
+            found.setdefault(mechanism.name, []).extend(found.get(above, ()))
+            above = model.mechanisms[above].on
+    return {name: "; ".join(dict.fromkeys(texts)) for name, texts in found.items() if texts}
+
+
+def _meant(model: Model, name: str) -> tuple[int, ...]:
+    """Bodies that a name means; none for one that has no shape."""
+    try:
+        return model.select(name)
+    except UnknownName:
+        return ()
+
+
+class _Kept(NamedTuple):
+    """An answer of a criterion with a period of its own, until it is asked again."""
+
+    result: Result
+    since: float
+    """Run time at which it was asked [s]."""
+    due: float
+    """Run time from which it is asked again [s]."""
+    muted: bool
+    """Whether it did not apply then."""
+    asked: tuple[str, ...]
+    """Robots, people and variables that it rests on."""
+
+
+class Judge:
+    """Asks every criterion at its period; what it cannot know becomes UNDECIDED.
+
+    Args:
+        bound: The criteria.
+        findings: Of sources and of the run, besides those of the model (`Finding.holds`).
+    """
+
+    def __init__(self, bound: Sequence[Bound], findings: Iterable[Finding] = ()) -> None:
+        self._bound = bound
+        self._findings = tuple(findings)
+        self._held: tuple[str, ...] | None = None
+        self._held_names: dict[str, str] = {}
+        self._as_heard: AsHeard | None = None
+        self._needs: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] | None = None
+        self._unmentioned: tuple[dict[str, str], ...] = ()
+        self._kept: dict[int, _Kept] = {}
+        self._why = [""] * len(bound)
+        """Of each criterion, why nothing that it said last is within."""
+        self._between = BetweenTicks([one.watch for one in bound])
+        self._warned: set[str] = set()
+
+    def __call__(self, state: State) -> tuple[Result, ...]:
+        """Results at this state, in the order of the file."""
+        if self._held is None:
+            model = state.model
+            findings = tuple(dict.fromkeys((*model.findings, *self._findings)))
+            self._held = tuple(held(bound.criterion, model, findings) for bound in self._bound)
+            self._held_names = held_names(findings, model)
+            self._needs = tuple(needed(bound.criterion, model) for bound in self._bound)
+            self._unmentioned = tuple(unmentioned(bound.criterion, model) for bound in self._bound)
+            self._as_heard = AsHeard(model)
+        assert self._as_heard is not None
+        if (told := self._as_heard.at(state)) is not None:
+            findings = tuple(dict.fromkeys((*state.model.findings, *self._findings, *told)))
+            self._held = tuple(held(bound.criterion, state.model, findings) for bound in self._bound)
+            self._held_names = held_names(findings, state.model)
+        results = tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
+
+        def ask(i: int) -> Result:
+            self._kept.pop(i, None)
+            return self._one(i, self._bound[i], state)
+
+        def look(i: int, evaluate: Evaluate, shadow: State) -> Result:
+            return self._now(i, evaluate, shadow)[0]
+
+        # What is held is taken back last: what is exceeded between two ticks is looked for all the same.
+        found = self._between(state, results, Asking(ask, look, undecided))
+        return tuple(
+            undecided(result, why) if why and not result.muted else result
+            for result, why in zip(found, self._why, strict=True)
+        )
+
+    @property
+    def looks(self) -> int:
+        """How many instants between ticks were looked at so far."""
+        return self._between.looks
+
+    def _one(self, i: int, bound: Bound, state: State) -> Result:
+        kept = self._kept.get(i)
+        criterion = bound.criterion
+        if kept and self._lasts(kept, criterion, state):
+            return kept.result
+        result, muted = self._now(i, bound.evaluate, state)
+        self._why[i] = self._reason(i, state)
+        if criterion.every is not None:
+            result = replace(result, t=state.t)
+            due, asked = state.t + criterion.every, tuple(sorted(state.asked))
+            self._kept[i] = _Kept(result, state.t, due, muted, asked)
+        return result
+
+    def _at_least(self, i: int, evaluate: Evaluate, state: State, reason: str) -> Result:
+        """What the known masses of a robot exceed, when others are not known; else undecided."""
+        criterion = self._bound[i].criterion
+        if criterion.heavier_is_worse:
+            try:
+                with state.asking(), state.known_masses_alone():
+                    result = self._asked(i, evaluate, state)
+                if result.verdict is _EXCEEDED:
+                    return undecided(replace(result, reason=f"{result.reason}; at least: {reason}"), reason)
+            except Exception as error:
+                _log.debug("%s: %s", criterion.name, error)
+        return _unknown(criterion, reason)
+
+    def _now(self, i: int, evaluate: Evaluate, state: State) -> tuple[Result, bool]:
+        """What a criterion says of a state, and whether it did not apply there."""
+        bound = self._bound[i]
+        muted: Result | None = None
+        try:
+            with state.asking():
+                muted = self._muted(bound.criterion, state)
+                result = muted or self._asked(i, evaluate, state)
+        except Unweighed as reason:
+            result = self._at_least(i, evaluate, state, str(reason))
+        except Undecided as reason:
+            result = _unknown(bound.criterion, str(reason))
+        except Exception as error:
+            # One's own criterion that fails must not end a run that others are judged in.
+            result = _unknown(bound.criterion, self._failed(bound, error))
+        return replace(result, basis=bound.basis), muted is not None
+
+    def _asked(self, i: int, evaluate: Evaluate, state: State) -> Result:
+        """What a criterion says, as far as it may be green.
+
+        Raises:
+            Undecided: What it depends on may not be relied on, or what it says is no result.
+        """
+        assert self._needs is not None
+        bound = self._bound[i]
+        names, bodies = self._needs[i]
+        state.require(*names)
+        if bodies:
+            state.require_bodies(bodies)
+        result = evaluate(state)
+        if type(result) is not Result:
+            what = f"{_where(bound)} returns {type(result).__name__}, not a Result"
+            self._warn(bound, what)
+            raise Undecided(what)
+        if result.t is not None or result.muted:
+            # When it was asked and whether it applied is for who asks to say: a log counts no instant twice.
+            result = replace(result, t=None, muted=False)
+        reason = contradiction(result, bound.criterion)
+        if not reason and (silent := unsaid(result)):
+            self._warn(bound, f"{_where(bound)}: {silent}")
+            silent = f"{silent}; {result.reason}".removesuffix("; ")
+            return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
+        if reason:
+            reason = f"{_where(bound)} contradicts itself: {reason}"
+            self._warn(bound, reason)
+            if type(result.verdict) is not Verdict:
+                raise Undecided(reason)
+        elif result.value is not None and not math.isfinite(result.value):
+            raise Undecided(f"the value is {result.value}, not a finite number")
+        return undecided(result, reason) if reason else result
+
+    def _failed(self, bound: Bound, error: Exception) -> str:
+        what = f"{_where(bound)} failed: {told(error)}"
+        self._warn(bound, what)
+        return what
+
+    def _warn(self, bound: Bound, what: str) -> None:
+        if bound.criterion.name not in self._warned:
+            self._warned.add(bound.criterion.name)
+            _log.warning("%s: %s", bound.criterion.name, what)
+
+    def _reason(self, i: int, state: State) -> str:
+        """Why nothing that a criterion has just said is within; empty for nothing."""
+        assert self._held is not None
+        reason = self._held[i]
+        if not self._held_names and not self._unmentioned[i]:
+            return reason
+        every = (*self._held_names.items(), *self._unmentioned[i].items())
+        texts = (text for name, text in every if name in state.asked)
+        return "; ".join(dict.fromkeys(filter(None, (reason, *(t for t in texts if t not in reason)))))
+
+    @staticmethod
+    def _lasts(kept: _Kept, criterion: Criterion, state: State) -> bool:
+        """Whether a result between two evaluations holds: what it rests on is heard, and not switched since.
+
+        Set back before its instant it says nothing.
+        """
+        if not kept.since - SLACK <= state.t < kept.due - SLACK or any(map(state.interrupted, kept.asked)):
+            return False
+        return criterion.active is None or bool(state.signal(criterion.active)) is not kept.muted
+
+    @staticmethod
+    def _muted(criterion: Criterion, state: State) -> Result | None:
+        """The result of a criterion that its variable says does not apply now; None when it applies."""
+        if criterion.active is None or state.signal(criterion.active):
+            return None
+        return Result(
+            name=criterion.name,
+            unit=criterion.unit,
+            limit=getattr(criterion, "limit", None),
+            at_most=criterion.at_most,
+            reason=f"not asked: {criterion.active} is false",
+            muted=True,
+        )

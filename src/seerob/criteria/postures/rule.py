@@ -1,0 +1,184 @@
+"""What every rule about a posture shares: whose, how accurately it is known, what is entered for it."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from msgspec import Meta
+
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Basis, Input, Level, Result
+from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.postures.ergonomic_posture import bind_posture
+from seerob.criteria.scoring.basis import (
+    ACCURACY_NOTE,
+    PROJECTION_NOTE,
+    choices,
+    entered,
+    posture_quality,
+    watched,
+)
+from seerob.criteria.scoring.held_work import Watch, WorkDetection
+from seerob.criteria.scoring.judgement import Method, judged
+from seerob.criteria.scoring.measured import Accuracy, JointAccuracy, accuracy_of
+from seerob.criteria.scoring.phases import Phase, check_order, phase_at, shared_phases
+from seerob.criteria.scoring.repetition import GAP
+from seerob.criteria.scoring.shoulder import ArmPolicy
+from seerob.criteria.scoring.spans import Span
+from seerob.criteria.scoring.thresholds import Thresholds
+from seerob.description.humans.angles import Angles
+from seerob.model import provenance
+from seerob.model.model import Model
+from seerob.twin.state import State
+
+
+class PostureRule(Criterion, frozen=True, kw_only=True):
+    """Base of the rules about a person's posture."""
+
+    instants: ClassVar[str] = (
+        "accepted: the method scores postures that are looked at, not the way between them"
+    )
+    whole: ClassVar[bool] = False  # bones that nobody sees are not assessed
+
+    human: str
+    """Who is judged."""
+    accuracy: Annotated[float, Meta(ge=0, lt=np.pi / 2, extra={"unit": "rad"})] | None = None
+    """How far each angle of the posture may be off [rad]; the verdict then is of the whole interval."""
+    joint_accuracy: JointAccuracy | None = None
+    """The same for single joints, where it differs."""
+    unmeasured: tuple[str, ...] = ()
+    """Bones that the source does not measure, such as ``"right_hand"``: what needs them is not assessed."""
+
+    def __post_init__(self) -> None:
+        check_order(getattr(self, "phases", ()))
+        self.error()
+
+    def subjects(self) -> tuple[str, ...]:
+        """The person."""
+        return (self.human,)
+
+    def error(self) -> Accuracy | None:
+        """Accuracy of each angle [rad]; None when nobody gave one."""
+        return accuracy_of(self.accuracy, self.joint_accuracy)
+
+
+class ScoredPosture(PostureRule, frozen=True, kw_only=True):
+    """Base of the rules that score the parts of the body and look the total up in tables: RULA, REBA."""
+
+    METHOD: ClassVar[Method]
+    PHASE: ClassVar[type[Phase]]
+    REPEATED: ClassVar[int]
+    """Movements per minute from which on work is repeated."""
+
+    thresholds: Thresholds = Thresholds()
+    """Where a posture counts as twisted, raised, upright and so on."""
+    arm: ArmPolicy = ArmPolicy.PROJECTION
+    """Which angle stands for the flexion of an upper arm."""
+    detect: WorkDetection | None = None
+    """Find static and repeated work in the movement, where no phase enters it."""
+
+    @property
+    def limit(self) -> int | None:
+        """Greatest admissible score."""
+        level = getattr(self, "action_level", None)
+        return None if level is None else self.METHOD.levels[level - self.METHOD.first_level]
+
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """Action levels, the lowest first."""
+        return self.METHOD.classes
+
+    @property
+    def static(self) -> float:
+        """How long a posture is held to be static [s]."""
+        raise NotImplementedError
+
+    def components(
+        self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: Watch | None = None
+    ) -> dict[str, Span]:
+        """Component scores of postures in a phase, in the order of the method.
+
+        Args:
+            angles: Of the postures.
+            phase: What was entered.
+            accuracy: Of each angle [rad].
+            watch: What was found of static and repeated work so far.
+
+        Returns:
+            Shapes (..., 2) of sided components and (...) of central ones.
+        """
+        raise NotImplementedError
+
+    def entered(self, model: Model) -> tuple[Phase, ...]:
+        """Phases of the rule, or else those that every rule shares."""
+        own: tuple[Phase, ...] = getattr(self, "phases", ())
+        return shared_phases(model, self.human, own, self.PHASE.from_task)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        read = bind_posture(model, self.human, self.unmeasured)
+        phases, unknown, error = self.entered(model), self.PHASE(), self.error()
+        watch = None if self.detect is None else Watch(self.detect, hold=self.static, count=self.REPEATED)
+        if watch is not None and self.every is not None and self.every > GAP:
+            raise InputError.at(
+                self.name,
+                "every",
+                f"{self.every:g} s is too seldom to see static and repeated work",
+                f"at most {GAP:g} s, or none",
+            )
+
+        def evaluate(state: State) -> Result:
+            angles = read(state)
+            if watch is not None:
+                watch.add(state.t, angles)
+            phase = phase_at(phases, state.t, unknown)
+            return judged(
+                self.METHOD,
+                name=self.name,
+                human=self.human,
+                limit=self.limit,
+                angles=angles,
+                components=self.components(angles, phase, watch=watch),
+                spread=None if error is None else self.components(angles, phase, error, watch),
+                thresholds=self.thresholds,
+            )
+
+        return evaluate
+
+    def based(
+        self,
+        model: Model,
+        *,
+        formula: str,
+        source: str,
+        not_modelled: tuple[str, ...],
+        options: tuple[Input, ...] = (),
+    ) -> Basis:
+        """The basis, with the inputs and limits that rules of this sort share.
+
+        Args:
+            model: The compiled workstation.
+            formula: Of the score.
+            source: Of the tables, with how sure they are.
+            not_modelled: What the rule leaves out.
+            options: Of this rule alone.
+        """
+        return Basis(
+            formula=formula,
+            source=source,
+            inputs=(
+                *provenance.motion(model, self.human),
+                *options,
+                *entered(self.entered(model), self.PHASE()),
+                *watched(self.detect, self.static, self.REPEATED),
+                *choices(self.thresholds, self.arm),
+                *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
+                *(() if self.limit is None else provenance.limit(self.limit, "")),
+            ),
+            not_modelled=(
+                *not_modelled,
+                PROJECTION_NOTE,
+                *((ACCURACY_NOTE,) if self.error() is not None else ()),
+            ),
+        )

@@ -1,0 +1,344 @@
+r"""Forces that torque limits allow at a point, [Weistroffer2022]_ section 2.2.2.4, [Chiacchio1997]_.
+
+The sets themselves are in `seerob.criteria.polytope`.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+import mujoco
+import numpy as np
+from msgspec import Meta
+from msgspec.structs import replace
+
+from seerob.core import figures
+from seerob.core.errors import InputError, Undecided
+from seerob.core.quantities import Metres3
+from seerob.core.snapshot import Arrow, Basis, Hull, Input, Marker, Origin, Result, Sphere, Verdict
+from seerob.core.transforms import Array
+from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge
+from seerob.criteria.polytope import Polytope, free_moment, torque_box, zero_moment
+from seerob.description.norms import body_limits
+from seerob.description.norms.force_limits import force_inputs, pushed_region
+from seerob.kernels.contact_forces import drawn_corners
+from seerob.kernels.polytope import largest
+from seerob.model import provenance
+from seerob.model.model import Mechanism, Model
+from seerob.recording.answers import Answers
+from seerob.twin import joint_torques
+from seerob.twin.spans import ROUNDING, UNBOUNDED, Fall, Falls, Points, Span, down_to
+from seerob.twin.state import State
+from seerob.twin.states import States
+
+DRAWN = 0.001
+"""Length drawn for 1 N [m]."""
+LARGEST_DRAWN = 2.0
+"""Corners farther than this are drawn here [m]."""
+
+FORMULA = {
+    "zero_moment": "{f : τ_min ≤ J_vᵀ f + b ≤ τ_max}: a point contact, without moment",
+    "free_moment": "{f : some m with τ_min ≤ J_vᵀ f + J_ωᵀ m + b ≤ τ_max}: a contact that bears a moment",
+    "torque_box": "{(J_vᵀ)⁺ (τ − b) : τ_min ≤ τ ≤ τ_max}: image of the 2ⁿ extreme torques",
+}
+LOAD = {
+    "gravity": "b = g(q): gravity, tools and workpieces included",
+    "motion": "b = c(q, q̇) + g(q): gravity and the velocity products",
+    "none": "b = 0: gravity is balanced by something else",
+}
+
+
+class ForcePolytope(Criterion, frozen=True, kw_only=True):
+    """Largest force that the robot's torque limits allow at a point, in any direction."""
+
+    unit: ClassVar[str] = "N"
+    by_shape: ClassVar[bool] = False
+
+    at: str
+    """Point: a robot (its tool's working point) or the full name of a link."""
+    offset: Metres3 = (0.0, 0.0, 0.0)
+    """The point in that frame [m]."""
+    limit: Annotated[float, Meta(gt=0, extra={"unit": "N"})] | None = None
+    """Largest admissible force [N]: the radius of the sphere that the polytope is compared with."""
+    body_region: str | None = None
+    """Instead of a limit: a body region, whose quasi-static limit F_s is the radius of the sphere."""
+    limits: str | None = None
+    """File with other limits of body regions, of the form of the one that ships."""
+    definition: Literal["zero_moment", "free_moment", "torque_box"] = "zero_moment"
+    """Which set: forces at a point contact, forces of a contact that also bears a moment, or the image of
+    all extreme torques under the pseudo-inverse. Each of the last two contains the first."""
+    load: Literal["gravity", "motion", "none"] = "gravity"
+    """What the torques must hold beside the force."""
+    torque_limits: tuple[tuple[float, float], ...] | None = None
+    """Least and largest torque of each joint [N·m or N] instead of the robot's own limits."""
+
+    def __post_init__(self) -> None:
+        if self.limit is not None and self.body_region is not None:
+            raise ValueError("give either limit or body_region")
+        if self.limits is not None and self.body_region is None:
+            raise ValueError("limits are of a body_region: name one")
+
+    def subjects(self) -> tuple[str, ...]:
+        """The point."""
+        return (self.at,)
+
+    def _table(self, model: Model) -> body_limits.BodyLimits:
+        own = self.limits
+        return body_limits.shipped() if own is None else body_limits.read(Path(model.folder, own))
+
+    def _against(self, model: Model) -> ForcePolytope:
+        """The same with the limit of its body region."""
+        if self.body_region is None:
+            return self
+        force = pushed_region(self._table(model), self.body_region).force
+        return replace(self, limit=force.value, body_region=None, limits=None)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        if self.body_region is not None:
+            return self._against(model).bind(model)
+        frame = model.frame(self.at)
+        robot = model.carrier(frame)
+        if self.load != "none":
+            robot.require_masses(self.name)
+        offset = np.array(self.offset)
+        lower, upper, unknown = self._torques(model, robot)
+
+        def evaluate(state: State) -> Result:
+            state.require(robot.name)
+            if unknown:
+                raise Undecided(unknown)
+            held = self._held(state, robot)
+            J = state.jacobian(frame, robot, offset)
+            polytope = self._polytope(J, lower - held, upper - held)
+            if polytope.empty:
+                raise Undecided(
+                    f"{robot.name}: the torque limits cannot hold it in this pose, with any force"
+                )
+            rotation, position = state.pose(frame)
+            return self._result(polytope, position + rotation @ offset)
+
+        return evaluate
+
+    def batch(self, model: Model) -> EvaluateMany | None:
+        """See `Criterion.batch`; of ``zero_moment`` only, whose corners are found without a hull."""
+        if self.definition != "zero_moment" or self.load == "motion":
+            return None
+        frame, offset = model.frame(self.at), np.array(self.offset)
+        robot = model.carrier(frame)
+        limit = self._against(model).limit
+        lower, upper, unknown = self._torques(model, robot)
+
+        def evaluate(states: States) -> Answers:
+            states.require(robot.name)
+            if unknown:
+                raise Undecided(unknown)
+            held = states.held(robot) if self.load == "gravity" else np.zeros((len(states), len(lower)))
+            J_v = np.ascontiguousarray(states.jacobian(frame, robot, offset)[:, :3])
+            norm, _, _ = largest(J_v, lower - held, upper - held)
+            # Unbounded is infinite: it exceeds any limit and is no figure. Empty is nan, and undecided.
+            return Answers.against(norm, limit, at_most=self.at_most).finite()
+
+        return evaluate
+
+    def falls(self, model: Model, points: Points) -> Falls | None:
+        r"""See `Criterion.falls`; of ``zero_moment``, without velocity products in the load.
+
+        What the torques allow in one pose, made smaller by a share, they allow in the other. With columns of
+        the Jacobian that differ by :math:`\epsilon_j`, torques of gravity that differ by :math:`\delta_j` and
+        at least :math:`r_j` left for the force either way, the largest force F, near one of which it is
+        :math:`F_e`, is
+
+        .. math:: F \le F_e (1 + \max_j (\delta_j + \epsilon_j F) / r_j).
+        """
+        frame, limit = model.frame(self.at), self._against(model).limit
+        robot = model.carrier(frame)
+        if self.definition != "zero_moment" or self.load == "motion" or limit is None or robot.holders:
+            return None
+        lower, upper, _ = self._torques(model, robot)
+        local = frame.body_from_frame[:3, :3] @ np.array(self.offset) + frame.body_from_frame[:3, 3]
+        point = points.add(frame.mj, local)
+        coupling = dict(zip(robot.v_address.tolist(), robot.coupling, strict=True))
+        heavy = [int(b) for b in robot.mj_bodies if model.mj.body_mass[b] > 0 and self.load == "gravity"]
+        weights = np.linalg.norm(model.mj.opt.gravity) * model.mj.body_mass[heavy]
+        centres = [points.add(b, model.mj.body_ipos[b]) for b in heavy]
+        data, every = mujoco.MjData(model.mj), np.zeros(model.mj.nv)
+
+        def held(q: Array) -> Array:
+            data.qpos[:] = q
+            mujoco.mj_kinematics(model.mj, data)
+            mujoco.mj_comPos(model.mj, data)
+            mujoco.mj_comVel(model.mj, data)
+            mujoco.mj_rne(model.mj, data, 0, every)
+            return np.asarray(robot.coupling.T @ every[robot.v_address])
+
+        def falls(span: Span, least: Array | float) -> Fall:
+            # At any instant, the nearer end is half the span away at most.
+            half = span.T / 2
+            moved = points.column_changes(point, span, coupling) * half + ROUNDING
+            gained, left = np.zeros(len(moved)), np.minimum(upper, -lower)
+            for weight, centre in zip(weights, centres, strict=True):
+                gained += weight * points.column_changes(centre, span, coupling) * half
+            if heavy:
+                loads = [held(span.path.at(t)[0]) for t in (span.begin, span.end)]
+                left = np.min([np.minimum(upper - load, load - lower) for load in loads], axis=0)
+            largest = limit - float(least)
+            if not (np.all(left > 0) and np.isfinite(moved).all() and np.isfinite(gained).all()):
+                return UNBOUNDED
+            shrinks = 1 - largest * float((moved / left).max())
+            if shrinks <= 0:
+                return UNBOUNDED
+            return down_to(least, limit - largest * (1 + float((gained / left).max())) / shrinks)
+
+        return falls
+
+    def _held(self, state: State, robot: Mechanism) -> Array:
+        if self.load == "gravity":
+            return joint_torques.gravity(state, robot)
+        return joint_torques.bias(state, robot) if self.load == "motion" else np.zeros(len(robot.joints))
+
+    def _polytope(self, J: Array, low: Array, high: Array) -> Polytope:
+        if self.definition == "zero_moment":
+            return zero_moment(J[:3], low, high)
+        return free_moment(J, low, high) if self.definition == "free_moment" else torque_box(J[:3], low, high)
+
+    def _result(self, polytope: Polytope, at: Array) -> Result:
+        unbounded = polytope.free.shape[1] > 0
+        farthest = polytope.farthest
+        across = math.sqrt(float(farthest @ farthest))
+        if unbounded:
+            # No force is too large for the structure here, so every limit is exceeded.
+            value, verdict = None, None if self.limit is None else Verdict.EXCEEDED
+            direction = polytope.free[:, 0]
+            reason = (
+                f"singular: no torque limits the force along ±{_vector(direction)}, only the structure does"
+            )
+        else:
+            value, verdict = across, judge(across, self.limit)
+            direction = farthest / across if across > 0 else np.zeros(3)
+            reason = f"largest along {_vector(direction)}"
+            if polytope.inscribed < 0:
+                reason += "; without any force the torque limits cannot hold the robot"
+        inscribed = polytope.inscribed if np.isfinite(polytope.inscribed) else None
+        return Result(
+            name=self.name,
+            value=value,
+            unit=self.unit,
+            limit=self.limit,
+            verdict=verdict,
+            nothing=unbounded and verdict is None,
+            reason=reason,
+            parts=(
+                Result(name="in every direction", value=inscribed, unit="N"),
+                *((Result(name="across that direction", value=across, unit="N"),) if unbounded else ()),
+                *(
+                    Result(name=f"direction {axis}", value=u, unit="")
+                    for axis, u in zip("xyz", direction.tolist(), strict=True)
+                ),
+            ),
+            markers=self._markers(polytope, at, direction, value, verdict),
+        )
+
+    def _markers(
+        self, polytope: Polytope, at: Array, direction: Array, value: float | None, verdict: Verdict | None
+    ) -> tuple[Marker, ...]:
+        center = tuple(at.tolist())
+        markers: list[Marker] = []
+        if len(polytope.triangles):
+            drawn, cut = drawn_corners(polytope.corners, at, DRAWN, LARGEST_DRAWN)
+            markers.append(
+                Hull(
+                    vertices=tuple(map(tuple, drawn.tolist())),
+                    faces=tuple(map(tuple, polytope.triangles.tolist())),
+                    label="cut off where it is drawn too large" if cut else "",
+                    verdict=verdict,
+                )
+            )
+        if self.limit is not None:
+            radius = min(DRAWN * self.limit, LARGEST_DRAWN)
+            markers.append(Sphere(center=center, radius=radius, label=f"limit {self.limit:g} N"))
+        length = LARGEST_DRAWN if value is None else min(DRAWN * value, LARGEST_DRAWN)
+        label = "unbounded" if value is None else figures.told(value, self.limit, self.unit, at_most=True)
+        arrow = tuple((length * direction).tolist())
+        markers.append(Arrow(origin=center, vector=arrow, label=label, verdict=verdict))
+        return tuple(markers)
+
+    def _torques(self, model: Model, robot: Mechanism) -> tuple[Array, Array, str]:
+        """Lower and upper torque limits, and what of them is unknown."""
+        names = [joint.name for joint in robot.joints]
+        if self.torque_limits is not None:
+            file = next(iter(model.workstation.files), "workstation")
+            pairs = np.array(self.torque_limits, float).reshape(-1, 2)
+            if len(pairs) != len(names) or not np.isfinite(pairs).all() or (pairs[:, 0] > pairs[:, 1]).any():
+                raise InputError.at(
+                    file,
+                    "torque_limits",
+                    f"{[list(pair) for pair in self.torque_limits]} does not fit",
+                    f"give [least, largest] in N·m or N for each of {', '.join(names)}",
+                )
+            return pairs[:, 0], pairs[:, 1], ""
+        unknown = [
+            name
+            for name, limit in zip(names, robot.effort_limits, strict=True)
+            # A limit of 0 in a description means that nobody filled it in.
+            if limit is None or limit.value <= 0 or limit.origin in (Origin.ASSUMED, Origin.MISSING)
+        ]
+        upper = np.array([0.0 if limit is None else limit.value for limit in robot.effort_limits])
+        text = f"{robot.name}: nobody gave the torque limit of {', '.join(unknown)}" if unknown else ""
+        return -upper, upper, text
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        robot = model.carrier(model.frame(self.at))
+        limit = provenance.limit(self.limit, "N")
+        doubts: tuple[str, ...] = ()
+        if self.body_region is not None:
+            edition, own = model.workstation.edition, self.limits is not None
+            limit, doubts = force_inputs(self._table(model), self.body_region, edition, own=own)
+        return Basis(
+            formula=f"largest |f| of {FORMULA[self.definition]}; {LOAD[self.load]}",
+            source="Weistroffer et al. 2022, section 2.2.2.4; Chiacchio et al. 1997",
+            inputs=provenance.motion(model, robot.name)
+            + self._limits_given(robot)
+            + (() if self.load == "none" else provenance.masses(model, robot))
+            + limit,
+            not_modelled=(
+                *doubts,
+                "static: no force of an impact, no inertia of the moving robot",
+                "friction in joints and gears, which a pushing robot must overcome and a pushed one adds",
+                "torques beyond the stated limits, and force monitoring of the controller below them",
+            ),
+        )
+
+    def _limits_given(self, robot: Mechanism) -> tuple[Input, ...]:
+        if self.torque_limits is not None:
+            return tuple(
+                Input(
+                    name=f"torque limits of {joint.name}",
+                    value=f"{low:g} … {high:g}",
+                    unit="N·m" if unit == "rad" else "N",
+                    origin=Origin.GIVEN,
+                    source="workstation file",
+                )
+                for joint, unit, (low, high) in zip(
+                    robot.joints, robot.units, self.torque_limits, strict=True
+                )
+            )
+        return tuple(
+            Input(name=f"torque limit of {joint.name}", origin=Origin.MISSING)
+            if limit is None or limit.value <= 0
+            else Input(
+                name=f"torque limit of {joint.name}, either way",
+                value=limit.value,
+                unit="N·m" if unit == "rad" else "N",
+                origin=limit.origin,
+                source=limit.source,
+            )
+            for joint, unit, limit in zip(robot.joints, robot.units, robot.effort_limits, strict=True)
+        )
+
+
+def _vector(u: Array) -> str:
+    return "(" + ", ".join(f"{0.0 if abs(x) < 5e-3 else x:.2f}" for x in u.tolist()) + ")"

@@ -1,0 +1,225 @@
+r"""Joint torques against their limits, and what of them the model does not explain.
+
+.. math:: |\tau_j| \le s\,\tau_{j,max},\qquad r = \tau - (M \ddot q + c + g)
+
+The residual r is friction, contact, a payload that the file does not have, or an error of the masses.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from msgspec import Meta
+
+from seerob.core.domains import at_least
+from seerob.core.errors import InputError, Undecided
+from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
+from seerob.core.transforms import Array
+from seerob.criteria.criterion import Criterion, Evaluate, judge_interval, worst
+from seerob.model import provenance
+from seerob.model.model import Mechanism, Model
+from seerob.twin import joint_torques
+from seerob.twin.state import State
+
+PerJoint = tuple[Annotated[float, Meta(ge=0)], ...]
+
+
+def shares(torques: Array, limits: Array, uncertainty: Array) -> tuple[Array, Array, Array]:
+    """Share of its limit that each joint holds, and the ends of the interval where the true share is.
+
+    Args:
+        torques: τ [N·m or N], shape (..., n).
+        limits: τ_max, NaN where nobody knows, shape (n,).
+        uncertainty: How far each torque may be off, shape (n,).
+
+    Returns:
+        Share, lowest, highest, NaN without a limit, shape (..., n) each.
+    """
+    limits, uncertainty = at_least("limits", limits), at_least("uncertainty", uncertainty)
+    size = np.abs(torques)
+    low = np.maximum(size - uncertainty, 0.0)
+    return size / limits, low / limits, (size + uncertainty) / limits
+
+
+class JointTorque(Criterion, frozen=True, kw_only=True):
+    """Joint torques of a robot against their limits, as its source measures them or as a model needs them."""
+
+    by_shape: ClassVar[bool] = False
+    by_torque: ClassVar[bool] = True
+    unit: ClassVar[str] = ""
+
+    robot: str
+    torques: Literal["measured", "model"] = "measured"
+    """What the source measures; or what the model needs for the motion, when the source measures nothing."""
+    limit: Annotated[float, Meta(gt=0, le=1)] = 1.0
+    """Largest admissible share of each joint's limit."""
+    limits: tuple[Annotated[float, Meta(gt=0)], ...] | None = None
+    """Limit of each joint [N·m or N]; those of the robot (maker's, or ``torque_limits``) when not given."""
+    torque_uncertainty: PerJoint | None = None
+    """How far each torque may be off [N·m or N]; gives the interval. Without it nothing that the model needs
+    is within: friction and rotors are not in it."""
+    largest_residual: PerJoint | None = None
+    """Of each joint: where measured torques are farther from what the model needs, the model does not explain
+    them, and what is within is undecided [N·m or N]."""
+
+    def subjects(self) -> tuple[str, ...]:
+        """The robot."""
+        return (self.robot,)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        robot = model.robot(self.robot)
+        limits = self._limits(model, robot)
+        uncertainty = self._per_joint(model, robot, "torque_uncertainty")
+        largest = self._per_joint(model, robot, "largest_residual")
+        names = [joint.name for joint in robot.joints]
+        units = ["N·m" if unit == "rad" else "N" for unit in robot.units]
+        if self.torques == "model" or largest is not None:
+            robot.require_masses(self.name)
+        needed = joint_torques.Needed(robot)
+
+        def evaluate(state: State) -> Result:
+            why = ""
+            model_torques: Array | None = None
+            try:
+                model_torques = needed(state)
+            except Undecided as reason:
+                if self.torques == "model":
+                    raise
+                why = str(reason)
+            tau = state.measured_torques(robot) if self.torques == "measured" else model_torques
+            assert tau is not None
+            share, low, high = shares(
+                tau, limits, np.zeros(len(names)) if uncertainty is None else uncertainty
+            )
+            parts = []
+            for j, name in enumerate(names):
+                verdict = (
+                    Verdict.UNDECIDED
+                    if np.isnan(limits[j])
+                    else judge_interval((float(low[j]), float(high[j])), self.limit)
+                )
+                parts.append(
+                    Result(
+                        name=name,
+                        value=abs(float(tau[j])),
+                        unit=units[j],
+                        limit=None if np.isnan(limits[j]) else self.limit * float(limits[j]),
+                        verdict=verdict,
+                        reason="nobody gave its limit" if np.isnan(limits[j]) else "",
+                    )
+                )
+            verdict = worst([part.verdict for part in parts])
+            reasons = [f"{part.name}: {part.reason}" for part in parts if part.reason]
+            if verdict is not Verdict.UNDECIDED and not np.isnan(share).all():
+                reasons.append(names[int(np.nanargmax(share))])
+            if self.torques == "model" and uncertainty is None and verdict is Verdict.WITHIN:
+                reasons.insert(0, "friction and rotors are not in the model: give torque_uncertainty")
+                verdict = Verdict.UNDECIDED
+            if self.torques == "measured" and model_torques is not None:
+                residual = tau - model_torques
+                parts += [
+                    Result(name=f"residual of {name}", value=float(r), unit=unit)
+                    for name, r, unit in zip(names, residual, units, strict=True)
+                ]
+                if largest is not None and (np.abs(residual) > largest).any():
+                    j = int(np.argmax(np.abs(residual) - largest))
+                    reasons.insert(
+                        0, f"{residual[j]:.3g} {units[j]} at {names[j]} are not explained by the model"
+                    )
+                    verdict = verdict if verdict is Verdict.EXCEEDED else Verdict.UNDECIDED
+            elif largest is not None:
+                reasons.insert(0, why)
+                verdict = verdict if verdict is Verdict.EXCEEDED else Verdict.UNDECIDED
+            value = float(np.nanmax(share)) if not np.isnan(share).all() else None
+            ends = (
+                None
+                if uncertainty is None or value is None
+                else (float(np.nanmax(low)), float(np.nanmax(high)))
+            )
+            return Result(
+                name=self.name,
+                value=value,
+                unit=self.unit,
+                limit=self.limit,
+                verdict=verdict,
+                reason="; ".join(reasons),
+                interval=ends,
+                parts=tuple(parts),
+            )
+
+        return evaluate
+
+    def _limits(self, model: Model, robot: Mechanism) -> Array:
+        """Of every joint [N·m or N], NaN where nobody knows, shape (n,)."""
+        if self.limits is not None:
+            given = self._per_joint(model, robot, "limits")
+            assert given is not None
+            return given
+        return np.array([np.nan if q is None else q.value for q in robot.effort_limits])
+
+    def _per_joint(self, model: Model, robot: Mechanism, key: str) -> Array | None:
+        """An option with one value for each joint, shape (n,); None when it is not given.
+
+        Raises:
+            InputError: It has another number of values.
+        """
+        given: tuple[float, ...] | None = getattr(self, key)
+        if given is None:
+            return None
+        names = [joint.name for joint in robot.joints]
+        if len(given) != len(names) or not np.isfinite(given).all():
+            file = next(iter(model.workstation.files), "workstation")
+            remedy = f"give one value in N·m or N for each of {', '.join(names)}"
+            raise InputError.at(file, key, f"{list(given)} does not fit", remedy)
+        return np.array(given, float)
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        robot = model.robot(self.robot)
+        source = next((s for s in model.workstation.sources if s.target() == robot.name), None)
+        measured = getattr(source, "origin", None) == "controller"
+        unknown = Origin.MISSING if source is None else Origin.GIVEN
+        heard = Input(
+            name=f"joint torques of {robot.name}",
+            origin=Origin.MEASURED if measured else unknown,
+            source="" if source is None else source.name,
+        )
+        bounds = [
+            provenance.given(f"limit of {joint.name}", value, "N·m or N")
+            for joint, value in zip(robot.joints, self.limits or (), strict=False)
+        ] or [
+            Input(
+                name=f"limit of {joint.name}",
+                value=None if q is None else q.value,
+                unit="N·m or N",
+                origin=Origin.MISSING if q is None else q.origin,
+                source="" if q is None else q.source,
+            )
+            for joint, q in zip(robot.joints, robot.effort_limits, strict=True)
+        ]
+        return Basis(
+            formula="largest |τ_j| / τ_j,max" + ("" if self.torques == "measured" else ", τ = M q̈ + c + g"),
+            source="equation of motion of the robot; limits as the inputs say",
+            inputs=(
+                *provenance.motion(model, robot.name),
+                *((heard,) if self.torques == "measured" else provenance.masses(model, robot)),
+                *bounds,
+                *provenance.limit(self.limit, ""),
+            ),
+            not_modelled=(
+                *(
+                    ("friction in joints and gears: motors give more than that",)
+                    if self.torques == "model"
+                    else ()
+                ),
+                *(
+                    ()
+                    if robot.rotor_inertia_known
+                    else ("rotor inertia: torques that accelerate rotors are in the residual",)
+                ),
+                "limits that depend on speed or temperature",
+                *(() if self.torque_uncertainty else ("uncertainty of the torques: nobody gave it",)),
+            ),
+        )

@@ -1,0 +1,188 @@
+r"""Kinetic energy of a robot, [Weistroffer2022]_ Eq. 5."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from msgspec import Meta
+
+from seerob.core import figures
+from seerob.core.domains import at_least
+from seerob.core.errors import Undecided
+from seerob.core.snapshot import Basis, Result, Sphere, Verdict
+from seerob.core.tolerances import deciding, spread
+from seerob.core.transforms import Array
+from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
+from seerob.model import provenance
+from seerob.model.model import Mechanism, Model
+from seerob.recording.answers import Answers
+from seerob.twin.accuracy.mass_tolerances import MassTolerances
+from seerob.twin.moving_base import energy_of
+from seerob.twin.spans import UNBOUNDED, Fall, Falls, Margin, Points, Span, change_of_motion
+from seerob.twin.state import State
+from seerob.twin.states import States
+
+DRAWN = 0.1
+"""Radius of the sphere of 1 J [m]; the volume is proportional to the energy."""
+
+
+LEAST = 1e-9
+"""What rounding may make of no energy [J]."""
+
+
+def kinetic_energy(M: Array, qd: Array) -> Array:
+    r"""Kinetic energy :math:`E = \frac{1}{2} \dot{q}^T M(q) \dot{q}`.
+
+    Args:
+        M: Joint-space mass matrix [kg, kg·m or kg·m²], shape (..., n, n).
+        qd: Joint velocities [rad/s or m/s], shape (..., n).
+
+    Returns:
+        Energy [J], shape (...).
+    """
+    energy = np.asarray(0.5 * (qd[..., None, :] @ M @ qd[..., :, None])[..., 0, 0])
+    at_least("energy of M, a mass matrix,", energy, -LEAST, "J")
+    return energy
+
+
+class KineticEnergy(Criterion, frozen=True, kw_only=True):
+    """Kinetic energy of a whole robot or machine with everything mounted on it."""
+
+    unit: ClassVar[str] = "J"
+    heavier_is_worse: ClassVar[bool] = True
+    by_speed: ClassVar[bool] = True
+    by_shape: ClassVar[bool] = False
+
+    robot: str
+    """A robot, with the speed that what carries it gives it; or a machine."""
+    limit: Annotated[float, Meta(gt=0, extra={"unit": "J"})] | None = None
+    """Largest admissible energy [J]."""
+
+    def subjects(self) -> tuple[str, ...]:
+        """The robot."""
+        return (self.robot,)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        robot = model.mover(self.robot)
+        aboard = _aboard(model, robot)
+        for each in (robot, *aboard):
+            each.require_masses(self.name)
+        masses, alone = MassTolerances(model, robot), robot.alone and not aboard
+
+        def evaluate(state: State) -> Result:
+            qd = state.qd(robot)
+            energy = (
+                float(kinetic_energy(state.mass_matrix(robot), qd))
+                if alone
+                else sum(energy_of(state, each) for each in (robot, *aboard))
+            )
+            verdict, interval, reason = judge(energy, self.limit), None, ""
+            if len(masses) and not alone:
+                raise Undecided(
+                    f"{robot.name}: mass_tolerance is not followed on what moves it: leave it out here"
+                )
+            if len(masses):
+                matrices = masses.matrices(state)
+                ends = spread(lambda shifts: kinetic_energy(matrices.at(shifts), qd), len(masses))
+                interval = float(ends.low), float(ends.high)
+                verdict = judge_interval(interval, self.limit)
+                reason = deciding(masses.tolerances, ends.widths) if verdict is Verdict.UNDECIDED else ""
+            error = state.speed_error(robot)
+            if error is not None:
+                # √(2E) is a norm of the velocities: it is off by no more than that of their errors.
+                off = float(np.sqrt(np.diagonal(state.mass_matrix(robot)) @ error**2))
+                low, high = (energy, energy) if interval is None else interval
+                interval = (
+                    0.5 * max(np.sqrt(2 * max(low, 0.0)) - off, 0.0) ** 2,
+                    0.5 * (np.sqrt(2 * max(high, 0.0)) + off) ** 2,
+                )
+                verdict = judge_interval(interval, self.limit)
+                if verdict is Verdict.UNDECIDED:
+                    reason = reason or "decided by the noise of positions that its speeds are derived from"
+            _, position = state.pose(robot.tip)
+            sphere = Sphere(
+                center=tuple(position.tolist()),
+                radius=DRAWN * max(energy, 0.0) ** (1 / 3),
+                label=figures.told(energy, self.limit, self.unit, at_most=True),
+                verdict=verdict,
+            )
+            return Result(
+                name=self.name,
+                value=energy,
+                unit=self.unit,
+                limit=self.limit,
+                verdict=verdict,
+                reason=reason,
+                interval=interval,
+                markers=(sphere,),
+            )
+
+        return evaluate
+
+    def batch(self, model: Model) -> EvaluateMany | None:
+        """See `Criterion.batch`; where no mass has a tolerance and nothing else moves it."""
+        robot = model.mover(self.robot)
+        if len(MassTolerances(model, robot)) or not robot.alone or _aboard(model, robot):
+            return None
+
+        def evaluate(states: States) -> Answers:
+            energy = kinetic_energy(states.mass_matrix(robot), states.qd(robot))
+            return Answers.against(energy, self.limit, at_most=self.at_most)
+
+        return evaluate
+
+    def falls(self, model: Model, points: Points) -> Falls | None:
+        r"""See `Criterion.falls`, of the largest energy that tolerances of masses allow.
+
+        :math:`\sqrt{2E}` is a norm of the velocities of all that has a mass, so it changes by no more than
+        the norm of how much they change. The largest is one too: of heavier masses, with centres that may
+        be d away, :math:`m (|v| + d |\omega|)^2 + \omega^T I \omega`
+        (`seerob.twin.accuracy.mass_tolerances`).
+        """
+        robot = model.mover(self.robot)
+        if self.limit is None:
+            return None
+        tolerances = MassTolerances(model, robot)
+        every = (robot, *_aboard(model, robot))
+        bodies = [int(b) for each in every for b in each.mj_bodies]
+        dofs = np.concatenate([each.v_address for each in every])
+        limit, changes = self.limit, change_of_motion(model, bodies, dofs, points, tolerances.heaviest)
+
+        def falls(span: Span, least: Array | float) -> Fall:
+            change, bend = changes(span)
+            if not np.isfinite(change):
+                return UNBOUNDED  # who jumps
+            most = np.sqrt(2 * max(limit - float(least), 0.0))
+            return Fall(float((most + change) * change), float(most * bend + bend**2 / 2))
+
+        return falls
+
+    def margin(self, result: Result) -> Margin:
+        """See `Criterion.margin`, of the largest energy that tolerances allow."""
+        far, off = super().margin(result)
+        return far - off, 0.0
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        robot = model.mover(self.robot)
+        aboard = _aboard(model, robot)
+        alone = robot.alone and not aboard
+        return Basis(
+            formula="E = ½ q̇ᵀ M(q) q̇, whole robot" if alone else "E = ½ Σ (m v² + ωᵀ I ω), whole robot",
+            source="Weistroffer et al. 2022, Eq. 5",
+            inputs=provenance.motion(model, robot.name, *(each.name for each in aboard))
+            + tuple(given for each in (robot, *aboard) for given in provenance.masses(model, each))
+            + provenance.limit(self.limit, "J"),
+            not_modelled=(
+                "not the energy of an impact, ½ μ v_rel², that ISO/TS 15066 limits per body region",
+                *(() if robot.rotor_inertia_known else ("energy of rotors and gears",)),
+            ),
+        )
+
+
+def _aboard(model: Model, machine: Mechanism) -> tuple[Mechanism, ...]:
+    """Robots that a machine carries: they have joints and speeds of their own."""
+    robots = (m for m in model.mechanisms.values() if m.role == "robot")
+    return tuple(m for m in robots if machine.name in model.carriers_of(m.name))

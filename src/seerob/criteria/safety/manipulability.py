@@ -1,0 +1,185 @@
+r"""Manipulability of a point of a robot, [Weistroffer2022]_ section 2.2.2.2."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar
+
+import numpy as np
+from msgspec import Meta
+
+from seerob.core import figures
+from seerob.core.quantities import Metres3
+from seerob.core.snapshot import Basis, Ellipsoid, Result, Verdict
+from seerob.core.transforms import Array, wxyz_from_rotation
+from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge
+from seerob.kernels.axes import principal_axes
+from seerob.model import provenance
+from seerob.model.model import Model
+from seerob.recording.answers import Answers
+from seerob.twin.spans import Fall, Falls, Points, Span
+from seerob.twin.state import State
+from seerob.twin.states import States
+
+STEP = math.radians(1)
+"""How far joints are moved to see which leads out of a singularity [rad or m]."""
+NOTHING = 1e-9
+"""Growth of a singular value up to which a joint does not lead out [m/rad]."""
+DRAWN = 0.3
+"""Half axis drawn for a singular value of 1 m/rad [m]."""
+
+
+def singular_values(J_v: Array) -> tuple[Array, Array]:
+    r"""Half axes of the velocity ellipsoid :math:`\{J_v \dot q : |\dot q| \le 1\}`.
+
+    They are the roots of the eigenvalues of :math:`J_v J_v^T`; found by SVD, which does not square
+    the condition number.
+
+    Args:
+        J_v: Linear Jacobian, shape (..., 3, n) [m/rad for revolute joints].
+
+    Returns:
+        Singular values, largest first, shape (..., 3) [m/rad], and the directions as columns of a
+        right-handed frame in the same order, shape (..., 3, 3).
+    """
+    J_v = np.asarray(J_v, float)
+    batch = J_v.shape[:-2]
+    rows = J_v.reshape(-1, *J_v.shape[-2:]).copy()
+    values, directions = np.empty((len(rows), 3)), np.empty((len(rows), 3, 3))
+    principal_axes(rows, values, directions)
+    values[np.isnan(values).any(axis=-1)] = np.nan
+    return values.reshape(*batch, 3), directions.reshape(*batch, 3, 3)
+
+
+def least_value_after(J: Array, step: float = STEP) -> Array:
+    r"""Smallest singular value of J_v [m/rad] once each joint alone has moved, either way, shape (n, 2).
+
+    Exact, not by a derivative, which at a singularity depends on which of the vectors is taken that the
+    arm cannot move along. A turn of joint j by :math:`\delta` turns what is farther out, :math:`J_{v,i}` of
+    i > j, and moves the point by :math:`d`, so that :math:`J_{v,i}` of the others changes by
+    :math:`\omega_i \times d`.
+
+    Args:
+        J: Jacobian of a chain from its base outward, linear rows first, shape (6, n).
+        step: How far each joint moves [rad or m].
+    """
+    linear, angular = J[:3].T, J[3:].T
+    n = len(linear)
+    moved = np.empty((n, 2, n, 3))
+    for j in range(n):
+        # 1 of a joint that turns or slides; of one that others follow, how fast all of them turn.
+        rate = float(np.linalg.norm(angular[j])) or 1.0
+        axis, own = angular[j] / rate, linear[j] / rate
+        for k, angle in enumerate((step * rate, -step * rate)):
+            sine, rest = math.sin(angle), 1 - math.cos(angle)
+            d = sine * own + rest * np.cross(axis, own) if axis.any() else angle * own
+            inner = linear[: j + 1] + np.cross(angular[: j + 1], d)
+            once = np.cross(axis, linear[j + 1 :])
+            outer = linear[j + 1 :] + sine * once + rest * np.cross(axis, once)
+            moved[j, k] = np.vstack([inner, outer])
+    return np.asarray(np.linalg.svd(moved, compute_uv=False)[..., -1])
+
+
+class Manipulability(Criterion, frozen=True, kw_only=True):
+    """How well a point can move in its worst direction; near zero the robot is near a singularity."""
+
+    unit: ClassVar[str] = "m/rad"
+    by_shape: ClassVar[bool] = False
+    at_most: ClassVar[bool] = False
+
+    at: str
+    """Point: a robot (its tool's working point) or the full name of a link."""
+    offset: Metres3 = (0.0, 0.0, 0.0)
+    """The point in that frame [m]."""
+    limit: Annotated[float, Meta(ge=0, extra={"unit": "m/rad"})] | None = None
+    """Least admissible smallest singular value of J_v [m/rad]."""
+
+    def subjects(self) -> tuple[str, ...]:
+        """The point."""
+        return (self.at,)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        frame = model.frame(self.at)
+        mechanism = model.carrier(frame)
+        offset = np.array(self.offset)
+        names = [joint.name for joint in mechanism.joints]
+
+        def evaluate(state: State) -> Result:
+            state.require(mechanism.name)
+            J = state.jacobian(frame, mechanism, offset)
+            sigma, axes = singular_values(J[:3])
+            smallest = float(sigma[2])
+            verdict = judge(smallest, self.limit, at_most=False)
+            reason = ""
+            if verdict is Verdict.EXCEEDED and len(names) >= 3:
+                after = least_value_after(J).max(axis=1)
+                joint = names[int(after.argmax())]
+                reason = f"near a singularity: {joint} leads out of it the soonest"
+                if after.max() <= smallest + NOTHING:
+                    reason = "no joint by itself leads out of the singularity"
+            rotation, position = state.pose(frame)
+            ellipsoid = Ellipsoid(
+                center=tuple((position + rotation @ offset).tolist()),
+                wxyz=tuple(wxyz_from_rotation(axes).tolist()),
+                radii=tuple((DRAWN * sigma).tolist()),
+                label=f"σ₃ {figures.told(smallest, self.limit, self.unit, at_most=False)}",
+                verdict=verdict,
+            )
+            parts = (
+                Result(name="σ₁", value=float(sigma[0]), unit="m/rad"),
+                Result(name="σ₂", value=float(sigma[1]), unit="m/rad"),
+                Result(name="√det J_v J_vᵀ", value=math.prod(sigma.tolist()), unit="m³/rad³"),
+            )
+            return Result(
+                name=self.name,
+                value=smallest,
+                unit=self.unit,
+                limit=self.limit,
+                at_most=False,
+                verdict=verdict,
+                reason=reason,
+                parts=parts,
+                markers=(ellipsoid,),
+            )
+
+        return evaluate
+
+    def batch(self, model: Model) -> EvaluateMany:
+        """See `Criterion.batch`."""
+        frame, offset = model.frame(self.at), np.array(self.offset)
+        mechanism = model.carrier(frame)
+
+        def evaluate(states: States) -> Answers:
+            sigma, _ = singular_values(states.jacobian(frame, mechanism, offset)[:, :3])
+            return Answers.against(sigma[:, 2], self.limit, at_most=self.at_most)
+
+        return evaluate
+
+    def falls(self, model: Model, points: Points) -> Falls:
+        """See `Criterion.falls`: no singular value changes more than the Frobenius norm of the Jacobian."""
+        frame = model.frame(self.at)
+        mechanism = model.carrier(frame)
+        local = frame.body_from_frame[:3, :3] @ np.array(self.offset) + frame.body_from_frame[:3, 3]
+        point = points.add(frame.mj, local)
+        coupling = dict(zip(mechanism.v_address.tolist(), mechanism.coupling, strict=True))
+
+        def falls(span: Span, _: Array | float) -> Fall:
+            moved = points.column_changes(point, span, coupling)
+            return Fall(float(np.linalg.norm(moved)) * span.T)
+
+        return falls
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        carrier = model.carrier(model.frame(self.at))
+        return Basis(
+            formula="smallest singular value of J_v(q); ellipsoid of J_v J_vᵀ",
+            source="Weistroffer et al. 2022, section 2.2.2.2",
+            inputs=(
+                provenance.point(model, self.at, self.offset),
+                *provenance.motion(model, carrier.name),
+                *provenance.limit(self.limit, "m/rad"),
+            ),
+            not_modelled=("orientation: only the linear rows of the Jacobian count",),
+        )

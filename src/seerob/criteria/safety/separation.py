@@ -1,0 +1,587 @@
+r"""Protective separation distance, ISO/TS 15066:2016 5.5.4.2.3; upper bound: [Weistroffer2022]_ Eq. 2."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Annotated, ClassVar, Literal, NamedTuple
+
+import numpy as np
+from msgspec import Meta
+from msgspec.structs import replace
+
+from seerob.core import figures
+from seerob.core.domains import number
+from seerob.core.errors import InputError, Undecided
+from seerob.core.snapshot import Basis, Input, Origin, Result, Segment, Verdict
+from seerob.core.tolerances import Shifts, Tolerance, deciding
+from seerob.core.transforms import Array
+from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge_interval, worst
+from seerob.criteria.partly_seen import partly_seen
+from seerob.criteria.sensors.detection import Detection, device_of
+from seerob.criteria.stopping.inputs import approach_speed, intrusion
+from seerob.criteria.stopping.largest import LargestSeparation
+from seerob.criteria.stopping.many_instants import separations
+from seerob.criteria.stopping.models import MOVING, Stop, StopModel, bind_stop
+from seerob.criteria.stopping.onset import LARGEST_WINDOW
+from seerob.criteria.stopping.search import TOP, factor_by_search
+from seerob.criteria.stopping.terms import At, Course, separation_distance, way_of_person
+from seerob.criteria.stopping.tolerances import SIMULATED, SeparationEnds, intervals, shifted, tolerances
+from seerob.description.norms import iso_13855
+from seerob.description.norms.iso_13855 import WALKING
+from seerob.model import provenance
+from seerob.model.model import Gap, Model
+from seerob.twin.accuracy.distance_ends import DistanceEnds
+from seerob.twin.accuracy.tracking_error import tracking
+from seerob.twin.body_place import BodyPlaces
+from seerob.twin.spans import UNBOUNDED, Fall, Falls, Margin, Points, Span, rows_of
+from seerob.twin.state import State
+
+__all__ = ["Detection", "Separation", "Stop", "separation_bound"]
+
+
+MORE = "S_p may be larger by"
+"""Name of the part of a result that says so; there is none where S_p is known."""
+
+
+class Required(NamedTuple):
+    """S_p of each moving part."""
+
+    S_p: Array
+    """What is sure from below [m], shape (n,)."""
+    most: Array
+    """A bound from above [m], shape (n,)."""
+    doubt: str
+    """Why it may be still more; empty when it may not."""
+
+
+def separation_bound(v_r: Array, v_h: float, T_r: float, T_s: float, xi: float) -> Array:
+    r"""Upper bound of the protective separation distance, Eq. 2.
+
+    :math:`S_p \le v_r (T_r + T_s) + v_h (T_r + T_s) + \xi`.
+
+    Args:
+        v_r: Speed of the hazardous part [m/s], shape (...); not below 0.
+        v_h: Speed of the person [m/s].
+        T_r: Reaction time [s].
+        T_s: Stopping time [s].
+        xi: Intrusion distance and position uncertainties, C + Z_d + Z_r [m].
+
+    Returns:
+        S_p [m], shape (...).
+    """
+    person, time = number("v_h", v_h, 0, unit="m/s"), number("T_r", T_r, 0, unit="s")
+    time = time + number("T_s", T_s, 0, unit="s")
+    return (np.maximum(v_r, 0.0) + person) * time + number("xi", xi, 0, unit="m")
+
+
+class Separation(Criterion, frozen=True, kw_only=True):
+    """Speed and separation monitoring: every moving part of a robot or machine against the person."""
+
+    unit: ClassVar[str] = "m"
+    whole: ClassVar[bool] = False
+    at_most: ClassVar[bool] = False
+
+    between: tuple[str, str]
+    """A robot or a machine, and a human. What carries it counts with it."""
+    stop: Stop
+    mode: Literal["dynamic", "fixed"] = "dynamic"
+    """S_p of the present speeds, or the largest that occurred so far."""
+    human_speed: Annotated[float, Meta(gt=0, extra={"unit": "m/s"})] | None = None
+    """v_h [m/s]; when not given, that of ISO 13855 for a person whose speed is not monitored:
+    2 m/s where that leads to S_p of 0.5 m or less, above 1.6 m/s but S_p not below 0.5 m."""
+    intrusion: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
+    """C: how far a person may reach in before being detected [m], ISO 13855."""
+    detection: Detection | None = None
+    """Instead of ``intrusion``: what C follows from."""
+    sensor: str | None = None
+    """An entry of ``[[sensors]]`` that detects the person: its response time is added to ``stop.reaction``,
+    and its detection capability and height give C unless ``intrusion`` does."""
+    human_uncertainty: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
+    """Z_d: uncertainty of the person's position [m]."""
+    robot_uncertainty: Annotated[float, Meta(ge=0, extra={"unit": "m"})] | None = None
+    """Z_r: uncertainty of the robot's position [m]."""
+    human_speed_tolerance: Annotated[float, Meta(ge=0, extra={"unit": "m/s"})] = 0.0
+    """How far `human_speed` may be off, either way [m/s]."""
+    intrusion_tolerance: Annotated[float, Meta(ge=0, extra={"unit": "m"})] = 0.0
+    """How far C may be off, given or from a device, either way [m]; C is never below 0."""
+
+    def __post_init__(self) -> None:
+        if self.human_speed_tolerance and self.human_speed_tolerance >= (self.human_speed or 0.0):
+            raise ValueError("human_speed_tolerance is of a human_speed that is larger: give that")
+        if self.intrusion_tolerance and not any((self.intrusion is not None, self.detection, self.sensor)):
+            raise ValueError("intrusion_tolerance is of a C that is not given: give intrusion or detection")
+        if self.intrusion is not None and self.detection is not None:
+            raise ValueError("give either intrusion or detection")
+
+    def _tolerances(self) -> tuple[Tolerance, ...]:
+        own = (
+            Tolerance("human_speed", self.human_speed_tolerance, "m/s"),
+            Tolerance("intrusion", self.intrusion_tolerance, "m"),
+        )
+        return (*tolerances(self.stop), *(tolerance for tolerance in own if tolerance.half))
+
+    def _shifted(self, shifts: Shifts) -> Separation:
+        """The same without tolerances, with its inputs at an end: 1 where S_p is largest; with no sensor."""
+        n = len(tolerances(self.stop))
+        sides = dict(zip((t.name for t in self._tolerances()[n:]), shifts[n:], strict=True))
+        v_h, C = self.human_speed, self._intrusion()[0]
+        if v_h is not None:
+            v_h += sides.get("human_speed", 0) * self.human_speed_tolerance
+        if "intrusion" in sides:
+            C = max((C or 0.0) + sides["intrusion"] * self.intrusion_tolerance, 0.0)
+        return replace(
+            self,
+            stop=shifted(self.stop, shifts[:n]),
+            human_speed=v_h,
+            **({"intrusion": C, "detection": None} if "intrusion" in sides else {}),
+            human_speed_tolerance=0.0,
+            intrusion_tolerance=0.0,
+        )
+
+    def at_worst(self, model: Model) -> Separation:
+        """The same without tolerances, with every input where S_p is largest."""
+        own, _, _ = self._by_device(model)
+        inputs = len(own._tolerances())
+        return own._shifted((1,) * inputs) if inputs else self
+
+    def subjects(self) -> tuple[str, ...]:
+        """The robot and the human."""
+        return self.between
+
+    def _sides(self, model: Model) -> tuple[str, str]:
+        """Robot and human, in that order."""
+        roles = {name: model.mechanism(name).role for name in self.between}
+        if sorted(role == "human" for role in roles.values()) != [False, True]:
+            what = f"{list(self.between)} are not a robot or machine and a human"
+            raise InputError.at(self.name, "between", what, "name one of each")
+        first, second = self.between
+        return (second, first) if roles[first] == "human" else (first, second)
+
+    def moving(self, model: Model) -> tuple[int, ...]:
+        """Bodies of which each has an S_p: the moving parts of the robot or machine, and what carries it."""
+        return model.moving_of(self._sides(model)[0])
+
+    def _gap(self, model: Model) -> Gap:
+        robot, human = self._sides(model)
+        return model.gap(model.select(human), model.moving_of(robot))
+
+    def _stop(self, model: Model) -> StopModel:
+        return bind_stop(self.stop, model, model.mover(self._sides(model)[0]), self._gap(model))
+
+    def _intrusion(self) -> tuple[float | None, str, str]:
+        """C [m] when known, why it is not complete, and its source."""
+        if self.detection is not None:
+            return self.detection.intrusion()
+        return self.intrusion, "" if self.intrusion is not None else "intrusion (C)", "workstation file"
+
+    def _by_device(self, model: Model) -> tuple[Separation, tuple[str, ...], tuple[Input, ...]]:
+        """The same without a sensor, with what the sensor adds; what is not known of it; inputs."""
+        if self.sensor is None:
+            return self, (), ()
+        device = device_of(model, self.name, self.sensor, self.detection)
+        stop = replace(self.stop, reaction=self.stop.reaction + device.response)
+        detection = device.detection if self.intrusion is None else None
+        return replace(self, stop=stop, detection=detection, sensor=None), device.doubts, device.inputs
+
+    def _terms(self) -> tuple[tuple[float, float, float], list[str]]:
+        """C, Z_d and Z_r [m], 0 where not known, and what is not known."""
+        C, missing_C, _ = self._intrusion()
+        missing = [missing_C] if missing_C else []
+        if self.human_uncertainty is None:
+            missing.append("human_uncertainty (Z_d)")
+        if self.robot_uncertainty is None:
+            missing.append("robot_uncertainty (Z_r)")
+        return (C or 0.0, self.human_uncertainty or 0.0, self.robot_uncertainty or 0.0), missing
+
+    def unknown(self, model: Model) -> str:
+        """Why S_p may be larger than what is computed; empty when it is not."""
+        own, doubts, _ = self._by_device(model)
+        return self._unknown([*own._terms()[1], *doubts], own._stop(model))
+
+    @staticmethod
+    def _unknown(missing: list[str], stop: StopModel) -> str:
+        reasons = [f"not given: {', '.join(missing)}"] if missing else []
+        return "; ".join([*reasons, *stop.doubts])
+
+    def _distance(self, course: Course, K: float, seen: Array | float) -> Array:
+        """S_p of each part [m], of a person who is seen to be as fast as ``seen`` [m/s]."""
+
+        def at_speed(v_h: Array | float) -> Array:
+            return separation_distance(course, v_h, self.stop.reaction, K)
+
+        if self.human_speed is not None:
+            return at_speed(np.maximum(self.human_speed, seen))
+        assumed = iso_13855.least_distance(at_speed)
+        return np.asarray(np.maximum(assumed, at_speed(seen))) if np.any(seen > WALKING) else assumed
+
+    @staticmethod
+    def _seen(state: State, gap: Gap) -> float:
+        """Speed of the person's fastest point that may be relied on [m/s]; 0 of a twin that is stopped."""
+        if state.strays(gap.a):
+            return 0.0
+        lost = state.lost_bodies(gap.a)
+        people = tuple(i for i in gap.a if i not in lost)
+        return float(state.fastest_points(people, estimates=True)[0].max(initial=0.0))
+
+    def looks_ahead(self, model: Model) -> Mapping[str, float]:
+        """See `Criterion.looks_ahead`: as long as the robot takes to react."""
+        if self.stop.acceleration is not None:
+            return {}
+        worst = self._by_device(model)[0].at_worst(model).stop.reaction
+        return {self._sides(model)[0]: min(worst, LARGEST_WINDOW) + model.workstation.engine.tick}
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        own, _, _ = self._by_device(model)
+        if self.stop.model == "simulated":
+            model.mover(self._sides(model)[0]).require_masses(self.name)
+
+        def figure(shifts: Shifts) -> Callable[[State], Array]:
+            required = own._shifted(shifts).required(model)
+            return lambda state: required(state).S_p
+
+        ends = SeparationEnds(own._tolerances(), figure, remembers=own.mode == "fixed")
+        rest = self.unknown(model), (LargestSeparation(), LargestSeparation()), ends
+        return partly_seen(model, own._gap(model), lambda gap: own._bound(model, gap, *rest))
+
+    def _bound(
+        self,
+        model: Model,
+        gap: Gap,
+        unknown_ever: str,
+        largest: tuple[LargestSeparation, LargestSeparation],
+        ends: SeparationEnds,
+    ) -> Evaluate:
+        stop = self._stop(model)
+        C, Z_d, Z_r = self._terms()[0]
+        K = C + Z_d + Z_r + gap.deviation
+        places, names = BodyPlaces(model), [body.name for body in model.bodies]
+        human = self._sides(model)[1]
+        ends_of_distance = DistanceEnds(model, gap)
+
+        def evaluate(state: State) -> Result:
+            found = state.closest_per_body(gap, estimates=True, strayed=True)
+            stray = state.strays(gap.a)
+            course = stop.courses(state)
+            now = course(1.0)
+            seen = self._seen(state, gap)
+            S_p, most, doubt = self._required(now, K, seen)
+            if self.mode == "fixed":
+                S_p, most = (each.including(state, x) for each, x in zip(largest, (S_p, most), strict=True))
+            slower = f"{stray}: how fast the person is nobody knows" if stray else ""
+            unknown = "; ".join(filter(None, (unknown_ever, doubt, slower)))
+            unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
+            near, far = ends_of_distance.of_bodies(state, found.distance)
+            span = ends.at(state) if ends.tolerances else None
+            # What its acceleration may add to S_p is as much less distance.
+            spans = intervals(near - (most - S_p), far, S_p, span)
+            open_at_all = span is not None or bool((far > near).any() or (most > S_p).any())
+            bodies = found.body_a.tolist()
+            parts = tuple(
+                Result(
+                    name=names[body],
+                    value=distance,
+                    unit="m",
+                    limit=least,
+                    at_most=False,
+                    verdict=self._verdict(ends_of_part, least, bool(unknown)),
+                    interval=ends_of_part if open_at_all else None,
+                    reason=names[bone],
+                )
+                for body, distance, least, ends_of_part, bone in zip(
+                    gap.b, found.distance.tolist(), S_p.tolist(), spans, bodies, strict=True
+                )
+            )
+            verdict = worst([part.verdict for part in parts])
+            margins = (found.distance - S_p).tolist()
+            k = min((i for i, part in enumerate(parts) if part.verdict is verdict), key=margins.__getitem__)
+            open_ = unknown
+            if verdict is Verdict.UNDECIDED and not unknown:
+                widths = np.zeros(0) if span is None else span.widths[:, k]
+                wide = float(far[k] - near[k])
+                open_ = deciding((*ends.tolerances, tracking(wide / 2)), np.append(widths, wide))
+                if most[k] > S_p[k] and bool((most - S_p)[k] >= max(wide, *widths.tolist(), 0.0)):
+                    faster = "if the robot gets faster during the reaction time as its torques allow: give "
+                    open_ = f"S_p is up to {most[k]:.3f} m {stop.more or faster + 'stop.acceleration'}"
+            nearest = places.named(state, int(found.body_a[k]), found.point_a[k])
+            where = f"{parts[k].name} ↔ {nearest}"
+            if seen > (self.human_speed or WALKING):
+                where += f", and {human} is seen at {seen:.2f} m/s, faster than v_h"
+            shown = figures.against(float(found.distance[k]), float(S_p[k]), self.unit, at_most=self.at_most)
+            segment = Segment(
+                start=tuple(found.point_b[k].tolist()),
+                end=tuple(found.point_a[k].tolist()),
+                label=f"{shown.value} m, S_p {shown.limit} m",
+                verdict=verdict,
+            )
+            return Result(
+                name=self.name,
+                value=float(found.distance[k]),
+                unit=self.unit,
+                limit=float(S_p[k]),
+                at_most=False,
+                verdict=verdict,
+                reason=f"{where}: {open_}" if verdict is Verdict.UNDECIDED else where,
+                interval=parts[k].interval,
+                parts=(
+                    *parts,
+                    *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r), seen),
+                    *self._more(most - S_p, doubt),
+                    *self._permissible(stop, state, course, now, found.distance, K),
+                ),
+                markers=(segment,),
+            )
+
+        return evaluate
+
+    @staticmethod
+    def _more(more: Array, doubt: str) -> tuple[Result, ...]:
+        """By how much S_p of some part may be larger than shown; no value where that has no bound."""
+        if doubt:
+            return (Result(name=MORE, unit="m", reason=doubt),)
+        most = float(more.max())
+        return (Result(name=MORE, value=most, unit="m"),) if most > 0 else ()
+
+    def _shown(
+        self, now: Course, k: int, S_p: float, rest: tuple[float, float, float], seen: float
+    ) -> tuple[Result, ...]:
+        """The terms of S_p of the part that governs; S_h is what the others leave."""
+        S_h = S_p - float(now.S_r[k] + now.S_s[k]) - sum(rest)
+        if self.mode == "dynamic" and self.human_speed is not None:
+            S_h = float(way_of_person(max(self.human_speed, seen), self.stop.reaction, now.T_s))
+        terms = {"S_h": S_h, "S_r": float(now.S_r[k]), "S_s": float(now.S_s[k])}
+        terms |= dict(zip(("C", "Z_d", "Z_r"), rest, strict=True))
+        return tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
+
+    def batch(self, model: Model) -> EvaluateMany | None:
+        """See `Criterion.batch`; where the stopping time is given and S_p is that of the present speeds."""
+        own, _, _ = self._by_device(model)
+        gap = own._gap(model)
+        K = sum(own._terms()[0]) + gap.deviation
+        if self.mode == "fixed" or own._tolerances():
+            return None
+        incomplete = bool(self.unknown(model))
+        return separations(own.stop, gap, own._distance, K, incomplete=incomplete)
+
+    def remembers(self, model: Model) -> bool:
+        """See `Criterion.remembers`."""
+        return self.mode == "fixed"
+
+    def falls(self, model: Model, points: Points) -> Falls | None:
+        """See `Criterion.falls`, of each moving part; where S_p follows from speeds or joint tables."""
+        gap, rises = self._gap(model), self.rises(model)
+        people, parts, lasts = rows_of(gap.a), rows_of(gap.b), self.lasts(model)
+        if rises is None:
+            most = self._most(model, points)
+            n = len(parts)
+
+            def below(span: Span, least: Array | float) -> Fall:
+                S_p = None if most is None else most(span)
+                if S_p is None:
+                    return UNBOUNDED
+                nearer, each = span.way(people) + span.fast[parts] * span.T, np.asarray(least)
+                lost = np.maximum(each[:n] - (each[n:] - nearer - S_p), nearer)
+                return Fall(np.inf, np.concatenate([lost, nearer]))
+
+            return None if most is None else below
+
+        def falls(span: Span, _: Array | float) -> Fall:
+            nearer = span.way(people) + span.fast[parts] * span.T
+            lost = np.concatenate([nearer + rises(span), nearer])
+            # What S_p has ahead may leave it at once: the margin at the end says nothing of the way there.
+            return Fall(np.inf, lost) if lasts else Fall(lost)
+
+        return falls
+
+    def lasts(self, model: Model) -> bool:
+        """Whether S_p of an instant is at least that of any other in the tick that begins with it.
+
+        But for how fast the robot gets meanwhile, `rises`.
+        """
+        return self._by_device(model)[0]._stop(model).lasts
+
+    def rises(self, model: Model) -> Callable[[Span], Array] | None:
+        """How much S_p of each of `moving` can change within a span [m]; None where not known."""
+        gap = self._gap(model)
+        people, parts = rows_of(gap.a), rows_of(gap.b)
+        required: list[Callable[[Array, float], Array]] = []
+        for each in dict.fromkeys((self, self.at_worst(model))):
+            own = each._by_device(model)[0]
+            by_speed, K = own._stop(model).by_speed, sum(own._terms()[0]) + gap.deviation
+            if by_speed is None:
+                return None
+            required.append(partial(own._at_speeds, by_speed, K))
+
+        def rises(span: Span) -> Array:
+            sides = [(v[parts], float(v[people].max(initial=0.0))) for v in (span.fast, span.slow)]
+            ends = ([S_p(*side) for side in sides] for S_p in required)
+            return np.asarray(np.max([most - least for most, least in ends], axis=0))
+
+        return rises
+
+    def _most(self, model: Model, points: Points) -> Callable[[Span], Array | None] | None:
+        """S_p of each of `moving` within a span at most [m], by how far joints and people get in it."""
+        own = self.at_worst(model)._by_device(model)[0]
+        gap, bind = self._gap(model), own._stop(model).in_span
+        longest = None if bind is None else bind(points)
+        if longest is None:
+            return None
+        people, K = rows_of(gap.a), sum(own._terms()[0]) + gap.deviation
+
+        def most(span: Span) -> Array | None:
+            course = longest(span)
+            seen = float(span.fast[people].max(initial=0.0))
+            return None if course is None or not np.isfinite(seen) else own._distance(course, K, seen)
+
+        return most
+
+    def _at_speeds(self, by_speed: Callable[[Array], Course], K: float, v: Array, seen: float) -> Array:
+        return self._distance(by_speed(v), K, seen)
+
+    def margin(self, result: Result) -> Margin:
+        """See `Criterion.margin`, of each moving part; then how far each is away."""
+        parts = [part for part in result.parts if part.verdict is not None]
+        away = np.array([part.value or 0.0 for part in parts])
+        least = np.array([part.limit or 0.0 for part in parts])
+        near = np.array([part.interval[0] if part.interval else part.value or 0.0 for part in parts])
+        return np.concatenate([away - least, near]), np.concatenate([away - near, np.zeros(len(parts))])
+
+    def _required(self, now: Course, K: float, seen: float) -> Required:
+        S_p = self._distance(now, K, seen)
+        most = S_p if now.most is None else np.maximum(self._distance(now.most, K, seen), S_p)
+        doubts = (now.doubt, "" if now.most is None else now.most.doubt)
+        return Required(S_p, most, "; ".join(dict.fromkeys(filter(None, doubts))))
+
+    def required(self, model: Model) -> Callable[[State], Required]:
+        """S_p of each of `moving`, in that order; to be asked at every tick."""
+        own, _, _ = self._by_device(model)
+        stop, largest = own._stop(model), (LargestSeparation(), LargestSeparation())
+        gap = own._gap(model)
+        K = sum(own._terms()[0]) + gap.deviation
+
+        def at(state: State) -> Required:
+            found = own._required(stop.courses(state)(1.0), K, own._seen(state, gap))
+            if own.mode != "fixed":
+                return found
+            S_p, most = (each.including(state, x) for each, x in zip(largest, found[:2], strict=True))
+            return Required(S_p, most, found.doubt)
+
+        return at
+
+    def inverse(self, model: Model) -> Callable[[State, Array], tuple[Array, tuple[Result, ...]]]:
+        """S_p of every moving part [m] and the largest permissible speed, at given distances of them [m].
+
+        Raises:
+            Undecided: When asked, where S_p may be larger than what is computed.
+        """
+        if self.sensor is not None:
+            return self._by_device(model)[0].inverse(model)
+        gap, stop = self._gap(model), self._stop(model)
+        K = sum(self._terms()[0]) + gap.deviation
+
+        def at(state: State, distance: Array) -> tuple[Array, tuple[Result, ...]]:
+            course = stop.courses(state)
+            now = course(1.0)
+            required = self._required(now, K, self._seen(state, gap))
+            if required.doubt:
+                raise Undecided(required.doubt)
+            return required.most, self._permissible(stop, state, course, now, distance, K)
+
+        return at
+
+    def _permissible(
+        self, stop: StopModel, state: State, course: At, now: Course, distance: Array, K: float
+    ) -> tuple[Result, ...]:
+        """Largest speed of the robot's fastest point for which no part is nearer than its S_p."""
+        speed, factor, reason = None, None, ""
+        seen = self._seen(state, self._gap(state.model))
+
+        def S_p(scale: float) -> Array:
+            required = self._required(course(scale), K, seen)
+            if required.doubt:
+                raise Undecided(required.doubt)
+            return required.most
+
+        least, most = stop.reactions(state)
+        onset = least if most is None else most
+        if state.strays(self._gap(state.model).a) or now.doubt or (now.most is not None and now.most.doubt):
+            reason = "S_p is at least what is shown: no speed follows"
+        elif stop.inverse is not None and onset(1.0).linear:
+            given = self.human_speed
+            assumed = iso_13855.speed_at(distance) if given is None else np.full(len(distance), given)
+            v_h = np.maximum(assumed, seen)
+            speed, factor = stop.inverse(onset(0.0), onset(1.0), distance, v_h, K)
+        elif now.v_r.max() > MOVING:
+            factor = factor_by_search(S_p, distance, stop.costly)
+            speed = factor * float(now.v_r.max())
+            reason = "or more" if factor == (1.0 if stop.costly else TOP) else ""
+        else:
+            reason = "stands still: no motion to scale"
+        beside = reason
+        if factor is None:
+            beside = reason or "stands still: no speed to compare with"
+        elif factor > TOP:
+            # Against next to no speed any factor comes out, and none says anything.
+            factor, beside = None, f"more than {TOP:g} times the present speed"
+        return (
+            Result(name="largest permissible speed", value=speed, unit="m/s", at_most=False, reason=reason),
+            Result(name="share of the present speed", value=factor, at_most=False, reason=beside),
+        )
+
+    @staticmethod
+    def _verdict(interval: tuple[float, float], S_p: float, incomplete: bool) -> Verdict | None:
+        """Below an incomplete S_p is EXCEEDED all the same; above it nothing follows."""
+        verdict = judge_interval(interval, S_p, at_most=False)
+        return Verdict.UNDECIDED if incomplete and verdict is Verdict.WITHIN else verdict
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        if self.sensor is not None:
+            own, _, of_device = self._by_device(model)
+            found = own.basis(model)
+            return replace(found, inputs=(*found.inputs, *of_device))
+        robot, human = self._sides(model)
+        stop = self._stop(model)
+        inputs = [
+            *provenance.motion(model, robot, human),
+            *provenance.shapes(self._gap(model)),
+            provenance.given("T_r", self.stop.reaction, "s"),
+            *(provenance.given(f"tolerance of {t.name}", t.half, t.unit) for t in self._tolerances()),
+            *stop.inputs,
+        ]
+        if self.stop.model == "simulated":
+            inputs += provenance.masses(model, model.mover(robot))
+        stated = None if self.detection is None else self.detection.stated()
+        inputs += [approach_speed(self.human_speed), stated or intrusion(self.intrusion)]
+        for name, value in (("Z_d", self.human_uncertainty), ("Z_r", self.robot_uncertainty)):
+            inputs.append(
+                Input(name=name, unit="m", origin=Origin.MISSING)
+                if value is None
+                else provenance.given(name, value, "m")
+            )
+        bound = self.stop.model == "bound"
+        formula = (
+            "S_p = (v_r + v_h)(T_r + T_s) + C + Z_d + Z_r"
+            if bound
+            else f"S_p = v_h (T_r + T_s) + S_r + S_s + C + Z_d + Z_r; {stop.formula}"
+        )
+        fixed = ", the largest so far" if self.mode == "fixed" else ""
+        toward = self.stop.direction == "toward"
+        norm = (
+            "ISO/TS 15066:2016 5.5.4.2.3; structure from public sources that agree (2S), "
+            "no licensed text was opened"
+        )
+        return Basis(
+            formula=f"{formula}{fixed}; v_h is no less than that of the twin's person; the distance must "
+            "not fall below S_p",
+            source=f"Weistroffer et al. 2022, Eq. 2 (upper bound of {norm})" if bound else norm,
+            inputs=tuple(inputs),
+            not_modelled=(
+                *stop.not_modelled,
+                *((SIMULATED,) if self.stop.model == "simulated" and tolerances(self.stop) else ()),
+                *(() if toward else ("direction: the speed counts in full, also of parts that move away",)),
+                *(self.detection.ways_around() if self.detection is not None else ()),
+                "a person who gets faster than v_h, and than now",
+            ),
+        )

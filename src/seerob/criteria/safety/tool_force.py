@@ -1,0 +1,273 @@
+r"""Force at the tool from measured joint torques, [Weistroffer2022]_ Eq. 6.
+
+.. math:: \tau_{ext} = J_v^T F,\qquad \tau_{ext} = \tau - (M \ddot q + c + g)
+
+F is the force that the robot exerts on its surroundings.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal, NamedTuple
+
+import numpy as np
+from msgspec import Meta
+
+from seerob.core import figures
+from seerob.core.domains import at_least, number
+from seerob.core.errors import InputError, Undecided
+from seerob.core.quantities import Metres3
+from seerob.core.snapshot import Arrow, Basis, Input, Marker, Origin, Result, Sphere, Verdict
+from seerob.core.transforms import Array
+from seerob.criteria.criterion import Criterion, Evaluate, judge, judge_interval
+from seerob.model import provenance
+from seerob.model.model import Mechanism, Model
+from seerob.twin import joint_torques
+from seerob.twin.state import State
+
+DRAWN = 0.002
+"""Arrow drawn for 1 N [m]."""
+LARGEST_DRAWN = 1.0
+NOTHING = 1e-9
+"""Share of a force that may be hidden without a word."""
+
+
+class Wrench(NamedTuple):
+    """What force explains torques best."""
+
+    wrench: Array
+    """Force, and moment if there was one to find, shape (..., 3) or (..., 6) [N, N·m]."""
+    residual: Array
+    """Torques that it does not explain, shape (..., n) [N·m or N]."""
+    gain: Array
+    """Damped pseudo-inverse: wrench = gain @ torques, shape (..., 3 or 6, n)."""
+    hidden: Array
+    """Share of a unit force that the torques do not show, along each axis in order of visibility,
+    0 (fully seen) … 1 (not at all), shape (..., 3 or 6)."""
+    axes: Array
+    """Those axes as columns, best seen first, shape (..., 3 or 6, 3 or 6)."""
+
+
+LARGEST = 1e3
+"""No arm moves its point so fast for the speed of a joint [m/rad]."""
+
+
+def wrench_from_torques(J: Array, tau: Array, *, damped_below: float) -> Wrench:
+    r"""Solve :math:`\tau = J^T w` by singular values, damped only near singularities.
+
+    With :math:`J = \sum_i \sigma_i u_i v_i^T`, the estimate is
+    :math:`w = \sum_i u_i \frac{\sigma_i}{\sigma_i^2 + \lambda_i^2} v_i^T \tau` where
+    :math:`\lambda_i^2 = \varepsilon^2 - \sigma_i^2` below :math:`\varepsilon`, else 0: least squares far from
+    singularities, and never more than :math:`|\tau| / \varepsilon` along an axis near them [Nakamura1986]_,
+    [Maciejewski1988]_.
+
+    Args:
+        J: Jacobian of the point, linear rows first: those alone (..., 3, n) for a contact without moment,
+            else all (..., 6, n).
+        tau: External joint torques, shape (..., n) [N·m or N].
+        damped_below: ε, singular value below which an axis is damped [m/rad].
+    """
+    J, tau = number("J", J), np.asarray(tau, float)
+    number("damped_below", damped_below, 0.0, LARGEST, "m/rad")
+    rows, n = J.shape[-2:]
+    axes, sigma, Vt = np.linalg.svd(J, full_matrices=True)
+    sigma = np.concatenate([sigma, np.zeros((*sigma.shape[:-1], rows - sigma.shape[-1]))], axis=-1)
+    squares = np.maximum(sigma**2, damped_below**2)
+    k = min(rows, n)
+    gain = (axes[..., :k] * (sigma / squares)[..., None, :k]) @ Vt[..., :k, :]
+    wrench = np.einsum("...ij,...j->...i", gain, tau)
+    residual = tau - np.einsum("...ij,...i->...j", J, wrench)
+    return Wrench(wrench, residual, gain, 1.0 - sigma**2 / squares, axes)
+
+
+def largest_error(gain: Array, uncertainty: Array) -> Array:
+    r"""Bound on the error of a force when each torque is known to ± ``uncertainty``.
+
+    :math:`|\delta F| \le \sum_j |K_j| \delta_j`, K_j the columns of the gain's force rows.
+
+    Args:
+        gain: From `wrench_from_torques`, shape (..., 3 or 6, n).
+        uncertainty: δ, shape (n,) [N·m or N].
+
+    Returns:
+        Shape (...) [N].
+    """
+    uncertainty = at_least("uncertainty", uncertainty, unit="N·m or N")
+    return np.asarray(np.linalg.norm(gain[..., :3, :], axis=-2) @ uncertainty)
+
+
+class ToolForce(Criterion, frozen=True, kw_only=True):
+    """Force that the robot exerts at its tool, from the joint torques that its source measures."""
+
+    by_torque: ClassVar[bool] = True
+    unit: ClassVar[str] = "N"
+    by_shape: ClassVar[bool] = False
+
+    at: str
+    """Point of contact: a robot (its tool's working point) or the full name of a link."""
+    offset: Metres3 = (0.0, 0.0, 0.0)
+    """The point in that frame [m]."""
+    limit: Annotated[float, Meta(gt=0, extra={"unit": "N"})] | None = None
+    """Largest admissible force [N]."""
+    torques: Literal["measured", "external"] = "measured"
+    """What the source sends: the torques of the motors, or the part of them that contacts cause, as some
+    controllers estimate it."""
+    contact: Literal["zero_moment", "free_moment"] = "zero_moment"
+    """Whether the contact is a point, or also bears a moment, which is then found too."""
+    damped_below: Annotated[float, Meta(gt=0, extra={"unit": "m/rad"})] = 0.02
+    """Singular value of the Jacobian below which a direction is damped [m/rad]."""
+    torque_uncertainty: tuple[Annotated[float, Meta(ge=0)], ...] | None = None
+    """How far each torque may be off, friction included [N·m or N]; gives the interval of the force."""
+    largest_residual: Annotated[float, Meta(gt=0, extra={"unit": "N·m"})] | None = None
+    """Norm of the torques that no force at this point explains, above which the contact is elsewhere and
+    the force undecided [N·m]."""
+
+    def subjects(self) -> tuple[str, ...]:
+        """The point."""
+        return (self.at,)
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        frame = model.frame(self.at)
+        robot = model.carrier(frame)
+        if self.torques == "measured":
+            robot.require_masses(self.name)
+        offset = np.array(self.offset)
+        uncertainty = self._uncertainty(model, robot)
+        rows = 3 if self.contact == "zero_moment" else 6
+        needed = joint_torques.Needed(robot)
+
+        def external(state: State) -> Array:
+            try:
+                tau = state.measured_torques(robot)
+            except Undecided:
+                needed.forget()
+                raise
+            return tau if self.torques == "external" else tau - needed(state)
+
+        def evaluate(state: State) -> Result:
+            tau = external(state)
+            found = wrench_from_torques(
+                state.jacobian(frame, robot, offset)[:rows], tau, damped_below=self.damped_below
+            )
+            rotation, position = state.pose(frame)
+            return self._result(found, tau, position + rotation @ offset, uncertainty)
+
+        return evaluate
+
+    def _result(self, found: Wrench, tau: Array, at: Array, uncertainty: Array | None) -> Result:
+        force = found.wrench[:3]
+        size, residual = float(np.linalg.norm(force)), float(np.linalg.norm(found.residual))
+        hidden = found.hidden * np.linalg.norm(found.axes[:3], axis=0)
+        interval = None
+        verdict = judge(size, self.limit)
+        reasons = []
+        if uncertainty is not None:
+            error = float(largest_error(found.gain, uncertainty))
+            interval = (max(size - error, 0.0), size + error)
+            verdict = judge_interval(interval, self.limit)
+            if verdict is Verdict.UNDECIDED:
+                reasons.append(f"the torques' uncertainty is ± {error:.3g} N, across the limit")
+        if hidden.max() > NOTHING:
+            unseen = found.axes[:3, int(hidden.argmax())]
+            share = found.hidden[int(hidden.argmax())]
+            reasons.append(
+                f"singular: {share:.0%} of a force along ±{_vector(unseen)} does not show in the torques"
+            )
+            # What is seen of a force may exceed a limit; what is not seen cannot be within one.
+            verdict, interval = (Verdict.UNDECIDED if verdict is Verdict.WITHIN else verdict), None
+        if self.largest_residual is not None and residual > self.largest_residual:
+            reasons.append(f"{residual:.3g} N·m fit no force at this point: the contact is elsewhere")
+            verdict = None if verdict is None else Verdict.UNDECIDED
+        total = float(np.linalg.norm(tau))
+        moment = found.wrench[3:]
+        return Result(
+            name=self.name,
+            value=size,
+            unit=self.unit,
+            limit=self.limit,
+            verdict=verdict,
+            reason="; ".join(reasons),
+            interval=interval,
+            parts=(
+                *(
+                    Result(name=f"F{axis}", value=float(f), unit="N")
+                    for axis, f in zip("xyz", force, strict=True)
+                ),
+                *(
+                    (Result(name="moment", value=float(np.linalg.norm(moment)), unit="N·m"),)
+                    * (len(moment) > 0)
+                ),
+                Result(name="residual", value=residual, unit="N·m"),
+                Result(name="residual share", value=residual / total if total > 0 else 0.0, unit=""),
+            ),
+            markers=self._markers(force, size, at, verdict),
+        )
+
+    def _markers(self, force: Array, size: float, at: Array, verdict: Verdict | None) -> tuple[Marker, ...]:
+        center = tuple(at.tolist())
+        drawn = DRAWN * force * min(1.0, LARGEST_DRAWN / max(DRAWN * size, 1e-12))
+        shown = figures.told(size, self.limit, self.unit, at_most=True)
+        arrow = Arrow(origin=center, vector=tuple(drawn.tolist()), label=shown, verdict=verdict)
+        if self.limit is None:
+            return (arrow,)
+        radius = min(DRAWN * self.limit, LARGEST_DRAWN)
+        return (arrow, Sphere(center=center, radius=radius, label=f"limit {self.limit:g} N"))
+
+    def _uncertainty(self, model: Model, robot: Mechanism) -> Array | None:
+        if self.torque_uncertainty is None:
+            return None
+        values = np.array(self.torque_uncertainty, float)
+        names = [joint.name for joint in robot.joints]
+        if len(values) != len(names) or not np.isfinite(values).all():
+            raise InputError.at(
+                next(iter(model.workstation.files), "workstation"),
+                "torque_uncertainty",
+                f"{list(self.torque_uncertainty)} does not fit",
+                f"give one value of 0 or more in N·m or N for each of {', '.join(names)}",
+            )
+        return values
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        robot = model.carrier(model.frame(self.at))
+        source = next((s for s in model.workstation.sources if s.target() == robot.name), None)
+        measured = getattr(source, "origin", None) == "controller"
+        unknown = Origin.MISSING if source is None else Origin.GIVEN
+        left = "τ_ext = τ" if self.torques == "external" else "τ_ext = τ − (M q̈ + c + g)"
+        way = "τ_ext = J_vᵀ F" if self.contact == "zero_moment" else "τ_ext = J_vᵀ F + J_ωᵀ m"
+        return Basis(
+            formula=f"F from {way}, {left}; least squares by SVD, damped below {self.damped_below:g} m/rad",
+            source="Weistroffer et al. 2022, Eq. 6; damping: Nakamura and Hanafusa 1986",
+            inputs=(
+                *provenance.motion(model, robot.name),
+                Input(
+                    name=f"joint torques of {robot.name}",
+                    origin=Origin.MEASURED if measured else unknown,
+                    source="" if source is None else source.name,
+                ),
+                *(provenance.masses(model, robot) if self.torques == "measured" else ()),
+                *(
+                    provenance.given(f"uncertainty of the torque of {joint.name}", value, "N·m or N")
+                    for joint, value in zip(robot.joints, self.torque_uncertainty or (), strict=False)
+                ),
+                *provenance.limit(self.limit, "N"),
+            ),
+            not_modelled=(
+                "contacts at any other point: they show as residual, or as a wrong force",
+                *(
+                    ("friction in joints and gears: it counts as force unless the source has taken it out",)
+                    if self.torques == "measured"
+                    else ()
+                ),
+                *(
+                    ()
+                    if robot.rotor_inertia_known or self.torques == "external"
+                    else ("rotor inertia: torques that accelerate rotors count as force",)
+                ),
+                *(() if self.torque_uncertainty else ("uncertainty of the torques: nobody gave it",)),
+            ),
+        )
+
+
+def _vector(u: Array) -> str:
+    return "(" + ", ".join(f"{0.0 if abs(x) < 5e-3 else x:.2f}" for x in u[:3]) + ")"

@@ -1,0 +1,122 @@
+"""What a machine says of itself, against what is admissible."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from msgspec import Meta
+
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
+from seerob.criteria.criterion import Criterion, Evaluate, judge
+from seerob.model import provenance
+from seerob.model.model import Model
+from seerob.twin.spans import Fall, Falls, Points
+from seerob.twin.state import State
+from seerob.workstation.variables.dictionary import Kind, Value
+
+
+class MachineVariable(Criterion, frozen=True, kw_only=True):
+    """A variable that a machine or a controller tells, against a limit or an expected value."""
+
+    variable: str
+    """Its name in the dictionary."""
+    unit: str = ""  # type: ignore[misc]
+    """Its SI unit, of a number: that of the limit and of the results."""
+    limit: Annotated[float, Meta(ge=-1e12, le=1e12)] | None = None
+    """Greatest admissible value, in ``unit``."""
+    expected: bool | str | None = None
+    """Instead: what it must be, of a bool, a text or a choice."""
+
+    def __post_init__(self) -> None:
+        if self.limit is not None and self.expected is not None:
+            raise ValueError("limit and expected are both given: keep one")
+
+    def variables(self) -> dict[str, str]:
+        """The variable."""
+        return {**Criterion.variables(self), self.variable: ""}
+
+    def bind(self, model: Model) -> Evaluate:
+        """See `Criterion.bind`."""
+        variable = model.dictionary[self.variable]
+        number = variable.type is Kind.NUMBER
+        if variable.si_unit != self.unit:
+            what = f"{self.unit!r}, but {self.variable} is in {variable.si_unit!r} here"
+            raise InputError.at(self.name, "unit", what, f'write unit = "{variable.si_unit}"')
+        if not number and self.limit is not None:
+            raise InputError.at(self.name, "limit", f"{self.variable} is no number", "give expected")
+        fits = bool if variable.type is Kind.BOOL else str
+        if self.expected is not None and (number or not isinstance(self.expected, fits)):
+            what = f"{self.expected!r}, but {self.variable} is a {variable.type}"
+            raise InputError.at(self.name, "expected", what, "give a value of that type")
+
+        def evaluate(state: State) -> Result:
+            now = judged(state.signal(self.variable))
+            # What was told since the last tick counts too: the first of it that exceeds.
+            told = (judged(value) for value in state.signals_meanwhile(self.variable))
+            return next((result for result in told if result.verdict is Verdict.EXCEEDED), now)
+
+        def judged(value: Value) -> Result:
+            if self.expected is not None:
+                return self._compared(value)
+            return Result(
+                name=self.name,
+                value=float(value) if isinstance(value, int | float) else None,
+                unit=self.unit,
+                limit=self.limit,
+                verdict=judge(value, self.limit) if isinstance(value, float) else None,
+                reason="" if number else self._said(value),
+                nothing=not number,
+            )
+
+        return evaluate
+
+    def falls(self, model: Model, points: Points) -> Falls:
+        """See `Criterion.falls`: a variable stands until it is told anew, and all that is told is judged."""
+        fall = Fall(0.0 if self.every is None else math.inf)
+        return lambda span, least: fall
+
+    def _compared(self, value: Value) -> Result:
+        """Of a bool itself, 0 or 1; of a text or a choice whether it is what is expected."""
+        figure, limit = int(value == self.expected), 1.0  # exact
+        if isinstance(self.expected, bool):
+            figure, limit = int(bool(value)), float(self.expected)
+        return Result(
+            name=self.name,
+            value=figure,
+            limit=limit,
+            at_most=limit == 0.0,
+            verdict=Verdict.WITHIN if value == self.expected else Verdict.EXCEEDED,
+            reason=self._said(value),
+        )
+
+    def _said(self, value: Value) -> str:
+        text = f"{self.variable} is {_word(value)}"
+        return text if self.expected in (None, value) else f"{text}, not {_word(self.expected)}"
+
+    def basis(self, model: Model) -> Basis:
+        """See `Criterion.basis`."""
+        variable = model.dictionary[self.variable]
+        source = f"{variable.source}: {variable.address}"
+        figure = variable.timeout if math.isfinite(variable.timeout) else None
+        expected = () if self.expected is None else (_entered(self.expected),)
+        return Basis(
+            formula=f"{self.variable} as its controller tells it",
+            source="the machine itself",
+            inputs=(
+                Input(name=self.variable, unit=self.unit, origin=Origin.MEASURED, source=source),
+                Input(name="time-out", value=figure, unit="s", origin=Origin.GIVEN, source="dictionary"),
+                *expected,
+                *provenance.limit(self.limit, self.unit),
+            ),
+            not_modelled=("whether what the controller tells is so",),
+        )
+
+
+def _entered(expected: bool | str) -> Input:
+    return Input(name="expected value", value=_word(expected), origin=Origin.GIVEN, source="workstation file")
+
+
+def _word(value: Value | None) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,258 @@
+"""Static and repeated work, found joint by joint while it happens.
+
+Causal: what is said at an instant depends on nothing after it, so that live and replayed runs agree.
+A joint is *held* while its angle stays within a band of twice the tolerance, short absences apart; a
+*movement* is a rise of more than a stated amplitude after a fall of as much, or the reverse. Both figures
+are choices: the methods leave it to an observer. `scoring.repetition` finds the same in scores that are
+recorded already.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from msgspec import Struct
+
+from seerob.criteria.scoring.repetition import GAP, WINDOW
+from seerob.criteria.scoring.spans import Span, between
+from seerob.criteria.scoring.thresholds import Angle
+from seerob.description.humans.angles import SIDED, Angles
+
+SAMPLE = 0.05
+"""Angles are looked at no more often than this [s]."""
+_ROUNDING = 1e-9
+PARTS: dict[str, tuple[str, ...]] = {
+    "upper arm": ("shoulder_flexion", "shoulder_abduction"),
+    "lower arm": ("elbow_flexion", "forearm_rotation"),
+    "wrist": ("wrist_flexion", "wrist_deviation"),
+    "neck": ("neck_flexion", "neck_side_bend", "neck_twist"),
+    "trunk": ("trunk_flexion", "trunk_side_bend", "trunk_twist"),
+    "legs": ("knee_flexion",),
+}
+"""Part of the body → angles that are watched."""
+ARMS = ("upper arm", "lower arm", "wrist")
+BODY = ("neck", "trunk", "legs")
+
+
+class WorkDetection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Static and repeated work is found in the movement, where no phase enters it."""
+
+    tolerance: Angle = math.radians(5)
+    """A joint that stays within this on either side is held [rad]; a choice."""
+    movement: Angle = math.radians(10)
+    """A movement to and fro of more than this is counted [rad]; a choice."""
+    from_rest: bool = False
+    """The work begins with the run. If not, what was before is unknown and the first minute undecided."""
+
+
+class Hold:
+    """How long one angle has been held.
+
+    Args:
+        tolerance: Half the width of the band [rad].
+        window: How far back it looks [s].
+        gap: Absences that are shorter do not count [s].
+    """
+
+    def __init__(self, tolerance: float, window: float, gap: float = GAP) -> None:
+        self._width, self._window, self._gap = 2 * tolerance + _ROUNDING, window, gap
+        self._t: deque[float] = deque()
+        self._low: deque[tuple[float, float]] = deque()
+        self._high: deque[tuple[float, float]] = deque()
+        self._away: list[tuple[float, float]] = []
+        self.since = math.nan
+        """Since when [s]; nan when nothing is known."""
+
+    def add(self, t: float, angle: float) -> None:
+        """The angle [rad] at an instant [s] after the one before."""
+        if self._t and self._spread(angle) > self._width:
+            self._away.append((t, angle))
+            if t - self._away[0][0] < self._gap - _ROUNDING:
+                return
+            for sample in self._away:
+                self._push(*sample)
+        else:
+            self._push(t, angle)
+        self._away.clear()
+
+    def _spread(self, angle: float) -> float:
+        return max(self._high[0][1], angle) - min(self._low[0][1], angle)
+
+    def _push(self, t: float, angle: float) -> None:
+        if math.isnan(self.since):
+            self.since = t
+        self._t.append(t)
+        while self._low and self._low[-1][1] >= angle:
+            self._low.pop()
+        while self._high and self._high[-1][1] <= angle:
+            self._high.pop()
+        self._low.append((t, angle))
+        self._high.append((t, angle))
+        while self._high[0][1] - self._low[0][1] > self._width:
+            oldest = min(self._low, self._high, key=lambda ends: ends[0][0])
+            self._forget(oldest.popleft()[0])
+            self.since = self._t[0]
+        while self._t[0] < t - self._window - _ROUNDING:
+            self._forget(self._t[0])
+
+    def _forget(self, until: float) -> None:
+        for ends in (self._low, self._high):
+            while ends and ends[0][0] <= until:
+                ends.popleft()
+        while self._t and self._t[0] <= until:
+            self._t.popleft()
+
+
+class Moves:
+    """How often one angle moved to and fro by an amplitude within the last minute.
+
+    Rises and falls are counted apart and the larger number counts: a trunk that turns to the left and back
+    moves as often as one that turns to the right.
+
+    Args:
+        amplitude: [rad]
+        window: [s]
+    """
+
+    def __init__(self, amplitude: float, window: float = WINDOW) -> None:
+        self._amplitude, self._window = max(amplitude, _ROUNDING), window
+        self._low = self._high = math.nan
+        self._going = 0
+        """1 since a rise, -1 since a fall, 0 before the first of either."""
+        self._turns: dict[int, deque[float]] = {1: deque(), -1: deque()}
+
+    def add(self, t: float, angle: float) -> None:
+        """The angle [rad] at an instant [s] after the one before."""
+        if math.isnan(self._low):
+            self._low = self._high = angle
+        self._low, self._high = min(self._low, angle), max(self._high, angle)
+        for way, passed in ((1, angle - self._low), (-1, self._high - angle)):
+            if self._going != way and passed >= self._amplitude - _ROUNDING:
+                self._going, self._low, self._high = way, angle, angle
+                self._turns[way].append(t)
+                break
+        for turns in self._turns.values():
+            while turns and turns[0] <= t - self._window + _ROUNDING:
+                turns.popleft()
+
+    @property
+    def count(self) -> int:
+        """Within the window that ended with the last sample."""
+        return max(map(len, self._turns.values()))
+
+
+class Found(NamedTuple):
+    """What is known of one part of the body: 0 or 1, or both when it cannot be known yet."""
+
+    static: Span
+    repeated: Span
+
+
+class Watch:
+    """Every part of a body over time.
+
+    Args:
+        detection: Tolerances.
+        hold: How long is static [s].
+        count: How many movements per minute are repeated work.
+    """
+
+    def __init__(self, detection: WorkDetection, *, hold: float, count: int) -> None:
+        self._detection, self._hold, self._count = detection, hold, count
+        self._t = -math.inf
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget everything."""
+        self._start = math.nan
+        self._known_before = self._detection.from_rest
+        tolerance, movement = self._detection.tolerance, self._detection.movement
+        self._holds = {key: Hold(tolerance, self._hold) for key in _keys()}
+        self._moves = {key: Moves(movement) for key in _keys()}
+        self._seen: dict[tuple[str, int], float] = {}
+
+    def add(self, t: float, angles: Angles) -> None:
+        """The posture at an instant [s]; an earlier one than before begins anew, the same adds nothing."""
+        if t < self._t - _ROUNDING:
+            self._t = -math.inf
+            self.begin()
+        if t < self._t + SAMPLE - _ROUNDING:
+            return
+        if math.isfinite(self._t) and t - self._t > GAP + SAMPLE:
+            # What happened in a silence is not known, so neither is what was before.
+            self.begin()
+            self._known_before = False
+        self._t = t
+        if math.isnan(self._start):
+            self._start = t
+        for name, side in _keys():
+            value = getattr(angles, name)
+            angle = float(value[side] if name in SIDED else value)
+            if not math.isnan(angle):
+                self._seen[name, side] = t
+                self._holds[name, side].add(t, angle)
+                self._moves[name, side].add(t, angle)
+
+    def part(self, part: str, side: int) -> Found:
+        """What is known of a part of the body on a side, 0 right and 1 left."""
+        keys = [(name, side if name in SIDED else 0) for name in PARTS[part]]
+        return Found(_every(map(self._static, keys)), _any(map(self._repeated, keys)))
+
+    def parts(self, part: str) -> tuple[Found, ...]:
+        """Of one side after the other; of the body's middle once."""
+        sided = PARTS[part][0] in SIDED
+        return tuple(self.part(part, side) for side in range(2 if sided else 1))
+
+    def _static(self, key: tuple[str, int]) -> Span:
+        since = self._holds[key].since
+        if math.isnan(since) or self._t - self._seen[key] > GAP:
+            return between(0, 1)
+        if self._t - since >= self._hold - _ROUNDING:
+            return between(1, 1)
+        whole = since <= self._start + _ROUNDING
+        return between(0, 1) if whole and not self._known_before else between(0, 0)
+
+    def _repeated(self, key: tuple[str, int]) -> Span:
+        if key not in self._seen or self._t - self._seen[key] > GAP:
+            return between(0, 1)
+        if self._moves[key].count >= self._count:
+            return between(1, 1)
+        short = self._t - self._start < WINDOW - _ROUNDING
+        return between(0, 1) if short and not self._known_before else between(0, 0)
+
+
+def muscle_use(watch: Watch) -> tuple[Span, Span]:
+    """RULA: of the arms, shape (2,), and of the body. Static when every part is held, or any is repeated."""
+    arms = [_mainly([watch.part(part, side) for part in ARMS]) for side in range(2)]
+    body = _mainly([found for part in BODY for found in watch.parts(part)])
+    return between([a.low for a in arms], [a.high for a in arms]), body
+
+
+def activity(watch: Watch, *, walking: bool) -> tuple[Span, Span]:
+    """REBA: any part held, and any part repeated, walking apart."""
+    found = [each for part in PARTS for each in watch.parts(part)]
+    moving = [each for part in PARTS if not (walking and part == "legs") for each in watch.parts(part)]
+    return _any(f.static for f in found), _any(f.repeated for f in moving)
+
+
+def _mainly(found: list[Found]) -> Span:
+    return _any([_every(f.static for f in found), *(f.repeated for f in found)])
+
+
+def _every(spans: Iterable[Span]) -> Span:
+    every = list(spans)
+    return between(min(int(s.low) for s in every), min(int(s.high) for s in every))
+
+
+def _any(spans: Iterable[Span]) -> Span:
+    every = list(spans)
+    return between(max(int(s.low) for s in every), max(int(s.high) for s in every))
+
+
+def _keys() -> Iterable[tuple[str, int]]:
+    for names in PARTS.values():
+        for name in names:
+            yield from ((name, side) for side in range(2 if name in SIDED else 1))

@@ -1,0 +1,155 @@
+"""Angles together with how far each of them may be off; scores of them as spans."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import asdict
+
+from seerob.core.transforms import Array
+from seerob.criteria.scoring.edges import ROUNDING
+from seerob.criteria.scoring.published import Ints
+from seerob.criteria.scoring.spans import Span, beyond, graded
+from seerob.criteria.scoring.thresholds import Angle, Thresholds
+from seerob.description.humans.angles import Angles
+
+Accuracy = float | Mapping[str, float]
+"""Of each angle [rad]: one figure for all, or one per name of `Angles`; a name that is not there is exact."""
+
+
+class JointAccuracy(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How far the angles of single joints may be off, where that differs from the rest."""
+
+    trunk: Angle | None = None
+    """Flexion, bending and twist of the trunk [rad]."""
+    neck: Angle | None = None
+    """Flexion, bending and twist of the neck [rad]."""
+    clavicle: Angle | None = None
+    """Raised shoulder [rad]."""
+    shoulder: Angle | None = None
+    """Direction and rotation of the upper arm [rad]."""
+    elbow: Angle | None = None
+    """Flexion of the elbow, and direction of the forearm [rad]."""
+    forearm: Angle | None = None
+    """Pronation and supination [rad]."""
+    wrist: Angle | None = None
+    """Flexion and deviation of the wrist [rad]."""
+    knee: Angle | None = None
+    """Flexion of the knee, and tilt of the shank [rad]."""
+    foot: Angle | None = None
+    """One foot above the other, seen from the hip [rad]."""
+
+
+ANGLES_OF: dict[str, tuple[str, ...]] = {
+    "trunk": ("trunk_flexion", "trunk_side_bend", "trunk_twist"),
+    "neck": ("neck_flexion", "neck_side_bend", "neck_twist"),
+    "clavicle": ("clavicle_elevation",),
+    "shoulder": ("shoulder_flexion", "shoulder_elevation", "shoulder_abduction", "shoulder_rotation"),
+    "elbow": ("arm_rise", "elbow_flexion", "forearm_out", "wrist_across"),
+    "forearm": ("forearm_rotation",),
+    "wrist": ("wrist_flexion", "wrist_deviation"),
+    "knee": ("knee_flexion", "shank_tilt"),
+    "foot": ("foot_rise",),
+}
+"""Joint of `JointAccuracy` → its angles."""
+
+
+def accuracy_of(all_angles: float | None, joints: JointAccuracy | None) -> Accuracy | None:
+    """Accuracy of each angle [rad]; None when nobody gave one.
+
+    Raises:
+        ValueError: Only some joints have one.
+    """
+    single = {} if joints is None else {k: v for k, v in asdict(joints).items() if v is not None}
+    if not single:
+        return all_angles
+    missing = [joint for joint in ANGLES_OF if joint not in single]
+    if all_angles is None and missing:
+        raise ValueError(
+            f"joint_accuracy: nothing is said of {', '.join(missing)}; give accuracy for the rest"
+        )
+    return {
+        name: single.get(joint, all_angles or 0.0) for joint, names in ANGLES_OF.items() for name in names
+    }
+
+
+LEVERS = {
+    "trunk_flexion": ("trunk_side_bend", False),
+    "neck_flexion": ("neck_side_bend", False),
+    "wrist_flexion": ("wrist_deviation", False),
+    "shoulder_rotation": ("shoulder_elevation", True),
+}
+"""Angle → the one that shortens its lever, to its cosine or to one more than that."""
+SHORT = 0.01
+"""A lever that is longer turns rounding by less than a hundredth of a degree."""
+
+
+class Measured:
+    """Angles of postures, each known to its accuracy.
+
+    Args:
+        angles: Of the postures.
+        accuracy: Of each angle [rad].
+    """
+
+    def __init__(self, angles: Angles, accuracy: Accuracy = 0.0) -> None:
+        self.angles = angles
+        self._accuracy = accuracy
+
+    def error(self, *names: str) -> float:
+        """The largest accuracy of some angles [rad]."""
+        if isinstance(self._accuracy, Mapping):
+            return max(self._accuracy.get(name, 0.0) for name in names)
+        return float(self._accuracy)
+
+    def graded(
+        self, name: str, score: Callable[[Array], Ints], *, within: tuple[int, int], neutral: float = 0.0
+    ) -> Span:
+        """`spans.graded` of an angle by its name."""
+        return graded(
+            getattr(self.angles, name),
+            score,
+            within=within,
+            accuracy=self.error(name),
+            neutral=neutral,
+            rounding=self.rounding(name),
+        )
+
+    def rounding(self, name: str) -> Array | float:
+        """How far rounding may turn an angle that is seen under a shortened lever [rad].
+
+        Seen from the side, a trunk that is bent sideways by 90° points nowhere, and of an arm that points
+        straight up no rotation about itself can be told.
+        """
+        if name not in LEVERS:
+            return 0.0
+        aside, whole = LEVERS[name]
+        lever = np.cos(getattr(self.angles, aside)) + (1.0 if whole else 0.0)
+        return turned(ROUNDING, lever) if np.any(lever < SHORT) else 0.0
+
+    def beyond(self, name: str, threshold: float, *, signed: bool = False) -> Span:
+        """`spans.beyond` of an angle by its name."""
+        return beyond(
+            getattr(self.angles, name),
+            threshold,
+            accuracy=self.error(name),
+            signed=signed,
+            rounding=self.rounding(name),
+        )
+
+
+def turned(accuracy: float, lever: Array) -> Array | float:
+    """How far an error turns a direction that is seen under a shortened lever [rad]."""
+    if not accuracy:
+        return 0.0
+    sine = np.minimum(np.sin(min(accuracy, np.pi / 2)) / np.maximum(np.abs(lever), 1e-12), 1.0)
+    return np.where(np.isnan(sine) | (sine < 1.0), np.arcsin(sine), np.pi)
+
+
+def one_foot_up(measured: Measured, thresholds: Thresholds) -> Span:
+    """1 where one foot is raised: an estimate of standing on one leg."""
+    # Not fmax: what is not assessed on one side is not known of both.
+    higher = measured.angles.foot_rise.max(axis=-1)
+    return beyond(higher, thresholds.foot_rise, accuracy=measured.error("foot_rise"))

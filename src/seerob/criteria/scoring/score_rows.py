@@ -1,0 +1,136 @@
+"""Rows of a result: one per component and side with its angles and bands, and one per total."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from seerob.core.snapshot import Aspect, Row, RowState, Verdict
+from seerob.criteria.scoring.bands import NEUTRAL, Edges, band_of
+from seerob.criteria.scoring.spans import Span
+from seerob.description.humans.angles import SIDED, Angles
+from seerob.description.humans.skeleton import SIDES
+
+BONES_OF: dict[str, tuple[str, ...]] = {
+    "upper arm": ("{side}_upper_arm",),
+    "lower arm": ("{side}_forearm",),
+    "wrist": ("{side}_hand",),
+    "wrist twist": ("{side}_hand", "{side}_forearm"),
+    "neck": ("neck", "head"),
+    "trunk": ("lumbar", "thorax"),
+    "legs": ("right_thigh", "right_shank", "left_thigh", "left_shank"),
+}
+"""Component → bones that are coloured."""
+ANGLES_OF: dict[str, tuple[str, ...]] = {
+    "upper arm": ("shoulder_flexion", "shoulder_abduction", "clavicle_elevation"),
+    "lower arm": ("elbow_flexion", "forearm_out", "wrist_across"),
+    "wrist": ("wrist_flexion", "wrist_deviation"),
+    "wrist twist": ("forearm_rotation",),
+    "neck": ("neck_flexion", "neck_side_bend", "neck_twist"),
+    "trunk": ("trunk_flexion", "trunk_side_bend", "trunk_twist"),
+    "legs": ("knee_flexion", "foot_rise"),
+}
+"""Component → angles that it is made of, for whoever reads the result."""
+
+
+def component_rows(
+    components: Mapping[str, Span],
+    spread: Mapping[str, Span] | None,
+    angles: Angles,
+    *,
+    human: str,
+    least: Mapping[str, int],
+    most: Mapping[str, int],
+    edges: Edges,
+) -> tuple[Row, ...]:
+    """A row per component and side.
+
+    Args:
+        components: Score of each component as it was measured, shapes (2,) and ().
+        spread: The same within the accuracy; None when that is not known.
+        angles: Of the posture.
+        human: Whose bones.
+        least: Least score of each component.
+        most: Greatest score of each component.
+        edges: Bands of the angles.
+    """
+    rows = []
+    for key, span in components.items():
+        wide = span if spread is None else spread[key]
+        for i in range(max(1, span.low.size)):
+            side = SIDES[i] if span.low.ndim else ""
+            low, high = float(span.low.flat[i]), float(span.high.flat[i])
+            known = low == high
+            rows.append(
+                Row(
+                    name=key,
+                    side=side,
+                    state=RowState.JUDGED if known else RowState.NOT_ASSESSED,
+                    value=low if known else None,
+                    scale=(float(least[key]), float(most[key])),
+                    interval=None
+                    if spread is None and known
+                    else (float(wide.low.flat[i]), float(wide.high.flat[i])),
+                    reason="" if known else "not measured or not entered",
+                    bones=tuple(f"{human}/{bone.format(side=side)}" for bone in BONES_OF.get(key, ())),
+                    aspects=aspects(angles, ANGLES_OF.get(key, ()), i if side else None, edges),
+                )
+            )
+    return tuple(rows)
+
+
+def total_row(
+    side: str,
+    ends: tuple[float, float],
+    reach: tuple[float, float] | None,
+    scale: tuple[float, float],
+    limit: float | None,
+    verdict: Verdict | None,
+) -> Row:
+    """The row of a total.
+
+    Args:
+        side: ``right``, ``left`` or empty for the whole.
+        ends: Least and greatest score as measured.
+        reach: The same within the accuracy; None when that is not known.
+        scale: Best and worst score of the method.
+        limit: Greatest admissible score.
+        verdict: Of the score.
+    """
+    known = ends[0] == ends[1]
+    shown = None if reach is None and known else ends if reach is None else reach
+    return Row(
+        name="score",
+        side=side,
+        state=RowState.JUDGED if known else RowState.NOT_ASSESSED,
+        value=float(ends[0]) if known else None,
+        limit=limit,
+        scale=(float(scale[0]), float(scale[1])),
+        interval=None if shown is None else (float(shown[0]), float(shown[1])),
+        verdict=verdict,
+        reason="" if known else "not assessed in full",
+    )
+
+
+def aspects(angles: Angles, names: Sequence[str], side: int | None, edges: Edges) -> tuple[Aspect, ...]:
+    """Angles with the bands that they fall into; of both sides where a component has none."""
+    found = []
+    for name in names:
+        values = getattr(angles, name)
+        label = name.replace("_", " ")
+        if name not in SIDED:
+            pairs = [(label, float(values))]
+        elif side is not None:
+            pairs = [(label, float(values[side]))]
+        else:
+            pairs = [(f"{own} {label}", float(x)) for own, x in zip(SIDES, values, strict=True)]
+        for text, value in pairs:
+            measured = value == value  # noqa: PLR0124 - not a NaN
+            found.append(
+                Aspect(
+                    name=text,
+                    value=value if measured else None,
+                    unit="rad",
+                    band=band_of(value, edges.get(name, ()), NEUTRAL.get(name, 0.0)),
+                )
+            )
+    return tuple(found)

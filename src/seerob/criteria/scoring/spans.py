@@ -1,0 +1,123 @@
+"""Scores of which only a span is known: an angle with an accuracy, a joint that nobody measured.
+
+The least score and the greatest are carried along side by side. A sum of spans and a table that grows in
+each argument keep them exact, as long as what goes in varies independently.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import reduce
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seerob.core.transforms import Array
+from seerob.criteria.scoring.edges import reached
+from seerob.criteria.scoring.published import Ints
+
+
+class Span(NamedTuple):
+    """Least and greatest score; equal when it is known."""
+
+    low: Ints
+    high: Ints
+
+    def __add__(self, other: object) -> Span:
+        """Sum of two independent scores."""
+        if not isinstance(other, Span):
+            return NotImplemented
+        return Span(self.low + other.low, self.high + other.high)
+
+    def at_least(self, least: int) -> Span:
+        """The same, not below a score."""
+        return Span(np.maximum(self.low, least), np.maximum(self.high, least))
+
+    @property
+    def known(self) -> bool:
+        """Whether least and greatest agree everywhere."""
+        return bool(np.array_equal(self.low, self.high))
+
+
+def exactly(score: ArrayLike) -> Span:
+    """A score that is known."""
+    array = np.asarray(score, np.int64)
+    return Span(array, array)
+
+
+def between(low: ArrayLike, high: ArrayLike) -> Span:
+    """A score of which the ends are known."""
+    return Span(np.asarray(low, np.int64), np.asarray(high, np.int64))
+
+
+def answer(yes: bool | None) -> Span:
+    """1 for yes, 0 for no, both when nobody said."""
+    return between(0, 1) if yes is None else exactly(int(yes))
+
+
+def graded(
+    angle: Array,
+    score: Callable[[Array], Ints],
+    *,
+    within: tuple[int, int],
+    accuracy: Array | float = 0.0,
+    neutral: float = 0.0,
+    rounding: Array | float = 0.0,
+) -> Span:
+    """Score of an angle that is known to ± ``accuracy``.
+
+    Args:
+        angle: [rad], shape (...); NaN is not assessed and may be any score.
+        score: Least at ``neutral`` and never less further away from it, on either side.
+        within: Least and greatest score that there is.
+        accuracy: [rad], of a shape that fits ``angle``.
+        neutral: [rad]
+        rounding: How far rounding alone may turn it [rad], shaped likewise: the worst of that counts.
+    """
+    if not np.any(accuracy):
+        low = high = score(angle)
+        if np.any(rounding):
+            worst = np.maximum(high, np.maximum(score(angle - rounding), score(angle + rounding)))
+            low = high = np.where(rounding >= np.pi, within[1], worst)
+    else:
+        first, last = angle - accuracy, angle + accuracy
+        high = np.maximum(score(first), score(last))
+        high = np.where(np.asarray(rounding) >= np.pi, within[1], high)
+        low = score(np.clip(neutral, first, last))
+    missing = np.isnan(angle)
+    if missing.any():
+        low, high = np.where(missing, within[0], low), np.where(missing, within[1], high)
+    return Span(low, high)
+
+
+def beyond(
+    angle: Array,
+    threshold: float,
+    *,
+    accuracy: Array | float = 0.0,
+    signed: bool = False,
+    rounding: Array | float = 0.0,
+) -> Span:
+    """1 where an angle, or its size unless ``signed``, is at a threshold or beyond it; else 0."""
+    if signed:
+        return graded(
+            angle,
+            lambda x: reached(x, threshold).astype(np.int64),
+            within=(0, 1),
+            accuracy=accuracy,
+            neutral=-np.inf,
+            rounding=rounding,
+        )
+    return graded(
+        angle,
+        lambda x: reached(np.abs(x), threshold).astype(np.int64),
+        within=(0, 1),
+        accuracy=accuracy,
+        rounding=rounding,
+    )
+
+
+def either(*spans: Span) -> Span:
+    """The greatest of several scores: ``twisted or bent`` counts once."""
+    return Span(reduce(np.maximum, [s.low for s in spans]), reduce(np.maximum, [s.high for s in spans]))

@@ -1,0 +1,279 @@
+"""Tables of angle zones: rows of an angle, a range and a score, with how long or how often it must be met.
+
+The angle zones of norms and the rules of companies are tables of this one sort. What is not known (an angle
+that nobody measures, its accuracy, a hold that began before the run) makes a span of the score, never 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Annotated, Literal
+
+import numpy as np
+from msgspec import Meta, Struct
+
+from seerob.core.errors import UnknownName
+from seerob.criteria.scoring.edges import ROUNDING
+from seerob.criteria.scoring.measured import Accuracy, Measured
+from seerob.criteria.scoring.repetition import GAP, WINDOW
+from seerob.description.humans.angles import NEEDS, SIDED, Angles
+from seerob.workstation.tables.task_phase import Period, Seconds
+
+_ROUNDING = 1e-9
+ZoneAngle = Annotated[
+    float,
+    Meta(ge=-2 * math.pi, le=2 * math.pi, extra={"unit": "rad"}, extra_json_schema={"x-unit": "rad"}),
+]
+DERIVED = {"head_inclination": ("trunk_flexion", "neck_flexion")}
+"""Sums of angles: the head against the vertical, as ISO 11226 relates it to neck and trunk."""
+MEASURES = (*NEEDS, *DERIVED)
+"""Every angle that a row may name."""
+RANGES = {"trunk_flexion": (-math.pi, math.pi), "shoulder_flexion": (-math.pi / 2, 1.5 * math.pi)}
+"""Least and greatest value [rad] where it is not ±π."""
+
+
+class ZoneRow(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One row of a table of zones: the score of an angle within a range."""
+
+    angle: str
+    """Which angle: ``trunk_flexion``, ``shoulder_elevation``, …"""
+    low: ZoneAngle | None = None
+    """Begin of the range [rad]; without end when not given. Where two rows meet, the higher score counts."""
+    high: ZoneAngle | None = None
+    """End of the range [rad], which belongs to it but at 0; without end when not given."""
+    score: Annotated[float, Meta(ge=0, le=1000)]
+    """Points, or the zone: 0 is nothing to be said against."""
+    either_way: bool = False
+    """The range is of the size of the angle: to the left as to the right."""
+    side: Literal["right", "left"] | None = None
+    """Only of this side; of each side when not given."""
+    hold: Seconds | None = None
+    """The row counts once the angle stayed in the range for so long [s]."""
+    per_minute: Annotated[float, Meta(gt=0, le=1000)] | None = None
+    """The row counts once the range was entered so often within the last minute."""
+    allowed: Period | None = None
+    """The row counts once the angle stayed longer than this [s], which is so at the begin of the range …"""
+    allowed_at_end: Period | None = None
+    """… and this at its end [s], linear in between."""
+    support: Literal["with", "without"] | None = None
+    """Only with, or only without, support of the trunk or arm; whatever the support when not given."""
+    colour: str = ""
+    """Colour of the zone, for reports: ``yellow``, ``#ffcc00``."""
+    label: str = ""
+    """What the zone is called: ``conditional``."""
+    confidence: str = ""
+    """How sure the figures are: ``2+`` sources, ``1``, ``M`` from memory."""
+
+    @property
+    def timed(self) -> bool:
+        """Whether it counts only after a while or after several times."""
+        return any(x is not None for x in (self.hold, self.per_minute, self.allowed))
+
+    def within(self, angle: float) -> bool:
+        """Whether an angle [rad] lies in the range."""
+        x = abs(angle) if self.either_way else angle
+        at_end = -ROUNDING if self.high == 0 else ROUNDING
+        return (self.low is None or x >= self.low - ROUNDING) and (
+            self.high is None or x <= self.high + at_end
+        )
+
+    def edges(self) -> list[float]:
+        """Where the range begins and ends [rad], on both sides when it is of the size."""
+        ends = [x for x in (self.low, self.high) if x is not None]
+        return [*ends, *(-x for x in ends)] if self.either_way else ends
+
+    def longest(self, angle: float) -> float:
+        """Longest admissible stay at an angle [rad] in the range [s]."""
+        assert self.allowed is not None
+        if self.allowed_at_end is None or self.low is None or self.high is None:
+            return self.allowed
+        x = abs(angle) if self.either_way else angle
+        return float(np.interp(x, [self.low, self.high], [self.allowed, self.allowed_at_end]))
+
+
+def mistakes(row: ZoneRow) -> list[tuple[str, str, str]]:
+    """What cannot be in a row: column, what is wrong, what would be right."""
+    found = []
+    if row.angle not in MEASURES:
+        found.append(
+            ("angle", str(UnknownName("angle", row.angle, MEASURES)), "docs/ergonomics.md lists all of them")
+        )
+    elif row.side is not None and not sided(row.angle):
+        found.append(("side", f"{row.angle} has no side", "leave it empty"))
+    if row.low is not None and row.high is not None and row.high <= row.low:
+        what = f"the range ends at {_deg(row.high)}, not after its begin at {_deg(row.low)}"
+        found.append(("high", what, "let it end later"))
+    if row.either_way and row.low is not None and row.low < 0:
+        found.append(("low", f"{_deg(row.low)} is no size", "give 0 or more, or drop either_way"))
+    if row.allowed_at_end is not None and (row.allowed is None or row.low is None or row.high is None):
+        found.append(("allowed_at_end", "needs allowed, low and high", "give them"))
+    if row.allowed is not None and (row.hold is not None or row.per_minute is not None):
+        found.append(("allowed", "stands beside hold or per_minute", "give two rows"))
+    return found
+
+
+def sided(angle: str) -> bool:
+    """Whether an angle is of a side."""
+    return angle in SIDED
+
+
+def _deg(angle: float) -> str:
+    return f"{math.degrees(angle):g}°"
+
+
+class Stay:
+    """How long and how often one angle is in one range. Absences shorter than a second do not count."""
+
+    def __init__(self) -> None:
+        self.since = math.nan
+        self.entries: deque[float] = deque()
+        self.peak = 0.0
+        """Angle of the largest size in this stay [rad]."""
+        self._left = math.nan
+
+    def add(self, t: float, inside: bool, angle: float) -> None:
+        """Whether the angle [rad] is inside at an instant [s]."""
+        if inside:
+            if math.isnan(self.since):
+                self.since, self.peak = t, angle
+                self.entries.append(t)
+            self.peak = max(self.peak, angle, key=abs)
+            self._left = math.nan
+        elif not math.isnan(self.since):
+            self._left = t if math.isnan(self._left) else self._left
+            if t - self._left >= GAP - _ROUNDING:
+                self.since = self._left = math.nan
+        while self.entries and self.entries[0] <= t - WINDOW + _ROUNDING:
+            self.entries.popleft()
+
+    def met(self, row: ZoneRow, t: float, *, more: float = 0.0) -> bool:
+        """Whether a row's time or number is reached; ``more`` is how much larger the angle may have been."""
+        if not row.timed:
+            return True
+        held = -1.0 if math.isnan(self.since) else t - self.since
+        if row.allowed is not None:
+            return held > _ROUNDING + row.longest(
+                abs(self.peak) + more if self.peak >= 0 else self.peak - more
+            )
+        long = row.hold is not None and held >= row.hold - _ROUNDING
+        often = row.per_minute is not None and len(self.entries) >= row.per_minute - _ROUNDING
+        return long or often
+
+
+class ZoneWatch:
+    """The rows of one table over time, for one person.
+
+    Args:
+        rows: Of the table.
+        from_rest: Whether nothing was held or repeated before the first instant.
+    """
+
+    def __init__(self, rows: Sequence[ZoneRow], *, from_rest: bool) -> None:
+        self._rows = tuple(rows)
+        self._from_rest = from_rest
+        self._t = -math.inf
+        self._begin(from_rest)
+
+    def _begin(self, known_before: bool) -> None:
+        self._known_before, self._start = known_before, math.nan
+        # Surely, possibly and as measured.
+        self._stays = {(i, side): (Stay(), Stay()) for i in range(len(self._rows)) for side in range(2)}
+
+    def add(
+        self,
+        t: float,
+        angles: Angles,
+        accuracy: Accuracy,
+        supported: Mapping[tuple[str, int], bool | None],
+    ) -> dict[tuple[str, int], tuple[float, float]]:
+        """Least and greatest score of each angle and side at an instant [s].
+
+        Args:
+            t: After the instant before; an earlier one begins anew.
+            angles: Of the posture; NaN is not measured.
+            accuracy: Of each angle [rad].
+            supported: Whether each angle and side has its weight supported; None when nobody said.
+        """
+        if t < self._t - _ROUNDING:
+            self._begin(self._from_rest)
+        elif math.isfinite(self._t) and t - self._t > GAP + _ROUNDING:
+            self._begin(False)
+        self._t = t
+        if math.isnan(self._start):
+            self._start = t
+        found = {}
+        for name in dict.fromkeys(row.angle for row in self._rows):
+            for side in range(2 if sided(name) else 1):
+                value, error = value_of(name, side, angles, accuracy)
+                found[name, side] = self._score(t, name, side, value, error, supported.get((name, side)))
+        return found
+
+    def _score(
+        self, t: float, name: str, side: int, value: float, error: float, supported: bool | None
+    ) -> tuple[float, float]:
+        least, most = RANGES.get(name, (-math.pi, math.pi))
+        missing = math.isnan(value)
+        first, last = (least, most) if missing else (value - error, value + error)
+        rows = [
+            (i, row)
+            for i, row in enumerate(self._rows)
+            if row.angle == name and row.side in (None, ("right", "left")[side])
+        ]
+        points = sorted({first, last, *(e for _, r in rows for e in r.edges() if first < e < last)})
+        points += [(a + b) / 2 for a, b in pairwise(points)]
+        meets: dict[int, tuple[bool, bool]] = {}
+        for i, row in rows:
+            inside = [row.within(x) for x in points]
+            meets[i] = self._met(i, row, side, t, (all(inside), any(inside)), value, error)
+        low = high = math.nan
+        for x in points:
+            here = [(row.score, *meets[i], _fits(row, supported)) for i, row in rows if row.within(x)]
+            sure = max((score for score, yes, _, (fits, _) in here if yes and fits), default=0.0)
+            may = max((score for score, _, maybe, (_, fits) in here if maybe and fits), default=0.0)
+            low, high = np.fmin(low, sure), np.fmax(high, may)
+        return float(low), float(high)
+
+    def _met(
+        self,
+        i: int,
+        row: ZoneRow,
+        side: int,
+        t: float,
+        inside: tuple[bool, bool],
+        value: float,
+        error: float,
+    ) -> tuple[bool, bool]:
+        sure, possible = self._stays[i, side]
+        angle = 0.0 if math.isnan(value) else value
+        sure.add(t, inside[0], angle)
+        possible.add(t, inside[1], angle)
+        begun = self._known_before or not row.timed
+        if not begun:
+            # What lasts since the first instant may have begun before it; a count needs a whole minute.
+            whole = possible.since <= self._start + _ROUNDING
+            short = row.per_minute is not None and t - self._start < WINDOW - _ROUNDING
+            lasting = row.per_minute is None or row.hold is not None
+            begun = not ((lasting and whole) or short)
+        may = possible.met(row, t, more=error) or not begun or math.isnan(value)
+        return sure.met(row, t, more=-error), may
+
+
+def value_of(name: str, side: int, angles: Angles, accuracy: Accuracy) -> tuple[float, float]:
+    """An angle by its name and how far it may be off [rad]."""
+    parts = DERIVED.get(name, (name,))
+    measured = Measured(angles, accuracy)
+    values = [getattr(angles, part) for part in parts]
+    total = sum(float(value[side] if sided(name) else value) for value in values)
+    return total, sum(measured.error(part) for part in parts)
+
+
+def _fits(row: ZoneRow, supported: bool | None) -> tuple[bool, bool]:
+    if row.support is None:
+        return True, True
+    if supported is None:
+        return False, True
+    fits = supported == (row.support == "with")
+    return fits, fits

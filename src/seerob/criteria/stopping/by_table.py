@@ -1,0 +1,212 @@
+"""A robot stops as its maker's table says: ways of the joints, carried over to the parts that they move."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from msgspec.structs import replace as changed
+
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Input, Origin
+from seerob.criteria.stopping.in_span import InSpan, Stopping, reach_of
+from seerob.criteria.stopping.onset import Chain, Levers, Onset
+from seerob.criteria.stopping.table import JointStop, SpeedStop, StoppingTable, interpolate, joint_stop
+from seerob.criteria.stopping.terms import Braking, Course, braking, travel
+from seerob.model.model import Gap, Mechanism, Model
+from seerob.twin.accuracy.mass_tolerances import MassTolerances
+from seerob.twin.state import State
+
+Bound = tuple[Braking, Callable[[Onset], Course] | None, tuple[Input, ...], InSpan | None]
+
+
+def not_its_own(table: StoppingTable, model: Model, robot: Mechanism) -> str:
+    """Why it is not known that a table is of a robot; empty when it is."""
+    entry = next(r for r in model.workstation.robots if r.name == robot.name)
+    if table.robot == robot.name or entry.model in table.models:
+        return ""
+    return (
+        f"the stopping table is that of {table.robot}, and whether {robot.name} ({entry.model}) is one is "
+        "not known: say so with stop.table_for"
+    )
+
+
+def bind_table(
+    table: StoppingTable,
+    others: float | None,
+    model: Model,
+    robot: Mechanism,
+    gap: Gap,
+    *,
+    rated_payload: float | None = None,
+    bind: Callable[[Stopping], InSpan | None],
+) -> Bound:
+    """How a robot's moving parts brake by its stopping table, and the inputs that it needs.
+
+    Beyond a table, and where the payload is not known, what the table has at its end is a bound from below:
+    figures that fall along an axis are not used, so none is less farther on. The course says so.
+
+    Args:
+        table: The maker's figures.
+        others: Stopping time of joints that the table does not have [s], None when nobody gave one.
+        model: The workstation.
+        robot: Who stops.
+        gap: Its second set are the moving parts.
+        rated_payload: Payload at which the figures hold [kg], of a table that does not say.
+        bind: Makes of how joints stop what bounds it within a span.
+
+    Raises:
+        InputError: The table speaks of joints that the robot does not have.
+    """
+    beyond = [entry.joint for entry in table.joints if entry.joint >= len(robot.joints)]
+    if beyond:
+        raise InputError.at(
+            "stop",
+            "table",
+            f"{table.robot} has joint {beyond[0]}, {robot.name} has {len(robot.joints)} joints",
+            "the table of this robot",
+        )
+    said = Origin.MISSING if table.rated_payload is None else Origin.STATED
+    source = f"{table.source} ({table.confidence})"
+    if rated_payload is not None:
+        table = changed(table, rated_payload=rated_payload)
+        said, source = Origin.GIVEN, "workstation file"
+    load = _payload(model, robot)
+    inputs = (
+        Input(
+            name=f"payload of {robot.name}",
+            value=load if np.isfinite(load) else None,
+            unit="kg",
+            origin=Origin.COMPUTED if np.isfinite(load) else Origin.MISSING,
+            source="masses of tools and workpieces",
+        ),
+        Input(
+            name="rated payload of the stopping table",
+            value=table.rated_payload,
+            unit="kg",
+            origin=said,
+            source=source,
+        ),
+    )
+    if table.tool is not None:
+        by_onset = _by_tool_speed(table, table.tool, robot, load)
+        return lambda state: lambda onset, scale: by_onset(onset), by_onset, inputs, None
+    braking, stopping = _by_joint(table, others, model, robot, gap, load)
+    return braking, None, inputs, bind(stopping)
+
+
+def _by_tool_speed(
+    table: StoppingTable, tool: SpeedStop, robot: Mechanism, load: float
+) -> Callable[[Onset], Course]:
+    share, unknown = _payload_share(table, robot, load)
+    if share > 1 + 1e-9:
+        unknown = f"payload is {share:.3g} of the rated payload, at which the stopping table ends"
+
+    def after(onset: Onset) -> Course:
+        # Any point counts as the tool's: the fastest decides for all.
+        top, end = float(onset.v_s.max()), tool.speed[-1]
+        beyond = f"{top:.3g} m/s is beyond the stopping table, which ends at {end:g} m/s"
+        T_s = interpolate([tool.speed], np.array(tool.time), [min(top, end)])
+        doubts = (onset.doubt, unknown, beyond if top > end * (1 + 1e-9) else "")
+        return braking(replace(onset, doubt="; ".join(filter(None, doubts))), T_s)
+
+    return after
+
+
+def _by_joint(
+    table: StoppingTable,
+    others: float | None,
+    model: Model,
+    robot: Mechanism,
+    gap: Gap,
+    load: float,
+) -> tuple[Braking, Stopping]:
+    entries = {entry.joint: entry for entry in table.joints}
+    full = [_full_speed(entries.get(j), robot, j) for j in range(len(robot.joints))]
+    levers = Levers(model, robot, gap)
+    share, unknown = _payload_share(table, robot, load)
+
+    def joint(j: int, speed: float, extension: float) -> tuple[float, float, str]:
+        """Way, time, and why both may be more."""
+        name = robot.joints[j].name
+        if speed == 0.0:
+            return 0.0, 0.0, ""
+        if j not in entries:
+            if others is None:
+                return 0.0, 0.0, f"{name}: not in the stopping table, and stop.stopping is not given"
+            return speed * others, others, ""
+        entry, whole = entries[j], full[j]
+        if not whole:
+            return 0.0, 0.0, f"{name}: neither the stopping table nor the robot says what full speed is"
+        asked = (speed / whole, share, extension)
+        axes = (entry.speed, entry.payload, entry.extension)
+        within = tuple(min(x, axis[-1]) for x, axis in zip(asked, axes, strict=True))
+        beyond = next(
+            (
+                f"{name}: {what} is {x:.3g} of the full figure, the stopping table ends at {axis[-1]:g}"
+                for what, x, axis in zip(("speed", "payload", "extension"), asked, axes, strict=True)
+                if x > axis[-1] * (1 + 1e-9)
+            ),
+            "",
+        )
+        way, time = joint_stop(entry, *within)
+        return min(way, speed * time), time, beyond or unknown
+
+    def after(onset: Onset, far: float, chains: Sequence[Chain]) -> Course:
+        speeds, ways = onset.speeds, onset.ways
+        assert speeds is not None
+        assert ways is not None
+        extension = far / table.reach if table.reach is not None else 1.0
+        stops = [joint(j, float(speed), extension) for j, speed in enumerate(speeds)]
+        every = np.abs(robot.coupling) @ (ways + np.array([way for way, _, _ in stops]))
+        total = np.array([travel(turns.tolist(), every[rows], arms) for turns, rows, arms in chains])
+        # What the way of both exceeds the reaction's by; the lever may grow during the reaction.
+        beside = np.maximum(total - onset.S_r, 0.0)
+        doubts = dict.fromkeys((onset.doubt, *(why for _, _, why in stops)))
+        longest = max(time for _, time, _ in stops)
+        return Course(onset.v_r, onset.S_r, beside, longest, "; ".join(filter(None, doubts)))
+
+    def bound(state: State) -> Callable[[Onset, float], Course]:
+        chains = levers.at(state)
+        far = reach_of(state.data_of(robot.name), state.model, robot)
+
+        def at(onset: Onset, scale: float) -> Course:
+            if onset.speeds is None or onset.ways is None:
+                speeds, ways = scale * np.abs(state.qd(robot)), np.zeros(len(robot.joints))
+                doubt = (
+                    "an acceleration of points says nothing of joints, and the stopping table is by joints: "
+                    f"give acceleration_limits of {robot.name} instead of stop.acceleration"
+                )
+                onset = replace(onset, speeds=speeds, ways=ways, doubt=doubt)
+            return after(onset, far, chains)
+
+        return at
+
+    return bound, after
+
+
+def _payload_share(table: StoppingTable, robot: Mechanism, load: float) -> tuple[float, str]:
+    """Share of the rated payload, and why it is not known: then 0, where a robot stops soonest."""
+    if table.rated_payload is None:
+        return 0.0, (
+            f"the stopping table of {table.robot} does not say for which payload it holds: give "
+            "stop.rated_payload, from the robot's data sheet"
+        )
+    if not np.isfinite(load):
+        return 0.0, "; ".join(robot.unknown_masses)
+    return load / table.rated_payload, ""
+
+
+def _full_speed(entry: JointStop | None, robot: Mechanism, j: int) -> float | None:
+    if entry is not None and entry.full_speed is not None:
+        return entry.full_speed
+    limit = robot.velocity_limits[j]
+    return None if limit is None else limit.value
+
+
+def _payload(model: Model, robot: Mechanism) -> float:
+    """Mass of all that a robot carries, the most that tolerances allow [kg]; NaN when nobody gave one."""
+    if robot.unknown_masses:
+        return float("nan")
+    return MassTolerances(model, robot).heaviest_load()

@@ -1,0 +1,155 @@
+"""Which bound holds during a robot's reaction time: of what is known the sharpest, and where it is from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from seerob.core.errors import Undecided
+from seerob.core.snapshot import Input, Origin
+from seerob.core.transforms import Array
+from seerob.criteria.stopping.onset import (
+    At,
+    Foreseen,
+    Levers,
+    Onset,
+    by_joints,
+    constant,
+    from_torques,
+    held,
+)
+from seerob.model.model import Gap, Mechanism, Model
+from seerob.twin.accuracy.mass_tolerances import MassTolerances
+from seerob.twin.state import State
+
+Reactions = Callable[[State], tuple[At, At | None]]
+"""What is sure from below, and a bound from above where that is another one."""
+
+NAME = "acceleration during T_r"
+GIVE = "give stop.acceleration"
+
+
+def bind_reaction(
+    model: Model, robot: Mechanism, gap: Gap, T_r: float, a: float | None, *, points: bool
+) -> tuple[Reactions, Input, tuple[str, ...]]:
+    """Resolve what a robot does until it brakes.
+
+    Args:
+        model: The workstation.
+        robot: Who moves.
+        gap: Its second set are the moving parts.
+        T_r: Reaction time [s].
+        a: Acceleration of its points that was given [m/s²].
+        points: Whether how it brakes can begin with an acceleration of points, or of joints.
+
+    Returns:
+        How to ask, where it is from, and what is left out.
+    """
+    if a is not None:
+        unsaid = (
+            "" if points or a == 0 else "its simulated stop begins at the present speeds: give 0, or a table"
+        )
+        given = constant(robot, gap, T_r, a, unsaid)
+        what = Input(name=NAME, value=a, unit="m/s²", origin=Origin.GIVEN, source="workstation file")
+        return lambda state: (given(state), None), what, ()
+    foreseen = Foreseen(model, robot, gap, T_r)
+    limits = _acceleration_limits(model, robot)
+    torques = np.array([np.nan if limit is None else limit.value for limit in robot.effort_limits])
+    levers = Levers(model, robot, gap)
+    largest = np.array([np.inf if limit is None else limit.value for limit in robot.velocity_limits])
+    carriers, now = model.carriers_of(robot.name), np.zeros(0)
+    off = ", ".join(map(str, MassTolerances(model, robot).tolerances))
+    bias, lead = _Bias(model, robot), model.workstation.engine.tick
+
+    def reactions(state: State) -> tuple[At, At | None]:
+        known = foreseen.at(state)
+        if known is not None and all(state.foresee(each, now) is not None for each in carriers):
+            return known, None
+        v, qd = state.fastest_points(gap.b)[0], state.qd(robot)
+        if robot.role != "robot":
+            why = f"nobody says how fast {robot.name} may get faster during the reaction time: {GIVE}"
+        elif robot.on:
+            why = f"{robot.name} is carried by {robot.on}, and nobody says how fast both get faster: {GIVE}"
+        elif not points:
+            why = f"what {robot.name} does during the reaction time is not known: {GIVE} = 0 where it may not"
+        elif limits is None and off:
+            why = f"what torques allow where {off} is not known: {GIVE}, or acceleration_limits"
+        elif limits is None and np.isnan(torques).any():
+            names = ", ".join(j.name for j, x in zip(robot.joints, torques, strict=True) if np.isnan(x))
+            why = f"{robot.name}: neither acceleration_limits nor the torque limit of {names}: {GIVE}"
+        else:
+            why = ""
+        qdd = limits
+        if not why and qdd is None:
+            try:
+                qdd = from_torques(state.mass_matrix(robot), bias(state), torques)
+            except Undecided as reason:
+                why = f"{reason}: {GIVE}"
+        if why or qdd is None:
+            return (lambda scale: held(scale * v, T_r, scale * qd, why)), None
+        accelerations, chains = qdd, levers.at(state)
+
+        def most(scale: float) -> Onset:
+            return by_joints(scale * v, T_r, scale * qd, accelerations, largest, robot.coupling, chains, lead)
+
+        if limits is not None:
+            return most, None
+        return (lambda scale: held(scale * v, T_r, scale * qd)), most
+
+    named = {limit.source for limit in robot.effort_limits if limit is not None}
+    value, origin, source, unit = (
+        "by torque limits and masses",
+        Origin.ESTIMATED,
+        "; ".join(sorted(named)),
+        "",
+    )
+    driving = [source for source in model.workstation.sources if source.target() == robot.name]
+    if robot.role == "robot" and not carriers and not any(each.live for each in driving):
+        # Whom nothing drives stands.
+        value, origin, source = "as its motion goes on", Origin.COMPUTED, "what drives it, known ahead"
+    elif limits is not None and not carriers:
+        value, origin, unit = ", ".join(f"{x:g}" for x in limits), Origin.GIVEN, "rad/s² or m/s²"
+        source = f"workstation file (acceleration_limits of {robot.name})"
+    elif np.isnan(torques).any() or robot.role != "robot" or carriers:
+        value, origin, source = "not known", Origin.MISSING, ""
+    what = Input(name=NAME, value=value, unit=unit, origin=origin, source=source)
+    left_out = tuple(f"an acceleration of {name}, which {robot.name} carries" for name in robot.riders)
+    return reactions, what, left_out
+
+
+def _acceleration_limits(model: Model, robot: Mechanism) -> Array | None:
+    """Of each joint [rad/s² or m/s²], where the file has them."""
+    table = next((r for r in model.workstation.robots if r.name == robot.name), None)
+    given = None if table is None else table.acceleration_limits
+    if not given or len(given) not in (1, len(robot.joints)):
+        return None
+    return np.array(np.broadcast_to(np.array(given, float), len(robot.joints)))
+
+
+def joint_limits(model: Model, robot: Mechanism) -> tuple[Array, Array] | None:
+    """Largest accelerations and speeds of joints, shape (j,); None without ``acceleration_limits``."""
+    limits = _acceleration_limits(model, robot)
+    if limits is None:
+        return None
+    return limits, np.array([np.inf if limit is None else limit.value for limit in robot.velocity_limits])
+
+
+class _Bias:
+    """Torques of gravity and motion on a robot's joints."""
+
+    def __init__(self, model: Model, robot: Mechanism) -> None:
+        self._data: Any = mujoco.MjData(model.mj)
+        self._robot, self._b = robot, np.zeros(model.mj.nv)
+
+    def __call__(self, state: State) -> Array:
+        mj, data, robot = state.model.mj, self._data, self._robot
+        now = state.data_of(robot.name)
+        data.qpos[:], data.qvel[:] = now.qpos, now.qvel
+        mujoco.mj_kinematics(mj, data)
+        mujoco.mj_comPos(mj, data)
+        mujoco.mj_comVel(mj, data)
+        mujoco.mj_rne(mj, data, 0, self._b)
+        return np.asarray(robot.coupling.T @ self._b[robot.v_address])

@@ -1,0 +1,1 @@
+"""Robots, meshes, people and norms as plain data, each figure with its origin."""

@@ -1,0 +1,203 @@
+"""From a frame of a device to pulls on bones: names, weights, mounting, where the device's world lies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from seerob.core.samples import BodyPoint, Vec3, Vec4
+from seerob.core.transforms import Array, rotation_from_wxyz, wxyz_from_rotation
+from seerob.description.capture.captured import CaptureFrame, Layout
+from seerob.description.capture.mapping import Convention, Place
+from seerob.description.description import Description
+from seerob.description.humans.posture import posture
+from seerob.description.humans.skeleton import BONES, bone_poses
+
+LARGEST = 1e3
+"""No person is farther from the origin of a device's world [m]."""
+UNIT = 0.1
+"""By how much the length of a quaternion may differ from 1."""
+OWN_PLACE = 0.2
+"""No device places a joint farther from ours [m]: about the length of a clavicle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One row of a device's frames, bound to a bone."""
+
+    index: int
+    """In the device's layout."""
+    name: str
+    bone: str
+    at: Array
+    """Where it is in the bone's frame [m], (3,)."""
+    segment_from_bone: Array | None
+    """How the bone is turned in the device's segment, (3, 3); None when nobody knows."""
+    position: float
+    """Weight of its position."""
+    orientation: float
+    """Weight of its orientation."""
+    fitted: bool = False
+    """Its place on the bone is still to be found: see `seerob.description.capture.mapping.Place`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observer:
+    """Makes pulls on bones of what one device sees; frozen."""
+
+    rows: tuple[Row, ...]
+    world_from_capture: Array
+    """Shape (4, 4)."""
+
+    def points(self, frame: CaptureFrame) -> tuple[BodyPoint, ...]:
+        """What a frame says of the person's bones, in the order of the rows.
+
+        Args:
+            frame: With as many rows as the layout that this was bound to.
+        """
+        R, origin = self.world_from_capture[:3, :3], self.world_from_capture[:3, 3]
+        seen = np.asarray(frame.positions, float)
+        with np.errstate(invalid="ignore", over="ignore"):
+            positions = seen @ R.T + origin
+            near = (np.abs(seen) < LARGEST).all(axis=1)  # false for NaN
+        turned, known = _turned(frame, R)
+        out = []
+        for row in self.rows:
+            i = row.index
+            sure = None if frame.confidence is None else _share(float(frame.confidence[i]))
+            factor = 1.0 if sure is None else sure
+            wp, wo = row.position * factor, row.orientation * factor
+            wxyz: Vec4 | None = None
+            if wo > 0 and row.segment_from_bone is not None and known[i]:
+                wxyz = _four(wxyz_from_rotation(turned[i] @ row.segment_from_bone))
+            out.append(
+                BodyPoint(
+                    name=row.name,
+                    bone=row.bone,
+                    at=_three(row.at),
+                    position=_three(positions[i]) if wp > 0 and near[i] else None,
+                    wxyz=wxyz,
+                    position_weight=wp,
+                    orientation_weight=wo,
+                    confidence=sure,
+                )
+            )
+        return tuple(out)
+
+
+def bind(
+    layout: Layout,
+    places: tuple[Place | None, ...],
+    description: Description,
+    *,
+    convention: Convention | None = None,
+    world_from_capture: Array | None = None,
+    position: float = 1.0,
+    orientation: float = 1.0,
+    bones: Mapping[str, float] | None = None,
+) -> Observer:
+    """Bind a device's rows to the bones of a person.
+
+    Args:
+        layout: The device's names.
+        places: From `seerob.description.capture.mapping.places`.
+        description: The person.
+        convention: Whose names they are; says how segments are turned in a posture of rest.
+        world_from_capture: Where the device's world lies, (4, 4); identity when not given.
+        position: Factor on every weight of a position.
+        orientation: Factor on every weight of an orientation.
+        bones: Further factors by bone.
+    """
+    tall = stature(description)
+    rested = None
+    if convention is not None and convention.rest is not None:
+        rested, _ = bone_poses(description, posture(description, convention.rest))
+    rows = []
+    for index, place in enumerate(places):
+        if place is None:
+            continue
+        factor = (bones or {}).get(place.bone, 1.0)
+        weights = place.position * position * factor, place.orientation * orientation * factor
+        if not any(weights):
+            continue  # as good as not mapped
+        rows.append(
+            Row(
+                index=index,
+                name=layout.names[index],
+                bone=place.bone,
+                at=place.at if place.metres else place.at * tall,
+                segment_from_bone=None
+                if rested is None or convention is None
+                else convention.axes.T @ rested[BONES.index(place.bone)],
+                position=weights[0],
+                orientation=weights[1],
+                fitted=place.fitted and weights[0] > 0,
+            )
+        )
+    world = np.eye(4) if world_from_capture is None else world_from_capture
+    return Observer(tuple(rows), world)
+
+
+def with_mounts(observer: Observer, mounts: Mapping[int, tuple[Array, Array]]) -> Observer:
+    """The same with what a calibration found.
+
+    Args:
+        observer: As the device states it.
+        mounts: Index of a row in the layout → ``segment_from_bone`` (3, 3) and ``at`` [m] (3,).
+    """
+    rows = tuple(
+        replace(row, segment_from_bone=mounts[row.index][0], at=mounts[row.index][1])
+        if row.index in mounts
+        else row
+        for row in observer.rows
+    )
+    return replace(observer, rows=rows)
+
+
+def with_places(observer: Observer, places: Mapping[str, Array]) -> Observer:
+    """The same with things elsewhere on their bones: by the device's name, in the bone's frame [m], (3,)."""
+    rows = tuple(
+        replace(row, at=places[row.name], fitted=False) if row.name in places else row
+        for row in observer.rows
+    )
+    return replace(observer, rows=rows)
+
+
+def without_unplaced(observer: Observer) -> tuple[Observer, tuple[str, ...]]:
+    """The same without positions of which nobody knows where on the bone they are, and their names."""
+    rows = tuple(replace(row, position=0.0, fitted=False) if row.fitted else row for row in observer.rows)
+    names = tuple(row.name for row in observer.rows if row.fitted)
+    return replace(observer, rows=tuple(row for row in rows if row.position or row.orientation)), names
+
+
+def stature(description: Description) -> float:
+    """Height of the vertex of a person who stands upright [m]."""
+    _, positions = bone_poses(description, np.zeros(len(description.joints())))
+    head = next(link for link in description.links if link.name == "head")
+    tops = [solid.points[:, 1].max() + solid.radius for solid in head.solids if solid.points is not None]
+    return float(positions[BONES.index("head"), 2] + max(tops))
+
+
+def _turned(frame: CaptureFrame, world_from_capture: Array) -> tuple[Array, Array]:
+    """World from segment of every row (n, 3, 3), and which of them are known (n,)."""
+    n = len(frame.positions)
+    if frame.orientations is None:
+        return np.zeros((n, 3, 3)), np.zeros(n, bool)
+    given = np.asarray(frame.orientations, float)
+    with np.errstate(invalid="ignore", over="ignore"):
+        known = np.abs(np.linalg.norm(given, axis=1) - 1.0) < UNIT  # false for NaN
+    return world_from_capture @ rotation_from_wxyz(np.where(known[:, None], given, (1.0, 0, 0, 0))), known
+
+
+def _share(value: float) -> float:
+    return min(max(value, 0.0), 1.0) if np.isfinite(value) else 0.0
+
+
+def _three(v: Array) -> Vec3:
+    return float(v[0]), float(v[1]), float(v[2])
+
+
+def _four(v: Array) -> Vec4:
+    return float(v[0]), float(v[1]), float(v[2]), float(v[3])

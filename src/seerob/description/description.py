@@ -1,0 +1,135 @@
+"""What every model reader returns, whatever the format: a tree of links in plain data.
+
+Robots from URDF, MJCF or the library and the digital human are the same kind of thing here;
+`seerob.model.model` turns it into MuJoCo bodies. Nothing in this file knows MuJoCo.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from seerob.core.errors import Problem
+from seerob.core.shapes.geometry import Mesh, Solid
+from seerob.core.snapshot import Finding, Origin
+from seerob.core.transforms import Array
+
+
+class JointKind(StrEnum):
+    """How a joint moves; one degree of freedom each."""
+
+    REVOLUTE = "revolute"
+    """About ``axis`` [rad], with or without limits (a continuous joint has none)."""
+    PRISMATIC = "prismatic"
+    """Along ``axis`` [m]."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number with where it comes from."""
+
+    value: float
+    origin: Origin
+    source: str
+    error: float = 0.0
+    """Relative uncertainty, of an estimate that has a bound; 0 when stated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mimic:
+    """``q = multiplier · q[joint] + offset``."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """One degree of freedom of a link relative to its parent."""
+
+    name: str
+    kind: JointKind
+    axis: Array
+    """Unit axis in the link's frame, shape (3,)."""
+    anchor: Array = field(default_factory=lambda: np.zeros(3))
+    """A point of the axis in the link's frame [m], shape (3,)."""
+    lower: float | None = None
+    """[rad or m]; None where there is no limit."""
+    upper: float | None = None
+    velocity: Quantity | None = None
+    """Largest speed [rad/s or m/s]; None when nobody stated one."""
+    effort: Quantity | None = None
+    """Largest torque or force [N·m or N]; None when nobody stated one."""
+    armature: Quantity | None = None
+    """Rotor inertia seen at the joint [kg·m² or kg]; None when nobody stated one."""
+    damping: float = 0.0
+    """[N·m·s/rad or N·s/m]"""
+    friction: float = 0.0
+    """Dry friction [N·m or N]."""
+    mimic: Mimic | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """Mass properties of a link in its own frame."""
+
+    mass: float
+    """[kg]"""
+    com: Array
+    """Centre of mass [m], shape (3,)."""
+    inertia: Array
+    """About the centre of mass, in the link's axes [kg·m²], shape (3, 3), symmetric."""
+    origin: Origin
+    source: str
+    error: float = 0.0
+    """Relative uncertainty of the mass, of an estimate from a mended shape; 0 when stated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """One rigid body."""
+
+    name: str
+    parent: str | None
+    """None for the root, which is fixed where the workstation puts it."""
+    parent_from_link: Array
+    """With every joint at 0, shape (4, 4)."""
+    joints: tuple[Joint, ...] = ()
+    """Several are applied in this order, each in the frame that the ones before it left."""
+    inertial: Inertial | None = None
+    """None: nobody gave one. Frames without shape or mass are such links too."""
+    refused_mass: str = ""
+    """Why what its file says of its mass cannot be used; empty where it can, or says nothing."""
+    impossible_mass: Problem | None = None
+    """What its file says of its mass that no body has, where that cannot be overlooked."""
+    visual: tuple[Mesh, ...] = ()
+    """For display, in the link's frame."""
+    solids: tuple[Solid, ...] = ()
+    """For distances and contacts, in the link's frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """A robot or a human: links in order, each after its parent."""
+
+    name: str
+    links: tuple[Link, ...]
+    tip: str
+    """Link that a tool is mounted on, and the default point of interest."""
+    source: str
+    """File, library entry and revision it was read from."""
+    findings: tuple[Finding, ...] = ()
+    """Everything that was repaired, guessed, dropped or is implausible."""
+    files: dict[str, bytes] = field(default_factory=dict)
+    """Every file that was read (name → content), for hashes and for recordings that travel."""
+
+    def joints(self) -> tuple[Joint, ...]:
+        """Joints that can be commanded, in order; those that mimic another are not among them."""
+        return tuple(j for link in self.links for j in link.joints if j.mimic is None)
+
+    def link(self, name: str) -> Link:
+        """The link of that name; KeyError when there is none."""
+        return {link.name: link for link in self.links}[name]

@@ -1,0 +1,300 @@
+"""URDF in: every link and joint kept, every number checked, every mistake reported at once.
+
+Not MuJoCo's own reader, which drops names of fixed links, the root's inertia, speed limits and
+visuals, turns mimic joints into soft constraints and invents masses from volumes.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from seerob.core.errors import InputError, Problem, suggestion
+from seerob.core.snapshot import Origin
+from seerob.core.transforms import Array
+from seerob.description import lint
+from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Mimic, Quantity
+from seerob.description.formats.mimic import flattened
+from seerob.description.formats.resolve import Resolver
+from seerob.description.formats.tree import in_order
+from seerob.description.formats.urdf_geometry import Shapes
+from seerob.description.xml_values import Reader, parse_xml
+
+KINDS = {"revolute": JointKind.REVOLUTE, "continuous": JointKind.REVOLUTE, "prismatic": JointKind.PRISMATIC}
+
+ONCE = {
+    "link": ("inertial",),
+    "inertial": ("origin", "mass", "inertia"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
+}
+"""What a link, its mass properties or a joint has one of."""
+
+
+def from_text(content: bytes, *, resolver: Resolver, name: str = "robot") -> Description:
+    """A robot from the text of a URDF file.
+
+    Args:
+        content: The text.
+        resolver: Finds the meshes it names.
+        name: Name of the robot; findings speak of ``name/link``.
+
+    Raises:
+        InputError: Every mistake in the file at once.
+    """
+    reader = Reader(resolver.file, name)
+    for remark in resolver.remarks:
+        reader.finding("assumed", "", remark)
+    root = parse_xml(content, resolver.file)
+    if root.tag != "robot":
+        raise InputError.at(
+            resolver.file, "", f"the root element is <{root.tag}>", "a URDF starts with <robot>"
+        )
+    _refuse_xacro(reader, root)
+    links, joints = _named(reader, root, "link"), _named(reader, root, "joint")
+    if not links:
+        reader.problem("", "has no <link>", "a robot has at least one")
+    parents = _parents(reader, links, joints)
+    order = in_order(reader, tuple(links), {child: parent for child, (parent, _) in parents.items()})
+    _refuse_repeated(reader, links, joints)
+    reader.raise_problems()
+
+    geometry = Shapes(reader, resolver)
+    geometry.read_colors(root)
+    made = [_link(reader, geometry, link, links[link], parents.get(link), joints) for link in order]
+    reader.raise_problems()
+    if any(joint.find("safety_controller") is not None for joint in joints.values()):
+        reader.finding(
+            "note", "", "safety_controller of joints ignored: its limits are those of one controller"
+        )
+    description = Description(
+        name=name,
+        links=flattened(reader, tuple(made)),
+        tip=lint.guessed_tip(made),
+        source=resolver.file,
+        files={Path(resolver.file).name: content, **geometry.files},
+    )
+    reader.raise_problems()
+    return lint.checked(description, reader)
+
+
+def _refuse_xacro(reader: Reader, root: Element) -> None:
+    for element in root.iter():
+        tag = str(element.tag)
+        if "xacro" in tag.partition("}")[0] and "}" in tag:
+            what = f"holds <xacro:{tag.rpartition('}')[2]}>"
+            reader.problem("", what, "expand it, or name the file .xacro so that it is expanded here")
+            break
+        for attribute, value in element.attrib.items():
+            if "${" in value or "$(" in value:
+                key = f"{tag}[{element.get('name', '')}].{attribute}"
+                remedy = "expand it with xacro, or name the file .xacro so that it is expanded here"
+                reader.problem(key, f"holds the unresolved expression {value[:80]!r}", remedy)
+    reader.raise_problems()
+
+
+def _named(reader: Reader, root: Element, tag: str) -> dict[str, Element]:
+    elements = root.findall(tag)
+    for i, element in enumerate(elements):
+        if not element.get("name"):
+            reader.problem(f"{tag}[{i}]", "has no name", "give it one that no other carries")
+    for repeated, count in Counter(e.get("name") for e in elements if e.get("name")).items():
+        if count > 1:
+            reader.problem(f"{tag}[{repeated}]", f"{count} {tag}s carry this name", "rename all but one")
+    return {e.attrib["name"]: e for e in elements if e.get("name")}
+
+
+def _refuse_repeated(reader: Reader, links: dict[str, Element], joints: dict[str, Element]) -> None:
+    """Of what a link or a joint has one of, two say two things: neither is taken for the other."""
+    every = [(f"joint[{name}]", joint, ONCE["joint"]) for name, joint in joints.items()]
+    for name, link in links.items():
+        every.append((f"link[{name}]", link, ONCE["link"]))
+        every += [(f"link[{name}].inertial", one, ONCE["inertial"]) for one in link.findall("inertial")]
+    for key, element, tags in every:
+        for tag in tags:
+            count = len(element.findall(tag))
+            if count > 1:
+                reader.problem(f"{key}.{tag}", f"is there {count} times", "keep the one that holds")
+
+
+def _parents(
+    reader: Reader, links: dict[str, Element], joints: dict[str, Element]
+) -> dict[str, tuple[str, str]]:
+    """Child link → (parent link, joint)."""
+    parents: dict[str, tuple[str, str]] = {}
+    for joint, element in joints.items():
+        ends = []
+        for tag in ("parent", "child"):
+            end = element.find(tag)
+            link = None if end is None else end.get("link")
+            if link not in links:
+                what = "is missing" if link is None else f"no link named {link!r}"
+                reader.problem(f"joint[{joint}].{tag}", what, suggestion(link or "", links))
+            ends.append(link)
+        parent, child = ends
+        if parent is None or child is None:
+            continue
+        if child in parents:
+            what = f"{child!r} already hangs on joint {parents[child][1]!r}"
+            reader.problem(f"joint[{joint}].child", what, "a link has one parent; loops cannot be read")
+            continue
+        parents[child] = (parent, joint)
+    return parents
+
+
+def _link(
+    reader: Reader,
+    geometry: Shapes,
+    name: str,
+    element: Element,
+    parent: tuple[str, str] | None,
+    joints: dict[str, Element],
+) -> Link:
+    parent_from_link: Array = np.eye(4)
+    joint: tuple[Joint, ...] = ()
+    if parent is not None:
+        parent_from_link = reader.origin(joints[parent[1]], f"joint[{parent[1]}]")
+        joint = _joint(reader, parent[1], joints[parent[1]])
+    visual = geometry.visual(element, name)
+    tag = "collision" if element.find("collision") is not None else "visual"
+    if tag == "visual" and visual:
+        reader.finding(
+            "note", name, "no collision shape in the file: distances and contacts use the visual one"
+        )
+    solids = geometry.solids(element, name, tag)
+    inertial, refused, impossible = _inertial(
+        reader, name, element, moves=bool(joint), body=bool(joint or visual or solids)
+    )
+    return Link(
+        name=name,
+        parent=parent[0] if parent else None,
+        parent_from_link=parent_from_link,
+        joints=joint,
+        inertial=inertial,
+        refused_mass=refused,
+        impossible_mass=impossible,
+        visual=visual,
+        solids=solids,
+    )
+
+
+def _joint(reader: Reader, name: str, element: Element) -> tuple[Joint, ...]:
+    key, kind = f"joint[{name}]", element.get("type", "")
+    if kind == "fixed":
+        if element.find("mimic") is not None:
+            reader.finding("note", name, "a fixed joint that mimics another: mimic ignored")
+        return ()
+    if kind in {"floating", "planar"}:
+        remedy = "a joint has one degree of freedom: chain several, or place the robot with base"
+        reader.problem(f"{key}.type", f"is {kind!r}", remedy)
+        return ()
+    if kind not in KINDS:
+        known = (*KINDS, "fixed")
+        reader.problem(f"{key}.type", f"is {kind!r}" if kind else "is missing", suggestion(kind, known))
+        return ()
+    axis = reader.numbers(element.find("axis"), "xyz", f"{key}.axis", (1.0, 0.0, 0.0))
+    length = float(np.linalg.norm(axis))
+    if length < 1e-9:
+        reader.problem(f"{key}.axis", f"is {axis.tolist()}", "must not be zero")
+        return ()
+    if abs(length - 1) > 1e-4:
+        reader.finding("note", name, f"axis of length {length:.6g} made a unit vector")
+    lower, upper = _range(reader, name, element, kind)
+    damping, friction = (
+        _not_negative(reader, element, attribute, key) for attribute in ("damping", "friction")
+    )
+    return (
+        Joint(
+            name=name,
+            kind=KINDS[kind],
+            axis=axis / length,
+            lower=lower,
+            upper=upper,
+            velocity=_limit(reader, name, element, "velocity"),
+            effort=_limit(reader, name, element, "effort"),
+            damping=damping,
+            friction=friction,
+            mimic=_mimic(reader, element, key),
+        ),
+    )
+
+
+def _range(reader: Reader, name: str, element: Element, kind: str) -> tuple[float | None, float | None]:
+    key, limit = f"joint[{name}].limit", element.find("limit")
+    if kind == "continuous":
+        return None, None
+    if limit is None or (limit.get("lower") is None and limit.get("upper") is None):
+        reader.finding("warning", name, f"no range given for a {kind} joint: taken as without limits")
+        return None, None
+    # URDF: an end that is not written is 0.
+    lower, upper = (float(reader.numbers(limit, end, key, (0.0,))[0]) for end in ("lower", "upper"))
+    if lower > upper:
+        reader.problem(key, f"lower {lower:g} is greater than upper {upper:g}", "swap them or correct them")
+    elif lower == upper:
+        reader.finding("warning", name, f"lower and upper are both {lower:g}: the joint cannot move")
+    return lower, upper
+
+
+def _limit(reader: Reader, name: str, element: Element, which: str) -> Quantity | None:
+    limit = element.find("limit")
+    value = None if limit is None else reader.number(limit, which, f"joint[{name}].limit")
+    quantity, text = lint.plausible_limit(which, value)
+    if text:
+        reader.finding("warning", name, text)
+    return None if quantity is None else Quantity(quantity, Origin.STATED, f"{reader.file}: joint {name}")
+
+
+def _not_negative(reader: Reader, element: Element, attribute: str, key: str) -> float:
+    value = float(reader.numbers(element.find("dynamics"), attribute, f"{key}.dynamics", (0.0,))[0])
+    if value < 0:
+        reader.problem(f"{key}.dynamics.{attribute}", f"is {value:g}", "must be at least 0")
+        return 0.0
+    return value
+
+
+def _mimic(reader: Reader, element: Element, key: str) -> Mimic | None:
+    mimic = element.find("mimic")
+    if mimic is None:
+        return None
+    multiplier = float(reader.numbers(mimic, "multiplier", f"{key}.mimic", (1.0,))[0])
+    offset = float(reader.numbers(mimic, "offset", f"{key}.mimic", (0.0,))[0])
+    return Mimic(mimic.get("joint", ""), multiplier, offset)
+
+
+def _inertial(
+    reader: Reader, name: str, link: Element, *, moves: bool, body: bool
+) -> tuple[Inertial | None, str, Problem | None]:
+    """Mass properties that can be used, why they cannot, and what is wrong with a mass that no body has."""
+    element, key = link.find("inertial"), f"link[{name}].inertial"
+    if element is None:
+        return None, "", None
+    before = len(reader.problems)
+    link_from_inertial = reader.origin(element, key)
+    mass, inertia = element.find("mass"), element.find("inertia")
+    if mass is None or mass.get("value") is None:
+        reader.finding("warning", name, "inertial without a mass: unknown")
+        return None, "inertial without a mass", None
+    kilograms = float(reader.numbers(mass, "value", f"{key}.mass", (0.0,))[0])
+    names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    xx, yy, zz, xy, xz, yz = (float(reader.numbers(inertia, n, f"{key}.inertia", (0.0,))[0]) for n in names)
+    if kilograms < 0:
+        reader.problem(f"{key}.mass.value", f"is {kilograms:g} kg", "a mass is greater than 0")
+    if len(reader.problems) > before:
+        return None, "", None
+    rotation = link_from_inertial[:3, :3]
+    matrix = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
+    made = Inertial(
+        mass=kilograms,
+        com=link_from_inertial[:3, 3],
+        inertia=0.5 * (matrix + matrix.T),
+        origin=Origin.STATED,
+        source=f"{reader.file}: link {name}",
+    )
+    kept, level, text = lint.plausible_inertial(made, body=body)
+    if text:
+        reader.finding(level, name, text)
+    # Of 0 kg without an inertia the file says no more than of one without <inertial>.
+    refused = "" if kept is not None or (kilograms <= lint.NOTHING and not matrix.any()) else text
+    return kept, refused, lint.no_mass(kilograms, file=reader.file, key=f"{key}.mass.value", moves=moves)

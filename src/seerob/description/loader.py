@@ -1,0 +1,93 @@
+"""One loader for every robot: the library, a file of an installed package, or a path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from seerob.core.errors import InputError, suggestion
+from seerob.description.description import Description
+from seerob.description.formats import mjcf, urdf
+from seerob.description.formats.resolve import Resolver, as_written_or_in_other_case, of_distribution
+from seerob.description.formats.xacro_files import expanded
+from seerob.description.robots import library
+from seerob.description.robots.maker_geometry import with_geometry_of
+from seerob.description.xml_values import MAX_BYTES, parse_xml
+
+
+def load_robot(
+    model: str,
+    *,
+    folder: Path,
+    packages: Mapping[str, str] | None = None,
+    meshes: str | None = None,
+    arguments: Mapping[str, str] | None = None,
+    name: str = "robot",
+) -> Description:
+    """A robot, read, repaired where it can be, and checked.
+
+    Args:
+        model: ``library:ur10``; ``package:<distribution>/<path in it>``, a file of an installed
+            Python distribution; or a path to a URDF, xacro or MJCF file.
+        folder: What relative paths are relative to: the folder of the workstation file.
+        packages: Folder of each ROS package that ``package://`` names.
+        meshes: A description (as ``model``) whose geometry replaces the library's envelope.
+        arguments: Values of the arguments of a xacro file.
+        name: Name of the robot; findings speak of ``name/link``.
+
+    Raises:
+        InputError: The file is missing, not a robot, or wrong beyond repair; all mistakes at once.
+        UnknownName: The library has no such robot.
+    """
+    if model.startswith("library:"):
+        description = library.load(model.removeprefix("library:"), name=name)
+    else:
+        description = _from_file(model, folder, packages or {}, arguments or {}, name)
+        # Numba is imported only where a file brings shapes of its own.
+        from seerob.description.shapes.protrusion import with_protrusions
+
+        description = with_protrusions(description)
+    if meshes is None:
+        return description
+    maker = load_robot(meshes, folder=folder, packages=packages, name=name)
+    return with_geometry_of(description, maker)
+
+
+def _from_file(
+    model: str, folder: Path, packages: Mapping[str, str], arguments: Mapping[str, str], name: str
+) -> Description:
+    path = _path(model, folder)
+    roots = {package: folder / root for package, root in packages.items()}
+    resolver = Resolver(model, path.parent, roots)
+    if path.suffix.lower() == ".xacro":
+        text, files = expanded(path, resolver, arguments)
+        robot = urdf.from_text(text, resolver=resolver, name=name)
+        return replace(robot, files={**robot.files, **files})
+    if path.suffix.lower() not in {".urdf", ".xml", ".mjcf"}:
+        readable = ".urdf, .xacro and .xml (URDF or MJCF) are read"
+        raise InputError.at(model, "", f"{path.suffix or 'no ending'!r} is not a robot description", readable)
+    if path.stat().st_size > MAX_BYTES:
+        raise InputError.at(model, "", f"has {path.stat().st_size} bytes", f"at most {MAX_BYTES} are read")
+    content = path.read_bytes()
+    root = parse_xml(content, str(path)).tag
+    if root == "robot":
+        return urdf.from_text(content, resolver=resolver, name=name)
+    if root == "mujoco":
+        return mjcf.read_mjcf(path, resolver=resolver, name=name)
+    raise InputError.at(
+        model, "", f"the root element is <{root}>", "<robot> (URDF) or <mujoco> (MJCF) is expected"
+    )
+
+
+def _path(model: str, folder: Path) -> Path:
+    if model.startswith("package:") and not model.startswith("package://"):
+        return of_distribution(model.removeprefix("package:"))
+    path = folder / model
+    if path.is_file():
+        return path
+    found = as_written_or_in_other_case(path)
+    if found is None:
+        hint = suggestion(model, [f"library:{known}" for known in library.names()])
+        raise InputError.at(model, "", "is a folder" if path.is_dir() else f"no such file {path}", hint)
+    raise InputError.at(model, "", f"no such file {path}", f"upper and lower case differ from {found.name}")

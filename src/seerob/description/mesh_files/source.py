@@ -1,0 +1,107 @@
+"""What every mesh reader gets and gives: bounded bytes in, raw triangles out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NoReturn
+from urllib.parse import unquote, urlsplit
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.errors import InputError, SeerobError
+from seerob.core.snapshot import Finding
+from seerob.core.transforms import Array
+
+Color = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class RawMesh:
+    """One mesh as the file has it: its own unit and axes, instance transforms already applied."""
+
+    name: str
+    """Path in the file's scene graph, joined with ``/``; empty when the file names nothing."""
+    vertices: Array
+    """Shape (n, 3), in the file's unit."""
+    faces: NDArray[np.int64]
+    """Shape (m, 3)."""
+    color: Color | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RawFile:
+    """What a reader found: meshes and what the file itself says of its unit and its axes."""
+
+    meshes: tuple[RawMesh, ...]
+    meters: float | None = None
+    """Metres per unit of the file; None when the format or the file does not say."""
+    up: str | None = None
+    """``x``, ``y`` or ``z``; None when the format does not say."""
+
+
+@dataclass(eq=False)
+class MeshSource:
+    """A mesh file's bytes, the files beside it that it names, and what was noticed on the way."""
+
+    path: Path
+    data: bytes
+    max_bytes: int
+    max_faces: int
+    files: dict[str, bytes] = field(default_factory=dict)
+    findings: list[Finding] = field(default_factory=list)
+
+    def fail(self, what: str, remedy: str = "", key: str = "") -> NoReturn:
+        """Raise the `InputError` that names this file."""
+        raise InputError.at(self.path, key, what, remedy)
+
+    def note(self, text: str, *, level: str = "note") -> None:
+        """Remember something the reader of a result must know."""
+        self.findings.append(Finding(level=level, subject=self.path.name, text=text))
+
+    def beside(self, uri: str) -> bytes | None:
+        """Content of a file that this one names, or None, with a finding, when it is not there.
+
+        Only files in the mesh file's own folder, or below, are read; nothing is fetched.
+
+        Raises:
+            InputError: for a URL, or a path that leaves the folder.
+        """
+        name = unquote(uri.strip()).replace("\\", "/")
+        split = urlsplit(name)
+        if len(split.scheme) > 1 and "://" in name:
+            self.fail(f"refers to {uri[:200]!r}: nothing is fetched", "put the file beside it")
+        folder = self.path.resolve().parent
+        try:
+            target = (folder / name).resolve()
+            inside = target.is_relative_to(folder)
+        except (ValueError, OSError):
+            inside = False
+        if not inside:
+            self.fail(f"refers to {uri[:200]!r}, outside its own folder", "copy that file beside this one")
+        if not target.is_file():
+            self.note(f"refers to {uri[:200]!r}, which is not there", level="warning")
+            return None
+        size = target.stat().st_size + sum(map(len, self.files.values()))
+        if size > self.max_bytes:
+            self.fail(f"with {name!r} it is larger than {self.max_bytes} bytes", "raise max_bytes")
+        self.files[target.relative_to(folder).as_posix()] = content = target.read_bytes()
+        return content
+
+    @contextmanager
+    def parsing(self, what: str) -> Iterator[None]:
+        """Turn whatever a third-party parser throws at a broken file into one `InputError`."""
+        try:
+            yield
+        except (SeerobError, KeyboardInterrupt, SystemExit):
+            raise
+        except MemoryError:
+            self.fail(f"{what}: it asks for more memory than there is")
+        except RecursionError:
+            self.fail(f"{what}: it is nested too deeply")
+        except Exception as error:
+            detail = f"{type(error).__name__}: {error}".splitlines()[0][:200]
+            self.fail(f"is not a readable {what} ({detail})", "export it again")

@@ -1,0 +1,85 @@
+"""A table of limits as the inputs of a `Basis`: every figure with edition, clause and confidence."""
+
+from __future__ import annotations
+
+from seerob.core.snapshot import Input, Origin
+from seerob.description.norms.body_limits import BodyLimits, Figure
+
+_ORIGIN = {"M": Origin.ESTIMATED, "D": Origin.COMPUTED, "own": Origin.GIVEN}
+
+
+def table_input(limits: BodyLimits, edition: str) -> tuple[Input, tuple[str, ...]]:
+    """The table itself, and what is doubtful about it.
+
+    Args:
+        limits: The table.
+        edition: Of the norm that the workstation file asks for.
+    """
+    label = f"{limits.edition}; {limits.title}"
+    doubts: tuple[str, ...] = ()
+    if edition != limits.edition:
+        label += f"; used for {edition}"
+        doubts = (
+            f"{edition}: whether any figure of its Annex M differs is not known row by row; "
+            f"the figures are those of {limits.edition}",
+        )
+    if limits.reviewed_by:
+        label += f"; figures outside the usual ranges: {limits.reviewed_by}"
+    return Input(name="limits", value=limits.file, origin=Origin.STATED, source=label), doubts
+
+
+def excluded_input(region: str) -> Input:
+    """A body region that the workstation file keeps from contact."""
+    source = "workstation file; by measures that are not evaluated here"
+    return Input(name=f"{region}: kept from contact", origin=Origin.GIVEN, source=source)
+
+
+def limit_inputs(limits: BodyLimits, *, own: bool, multiplier: float | None = None) -> tuple[Input, ...]:
+    """Every figure of a table.
+
+    Args:
+        limits: The table.
+        own: Whether it is the user's own file.
+        multiplier: Of the transient limits, where it is lower than the table's.
+    """
+    found = []
+    for region in limits.regions.values():
+        if not region.permitted:
+            source = region.permission_source
+            value = "contact not permitted"
+            found.append(Input(name=region.name, value=value, origin=_origin(None, own=own), source=source))
+            continue
+        figures = {
+            "F_s": region.force,
+            "transient multiplier": region.multiplier,
+            "k": region.stiffness,
+            "m_H": region.mass,
+            "transient energy": region.energy,
+            **{f"p_s {area.name}": area.pressure for area in region.areas},
+        }
+        for name, figure in figures.items():
+            if figure is None:
+                continue
+            if name == "transient multiplier" and multiplier is not None and multiplier < figure.value:
+                source = f"workstation file, instead of {figure.value:g}: {figure.source}"
+                given = Input(
+                    name=f"{region.name}: {name}", value=multiplier, origin=Origin.GIVEN, source=source
+                )
+                found.append(given)
+            else:
+                found.append(
+                    Input(
+                        name=f"{region.name}: {name}",
+                        value=figure.value,
+                        unit=figure.unit,
+                        origin=_origin(figure, own=own),
+                        source=figure.source,
+                    )
+                )
+    return tuple(found)
+
+
+def _origin(figure: Figure | None, *, own: bool) -> Origin:
+    if own:
+        return Origin.GIVEN
+    return Origin.STATED if figure is None else _ORIGIN.get(figure.confidence, Origin.STATED)

@@ -1,0 +1,1 @@
+"""The robot library, and what is known of one very robot."""

@@ -1,0 +1,1 @@
+"""Meshes as solids: checked, mended, measured, simplified, written."""

@@ -1,0 +1,246 @@
+"""Mass, centre of mass and inertia from shape and uniform density, with method and error stated.
+
+A closed mesh is integrated exactly; an inverted one is turned; an open one is mended, flooded or
+wrapped in its hull, and the result says so with a bound; what has no volume is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from seerob.core.errors import InputError
+from seerob.core.shapes.geometry import Mesh
+from seerob.core.snapshot import Finding, Origin
+from seerob.description.description import Inertial
+from seerob.description.shapes.detail import from_manifold, manifold
+from seerob.description.shapes.mesh_bodies import bodies, flipped, is_closed, joined, joined_unmerged, outward
+from seerob.description.shapes.mesh_mending import Mended, mended, one_sided
+from seerob.description.shapes.moments import (
+    Moments,
+    combined,
+    of_capsule,
+    of_closed_mesh,
+    of_dilated_rectangle,
+    of_solid,
+    signed_volume,
+)
+from seerob.description.shapes.voxel_fill import voxel_fill
+
+__all__ = [
+    "Moments",
+    "combined",
+    "from_shape",
+    "of_capsule",
+    "of_closed_mesh",
+    "of_dilated_rectangle",
+    "of_solid",
+]
+
+WORST = 0.5
+"""Largest relative error of a volume that a mass may be computed from."""
+PATCHED = 0.2
+"""Largest share of the surface that may have been missing before mending stops being credible."""
+
+
+class _Estimate(NamedTuple):
+    moments: Moments
+    method: str
+    error: float
+    notes: tuple[str, ...] = ()
+    provided: str = ""
+    """What the error bound rests on."""
+
+
+def from_shape(
+    meshes: Sequence[Mesh],
+    *,
+    density: float | None = None,
+    mass: float | None = None,
+    subject: str = "mass properties",
+) -> tuple[Inertial, tuple[Finding, ...]]:
+    """Mass properties of a part of uniform density.
+
+    Args:
+        meshes: Its surface, in the part's frame [m]; several are taken together.
+        density: Mass per volume [kg/m³]; the mass follows from it.
+        mass: Mass [kg]; the inertia is scaled to it. Exactly one of the two.
+        subject: Full name of the part, for findings and errors.
+
+    Returns:
+        The mass properties, whose ``error`` bounds the relative error of the mass (0 for a closed mesh
+        and for a given mass), and what was noticed.
+
+    Raises:
+        InputError: neither or both are given, or not positive; there is no mesh; or no volume can be
+            had from it within `WORST`.
+    """
+    name = "density" if mass is None else "mass"
+    given = density if mass is None else mass
+    if given is None or (density is not None and mass is not None):
+        what = "neither mass nor density is given" if given is None else "both mass and density are given"
+        raise InputError.at(subject, "mass", what, "give one of them")
+    if not (np.isfinite(given) and given > 0):
+        raise InputError.at(subject, name, f"{given!r} is not a positive number")
+    filled = tuple(m for m in meshes if len(m.faces))
+    if not filled:
+        raise InputError.at(subject, name, "there is no mesh to take mass properties from", "give inertia")
+    mesh, dropped = joined(filled)
+    if not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
+        raise InputError.at(subject, name, "the mesh has no area or is not finite", "export it again")
+    estimate = _estimate(mesh, subject, strict=mass is None)
+    moments, error = estimate.moments, estimate.error
+    if mass is None:
+        source = f"{given:g} kg/m³ × volume of {estimate.method}"
+        inertial = moments.inertial(
+            mass=given * moments.volume, origin=Origin.ESTIMATED, source=source, error=error
+        )
+    else:
+        source = f"mass given; centre and inertia from uniform density over {estimate.method}"
+        inertial = moments.inertial(mass=mass, origin=Origin.GIVEN, source=source)
+    notes = ((dropped,) if dropped else ()) + estimate.notes
+    findings = [Finding(level="note", subject=subject, text=text) for text in notes]
+    if error > 0 or estimate.method != _EXACT:
+        figure = f"mass {inertial.mass:.4g} kg" if mass is None else "centre of mass and inertia"
+        bound = f"±{100 * error:.{0 if error > 0.1 else 2}f} %" if error > 1e-4 else "exact within 0.01 %"
+        text = f"{figure} from {estimate.method}, volume {bound}{estimate.provided}"
+        findings.append(Finding(level="warning" if error > 0.01 else "note", subject=subject, text=text))
+    return inertial, tuple(findings)
+
+
+_EXACT = "the closed mesh"
+_NOTHING = Moments(0.0, np.zeros(3), np.zeros((3, 3)))
+
+
+def _estimate(mesh: Mesh, subject: str, *, strict: bool) -> _Estimate:
+    """The first of: exact integral, mended mesh, voxels, hull, whose bound is good enough."""
+    hull = _hull(mesh)
+    if hull is None:
+        raise InputError.at(
+            subject, "mass", "the mesh is flat: it encloses no volume", "give mass, com and inertia by hand"
+        )
+    missing = 0.0
+    single = one_sided(mesh)
+    if is_closed(mesh) and not _is_sheet(mesh, hull.volume):
+        first = _of_bodies(mesh, _EXACT, ())
+    elif is_closed(single) and not _is_sheet(single, hull.volume):
+        first = _of_bodies(single, _EXACT, ("its triangles are double-sided: one side was used",))
+    else:
+        patched = mended(single)
+        missing = patched.filled
+        first = _of_mended(patched)
+    credible = _is_credible(first, hull) and missing <= PATCHED
+    if credible and first.error <= WORST:
+        return first
+    flooded = voxel_fill(mesh)
+    if flooded is not None:
+        error = (flooded.high - flooded.low) / (flooded.high + flooded.low)
+        if error <= WORST:
+            return _Estimate(flooded.moments, "the mesh filled with voxels (open or tangled)", error)
+    # What is there bounds a hull from inside only while most of the surface is there.
+    inner = first.moments.volume if credible else 0.0
+    error = 1 - inner / hull.volume
+    if error <= WORST or not strict:
+        return _Estimate(hull, "the convex hull of the open mesh", error)
+    raise InputError.at(
+        subject,
+        "density",
+        f"the mesh is open and {100 * missing:.0f} % of a closed surface is missing: no volume within "
+        f"±{100 * WORST:.0f} %",
+        "give the mass, or close the mesh",
+    )
+
+
+def _is_sheet(mesh: Mesh, hull_volume: float) -> bool:
+    return sum(abs(signed_volume(b)) for b in bodies(mesh)) <= 1e-9 * hull_volume
+
+
+def _is_credible(estimate: _Estimate, hull: Moments) -> bool:
+    volume, inertia = estimate.moments.volume, estimate.moments.inertia
+    if not 1e-9 * hull.volume < volume <= hull.volume * (1 + 1e-9):
+        return False
+    a, b, c = np.linalg.eigvalsh(inertia)
+    return bool(a > 0 and a + b >= c * (1 - 1e-9))
+
+
+def _hull(mesh: Mesh) -> Moments | None:
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(mesh.vertices)
+    except (QhullError, ValueError):
+        return None
+    faces = hull.simplices.astype(np.int32)
+    a, b, c = np.moveaxis(mesh.vertices[faces], 1, 0)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    moments = of_closed_mesh(Mesh(mesh.vertices, faces))
+    size = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+    return moments if moments.volume > 1e-9 * size**3 else None
+
+
+def _of_mended(patched: Mended) -> _Estimate:
+    if not np.isfinite(patched.slack):
+        return _Estimate(_NOTHING, "a heap of triangles", np.inf)
+    method = "the mended mesh (" + ", ".join(patched.steps) + ")"
+    estimate = _of_bodies(patched.mesh, method, ())
+    volume = estimate.moments.volume
+    error = estimate.error + patched.slack / volume if volume > 0 else np.inf
+    provided = ", if the holes' true surface lies in the hull of their rims" if patched.filled else ""
+    return estimate._replace(error=float(error), provided=provided)
+
+
+def _of_bodies(mesh: Mesh, method: str, notes: tuple[str, ...]) -> _Estimate:
+    """Closed bodies together: outer surfaces turned outward, overlaps counted once."""
+    parts, turned = outward(bodies(mesh))
+    if turned:
+        notes += (f"{turned} of {len(parts)} bodies were inside out and were turned",)
+    volumes = [signed_volume(p) for p in parts]
+    solid = [p for p, v in zip(parts, volumes, strict=True) if v > 0]
+    total = sum(volumes)
+    if not solid or not total > 0:
+        return _Estimate(_NOTHING, method, np.inf, notes)
+    whole = of_closed_mesh(joined_unmerged(parts))
+    if not _boxes_meet(solid):
+        return _Estimate(whole, method, 0.0, notes)
+    union = _union(parts, volumes)
+    if union is None:
+        error = 1 - max(volumes) / sum(v for v in volumes if v > 0)
+        return _Estimate(whole, method + " (overlaps of its bodies not resolved)", error, notes)
+    once = of_closed_mesh(union)
+    if once.volume < whole.volume * (1 - 1e-9):
+        notes += (f"its {len(parts)} bodies overlap; the {whole.volume - once.volume:.3g} m³ count once",)
+        return _Estimate(once, method, 0.0, notes)
+    return _Estimate(whole, method, 0.0, notes)
+
+
+def _boxes_meet(parts: Sequence[Mesh]) -> bool:
+    low = np.array([p.vertices.min(axis=0) for p in parts])
+    high = np.array([p.vertices.max(axis=0) for p in parts])
+    order = np.argsort(low[:, 0])
+    low, high = low[order], high[order]
+    for i in range(len(parts) - 1):
+        later = slice(i + 1, int(np.searchsorted(low[:, 0], high[i, 0])))
+        if ((low[later] < high[i]) & (low[i] < high[later])).all(axis=1).any():
+            return True
+    return False
+
+
+def _union(parts: Sequence[Mesh], volumes: Sequence[float]) -> Mesh | None:
+    import manifold3d
+
+    solids: list[Any] = []
+    cavities: list[Any] = []
+    for part, volume in zip(parts, volumes, strict=True):
+        body = manifold(part if volume > 0 else flipped(part))
+        if body is None:
+            return None
+        (solids if volume > 0 else cavities).append(body)
+    whole = manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add)
+    if cavities:
+        whole -= manifold3d.Manifold.batch_boolean(cavities, manifold3d.OpType.Add)
+    if whole.status() != manifold3d.Error.NoError or whole.is_empty():
+        return None
+    return from_manifold(whole)

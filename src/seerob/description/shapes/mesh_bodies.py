@@ -1,0 +1,122 @@
+"""Which bodies a mesh is made of, whether they are closed, and which of them lie in which."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.shapes.geometry import Mesh
+from seerob.core.transforms import Array
+from seerob.description.shapes.moments import signed_volume
+from seerob.description.shapes.tidy import tidied
+
+Indices = NDArray[np.int64]
+
+
+def joined(meshes: Sequence[Mesh]) -> tuple[Mesh, str]:
+    """All of them as one mesh, with equal vertices merged: a body split by colour closes again.
+
+    Returns:
+        The mesh, and what was dropped in words.
+    """
+    return tidied(joined_unmerged(meshes))
+
+
+def joined_unmerged(meshes: Sequence[Mesh]) -> Mesh:
+    """All of them as one mesh, vertex by vertex and triangle by triangle, in the first one's colour."""
+    offsets = np.cumsum([0, *(len(m.vertices) for m in meshes)])
+    faces = np.vstack([m.faces + o for m, o in zip(meshes, offsets, strict=False)])
+    return Mesh(np.vstack([m.vertices for m in meshes]), faces.astype(np.int32), meshes[0].color)
+
+
+def edge_balance(faces: NDArray[np.integer]) -> tuple[Indices, Indices, Indices]:
+    """Undirected edges (k, 2), how often each is passed upward minus downward, and by how many faces.
+
+    A mesh encloses a volume when the balance of every edge is 0, whether or not it is manifold.
+    """
+    directed = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    upward = directed[:, 0] < directed[:, 1]
+    low, high = directed.min(axis=1), directed.max(axis=1)
+    # One number per edge sorts much faster than two columns.
+    span = int(faces.max()) + 1 if len(faces) else 1
+    keys, inverse, uses = np.unique(low * span + high, return_inverse=True, return_counts=True)
+    balance = np.bincount(inverse.ravel(), np.where(upward, 1, -1), len(keys)).astype(np.int64)
+    return np.column_stack([keys // span, keys % span]), balance, uses.astype(np.int64)
+
+
+def is_closed(mesh: Mesh) -> bool:
+    """Whether every edge is passed as often one way as the other."""
+    return bool(len(mesh.faces)) and not edge_balance(mesh.faces)[1].any()
+
+
+def bodies(mesh: Mesh) -> tuple[Mesh, ...]:
+    """The parts of a mesh whose faces share edges, largest first."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = adjacent_faces(mesh.faces)
+    count = len(mesh.faces)
+    graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    number, label = connected_components(graph, directed=False)
+    if number == 1:
+        return (mesh,)
+    order = np.argsort(label, kind="stable")
+    groups = np.split(mesh.faces[order], np.flatnonzero(np.diff(label[order])) + 1)
+    parts = [_only(mesh, faces) for faces in groups]
+    return tuple(sorted(parts, key=lambda m: -float(np.prod(np.ptp(m.vertices, axis=0) + 1e-12))))
+
+
+def _only(mesh: Mesh, faces: NDArray[np.int32]) -> Mesh:
+    used, index = np.unique(faces, return_inverse=True)
+    return Mesh(mesh.vertices[used], index.reshape(-1, 3).astype(np.int32), mesh.color)
+
+
+def adjacent_faces(faces: NDArray[np.integer]) -> Indices:
+    """Pairs of faces that share an edge, each face with the next one around the edge, shape (k, 2)."""
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
+    key = edges[:, 0] * (int(faces.max()) + 1) + edges[:, 1]
+    order = np.argsort(key, kind="stable")
+    same = key[order][1:] == key[order][:-1]
+    return np.column_stack([order[:-1][same] // 3, order[1:][same] // 3])
+
+
+def winding_number(mesh: Mesh, point: Array) -> float:
+    """How often the mesh goes around a point (3,): 1 inside a closed mesh, 0 outside, by solid angles."""
+    corners = mesh.vertices[mesh.faces] - point
+    lengths = np.linalg.norm(corners, axis=2)
+    a, b, c = np.moveaxis(corners, 1, 0)
+    la, lb, lc = lengths.T
+    det = np.einsum("ij,ij->i", a, np.cross(b, c))
+    dots = [np.einsum("ij,ij->i", p, q) for p, q in ((a, b), (b, c), (c, a))]
+    below = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
+    return float(2 * np.arctan2(det, below).sum() / (4 * np.pi))
+
+
+def outward(parts: tuple[Mesh, ...]) -> tuple[tuple[Mesh, ...], int]:
+    """Closed bodies with their outer surfaces turned outward; inward ones inside another stay cavities.
+
+    Returns:
+        The bodies, and how many were turned.
+    """
+    low = np.array([m.vertices.min(axis=0) for m in parts])
+    high = np.array([m.vertices.max(axis=0) for m in parts])
+    turned = 0
+    result = []
+    for i, part in enumerate(parts):
+        root = i
+        # The parts are sorted, so the first one that holds this one is the outermost.
+        for j in np.flatnonzero(((low[:i] <= low[i]) & (high[i] <= high[:i])).all(axis=1)).tolist():
+            if abs(winding_number(parts[j], part.vertices[0])) > 0.5:
+                root = j
+                break
+        inward = signed_volume(parts[root]) < 0
+        turned += inward
+        result.append(flipped(part) if inward else part)
+    return tuple(result), turned
+
+
+def flipped(mesh: Mesh) -> Mesh:
+    """The mesh inside out."""
+    return Mesh(mesh.vertices, np.ascontiguousarray(mesh.faces[:, ::-1]), mesh.color)

@@ -1,0 +1,1 @@
+"""Sources, recorded and live: whoever says where robots, machines and people are."""

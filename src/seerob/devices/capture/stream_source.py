@@ -1,0 +1,241 @@
+"""Base of the sources that hear captured motion of a person while it happens."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import time
+from collections.abc import AsyncGenerator
+from typing import ClassVar
+
+import numpy as np
+from msgspec import field
+
+from seerob.core.quantities import Pose, Seconds
+from seerob.core.samples import BodyPoint, BodySample, Quality, Sample, SignalSample
+from seerob.core.snapshot import Finding
+from seerob.description.capture.calibration import Calibrated, CalibrationPose
+from seerob.description.capture.captured import CaptureFrame, Layout
+from seerob.description.capture.observing import Observer
+from seerob.description.description import Description
+from seerob.description.humans import manikin
+from seerob.devices.capture.options import (
+    Calibration,
+    CutOff,
+    Instant,
+    Mapped,
+    Weights,
+    calibrated,
+    lateness,
+    observer,
+    person,
+    placed_only,
+)
+from seerob.devices.live.listening import LiveSource, say_once
+from seerob.workstation.source import Target
+
+_log = logging.getLogger(__name__)
+
+MOST_CALIBRATION_FRAMES = 20_000
+SAME_PERSON = 0.5
+"""A person of another name who appears no farther away [m] from where one was lost is the same one."""
+
+
+class CaptureStream(LiveSource, frozen=True, kw_only=True):
+    """Base of a stream of captured motion: one module, one class, one generator `frames`."""
+
+    shares: ClassVar[bool] = True
+    captured: ClassVar[str] = "live"
+
+    human: str
+    """The person it drives; several devices may drive the same one."""
+    subject: str = ""
+    """Which person, as the device calls it; the first that is heard when not given."""
+    at: Pose = Pose()
+    """Where the device's world lies in the workstation (its origin, its z up)."""
+    latency: Instant = 0.0
+    """Time from the motion to the arrival of what the device says of it [s]."""
+    hold: Seconds = 0.5
+    """Age at which a bone that is no longer seen does not count any more [s]."""
+    smoothing: CutOff | None = None
+    """Cut-off frequency of a low-pass filter against the device's noise [Hz]; no filter when not given."""
+    weights: Weights = Weights()
+    """How much it counts beside other devices."""
+    convention: str = ""
+    """Whose names they are (``xsens``, ``azure_kinect`` …); what the device says, or found by the names."""
+    mapping: dict[str, str | Mapped] = field(default_factory=dict)
+    """Device's name → bone of ours, in place of the convention's; ``""`` for what shall not be used."""
+    calibration: Calibration = Calibration()
+    """How the mounting of the sensors is found; its time begins with the first frame."""
+
+    def target(self) -> str:
+        """The person."""
+        return self.human
+
+    def behind(self) -> float:
+        """Delay behind the world that it needs [s]; latency and filter come on top of the period."""
+        return super().behind() + (lateness(self) if self.delay is None else 0.0)
+
+    def frames(self) -> AsyncGenerator[tuple[Layout, CaptureFrame], None]:
+        """Connect, and yield every frame of every person until the connection ends.
+
+        The layout is the same object as long as the names are the same. A frame whose time is not finite
+        is taken as of its arrival.
+
+        Raises:
+            OSError: There is no connection, or no longer.
+            SeerobError: What the other end says cannot be understood.
+        """
+        raise NotImplementedError
+
+    async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
+        """Pulls on the bones of the person, as they arrive."""
+        description = _anybody() if target is None else person(target, self.human, self.name)
+        hearing = _Hearing(self, description)
+        async with contextlib.aclosing(self.frames()) as frames:
+            async for layout, frame in frames:
+                sample = hearing.take(layout, frame, time.monotonic())
+                if sample is not None:
+                    yield sample
+
+
+class _Hearing:
+    """One connection: the names that are bound, the person who is followed, the calibration."""
+
+    def __init__(self, source: CaptureStream, description: Description) -> None:
+        self._source, self._description = source, description
+        self._layout: Layout | None = None
+        self._observer: Observer | None = None
+        self._subject: str | None = source.subject or None
+        self._last_seen = -np.inf
+        self._last_place: np.ndarray | None = None
+        self._begun: float | None = None
+        self._window: list[CaptureFrame] = []
+        self._calibrated = source.calibration.pose is CalibrationPose.NONE
+
+    def take(self, layout: Layout, frame: CaptureFrame, now: float) -> BodySample | SignalSample | None:
+        """The sample of a frame that arrived at ``now`` [s]; None while there is nothing to say."""
+        bound = self._bind(layout)
+        if len(frame.positions) != len(layout.names):
+            return None
+        followed, changed = self._follows(frame, now)
+        if not followed:
+            return None
+        if not self._calibrated:
+            return self._calibrate(layout, frame, now)
+        points = bound.points(frame)
+        late = lateness(self._source)
+        return BodySample(
+            source=self._source.name,
+            target=self._source.human,
+            seq=0,
+            t=now - late,
+            t_device=frame.t if np.isfinite(frame.t) else None,
+            points=points,
+            subject=frame.subject,
+            latency=late,
+            hold=self._source.hold,
+            smoothing=self._source.smoothing or 0.0,
+            quality=_quality(points, changed),
+        )
+
+    def _bind(self, layout: Layout) -> Observer:
+        if self._observer is None or layout is not self._layout:
+            again = self._layout is not None and layout.names == self._layout.names
+            self._layout = layout
+            if self._observer is None or not again:
+                source = self._source
+                self._observer, findings = observer(
+                    source, layout, self._description, file=source.name or "stream"
+                )
+                _say(findings)
+                if self._calibrated:
+                    self._drop_unplaced()
+        return self._observer
+
+    def _drop_unplaced(self) -> None:
+        assert self._observer is not None  # bound before
+        remedy = 'a calibration with pose = "npose" finds out where'
+        self._observer, findings = placed_only(self._observer, self._source.human, remedy)
+        _say(findings)
+
+    def _follows(self, frame: CaptureFrame, now: float) -> tuple[bool, bool]:
+        """Whether the frame is of the person who is followed, and whether that has another name now."""
+        place = _middle(frame)
+        if self._subject is None or frame.subject == self._subject:
+            self._subject = frame.subject
+        elif (
+            self._source.subject
+            or now - self._last_seen < self._source.timeout
+            or (
+                self._last_place is None
+                or place is None
+                or np.linalg.norm(place - self._last_place) > SAME_PERSON
+            )
+        ):
+            return False, False
+        else:
+            _log.warning(
+                "%s: %r is taken for %r, who was lost there", self._source.name, frame.subject, self._subject
+            )
+            self._subject = frame.subject
+            self._note(place, now)
+            return True, True
+        self._note(place, now)
+        return True, False
+
+    def _note(self, place: np.ndarray | None, now: float) -> None:
+        if place is not None:
+            self._last_place, self._last_seen = place, now
+
+    def _calibrate(self, layout: Layout, frame: CaptureFrame, now: float) -> SignalSample | None:
+        """What a calibration found, when it has ended."""
+        wanted = self._source.calibration
+        self._begun = now if self._begun is None else self._begun
+        since = now - self._begun - wanted.start
+        if since < 0:
+            return None
+        if since <= wanted.duration and len(self._window) < MOST_CALIBRATION_FRAMES:
+            self._window.append(frame)
+            return None
+        assert self._observer is not None  # bound before
+        self._observer, found = calibrated(
+            self._source, self._window, layout, self._observer, self._description
+        )
+        _say(found.findings)
+        self._drop_unplaced()
+        self._window, self._calibrated = [], True
+        return SignalSample(source=self._source.name, seq=0, t=now, values=_residuals(found))
+
+
+def _residuals(found: Calibrated) -> dict[str, float | bool | str]:
+    """Per sensor how far it was from where it is expected [m] and how it is turned [rad], where known."""
+    values: dict[str, float | bool | str] = {"calibration heading [rad]": found.heading}
+    for r in found.residuals:
+        for what, value in (("off [m]", r.off), ("moved [m]", r.moved), ("turned [rad]", r.turn)):
+            if np.isfinite(value):
+                values[f"calibration {r.name} {what}"] = value
+    return values
+
+
+def _say(findings: tuple[Finding, ...]) -> None:
+    for finding in findings:
+        level = logging.WARNING if finding.level == "warning" else logging.INFO
+        say_once(_log, level, f"{finding.subject}: {finding.text}")
+
+
+def _quality(points: tuple[BodyPoint, ...], changed: bool) -> Quality:
+    if not any(point.position is not None or point.wxyz is not None for point in points):
+        return Quality.INVALID
+    return Quality.DEGRADED if changed else Quality.GOOD
+
+
+def _middle(frame: CaptureFrame) -> np.ndarray | None:
+    positions = np.asarray(frame.positions, float)
+    seen = positions[np.isfinite(positions).all(axis=1)]
+    return np.asarray(seen.mean(axis=0)) if len(seen) else None
+
+
+def _anybody() -> Description:
+    """Somebody of medium size, for looking at a stream that drives nobody."""
+    return manikin.build(name="anybody", stature=1.75, mass=75.0, sex="male")

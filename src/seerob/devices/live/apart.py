@@ -1,0 +1,230 @@
+"""A live source in a process of its own, seen from the one in which the twin computes.
+
+Python lets one thread of a process compute at a time. Beside a twin that computes, or another source that
+decodes, each packet would wait for them several times on the way from the socket to the mailbox; in a process
+of its own it waits for none, and the twin for no one who decodes. `seerob.devices.live.listening_process` is
+that process; what it hears lies in memory that both see (`seerob.devices.live.shared_mailbox`), and what it
+logs is logged here. Should it end, it is started again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from threading import Event, Lock, Thread
+from typing import IO, NamedTuple
+
+import msgspec
+
+from seerob.core.samples import Quality, Sample, SignalSample
+from seerob.devices.live.device_clock import Known
+from seerob.devices.live.listening import FIRST_PAUSE, LONGEST_PAUSE, STOP_WITHIN, LiveSource, because
+from seerob.devices.live.shared_mailbox import SharedMailbox, memory
+from seerob.workstation.source import Target
+
+_log = logging.getLogger(__name__)
+
+COMMAND = (sys.executable, "-P", "-m", "seerob.devices.live.listening_process")
+"""``-P``: the folder it is started in is none to take modules from."""
+BEGIN_WITHIN = 10.0
+"""How long a run waits until it listens [s]."""
+LONGEST_LINE = 1 << 20
+"""Of what it logs [byte]."""
+SPARE = 2.0
+"""Beyond the time in which listeners end [s]; then it is killed."""
+
+
+class Order(NamedTuple):
+    """What the other process is told at its start, pickled."""
+
+    path: list[str]
+    """Where modules are found: what follows may be of any."""
+    level: int
+    """Of the log."""
+    memory: int
+    """Descriptor of the mailbox's memory, inherited."""
+    again: bool
+    """Whether another one listened before."""
+    pair: bytes
+    """From `told`."""
+    known: Known | None = None
+    """What the one before knew of the device's clock."""
+
+
+class Said(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A line from the other process: a record of the log, or that it listens now."""
+
+    ready: bool = False
+    logger: str = ""
+    level: int = 0
+    text: str = ""
+    trace: str | None = None
+
+
+def told(source: LiveSource, target: Target | None) -> bytes | None:
+    """A source and what it drives, as another process can be told; None when only this one knows it."""
+    if os.name != "posix" or not sys.executable or getattr(sys, "frozen", False):
+        return None  # memory is inherited by its descriptor; a frozen program is no interpreter
+    if not type(source).apart or type(source).__module__ == "__main__":
+        return None
+    try:
+        return pickle.dumps((source, target))
+    except Exception:  # whatever stands in its way
+        return None
+
+
+class Apart:
+    """One source's process, its end and its beginning anew.
+
+    Args:
+        name: Of the source.
+        pair: It and what it drives, from `told`.
+    """
+
+    def __init__(self, name: str, pair: bytes) -> None:
+        self.name = name
+        self._pair = pair
+        self._box: SharedMailbox | None = None
+        self._known: Known | None = None
+        self._begun, self._stopping = Event(), Event()
+        self._lock = Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._listens = False
+        self._thread = Thread(target=self._keep, name=f"seerob-apart-{self.name}", daemon=True)
+
+    def start(self) -> None:
+        """Start it; returns at once."""
+        self._thread.start()
+
+    def wait(self) -> None:
+        """Until it listens, or cannot."""
+        if not self._begun.wait(BEGIN_WITHIN):
+            _log.warning("%s: its process did not begin to listen within %g s", self.name, BEGIN_WITHIN)
+
+    def take(self) -> tuple[Sample, ...]:
+        """What was heard since the last call, the newest of each."""
+        box = self._box
+        samples = () if box is None else box.take()
+        for sample in samples:
+            # What is late has the right instant all the same; after a step nobody knows.
+            sure = sample.quality in (Quality.GOOD, Quality.LATE)
+            if sure and sample.t_device is not None and not isinstance(sample, SignalSample):
+                self._known = Known(sample.t - sample.t_device, sample.t_device, sample.t)
+        return samples
+
+    def ask_to_stop(self) -> None:
+        """Ask it to end; returns at once."""
+        with self._lock:
+            self._stopping.set()
+            if self._process is None:
+                return
+            if self._listens and self._process.stdin is not None:
+                with contextlib.suppress(OSError):  # it has ended
+                    self._process.stdin.close()
+            else:  # it may be in the middle of being told, and has nothing yet to leave in order
+                self._process.terminate()
+
+    def join(self) -> None:
+        """Wait for its end."""
+        self._thread.join(STOP_WITHIN + SPARE)
+        if self._thread.is_alive():
+            with self._lock:
+                if self._process is not None:
+                    self._process.kill()
+            self._thread.join(SPARE)
+        self._box = None
+
+    def _keep(self) -> None:
+        pause, again = FIRST_PAUSE, False
+        while not self._stopping.is_set():
+            begun = time.monotonic()
+            try:
+                how = self._once(again)
+            except OSError as error:
+                how = because(error)
+            self._begun.set()
+            if self._stopping.is_set():
+                return
+            if time.monotonic() - begun > LONGEST_PAUSE:
+                pause = FIRST_PAUSE
+            _log.error("%s: the process that listened has ended (%s) and is started again", self.name, how)
+            again = True
+            self._stopping.wait(pause)
+            pause = min(2 * pause, LONGEST_PAUSE)
+
+    def _once(self, again: bool) -> str:
+        """Have it run from its start to its end; how it ended.
+
+        Raises:
+            OSError: It cannot be started.
+        """
+        file = memory()
+        try:
+            box = SharedMailbox(file)
+            with self._lock:
+                if self._stopping.is_set():
+                    return ""
+                process = self._process = _started(file)
+                self._listens = False
+        finally:
+            os.close(file)
+        self._box = box
+        with process:
+            level = logging.getLogger("seerob").getEffectiveLevel()
+            self._tell(process, Order(sys.path, level, file, again, self._pair, self._known))
+            if process.stdout is not None:
+                self._hear(process.stdout)
+            try:
+                process.wait(SPARE)
+            except subprocess.TimeoutExpired:  # nobody can hear it any more
+                process.kill()
+        code = process.returncode
+        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+
+    def _tell(self, process: subprocess.Popen[bytes], order: Order) -> None:
+        # What has ended reads nothing; that is found out by hearing nothing of it.
+        with contextlib.suppress(OSError):
+            if process.stdin is not None:
+                process.stdin.write(pickle.dumps(tuple(order)))
+                process.stdin.flush()
+
+    def _hear(self, said: IO[bytes]) -> None:
+        decoder = msgspec.json.Decoder(Said)
+        while line := said.readline(LONGEST_LINE):
+            try:
+                found = decoder.decode(line)
+            except msgspec.DecodeError:
+                _log.warning("the process that listens says what nobody understands: %.200r", line)
+                continue
+            if found.ready:
+                with self._lock:
+                    self._listens = True
+                self._begun.set()
+            else:
+                _log_again(found)
+
+
+def _started(file: int) -> subprocess.Popen[bytes]:
+    path = os.pathsep.join(entry for entry in sys.path if entry)
+    return subprocess.Popen(  # noqa: S603 - of our own
+        COMMAND,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": path},
+        pass_fds=(file,),
+        process_group=0,  # Ctrl-C is for the run, which asks it to end
+    )
+
+
+def _log_again(said: Said) -> None:
+    logger = logging.getLogger(said.logger)
+    if logger.isEnabledFor(said.level):
+        record = logger.makeRecord(said.logger, said.level, "", 0, "%s", (said.text,), None)
+        record.exc_text = said.trace
+        logger.handle(record)

@@ -1,0 +1,170 @@
+r"""Whether what one device says from sample to sample can be one motion: every sample, where it is heard.
+
+A run takes the newest sample of each tick; what came between is seen here only. Positions may not go
+farther than anybody could in the time between two stamps, and the velocities that a controller measures must
+be the derivative of the positions that it measures: over the last `SPAN`, no joint's way may differ from the
+integral of its velocity by more than noise, rounding and the lag of a filter explain.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+from seerob.core.samples import BodySample, JointSample, PoseSample, Sample, SignalSample
+from seerob.files.trajectories.checks import disagreement
+from seerob.workstation.source import Target
+
+SPAN = 0.5
+"""Over which ways and velocities are compared [s]: shorter than a motion of any program, longer than the lag
+of any filter."""
+ANCHORS = 10
+"""Instants of it that the newest sample is compared with."""
+NOISE = {"rad": 5e-3, "m": 1e-3}
+"""A difference of both that is not looked at [rad or m]: encoders of arms are a hundred times better, their
+velocities are noisy by up to 0.01 rad/s, which this is half a second of."""
+SHARE = 0.2
+"""Of the way: velocities that are rounded or filtered are off by a tenth, so is the trapezoidal rule at
+10 Hz."""
+LAG = 0.03
+"""By which a filter may delay velocities [s]: a low-pass of 5 Hz, lower than controllers have."""
+FASTEST = {"rad": 30.0, "m": 10.0}
+"""No joint is faster [rad/s or m/s]; as `seerob.twin.control.sample_values.LARGEST_SPEED`."""
+TIMES_LIMIT = 2.0
+"""Nor faster than so many times its speed limit, where that is known."""
+LOOSE = 0.05
+"""Jitter of arrivals [s]: where a device sends no time, samples may come so much closer together."""
+BODY_SPEED, BODY_SLACK = 10.0, 0.2
+"""Of a point of a person: faster than any hand at work [m/s], and noise of depth cameras [m]."""
+MANY = 0.5
+"""Share of the points of a person that do not jump together unless all of it is elsewhere."""
+SILENCE = 0.5
+"""After it what was before says nothing of now [s]."""
+
+
+class _Told(NamedTuple):
+    t: float
+    q: tuple[float, ...]
+    qd: tuple[float, ...]
+    way: tuple[float, ...]
+    """Integral of the velocity [rad or m]."""
+    length: tuple[float, ...]
+    """Integral of its magnitude."""
+
+
+class Contradictions:
+    """What one source says of one target, sample by sample.
+
+    Args:
+        target: With joint units and speed limits; None where nobody knows them.
+    """
+
+    def __init__(self, target: Target | None) -> None:
+        units = () if target is None else target.units
+        limits = () if target is None else target.velocity
+        self._units = units
+        self._fastest = [
+            min(FASTEST[unit], FASTEST[unit] if limit is None else TIMES_LIMIT * limit)
+            for unit, limit in zip(units, limits, strict=False)
+        ]
+        self._before: Sample | None = None
+        self._at = -math.inf
+        self._told: deque[_Told] = deque(maxlen=ANCHORS)
+        self._newest: _Told | None = None
+
+    def find(self, sample: Sample) -> str:
+        """Why this sample and those before it are no one motion; empty when they may be."""
+        if isinstance(sample, SignalSample):
+            return ""
+        t = sample.t if sample.t_device is None else sample.t_device
+        step, before = t - self._at, self._before
+        if sample.t_device is None and step < LOOSE:
+            step += LOOSE
+        self._at, self._before = t, sample
+        if not 0 < step < SILENCE or type(before) is not type(sample):
+            self._told.clear()
+            self._newest = None
+            before = None
+        if isinstance(sample, JointSample):
+            jump = self._leap(before, sample, step) if isinstance(before, JointSample) else ""
+            return jump or self._compare(sample, t)
+        if isinstance(sample, PoseSample):
+            return _moved(before, sample, step) if isinstance(before, PoseSample) else ""
+        return _flew(before, sample, step) if isinstance(before, BodySample) else ""
+
+    def _leap(self, before: JointSample, sample: JointSample, step: float) -> str:
+        for k, (a, b) in enumerate(zip(before.q, sample.q, strict=False)):
+            fastest = self._fastest[k] if k < len(self._fastest) else FASTEST["rad"]
+            unit = self._units[k] if k < len(self._units) else "rad"
+            if abs(b - a) > fastest * step + NOISE[unit]:
+                return f"joint {k + 1} went {abs(b - a):.3g} {unit} within {1e3 * step:.0f} ms"
+        return ""
+
+    def _compare(self, sample: JointSample, t: float) -> str:
+        """Ways and velocities over the last `SPAN`."""
+        q, qd = sample.q, sample.qd
+        if qd is None or len(qd) != len(q):
+            self._newest = None
+            return ""
+        last = self._newest
+        if last is None or len(last.q) != len(q):
+            zeros = (0.0,) * len(q)
+            self._told.clear()
+            self._newest = _Told(t, q, qd, zeros, zeros)
+            self._told.append(self._newest)
+            return ""
+        half = 0.5 * (t - last.t)
+        way = tuple([w + half * (a + b) for w, a, b in zip(last.way, last.qd, qd, strict=True)])
+        length = tuple(
+            [w + half * (abs(a) + abs(b)) for w, a, b in zip(last.length, last.qd, qd, strict=True)]
+        )
+        now = self._newest = _Told(t, q, qd, way, length)
+        found = ""
+        for then in self._told:
+            if t - then.t <= SPAN and (found := self._differ(then, now)):
+                break
+        if t - self._told[-1].t >= SPAN / ANCHORS:
+            self._told.append(now)
+        return found
+
+    def _differ(self, then: _Told, now: _Told) -> str:
+        for k, (a, b) in enumerate(zip(then.q, now.q, strict=True)):
+            went, said = b - a, now.way[k] - then.way[k]
+            off = abs(went - said)
+            unit = self._units[k] if k < len(self._units) else "rad"
+            if off < NOISE[unit]:
+                continue
+            path = max(now.length[k] - then.length[k], abs(went))
+            lag = LAG * max(abs(now.qd[k]), abs(then.qd[k]), path / (now.t - then.t))
+            if off > NOISE[unit] + SHARE * path + lag:
+                how = disagreement(went * went, said * said, went * said)
+                return (
+                    f"the velocity of joint {k + 1} {how or 'is not that of its positions'}: they went "
+                    f"{went:.3g} {unit} in {now.t - then.t:.2g} s, the velocities say {said:.3g} {unit}"
+                )
+        return ""
+
+
+def _moved(before: PoseSample, sample: PoseSample, step: float) -> str:
+    way = math.dist(before.position, sample.position)
+    dot = abs(sum(a * b for a, b in zip(before.wxyz, sample.wxyz, strict=True)))
+    turn = 2 * math.acos(min(1.0, dot))
+    if way > FASTEST["m"] * step + NOISE["m"] or turn > FASTEST["rad"] * step + NOISE["rad"]:
+        return f"it went {way:.3g} m and turned {turn:.3g} rad within {1e3 * step:.0f} ms"
+    return ""
+
+
+def _flew(before: BodySample, sample: BodySample, step: float) -> str:
+    """Whether most points of a person are elsewhere."""
+    was = {p.name: p.position for p in before.points if p.position is not None}
+    reach = BODY_SPEED * step + BODY_SLACK
+    count = far = 0
+    for p in sample.points:
+        place = was.get(p.name)
+        if place is not None and p.position is not None:
+            count += 1
+            far += math.dist(place, p.position) > reach
+    if count and far >= MANY * count:
+        return f"{far} of {count} points went farther than {reach:.2g} m within {1e3 * step:.0f} ms"
+    return ""

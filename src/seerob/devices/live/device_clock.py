@@ -1,0 +1,203 @@
+r"""A device's clock on the host's: the offset between both, from what arrives, and what it is worth.
+
+A sample that the device stamped :math:`t_d` arrives at host time :math:`t_h = t_d + o + \lambda` with an
+offset :math:`o` and a latency :math:`\lambda \ge 0`. The smallest :math:`t_h - t_d` bounds the offset from
+above by the least latency, so :math:`t_d + \min(t_h - t_d)` is when the sample was taken, free of the jitter
+of the way, and never later than it arrived. What is over that least one is how late a sample is.
+
+The minimum may fall at once, by whatever came faster than anything before. It rises no faster than clocks
+drift (`DRIFT`), through silences and connections alike: a delay that lasts stays a delay. What is made of it
+moves smoothly (`SLEW`), so that intervals between samples never collapse. Time that goes back is a restart
+once, and a loop after that.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+DRIFT = 2e-4
+"""Fastest rise of the offset [s/s]: the quartz clocks of controllers and computers are each within 100 ppm of
+true time (usual data sheets: 20 to 100 ppm), two of them drift apart by 200 ppm at most. A delay that grows
+more slowly than this cannot be told from drift."""
+SLEW = 0.01
+"""How fast the instants of samples are shifted after the offset fell [s/s]: speeds are off by as much."""
+SETTLED = 0.005
+"""Nearer to what the offset was found to be, instants are relied on [s]: a quarter of a tick's usual delay
+behind the world. Farther away they are shifted ten times as fast, and nothing is relied on."""
+STEP = 0.02
+"""Above it the offset does not slew but step, and only when the next sample says so too [s]: no sample of an
+ordinary network is so much faster than all before, one stamp that is wrong looks just so."""
+REORDERED = 0.25
+"""A stamp that lies back by less was overtaken on the way, or sent twice [s]; it is no news."""
+HOLD = 0.5
+"""Nothing is relied on for so long after a clock stepped or went back [s]: the twin swings to where the
+device is, as after a slip (`seerob.devices.live.real_time.SETTLE`)."""
+RESTART_HOLD = 2.5
+"""The same after a restart [s]: what starts again to say what it said in the last seconds is told from a
+device that was switched on by going back once more."""
+AGAIN = 60.0
+"""A clock that starts again twice within this time is followed, and not relied on for as long [s]: no
+controller is switched on so often."""
+KEPT = 16384
+"""Stamps of which it is known what was said with them: half a minute of the fastest source."""
+LATEST = 1e12
+"""No clock counts further [s]: what is later or not finite is no instant."""
+AFTER = 1e-6
+"""Between an instant and the next one where the clock has stepped back [s]."""
+
+
+class Instant(NamedTuple):
+    """When a sample was taken."""
+
+    t: float | None
+    """On the host's clock [s]; None for what is no news: not newer than what was heard before."""
+    doubt: str = ""
+    """Why the device's time may not be relied on now; empty when it may."""
+
+
+class Known(NamedTuple):
+    """What is known of a device's clock, for whoever listens to it next."""
+
+    offset: float
+    """Host time less device time [s]."""
+    device: float
+    """Newest stamp [s]."""
+    host: float
+    """When that was, on the host's monotonic clock [s]."""
+
+
+class DeviceClock:
+    """Estimates when, on the host's clock, a device took its samples.
+
+    Args:
+        known: What another listener knew of it: a delay that lasts stays one.
+
+    Attributes:
+        latency: How much later than the fastest one of late the newest sample arrived [s].
+    """
+
+    def __init__(self, known: Known | None = None) -> None:
+        self._newest = -math.inf
+        """Stamp of the newest sample."""
+        self._host = 0.0
+        """When the last one arrived."""
+        self._offset = math.inf
+        """Least host time less device time, as far as clocks do not drift."""
+        self._applied = math.inf
+        """What samples are shifted by: it follows the offset."""
+        self._last = -math.inf
+        """Instant of the newest sample."""
+        self._ahead: float | None = None
+        """Host time less device time of a sample that was ahead of its time, and not yet believed."""
+        self._connected = True
+        """Nothing was heard since it has connected."""
+        self._restarted = -math.inf
+        """When it last started again."""
+        self._said: dict[float, int] = {}
+        self._doubt, self._until = "", -math.inf
+        self.latency = 0.0
+        if known is not None:
+            self._offset = self._applied = known.offset
+            self._newest, self._host = known.device, known.host
+
+    def reconnect(self) -> None:
+        """It has connected anew: its clock may have started again, and else goes on."""
+        self._connected = True
+
+    @property
+    def offset(self) -> float | None:
+        """Host time less device time [s], too large by the least latency; None before anything arrived."""
+        return self._offset if math.isfinite(self._offset) else None
+
+    def hear(self, device: float, host: float, said: int = 0) -> Instant:
+        """When a sample was taken.
+
+        Args:
+            device: Its device time [s].
+            host: When it arrived, on the host's monotonic clock [s].
+            said: What tells its content from that of others: a hash.
+
+        Returns:
+            At most ``host``, but for `SETTLED` where the offset fell just now.
+        """
+        if not abs(device) <= LATEST:
+            return Instant(None)
+        if device <= self._newest and not self._is_restart(device, host, said):
+            return Instant(None, self._standing(host))
+        raw = host - device
+        if not math.isfinite(self._offset):
+            self._offset = self._applied = raw
+        elif not self._follow(raw, host):
+            return Instant(None, self._standing(host))
+        self._connected = False
+        self._newest, self._host = device, max(host, self._host)
+        self.latency = raw - self._offset
+        if len(self._said) >= KEPT:
+            del self._said[next(iter(self._said))]
+        self._said.pop(device, None)
+        self._said[device] = said
+        t = device + self._applied
+        if t <= self._last and self._until > host:
+            # The clock has stepped back: what comes is news all the same, and nothing is relied on.
+            t = self._last + AFTER
+            self._hold(host, HOLD, self._doubt)
+        self._last = max(self._last, t)
+        return Instant(t, self._standing(host))
+
+    def _follow(self, raw: float, host: float) -> bool:
+        """Let the offset follow; False for a sample that is ahead of its time and is not believed yet."""
+        passed = max(0.0, host - self._host)
+        risen = self._offset + DRIFT * passed
+        if raw < self._offset - STEP:
+            ahead, self._ahead = self._ahead, raw
+            what = f"its time stamps are {self._offset - raw:.3g} s ahead of what its clock was"
+            self._hold(host, HOLD, what)
+            if ahead is None:
+                return False
+            raw = max(ahead, raw)
+        else:
+            self._ahead = None
+        self._offset = min(risen, raw)
+        off = self._applied - self._offset
+        if off > STEP:
+            self._applied = self._offset
+            if self._ahead is None:
+                self._hold(host, HOLD, f"its clock was found {1e3 * off:.0f} ms off")
+        elif off > SETTLED:
+            self._applied -= min(off, 10 * SLEW * passed)
+            self._hold(host, 0.0, f"its clock is being found: {1e3 * off:.0f} ms off")
+        elif off > 0:
+            self._applied -= min(off, SLEW * passed)
+        else:
+            self._applied = self._offset
+        return True
+
+    def _is_restart(self, device: float, host: float, said: int) -> bool:
+        """Whether time that does not go on is that of a device which started again; else it is no news."""
+        back = self._newest - device
+        if back == 0 or (not self._connected and back <= REORDERED):
+            return False
+        if not self._connected and self._said.get(device) == said:
+            self._hold(
+                host, HOLD, f"says again what it said {back:.3g} s before: is a recording played to it?"
+            )
+            return False
+        if host - self._restarted < AGAIN:
+            what = f"its time went back by {back:.3g} s, not for the first time within {AGAIN:g} s: a loop?"
+            self._hold(host, AGAIN, what)
+        else:
+            what = f"its time went back by {back:.3g} s: it seems to have started again"
+            self._hold(host, RESTART_HOLD, what)
+        self._restarted = host
+        self._offset = self._applied = math.inf
+        self._newest, self._ahead = -math.inf, None
+        return True
+
+    def _hold(self, host: float, seconds: float, why: str) -> None:
+        if not self._standing(host) or host + seconds >= self._until:
+            self._doubt, self._until = why, host + seconds
+
+    def _standing(self, host: float) -> str:
+        """The doubt that holds at ``host`` [s]."""
+        return self._doubt if host <= self._until else ""

@@ -1,0 +1,384 @@
+"""What a live source is, and everything that live sources share: thread, back-off, stop, time.
+
+A `LiveSource` says in one asynchronous generator what it hears, `LiveSource.listen`. A `Listener` runs
+that in a thread of its own, begins anew when it ends, puts each sample's time on the host's clock and
+posts it to a mailbox, where only the newest waits. `seerob.devices.live.ears.Listening` is all of them
+together, from which a run takes once per tick.
+
+The twin runs a fixed delay behind the world, one period of the slowest source and a margin, so that
+there is a sample on either side of what is shown and references interpolate.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import time
+from collections.abc import AsyncGenerator, Callable, Coroutine, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import ContextVar
+from pathlib import Path
+from threading import Lock, Thread
+from typing import Annotated, Any, ClassVar, TypeVar
+
+from msgspec import Meta
+from msgspec.structs import replace
+
+from seerob.core.errors import InputError, SeerobError
+from seerob.core.host_name import check_host, check_url
+from seerob.core.samples import BodySample, JointSample, Quality, Sample, SignalSample, key
+from seerob.core.snapshot import Finding
+from seerob.devices.live.arrivals import Arrivals, Statistics
+from seerob.devices.live.contradictions import Contradictions
+from seerob.devices.live.device_clock import AFTER, HOLD, DeviceClock, Instant, Known
+from seerob.workstation.source import Opened, Source, Target
+
+_log = logging.getLogger(__name__)
+T = TypeVar("T")
+
+MARGIN = 0.005
+"""Of the delay behind the world, for what is late on the way [s]."""
+FIRST_PAUSE, LONGEST_PAUSE = 0.1, 2.0
+"""Before it is tried again [s]; doubled from the one to the other."""
+STOP_WITHIN = 1.0
+"""A listener that does not end by then is left behind [s]; its thread keeps no process alive."""
+ASK_WITHIN = 1.5
+"""At start [s]."""
+UNTIMED = "it sends no time, so that nobody knows how late it is: give a bound as delay of the source"
+
+
+_said: ContextVar[set[str]] = ContextVar("said")
+MOST_SAID = 1000
+
+
+def say_once(log: logging.Logger, level: int, text: str) -> None:
+    """Log a line that is as true of each connection, the first time only.
+
+    Of a loss and of a return there is one line each; what was said at the first connection is not said
+    again at the next.
+    """
+    said = _said.get(set())
+    if text not in said:
+        log.log(level, "%s", text)
+        if len(said) < MOST_SAID:
+            said.add(text)
+
+
+class LiveSource(Source, frozen=True, kw_only=True):
+    """Base of the sources whose future nobody knows: controllers, machines, trackers."""
+
+    delay: Annotated[float, Meta(ge=0, extra={"unit": "s"}, extra_json_schema={"x-unit": "s"})] | None = None
+    """How far the twin is behind the world [s]; one period of the source and 5 ms when not given. Of
+    what is sent without a time also how late it is at most."""
+
+    live: ClassVar[bool] = True
+    apart: ClassVar[bool] = True
+    """Whether it may listen in another process: not who takes what this one has."""
+    loads: ClassVar[tuple[str, ...]] = ()
+    """Libraries that it needs when it listens: loaded before anybody does, since that holds others up."""
+    asked: ClassVar[bool] = False
+    """Whether what is sent without a time is the answer to a question that was asked at its ``t``, or comes
+    from this process: then nothing is late unseen."""
+    asks: ClassVar[str] = ""
+    """A line of the workstation file that it needs and that no device can say: `seerob probe` shows it."""
+
+    def __post_init__(self) -> None:
+        for option in ("host", "bind", "sender"):
+            if host := getattr(self, option, None):
+                check_host(option, host)
+        if url := getattr(self, "url", None):
+            check_url("url", url)
+        if self.loop:
+            raise ValueError("a live source has no end to start again from: remove loop")
+        if self.behind() >= self.timeout:
+            raise ValueError(
+                f"a timeout of {self.timeout:g} s is not longer than the delay of {self.behind():g} s: "
+                "give a longer timeout"
+            )
+
+    def period(self) -> float:
+        """Expected interval between its samples [s]."""
+        raise NotImplementedError
+
+    def behind(self) -> float:
+        """Delay behind the world that it needs [s]."""
+        return self.period() + MARGIN if self.delay is None else self.delay
+
+    async def ask(self) -> tuple[Finding, ...]:
+        """Connect briefly, for what the other end says of itself: what it is, what it does not have.
+
+        Raises:
+            OSError: There is no connection.
+            SeerobError: It answers, but cannot be understood.
+            InputError: It is understood, and is not what this source can use.
+        """
+        return ()
+
+    async def inquire(self, folder: Path, target: Target | None) -> tuple[Finding, ...]:
+        """The same at the start of a run, when it is known what it is asked for; raises as `ask` does."""
+        return await self.ask()
+
+    def open(self, folder: Path, target: Target | None) -> Opened:
+        """Ask the other end what it has, if it can be reached: a run may begin before it can.
+
+        Raises:
+            InputError: It can be reached, and is not what this source can use.
+        """
+        about = self.target() or self.name
+        text = (
+            f"the twin runs {1e3 * self.behind():.0f} ms behind the world, where samples lie on either side"
+        )
+        behind = Finding(level="note", subject=about, text=text)
+        try:
+            said = at_start(self.inquire(folder, target), within=self.patience())
+        except InputError:
+            raise
+        except (OSError, EOFError, SeerobError) as error:
+            who = "" if about == self.name else f"{self.name}: "
+            text = f"{who}not reached at start: {because(error)}; it is tried again during the run"
+            said = (Finding(level="warning", subject=about, text=text),)
+        return Opened(samples=(), duration=0.0, findings=(behind, *said))
+
+    def patience(self) -> float:
+        """How long a run waits for the answer at start [s]."""
+        return ASK_WITHIN
+
+    def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
+        """Connect, and yield what is heard until the connection ends; then it is called again.
+
+        ``t`` of a sample is when it arrived on the host's monotonic clock, ``t_device`` the device's
+        own time. Runs in a thread and loop of its own, and must end promptly when it is cancelled.
+
+        Raises:
+            OSError: There is no connection, or no longer.
+            SeerobError: What the other end says cannot be understood.
+        """
+        raise NotImplementedError
+
+
+def at_start(question: Coroutine[Any, Any, T], *, within: float = ASK_WITHIN) -> T:
+    """The answer to what is asked when a source is opened.
+
+    Raises:
+        TimeoutError: There was none within that time [s].
+    """
+    # In a thread: whoever opens it may be in an event loop, a notebook for one.
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(asyncio.run, asyncio.wait_for(question, within)).result()
+
+
+def because(error: BaseException) -> str:
+    """Why there is no connection, in one line."""
+    if isinstance(error, TimeoutError):
+        return str(error) or "no answer in time"
+    if isinstance(error, OSError) and error.errno is not None and error.errno > 0:
+        # asyncio's own text hides the reason behind the address.
+        return os.strerror(error.errno)
+    return str(error) or type(error).__name__
+
+
+def delay_of(sources: Iterable[Source]) -> float:
+    """How far a run of these sources is behind the world [s]; 0 when none is live."""
+    return max((s.behind() for s in sources if isinstance(s, LiveSource)), default=0.0)
+
+
+class Listener:
+    """One live source in a thread of its own.
+
+    Args:
+        source: The source.
+        target: What it drives.
+        post: Called with each sample, on the host's clock; from the listener's thread.
+        again: Whether it was heard before, and lost.
+        known: What was known of its clock then.
+    """
+
+    def __init__(
+        self,
+        source: LiveSource,
+        target: Target | None,
+        post: Callable[[Sample], None],
+        *,
+        again: bool = False,
+        known: Known | None = None,
+    ) -> None:
+        self.name = name_of(source)
+        self.drives = bool(source.target())
+        """Whether it drives a robot or a person, or only has signals."""
+        self._source, self._target, self._post = source, target, post
+        self._clock, self._arrivals = DeviceClock(known), Arrivals(source.period())
+        self._bound = source.timeout
+        self._contradictions: dict[tuple[str, ...], Contradictions] = {}
+        self._found: dict[tuple[str, ...], tuple[str, float]] = {}
+        """What contradicted itself, and until when that counts [s]."""
+        self._posted: dict[tuple[str, ...], Sample] = {}
+        self._lock = Lock()
+        self._thread = Thread(target=self._run, name=f"seerob-{self.name}", daemon=True)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._stopping = False
+        self._up: bool | None = False if again else None
+        self._seq = 0
+
+    def start(self) -> None:
+        """Begin to listen; returns at once."""
+        self._thread.start()
+
+    def ask_to_stop(self) -> None:
+        """Ask the thread to end; returns at once."""
+        with self._lock:
+            self._stopping = True
+            if self._loop is not None and self._task is not None:
+                with contextlib.suppress(RuntimeError):  # the loop ended by itself meanwhile
+                    self._loop.call_soon_threadsafe(self._task.cancel)
+
+    def join(self, seconds: float) -> bool:
+        """Wait for the thread to end; whether it has."""
+        self._thread.join(seconds)
+        return not self._thread.is_alive()
+
+    def statistics(self) -> Statistics:
+        """What arrived so far."""
+        return self._arrivals.statistics(self._clock.offset)
+
+    def _run(self) -> None:
+        with contextlib.suppress(asyncio.CancelledError):
+            asyncio.run(self._listen())
+
+    async def _listen(self) -> None:
+        with self._lock:
+            self._loop, self._task = asyncio.get_running_loop(), asyncio.current_task()
+            if self._stopping:
+                return
+        _said.set(set())
+        pause = FIRST_PAUSE
+        while True:
+            self._clock.reconnect()
+            begun = time.monotonic()
+            reason = await self._session()
+            if self._stopping:
+                return
+            # Who speaks for less than the last pause and falls silent again is tried less and less often.
+            if self._up and time.monotonic() - begun > pause:
+                pause = FIRST_PAUSE
+            self._lose(reason)
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, LONGEST_PAUSE)
+
+    async def _session(self) -> str:
+        """Listen until the connection ends; why it did."""
+        try:
+            async with contextlib.aclosing(self._source.listen(self._target)) as samples:
+                async for sample in samples:
+                    # `asyncio.wait_for`, which some libraries use, forgets a cancellation that comes
+                    # together with what it waits for (Python 3.11).
+                    if self._stopping:
+                        break
+                    self._take(sample)
+        except (OSError, EOFError, SeerobError) as error:
+            return because(error)
+        except Exception as error:
+            if self._up is not False:  # once per loss
+                _log.exception("%s: a mistake in the source itself", self.name)
+            return f"{type(error).__name__}: {error}"
+        return "the other end closed the connection"
+
+    def _take(self, sample: Sample) -> None:
+        if isinstance(sample, SignalSample):
+            self._news(sample, sample.t, self.drives)
+            return
+        host, what = sample.t, key(sample)
+        heard = Instant(host)
+        if sample.t_device is not None:
+            heard = self._clock.hear(sample.t_device, host, _content(sample))
+        if heard.t is None:
+            self._arrivals.repeat()
+            if heard.doubt and what in self._posted:
+                # No news, and a doubt about what was said before.
+                self._doubt(what, heard.doubt)
+            return
+        late = (self._source.delay or 0.0) * (not self._source.asked)
+        if sample.t_device is not None:
+            late = self._clock.latency
+        reason = heard.doubt or self._contradiction(sample, what, host)
+        if sample.t_device is None and not self._source.asked and self._source.delay is None:
+            reason = reason or UNTIMED
+        quality = sample.quality
+        if late > self._bound and sample.t_device is not None:
+            reason = f"heard {late:.2f} s later than at its best (bound {self._bound:g} s)"
+            quality = Quality.LATE if quality is Quality.GOOD else quality
+        if reason and quality is Quality.GOOD:
+            quality = Quality.DEGRADED
+        reason = reason and f"{self.name}: {reason}"
+        self._news(replace(sample, t=heard.t, quality=quality, reason=reason, late=late), host, quiet=False)
+
+    def _news(self, sample: Sample, host: float, quiet: bool) -> None:
+        """Post what is new.
+
+        Args:
+            sample: On the host's clock.
+            host: When it arrived [s].
+            quiet: It is not what this source is listened to for.
+        """
+        if not quiet:
+            self._arrivals.add(host, sample.t_device)
+            if self._up is False:
+                _log.warning("%s: heard again", self.name)
+            self._up = True
+        sample = self._posted[key(sample)] = replace(sample, source=self.name, seq=self._seq)
+        self._seq += 1
+        self._post(sample)
+
+    def _doubt(self, what: tuple[str, ...], reason: str) -> None:
+        """Say again what was said last, with a doubt: whoever has taken it would not know."""
+        last = self._posted[what]
+        reason = f"{self.name}: {reason}"
+        if last.reason == reason:
+            return
+        quality = Quality.DEGRADED if last.quality is Quality.GOOD else last.quality
+        self._posted[what] = replace(last, t=last.t + AFTER, quality=quality, reason=reason, seq=self._seq)
+        self._seq += 1
+        self._post(self._posted[what])
+
+    def _contradiction(self, sample: Sample, what: tuple[str, ...], host: float) -> str:
+        """What in it contradicts what was said before, now or a moment ago."""
+        if what not in self._contradictions:
+            self._contradictions[what] = Contradictions(self._target)
+        if found := self._contradictions[what].find(sample):
+            self._found[what] = found, host + HOLD
+        found, until = self._found.get(what, ("", 0.0))
+        return found if host <= until else ""
+
+    def _lose(self, reason: str) -> None:
+        """One line per loss, however often it is tried again."""
+        if self._up is not False:
+            _log.warning("%s: not heard: %s", self.name, reason)
+            self._arrivals.lose()
+            self._up = False
+
+
+def _content(sample: Sample) -> int:
+    """What tells a sample's content from that of others."""
+    if isinstance(sample, JointSample):
+        return hash((sample.q, sample.qd))
+    if isinstance(sample, BodySample):
+        return hash(tuple([(p.position, p.wxyz) for p in sample.points]))
+    return 0 if isinstance(sample, SignalSample) else hash((sample.position, sample.wxyz))
+
+
+def name_of(source: LiveSource) -> str:
+    """What a source is called where a run tells of it."""
+    return source.name or f"{type(source).__module__.rpartition('.')[2]} {source.target()}".strip()
+
+
+def stop(listeners: Sequence[Listener]) -> None:
+    """End all of them and log what they heard; one that does not end in time is left behind."""
+    for listener in listeners:
+        listener.ask_to_stop()
+    end = time.monotonic() + STOP_WITHIN
+    for listener in listeners:
+        if not listener.join(max(0.0, end - time.monotonic())):
+            _log.warning("%s: did not stop within %g s", listener.name, STOP_WITHIN)
+        _log.info("%s: %s", listener.name, listener.statistics())

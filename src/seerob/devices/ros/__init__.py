@@ -1,0 +1,1 @@
+"""What sources of ROS share."""

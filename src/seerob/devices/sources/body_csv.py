@@ -1,0 +1,30 @@
+"""Points or bones of a person in a table, as many programs write them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from seerob.description.capture.captured import Captured, Seen
+from seerob.devices.capture.marker_file import MarkerFile
+from seerob.files.motion_capture import body_csv
+from seerob.files.motion_capture.frame_arrays import about
+from seerob.files.tables.mapping import TimeUnit
+
+
+class BodyCsv(MarkerFile, frozen=True, kw_only=True):
+    """Points or bones of a person from delimited text, units in the headers."""
+
+    seen: Seen = Seen.JOINTS
+    """What the points are: ``joints``, ``segments``, ``markers`` or ``trackers``."""
+    time_unit: TimeUnit | None = None
+    """Of the time, when its header does not say it."""
+
+    def read(self, path: Path) -> Captured:
+        """The points of the person.
+
+        Raises:
+            InputError: It is no such table, or the unit, the vertical or the person is not clear.
+        """
+        captured = body_csv.read(path, self.reading(), seen=self.seen, time_unit=self.time_unit or "")
+        return replace(captured, findings=about(captured.findings, self.human))

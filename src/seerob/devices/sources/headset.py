@@ -1,0 +1,140 @@
+"""A headset in the hands of this run's own page: head, controllers or hands, and body joints.
+
+The page (WebXR, ``local-floor``) sends what it sees over the connection it has anyway; who may connect is
+the server's affair. Three points are no body: legs, pelvis and spine are estimated, and count as not
+measured for ergonomics.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections import deque
+from collections.abc import AsyncGenerator, Iterable
+from contextlib import aclosing
+from typing import Annotated, ClassVar
+
+import numpy as np
+from msgspec import Meta
+
+from seerob.core.snapshot import Finding
+from seerob.description.capture.captured import CaptureFrame, Layout, Seen
+from seerob.description.capture.mapping import conventions, plain
+from seerob.devices.capture.stream_source import CaptureStream
+from seerob.devices.live.headset_offers import OFFERS, Offer
+from seerob.devices.live.listening import say_once
+from seerob.protocols.tracking.xr_axes import world_positions, world_turns
+
+_log = logging.getLogger(__name__)
+
+SILENCE = 2.0
+"""Without an offer the connection counts as lost [s]."""
+GATHER = 0.3
+"""Names that appear later than this begin a new layout [s]."""
+GUESSED = 0.3
+"""Confidence of what the headset itself estimates; our choice."""
+BODY = "hips"
+"""Whoever sends this joint sends a body."""
+
+
+class Headset(CaptureStream, frozen=True, kw_only=True):
+    """A person who wears a headset that shows this run's page."""
+
+    apart: ClassVar[bool] = False
+    """The page's server is of the run's own process."""
+    frequency: Annotated[float, Meta(ge=30, le=144, extra={"unit": "Hz"})] = 72.0
+    """Pictures per second of the headset [Hz]."""
+
+    def period(self) -> float:
+        """Interval between samples that is expected [s]."""
+        return 1 / self.frequency
+
+    async def ask(self) -> tuple[Finding, ...]:
+        """What is to be said before anybody wears it."""
+        text = (
+            "waits for a page of this run that offers what a headset sees; with head and hands only, legs, "
+            "pelvis and spine are estimated and count as not measured"
+        )
+        return (Finding(level="assumed", subject=self.human, text=f"headset: {text}"),)
+
+    async def frames(self) -> AsyncGenerator[tuple[Layout, CaptureFrame], None]:
+        """What the page offers.
+
+        Raises:
+            TimeoutError: No page offers anything.
+        """
+        layout: Layout | None = None
+        known: set[str] = set()
+        begun: float | None = None
+        last = -1.0
+        async with aclosing(self._offers()) as offers:
+            async for offer in offers:
+                begun = offer.arrived if begun is None else begun
+                fresh = set(offer.names) - known
+                if layout is None or (BODY in fresh and BODY not in layout.names):
+                    known |= set(offer.names)
+                    if offer.arrived - begun < GATHER:
+                        continue
+                    layout = layout_of(known)
+                    self._tell(layout)
+                if offer.t <= last:
+                    continue
+                last = offer.t
+                yield layout, frame(offer, layout)
+
+    def _tell(self, layout: Layout) -> None:
+        if BODY not in layout.names:
+            text = "head and hands only: legs, pelvis and spine are estimated, not measured"
+            say_once(_log, logging.WARNING, f"{self.name or f'headset {self.human}'}: {text}")
+
+    async def _offers(self) -> AsyncGenerator[Offer, None]:
+        loop = asyncio.get_running_loop()
+        waiting: deque[Offer] = deque(maxlen=64)
+        arrived = asyncio.Event()
+        key = object()
+
+        def take(offer: Offer) -> None:
+            waiting.append(offer)
+            with contextlib.suppress(RuntimeError):  # the loop ended meanwhile
+                loop.call_soon_threadsafe(arrived.set)
+
+        OFFERS.wait(self.human, key, take)
+        try:
+            while True:
+                try:
+                    async with asyncio.timeout(SILENCE):
+                        await arrived.wait()
+                except TimeoutError as error:
+                    what = f"no page offers a headset of {self.human!r}"
+                    raise TimeoutError(what) from error
+                arrived.clear()
+                while waiting:
+                    yield waiting.popleft()
+        finally:
+            OFFERS.leave(self.human, key)
+
+
+def layout_of(names: Iterable[str]) -> Layout:
+    """Rows for what is of use: the names that mean a bone, or all when none does."""
+    every = sorted(set(names))
+    places = conventions()["webxr"].places
+    useful = [name for name in every if plain(name) in places] or every
+    seen = Seen.JOINTS if BODY in useful else Seen.TRACKERS
+    return Layout(seen=seen, names=tuple(useful), convention="webxr")
+
+
+def frame(offer: Offer, layout: Layout) -> CaptureFrame:
+    """An offer in the rows of a layout, with z up; NaN for what is not tracked."""
+    rows = {name: row for row, name in enumerate(offer.names)}
+    n = len(layout.names)
+    positions, turns, sure = np.full((n, 3), np.nan), np.full((n, 4), np.nan), np.zeros(n)
+    for row, name in enumerate(layout.names):
+        found = rows.get(name)
+        if found is not None:
+            positions[row], turns[row] = offer.positions[found], offer.wxyz[found]
+            sure[row] = GUESSED if offer.guessed[found] else 1.0
+    with np.errstate(all="ignore"):  # what is not finite is left out where it is used
+        return CaptureFrame(
+            t=offer.t, positions=world_positions(positions), orientations=world_turns(turns), confidence=sure
+        )

@@ -1,0 +1,49 @@
+"""Recordings of a depth camera's body tracking: JSON of ``offline_processor``, ROS bag, or text."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from seerob.core.errors import InputError
+from seerob.description.capture.captured import Captured
+from seerob.devices.capture.file_source import CaptureFile
+from seerob.files.motion_capture import kinect_bag, kinect_json, kinect_text
+from seerob.files.motion_capture.frame_arrays import about
+from seerob.files.motion_capture.kinect_recording import Reading
+from seerob.files.tables.mapping import LengthUnit, TimeUnit
+from seerob.workstation.workstation import Pose
+
+BAGS = (".bag", ".db3", ".mcap")
+TEXTS = (".csv", ".txt", ".tsv")
+
+
+class KinectRecording(CaptureFile, frozen=True, kw_only=True):
+    """A recording of a depth camera that tracks bodies (JSON, ROS bag, text)."""
+
+    topic: str = ""
+    """Of a bag with several topics of skeletons."""
+    unit: LengthUnit | None = None
+    """Of the positions in a text, when its headers do not say it."""
+    time_unit: TimeUnit | None = None
+    """Of the time in a text, when its header does not say it."""
+
+    def read(self, path: Path) -> Captured:
+        """The person, upright: as ``at`` says, or as the person stands.
+
+        Raises:
+            InputError: The file is missing or wrong, or holds several persons and nobody said which.
+        """
+        reading = Reading(self.file, self.subject, level=self.at != Pose())
+        suffix = path.suffix.lower()
+        if suffix in BAGS or path.is_dir():
+            captured = kinect_bag.read(path, reading, topic=self.topic)
+        elif suffix == ".json":
+            captured = kinect_json.read(path, reading)
+        elif suffix in TEXTS:
+            captured = kinect_text.read(path, reading, unit=self.unit or "", time_unit=self.time_unit or "")
+        else:
+            what = f"{path.suffix or 'no suffix'}: unknown kind of file"
+            remedy = f"known: .json, {', '.join(BAGS)}, {', '.join(TEXTS)}, the folder of a ROS 2 bag"
+            raise InputError.at(self.file, "file", what, remedy)
+        return replace(captured, findings=about(captured.findings, self.human))

@@ -1,0 +1,351 @@
+"""Recordings of Xsens MVN in its XML format, MVNX 3 and 4.
+
+Positions and orientations of the 23 segments, the calibration poses, the lengths of the segments. Frames are
+read as they are needed, so a file may be larger than memory. Joint angles that the file has are compared
+with those of its segments: when both agree, file and reader mean the same thing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.errors import InputError, Problem
+from seerob.core.orientation import product
+from seerob.core.snapshot import Finding
+from seerob.core.transforms import Array
+from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
+from seerob.devices.capture.file_source import CaptureFile
+from seerob.devices.capture.mvnx_head import lengths, numbers, unmeasured
+from seerob.devices.capture.mvnx_stream import Head, RawFrame, stream
+from seerob.devices.capture.xsens import anatomical, correction, differences
+from seerob.protocols.tracking.mvn_pose import METRES, unit_of
+from seerob.protocols.tracking.mvn_segments import JOINTS, PARENTS, SEGMENTS
+
+KEPT = 50_000
+"""Frames that are kept in memory, 65 MB; a longer file is read again whenever it is needed."""
+CHECKED = 200
+"""Frames at most whose joint angles are compared."""
+AGREE = math.radians(0.1)
+"""Angles that are no further apart are the same."""
+NO_TURN = math.radians(0.05)
+"""Rounding of the numbers in a file."""
+ROUNDING = 1.1e-3
+"""A frame's time is written in whole milliseconds [s]."""
+RATES = (1.0, 1000.0)
+ARMS_DOWN = 0.7
+"""Share of the way from shoulder to wrist that goes down: arms hang."""
+
+
+# -- the file ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _File:
+    """A file and what its head says; its frames can be iterated again and again."""
+
+    path: Path
+    name: str
+    """For messages."""
+    rows: NDArray[np.intp]
+    """Place in the file of each of `SEGMENTS`, shape (23,)."""
+    count: int
+    """Segments in the file."""
+    rate: float
+    confidence: Array | None
+    subject: str
+    metres: float = 1.0
+    kept: tuple[CaptureFrame, ...] | None = None
+    """All frames, when they are few; else they are read anew each time."""
+    turn: Array | None = None
+    """Ideal segment in each of the file's, w first, shape (23, 4); None when they are the same."""
+
+    def __iter__(self) -> Iterator[CaptureFrame]:
+        if self.kept is not None:
+            yield from self.kept
+            return
+        last = -math.inf
+        for number, raw in enumerate(_motion(self.path, self.name)):
+            frame = self.frame(raw, number)
+            if frame is not None and frame.t > last:
+                last = frame.t
+                yield frame
+
+    def frame(self, raw: RawFrame, number: int, pose: str = "") -> CaptureFrame | None:
+        """One frame; None when it has no position and orientation, or others than it should."""
+        try:
+            p = self.metres * numbers(raw.texts["position"], 3 * self.count).reshape(-1, 3)
+            q = numbers(raw.texts["orientation"], 4 * self.count).reshape(-1, 4)
+        except (KeyError, ValueError):
+            return None
+        p, q = p[self.rows], q[self.rows]
+        with np.errstate(invalid="ignore", over="ignore"):
+            length = np.linalg.norm(q, axis=1)
+            q = np.where(
+                (np.abs(length - 1) < 0.05)[:, None], q / np.where(length == 0, 1, length)[:, None], np.nan
+            )
+            if self.turn is not None:
+                q = product(q, self.turn)
+            p = np.where((np.abs(p).max(axis=1) < 1e4)[:, None], p, np.nan)
+        return CaptureFrame(
+            t=self._time(raw, number),
+            positions=p,
+            orientations=q,
+            confidence=self.confidence,
+            subject=self.subject,
+            pose=pose,
+        )
+
+    def _time(self, raw: RawFrame, number: int) -> float:
+        """From the index when the time says the same, free of its rounding; else the time [s]."""
+        by_number = number / self.rate
+        try:
+            by_index = int(raw.attributes.get("index", "")) / self.rate
+        except ValueError:
+            by_index = by_number
+        try:
+            time = float(raw.attributes["time"]) / 1000
+        except (KeyError, ValueError):
+            return by_index
+        if not math.isfinite(time):
+            return by_index
+        return by_index if abs(by_index - time) < ROUNDING else time
+
+
+def _motion(path: Path, file: str) -> Iterator[RawFrame]:
+    return (item for item in stream(path, file) if isinstance(item, RawFrame) and _kind(item) == "normal")
+
+
+def _kind(raw: RawFrame) -> str:
+    return raw.attributes.get("type", "normal")
+
+
+@dataclass
+class _Survey:
+    """What one reading of the whole file finds."""
+
+    frames: int = 0
+    broken: int = 0
+    backward: int = 0
+    first: float = 0.0
+    last: float = -math.inf
+    special: dict[str, CaptureFrame] = field(default_factory=dict)
+    unit: str | None = None
+    kept: list[CaptureFrame] | None = field(default_factory=list)
+    checked: list[tuple[Array, Array]] = field(default_factory=list)
+    angles: int = 0
+
+
+def read(path: Path, *, file: str = "") -> Captured:
+    """A whole recording.
+
+    Args:
+        path: The file.
+        file: Its name, for messages.
+
+    Raises:
+        InputError: The file is missing, or is no MVNX with segments, a frame rate and frames.
+    """
+    name = file or str(path)
+    items = stream(path, name)
+    head = next(items)
+    assert isinstance(head, Head)  # stream says it first
+    opened = _file(path, name, head)
+    found = _survey(opened, head, items)
+    if not found.frames:
+        what = f"{found.broken} frames of motion, none with" if found.broken else "no frame of motion with"
+        what = f"{what} positions and orientations of all segments"
+        raise InputError.at(name, "frames", what, 'export frames of type "normal" with both')
+    if found.unit is None:
+        what = "the trunk of the first frame is not as long as a person's in any unit"
+        raise InputError.at(name, "position", what, "is it an export of MVN, in metres?")
+    turn, turned = _turn(name, found.special)
+    metres = METRES[found.unit]
+    kept = None
+    if found.kept is not None:
+        kept = tuple(
+            replace(f, positions=metres * f.positions, orientations=_corrected(f.orientations, turn))
+            for f in found.kept
+        )
+    scaled = replace(opened, metres=metres, turn=turn, kept=kept)
+    findings = _findings(name, head, found)
+    poses, more = _calibration(name, found.special, metres, turn)
+    return Captured(
+        layout=Layout(Seen.SEGMENTS, SEGMENTS, "xsens", PARENTS),
+        frames=scaled,
+        rate=opened.rate,
+        count=found.frames,
+        calibration=poses,
+        lengths=lengths(head),
+        findings=(*findings, *more, *turned, *_angles(name, found, turn)),
+    )
+
+
+def _file(path: Path, name: str, head: Head) -> _File:
+    if not head.subjects:
+        raise InputError.at(name, "", "no <subject>", "is it an MVNX file, of version 3 or 4?")
+    problems = []
+    if head.subjects > 1:
+        problems.append(Problem(name, "subject", "more than one subject", "export each person alone"))
+    if head.rate is None or not RATES[0] <= head.rate <= RATES[1]:
+        what = f"frameRate is {head.rate}" if head.rate is not None else "no frameRate"
+        problems.append(Problem(name, "subject", what, f"{RATES[0]:g} to {RATES[1]:g} Hz"))
+    missing = [name for name in SEGMENTS if name not in head.segments]
+    if missing:
+        what = f"no segment {', '.join(missing[:4])}{' …' if len(missing) > 4 else ''}"
+        problems.append(Problem(name, "segments", what, "MVN's 23 segments are needed"))
+    if problems:
+        raise InputError(problems)
+    lost = unmeasured(head)
+    confidence = np.array([0.0 if name in lost else 1.0 for name in SEGMENTS]) if lost else None
+    rows = np.array([head.segments.index(name) for name in SEGMENTS])
+    assert head.rate is not None  # checked above
+    return _File(path, name, rows, len(head.segments), head.rate, confidence, head.subject)
+
+
+def _survey(file: _File, head: Head, items: Iterator[Head | RawFrame]) -> _Survey:
+    found = _Survey()
+    number = 0
+    every = 1
+    for raw in items:
+        assert isinstance(raw, RawFrame)  # the head comes once
+        if (kind := _kind(raw)) != "normal":
+            frame = file.frame(raw, 0)
+            if frame is not None:
+                found.special.setdefault(kind, frame)
+            continue
+        frame = file.frame(raw, number)
+        number += 1
+        if frame is None:
+            found.broken += 1
+        elif frame.t <= found.last:
+            found.backward += 1
+        else:
+            found.first = frame.t if not found.frames else found.first
+            found.frames, found.last = found.frames + 1, frame.t
+            found.unit = found.unit or unit_of(frame.positions)
+            if found.kept is not None:
+                found.kept.append(frame)
+                found.kept = None if len(found.kept) > KEPT else found.kept
+            if "jointAngle" in raw.texts and len(head.joints) == len(JOINTS):
+                found.angles += 1
+                if found.angles % every == 0:
+                    _check(found, frame, raw)
+                    if len(found.checked) > CHECKED:
+                        found.checked, every = found.checked[::2], 2 * every
+    return found
+
+
+def _check(found: _Survey, frame: CaptureFrame, raw: RawFrame) -> None:
+    try:
+        angles = numbers(raw.texts["jointAngle"], 3 * len(JOINTS)).reshape(-1, 3)
+    except ValueError:
+        return
+    assert frame.orientations is not None  # every frame of this format has them
+    found.checked.append((frame.orientations, np.radians(angles)))
+
+
+def _calibration(
+    name: str, special: dict[str, CaptureFrame], metres: float, turn: Array | None
+) -> tuple[tuple[CaptureFrame, ...], list[Finding]]:
+    """Poses by what they look like: a frame that is called npose may have its arms to the sides."""
+    poses, findings = [], []
+    for kind in ("tpose", "npose", "identity"):
+        frame = special.get(kind)
+        if frame is None or (kind == "identity" and "tpose" in special):
+            continue
+        p = metres * frame.positions
+        way = p[SEGMENTS.index("RightHand")] - p[SEGMENTS.index("RightUpperArm")]
+        length = float(np.linalg.norm(way))
+        seen = "npose" if length > 0 and -way[2] / length > ARMS_DOWN else "tpose"
+        if kind in {"tpose", "npose"} and seen != kind:
+            arms = "hanging" if seen == "npose" else "to the sides"
+            text = f"its frame {kind} shows the arms {arms}: taken as {seen}"
+            findings.append(Finding(level="note", subject=name, text=text))
+        poses.append(
+            CaptureFrame(
+                t=0.0,
+                positions=p,
+                orientations=_corrected(frame.orientations, turn),
+                confidence=frame.confidence,
+                subject=frame.subject,
+                pose=seen,
+            )
+        )
+    return tuple(poses), findings
+
+
+def _corrected(wxyz: Array | None, turn: Array | None) -> Array | None:
+    return wxyz if wxyz is None or turn is None else product(wxyz, turn)
+
+
+def _findings(name: str, head: Head, found: _Survey) -> list[Finding]:
+    def say(level: str, text: str) -> Finding:
+        return Finding(level=level, subject=name, text=text)
+
+    said = [
+        say(
+            "note", f"MVN {head.software or 'of unknown version'}, MVNX {head.version or '?'}: {head.subject}"
+        )
+    ]
+    if found.unit != "m":
+        said.append(say("assumed", f"positions are in {found.unit}: else the trunk would not be a person's"))
+    if lost := unmeasured(head):
+        text = f"configuration {head.configuration or 'unknown'}: no sensor for {', '.join(lost)}"
+        said.append(say("warning", f"{text}; MVN moves them stiffly with their neighbours: not measured"))
+    if found.broken:
+        said.append(say("warning", f"{found.broken} frames without position and orientation left out"))
+    if found.backward:
+        said.append(say("warning", f"{found.backward} frames that are not after the one before left out"))
+    span = found.last - found.first
+    expected = round(span * (head.rate or 0.0)) + 1
+    if expected > found.frames + 1:
+        said.append(say("warning", f"{expected - found.frames} of {expected} frames are missing"))
+    if extra := [s for s in head.segments if s not in SEGMENTS]:
+        said.append(say("note", f"segments that are not used: {', '.join(extra[:6])}"))
+    return said
+
+
+def _angles(name: str, found: _Survey, turn: Array | None) -> list[Finding]:
+    """Whether the file's joint angles are those of its segments."""
+    if not found.checked:
+        return []
+    q, angles = (np.stack(columns) for columns in zip(*found.checked, strict=True))
+    if turn is not None:
+        q = product(q.reshape(-1, 4), np.tile(turn, (len(q), 1))).reshape(q.shape)
+    with np.errstate(invalid="ignore"):
+        off = float(np.nanmax(differences(anatomical(q), angles), initial=0.0))
+    text = f"its joint angles differ from those of its segments by at most {math.degrees(off):.2f}°"
+    if off > AGREE:
+        text += ": it is not clear which are right; the segments are used"
+    return [Finding(level="note" if off <= AGREE else "warning", subject=name, text=text)]
+
+
+def _turn(name: str, special: dict[str, CaptureFrame]) -> tuple[Array | None, list[Finding]]:
+    """The correction by the frames tpose and tpose-isb, where the file has both."""
+    tpose, isb = (special.get(kind) for kind in ("tpose", "tpose-isb"))
+    if tpose is None or isb is None or tpose.orientations is None or isb.orientations is None:
+        text = "no frames tpose and tpose-isb: segments are taken to have the world's axes in the T-pose"
+        return None, [Finding(level="assumed", subject=name, text=text)]
+    turn, largest = correction(tpose.orientations, isb.orientations)
+    if not np.isfinite(largest) or largest < NO_TURN:
+        return None, []
+    text = f"segments are turned by up to {math.degrees(largest):.2f}°, as its tpose and tpose-isb say"
+    return turn, [Finding(level="note", subject=name, text=text)]
+
+
+class Mvnx(CaptureFile, frozen=True, kw_only=True):
+    """A person moved by a recording of Xsens MVN (MVNX 3 or 4)."""
+
+    def read(self, path: Path) -> Captured:
+        """The file's 23 segments, and its calibration poses."""
+        found = read(path, file=self.file)
+        first = next(iter(found.frames)).subject
+        if self.subject and self.subject != first:
+            raise InputError.at(self.file, "subject", f"no {self.subject!r} in it", f"it has {first!r}")
+        return found

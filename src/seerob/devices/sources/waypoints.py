@@ -1,0 +1,169 @@
+"""Programmed waypoints made into a continuous motion: a first look, before a controller has run it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+
+from seerob.core.errors import InputError, Problem, suggestion
+from seerob.core.quantities import Pose, Radians, unit
+from seerob.core.same_names import by_name
+from seerob.core.snapshot import Finding
+from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
+from seerob.devices.motion_files.logged_program import log_kind, logged_program
+from seerob.devices.motion_files.trajectory_file import TrajectoryFile, notes
+from seerob.files.trajectories.trajectory import MotionOrigin, Trajectory
+from seerob.files.waypoints.arm import Arm
+from seerob.files.waypoints.branches import parse
+from seerob.files.waypoints.continuous import Continuous, Wish, continuous
+from seerob.files.waypoints.joint_limits import JointLimits
+from seerob.files.waypoints.point import Point
+from seerob.files.waypoints.reading import read_program
+from seerob.files.waypoints.waypoint import Program
+from seerob.workstation.source import Target
+
+Above = Annotated[float, Meta(gt=0, le=1e6)]
+BY_HAND = "points"
+
+
+class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
+    """A robot's motion through waypoints, timed here: URScript, .urp, tables, TOML, YAML, logs, by hand."""
+
+    file: str = ""
+    """Path, from the folder of the workstation file; its ending says what it is. Without it ``points``."""
+    tolerance: Annotated[Annotated[float, Meta(gt=0, le=1)] | None, unit("rad")] = None
+    """Of a log (RoboDK, KUKA): how far in any joint the moves between waypoints may be from what was logged
+    [rad or m]; needed with a log."""
+    points: tuple[Point, ...] = ()
+    """Waypoints by hand instead of a file; their keys are below."""
+    origin: MotionOrigin = MotionOrigin.PLANNED
+    """What the motion is a motion of: the timing is made here, so it is preliminary."""
+    joint_speed: Annotated[Above | None, unit("rad/s")] = None
+    """Of the leading joint [rad/s or m/s], where a joint move does not say."""
+    joint_acceleration: Annotated[Above | None, unit("rad/s²")] = None
+    """Likewise [rad/s² or m/s²]."""
+    joint_jerk: Annotated[Above | None, unit("rad/s³")] = None
+    """Of joint moves [rad/s³ or m/s³]; no program says it, and none is assumed."""
+    tool_speed: Annotated[Above | None, unit("m/s")] = None
+    """Of the tool point, where a linear or circular move does not say [m/s]."""
+    tool_acceleration: Annotated[Above | None, unit("m/s²")] = None
+    """Likewise [m/s²]."""
+    tool_jerk: Annotated[Above | None, unit("m/s³")] = None
+    """Of linear and circular moves [m/s³]."""
+    tool_turn: Annotated[Above | None, unit("rad/s")] = None
+    """Largest turning speed of the tool on linear and circular moves [rad/s]; when not given only the
+    joints' speed limits hold, and what it reaches is said."""
+    start: Radians | None = None
+    """Joint positions before the first waypoint [rad or m]; when not given, that waypoint, if it has any."""
+    branch: str | None = None
+    """Signs of shoulder, elbow and wrist, such as ``"+-+"``, for poses that joint moves go to; the branch
+    nearest to where the robot is when not given."""
+    at: str | None = None
+    """Link that carries the tool point (``tool0``); the description's tip when not given."""
+    tcp: Pose | None = None
+    """Tool point in that link's frame; what the program says (``set_tcp``), else the link's origin."""
+    base: str | None = None
+    """Link that poses are given in; a controller's own file means the link ``base`` where there is one."""
+    period: Annotated[float, unit("s", ge=0.001, le=0.1)] = 0.008
+    """Of the samples [s]."""
+
+    def __post_init__(self) -> None:
+        if bool(self.file) == bool(self.points):
+            raise ValueError("give either file or points")
+        if self.branch is not None:
+            parse(self.branch)
+
+    def read(self, path: Path, target: Target) -> tuple[Trajectory, tuple[Finding, ...]]:
+        """Read the waypoints, solve the poses, time the way."""
+        program = self.program(path)
+        arm, said = self.arm(program, target)
+        found = self.motion(program, arm, _limits(target, arm))
+        where = program.file
+        text = (
+            f"the motion between the {len(program.waypoints)} waypoints of {where} is timed by seerob with "
+            f"limited jerk, {found.trajectory.duration:.3f} s in all: a controller's own timing, blends and "
+            "branches may differ"
+        )
+        return found.trajectory, (
+            *notes((text, *said), target.name, level="assumed"),
+            *notes(tuple(f"{where}: {r}" for r in (*program.remarks, *found.remarks)), target.name),
+            *notes(tuple(f"{where}: {d}" for d in found.doubts), target.name, level="warning"),
+        )
+
+    def motion(self, program: Program, arm: Arm, limits: JointLimits) -> Continuous:
+        """The continuous motion.
+
+        Args:
+            program: Of `program`.
+            arm: Of `arm`.
+            limits: What its joints may do.
+
+        Raises:
+            InputError: What nobody gave, or a waypoint that cannot be reached.
+        """
+        wish = by_name(Wish, self, branch=None if self.branch is None else parse(self.branch))
+        return continuous(program, arm, wish, limits=limits)
+
+    def program(self, path: Path) -> Program:
+        """The waypoints of the file, or those by hand.
+
+        Raises:
+            InputError: The file is wrong.
+        """
+        if self.file and (kind := log_kind(path)) is not None:
+            return logged_program(kind, path, self.file, self.robot, self.tolerance)
+        if self.file:
+            return read_program(path, self.file)
+        return Program(BY_HAND, tuple(p.waypoint(f"points[{i}]") for i, p in enumerate(self.points)))
+
+    def arm(self, program: Program, target: Target) -> tuple[Arm, tuple[str, ...]]:
+        """The robot up to its tool point, and what is assumed of both.
+
+        Raises:
+            InputError: No description, or a link that is not there.
+        """
+        where = self.file or BY_HAND
+        if target.description is None:
+            raise InputError.at(where, "robot", f"nobody describes {target.name}", "name a robot")
+        links = [link.name for link in target.description.links]
+        problems = [
+            Problem(where, key, f"no link {name!r} of {target.name}", suggestion(name, links))
+            for key, name in (("at", self.at), ("base", self.base))
+            if name is not None and name not in links
+        ]
+        if problems:
+            raise InputError(problems)
+        base = self.base
+        if base is None and program.controller and "base" in links:
+            base = "base"
+        poses = any(w.pose is not None for w in program.waypoints)
+        tip = self.at or target.description.tip
+        tcp, whose = self._tcp(program)
+        said = (
+            ()
+            if not poses
+            else (
+                f"poses are of the point {whose} of {tip}, in the frame of {base or links[0]}: a controller "
+                "may have another tool point or base",
+            )
+        )
+        return Arm(target.description, link=tip, link_from_tcp=tcp, base=base), said
+
+    def _tcp(self, program: Program) -> tuple[Array, str]:
+        if self.tcp is not None:
+            turn = np.eye(3)
+            if self.tcp.wxyz is not None:
+                turn = rotation_from_wxyz(self.tcp.wxyz)
+            elif self.tcp.rpy is not None:
+                turn = rotation_from_rpy(self.tcp.rpy)
+            return transform(turn, self.tcp.position), "that tcp says"
+        if program.tcp is not None:
+            return transform(rotation_from_wxyz(program.tcp.wxyz), program.tcp.position), "that set_tcp says"
+        return np.eye(4), "at the origin"
+
+
+def _limits(target: Target, arm: Arm) -> JointLimits:
+    return JointLimits.of(arm.n, speed=target.velocity, acceleration=target.acceleration, jerk=target.jerk)

@@ -1,0 +1,286 @@
+"""What sources of machine variables share: values that come one by one become one picture of them all.
+
+A device says what changes, or is asked again and again. Either way a sample is everything that is known
+of its variables now, in SI and under the dictionary's names; what is too old, what the device calls bad
+and what cannot be is a doubt with its reason.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncGenerator, AsyncIterator, Mapping
+from contextlib import aclosing
+from pathlib import Path
+from typing import ClassVar, NamedTuple, Self
+
+from msgspec.structs import replace
+
+from seerob.core.errors import SeerobError
+from seerob.core.quantities import Seconds
+from seerob.core.samples import Sample, SignalSample
+from seerob.core.snapshot import Finding
+from seerob.devices.live.listening import ASK_WITHIN, LiveSource, because
+from seerob.workstation.source import Target
+from seerob.workstation.variables.dictionary import BadValue, Value, Variable
+
+COVER_WITHIN = 1.0
+"""How long a device is listened to for what it has of the dictionary, at start [s]."""
+LONGEST_PULSE = 0.25
+"""A device that speaks of changes is asked so often at least whether it is there [s]: what stands is as old
+as the last answer, and a change is a motion since then."""
+BEAT = 0.05
+"""A sample is sent at least this often while there is a connection [s]: no news is news, too."""
+PULSES = 4
+"""A device that says nothing is asked so often within its source's time-out whether it is there."""
+
+
+FILES = ("ca", "certificate", "key", "server_certificate")
+"""Options that name a file beside the workstation."""
+
+
+class Change(NamedTuple):
+    """What a device said of one variable."""
+
+    name: str
+    """In the dictionary."""
+    raw: object
+    """As it was sent."""
+    doubt: str = ""
+    """Why the device itself does not stand by it."""
+    age: float = 0.0
+    """How old it may have been when it arrived [s]: since it was asked for, or by the device's own stamps."""
+
+
+class Shown(NamedTuple):
+    """That a device was there, and that what it had to say until then has arrived."""
+
+    asked: float
+    """When it was asked, of what has answered since: host's monotonic time [s]."""
+
+
+class Node(NamedTuple):
+    """One variable that a device has, found by browsing."""
+
+    address: str
+    """As the dictionary has it."""
+    type: str
+    """As the device calls it."""
+    unit: str
+    """As the device states it; empty when it does not."""
+    value: str
+    """What it was, for whoever reads the skeleton."""
+
+
+class VariablesSource(LiveSource, frozen=True, kw_only=True):
+    """Base of the sources that read the variables of machines; which ones, the dictionary says."""
+
+    reads_variables: ClassVar[bool] = True
+    by_exception: ClassVar[bool] = True
+    """Whether the device speaks up when something changes: then a value stands as long as the connection
+    does. Else it grows old from when it was said."""
+
+    timeout: Seconds = 1.0
+    """Age at which what it said no longer counts [s], beside the time-out of each variable."""
+
+    def period(self) -> float:
+        """Interval between samples that is expected [s]."""
+        return BEAT
+
+    def beside(self, folder: Path) -> Self:
+        """The same source with the files that it names found from the folder of the workstation file."""
+        named = {key: getattr(self, key, None) for key in FILES}
+        return replace(self, **{key: str(folder / path) for key, path in named.items() if path is not None})
+
+    def patience(self) -> float:
+        """How long a run waits for the answer at start [s]."""
+        return ASK_WITHIN + COVER_WITHIN
+
+    async def inquire(self, folder: Path, target: Target | None) -> tuple[Finding, ...]:
+        """What the device says of itself, and what of the dictionary it does not have."""
+        found = await self.ask()
+        read = tuple(v for v in (() if target is None else target.variables) if not v.write)
+        return (*found, *(await self._covered(read, folder))) if read else found
+
+    async def _covered(self, variables: tuple[Variable, ...], folder: Path) -> tuple[Finding, ...]:
+        """Each variable once: heard and believable, in doubt, or not heard in time."""
+        picture, clock = Picture(variables, by_exception=True), asyncio.get_running_loop()
+        end, waiting, ended = clock.time() + COVER_WITHIN, {v.name for v in variables}, ""
+        try:
+            async with aclosing(self.changes(variables, folder)) as said, asyncio.timeout_at(end):
+                async for changes in said:
+                    picture.take(changes, time.monotonic())
+                    waiting -= {change.name for change in changes if isinstance(change, Change)}
+                    if not waiting:
+                        break
+        except TimeoutError:
+            pass
+        except (OSError, EOFError, SeerobError) as error:
+            ended = because(error)
+        doubts = picture.sample(time.monotonic()).doubts
+        unheard = f"not heard within {COVER_WITHIN:g} s" + (f": {ended}" if ended else "")
+        texts = {name: unheard if name in waiting else doubts[name] for name in doubts}
+        heard = f"{len(variables) - len(texts)} of {len(variables)} variables are heard at start"
+        return (
+            Finding(level="note", subject=self.name, text=heard),
+            *(
+                Finding(level="warning", subject=name, text=text.removeprefix(f"{name}: "))
+                for name, text in texts.items()
+            ),
+        )
+
+    def times(self, variable: Variable) -> bool:
+        """Whether it shows how late a variable is heard: it is asked for it, or told when it was so."""
+        return False
+
+    def changes(
+        self, variables: tuple[Variable, ...], folder: Path
+    ) -> AsyncGenerator[tuple[Change | Shown, ...], None]:
+        """Connect, and yield what the device says of the variables until the connection ends.
+
+        Each time it yields, the device was there at that moment. A device that only speaks of changes has to
+        be asked now and then: what stands is as old as the newest question that it has answered.
+
+        Args:
+            variables: Those to read.
+            folder: Where relative paths start: the folder of the workstation file.
+
+        Raises:
+            OSError: There is no connection, or no longer.
+            SeerobError: What the device says cannot be understood, or it has not what is asked for.
+        """
+        raise NotImplementedError
+
+    async def browse(self) -> AsyncGenerator[Node, None]:
+        """The variables that the device has, for a skeleton of a dictionary.
+
+        Raises:
+            OSError: There is no connection.
+            SeerobError: The device cannot be asked what it has.
+        """
+        raise NotImplementedError
+        yield
+
+    async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
+        """Everything that is known, whenever something changes and at least every `BEAT`."""
+        variables = () if target is None else target.variables
+        picture = Picture(variables, by_exception=self.by_exception, bounds=self._bounds(variables))
+        folder = Path("" if target is None else target.folder)
+        read = tuple(v for v in variables if not v.write)
+        alive = time.monotonic()
+        async with aclosing(self.changes(read, folder)) as said, aclosing(_beating(said)) as beats:
+            async for changes in beats:
+                now = time.monotonic()
+                if changes is not None:
+                    alive = now
+                    picture.take(changes, now)
+                if picture.begun:
+                    # Silence is no news: what stood when the device was last heard is as old as that.
+                    yield picture.sample(now, alive)
+
+    def _bounds(self, variables: tuple[Variable, ...]) -> dict[str, float]:
+        """How late what nobody shows to be late may be, as the file says [s]."""
+        late = {v.name for v in variables if not v.write and not self.times(v)}
+        return dict.fromkeys(late, self.delay or 0.0)
+
+
+class Picture:
+    """What is known of a device's variables.
+
+    Args:
+        variables: Of the dictionary.
+        by_exception: Whether a value stands until the device says another.
+        bounds: How much older than it seems a variable may be [s], by name.
+    """
+
+    def __init__(
+        self,
+        variables: tuple[Variable, ...],
+        *,
+        by_exception: bool,
+        bounds: Mapping[str, float] | None = None,
+    ) -> None:
+        self._variables = {v.name: v for v in variables}
+        self._bounds = bounds or {}
+        self._shown: float | None = None
+        """Until when everything was said that is known [s]; None where that was not asked."""
+        self._by_exception = by_exception
+        self._said: dict[str, float] = {}
+        self._values: dict[str, Value] = {}
+        self._bad: dict[str, str] = {}
+        self.begun = False
+        """Whether the device has said anything yet."""
+
+    def take(self, changes: tuple[Change | Shown, ...], now: float) -> None:
+        """Hear what the device says.
+
+        Args:
+            changes: What it says.
+            now: Host's monotonic time [s].
+        """
+        for change in changes:
+            if isinstance(change, Shown):
+                self._shown = max(change.asked, self._shown or change.asked)
+                continue
+            variable = self._variables.get(change.name)
+            if variable is None:
+                continue
+            self.begun = True
+            self._said[change.name] = now - change.age
+            self._bad.pop(change.name, None)
+            if change.doubt:
+                self._bad[change.name] = f"{change.name}: {change.doubt}"
+                continue
+            try:
+                self._values[change.name] = variable.value(change.raw)
+            except BadValue as error:
+                self._bad[change.name] = str(error)
+
+    def sample(self, now: float, heard: float | None = None) -> SignalSample:
+        """What is known.
+
+        Args:
+            now: Host's monotonic time [s].
+            heard: When the device was heard last [s]; now when not given.
+        """
+        t = now if heard is None else heard
+        doubts = dict(self._bad)
+        for name, variable in self._variables.items():
+            if variable.write or name in doubts:
+                continue
+            said = self._said.get(name)
+            if said is None:
+                doubts[name] = f"{name}: nothing heard yet"
+            elif not self._by_exception and now - said > variable.timeout:
+                doubts[name] = f"{name}: not heard for {now - said:.2f} s (time-out {variable.timeout:g} s)"
+        ages = {name: age for name in self._values if (age := self._age(name, t)) > 0}
+        return SignalSample(source="", seq=0, t=t, values=dict(self._values), doubts=doubts, ages=ages)
+
+    def _age(self, name: str, t: float) -> float:
+        """How much older than ``t`` what is known of a variable may be [s]."""
+        said = self._shown if self._by_exception else self._said[name]
+        return max(0.0, t - (t if said is None else said)) + self._bounds.get(name, 0.0)
+
+
+async def _beating(
+    said: AsyncIterator[tuple[Change | Shown, ...]],
+) -> AsyncGenerator[tuple[Change | Shown, ...] | None, None]:
+    """What is said, and None every `BEAT` in which nothing is."""
+    waiting: asyncio.Task[tuple[Change | Shown, ...]] | None = None
+    try:
+        while True:
+            if waiting is None:
+                waiting = asyncio.ensure_future(anext(said))
+            done, _ = await asyncio.wait({waiting}, timeout=BEAT)
+            if not done:
+                yield None
+                continue
+            heard, waiting = waiting, None
+            try:
+                yield heard.result()
+            except StopAsyncIteration:
+                return
+    finally:
+        if waiting is not None:
+            waiting.cancel()
+            await asyncio.gather(waiting, return_exceptions=True)

@@ -1,0 +1,1 @@
+"""Exact distances, depths, rays and fields of the shapes of the scene."""

@@ -1,1 +1,0 @@
-"""Questions to the shapes of the scene: least distances, depths and rays."""

@@ -1,0 +1,1 @@
+"""Motions from files: tables, trajectories, waypoints, motion capture."""

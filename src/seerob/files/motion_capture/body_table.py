@@ -1,0 +1,243 @@
+"""Tables of captured motion: a row per instant with three columns per point, or a row per point.
+
+Delimited text. Headers say what is what: ``PELVIS_X [mm]``, ``LeftHand position y (m)``, ``head qw``,
+``wrist confidence``; with a row per point ``time [s], joint, x [mm], y, z, qw …``. A cell that is empty or
+``NaN`` was not seen.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from seerob.core.errors import InputError, Problem
+from seerob.core.transforms import Array
+from seerob.files.motion_capture.body_columns import TIMES, Column, column
+from seerob.files.motion_capture.decimal_comma import Commas
+from seerob.files.motion_capture.frame_arrays import MAX_VALUES, check_size
+from seerob.files.tables.candidates import candidates
+from seerob.files.tables.grid import MAX_COLUMNS, MAX_PROBLEMS, Grid
+from seerob.files.tables.mapping import Mapping
+
+SEARCH = 60
+"""Rows in which a header is looked for."""
+MAX_POINTS = 2000
+FIRST = {"position": 0, "orientation": 3, "confidence": 7}
+WIDTH = 8
+"""x, y, z, then w, x, y, z, then confidence."""
+_EMPTY = frozenset(["", "nan", "none", "null", "na", "n/a", "-"])
+
+
+@dataclass(frozen=True, eq=False)
+class BodyTable:
+    """What a table holds, in its own unit and axes."""
+
+    names: tuple[str, ...]
+    t: Array
+    """[s], shape (n,)."""
+    persons: tuple[str, ...]
+    """Of each row, as the file has it; empty texts when it has none."""
+    values: Array
+    """Shape (n, k, 8): x, y, z, quaternion w, x, y, z, confidence; NaN where the file has nothing."""
+    unit: str
+    """Of the positions; empty when no header says it."""
+    has: frozenset[str]
+    """Which of ``position``, ``orientation``, ``confidence`` there are."""
+
+
+def read(path: Path, *, file: str, time_unit: str = "") -> BodyTable:
+    """A table of captured motion.
+
+    Args:
+        path: Delimited text.
+        file: As messages name it.
+        time_unit: Of the time column, when its header does not say it: ``s``, ``ms``, ``us``.
+
+    Raises:
+        InputError: It has no such header, a cell that is no number, or nobody says the unit of time.
+    """
+    grid, row, columns = _header(path, file)
+    scale = _time_scale(columns, file, time_unit)
+    if any(c.what == "point" for c in columns.values()):
+        return _by_point(grid, row, columns, scale)
+    return _by_instant(grid, row, columns, scale)
+
+
+def _header(path: Path, file: str) -> tuple[Grid, int, dict[int, Column]]:
+    """The table, its header's row from 1, and what its columns hold, by index."""
+    for grid, _ in candidates(path, file, Mapping()):
+        for number, row in enumerate(islice(grid.rows(), SEARCH), start=1):
+            if len(row) > MAX_COLUMNS:
+                break
+            found = {i: c for i, cell in enumerate(row) if (c := column(str(cell))) is not None}
+            kinds = [c.what for c in found.values()]
+            if "time" in kinds and kinds.count("position") + kinds.count("orientation") >= 3:
+                _check_columns(found, file, number)
+                return grid, number, found
+    what = "no row names a time and coordinates"
+    remedy = "name the columns: time [s], PELVIS_X [mm], PELVIS_Y [mm], PELVIS_Z [mm], …"
+    raise InputError.at(file, "", what, remedy)
+
+
+def _check_columns(columns: dict[int, Column], file: str, row: int) -> None:
+    problems: list[Problem] = []
+    seen: dict[tuple[str, str, int], int] = {}
+    for index, c in columns.items():
+        key = (c.name, c.what, c.axis)
+        if key in seen:
+            what = f"columns {seen[key] + 1} and {index + 1} are both {c.name} {c.what} {c.axis}".replace(
+                "  ", " "
+            )
+            problems.append(Problem(file, f"row {row}", what, "rename or remove one"))
+        seen[key] = index
+    for name in dict.fromkeys(c.name for c in columns.values()):
+        for what, count in (("position", 3), ("orientation", 4)):
+            own = sum(c.name == name and c.what == what for c in columns.values())
+            if own not in (0, count):
+                text = f"{own} columns for the {what} of {name or 'a point'}, {count} are needed"
+                problems.append(Problem(file, f"row {row}", text, "name all of them, or none"))
+    if problems:
+        raise InputError(problems[:MAX_PROBLEMS])
+
+
+def _time_scale(columns: dict[int, Column], file: str, given: str) -> float:
+    stated = next(c.unit for c in columns.values() if c.what == "time")
+    unit = given or stated
+    if unit not in TIMES:
+        what = f"the time is in {unit!r}" if unit else "no unit in the header of the time"
+        raise InputError.at(file, "time_unit", what, 'give time_unit = "s", "ms" or "us"')
+    return TIMES[unit]
+
+
+def _unit(columns: dict[int, Column], file: str) -> str:
+    stated = {c.unit for c in columns.values() if c.what == "position" and c.unit}
+    if len(stated) > 1:
+        raise InputError.at(file, "unit", f"positions in several units: {', '.join(sorted(stated))}")
+    return next(iter(stated), "")
+
+
+@dataclass(eq=False)
+class _Numbers:
+    """Cells as numbers, with every mistake up to a bound."""
+
+    file: str
+    problems: list[Problem] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._commas = Commas(self.file)
+
+    def row(self, cells: list[object], number: int) -> list[float]:
+        """Numbers; NaN for what is empty."""
+        try:
+            return list(map(float, cells))  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            return [self._one(cell, number) for cell in cells]
+
+    def _one(self, cell: object, number: int) -> float:
+        text = str(cell).strip()
+        if cell is None or text.lower() in _EMPTY:
+            return float("nan")
+        try:
+            return self._commas.number(text)
+        except ValueError:
+            self.problems.append(Problem(self.file, f"row {number}", f"{text[:40]!r} is no number"))
+            if len(self.problems) >= MAX_PROBLEMS:
+                raise InputError(self.problems) from None
+            return float("nan")
+
+    def check(self) -> None:
+        """Raise what was wrong."""
+        if self.problems:
+            raise InputError(self.problems)
+        self._commas.check()
+
+
+def _rows(grid: Grid, header: int) -> Iterator[tuple[int, Sequence[object]]]:
+    for number, row in enumerate(grid.rows(), start=1):
+        if number > header and any(str(cell).strip() for cell in row if cell is not None):
+            yield number, row
+
+
+def _by_instant(grid: Grid, header: int, columns: dict[int, Column], scale: float) -> BodyTable:
+    names = tuple(dict.fromkeys(c.name for c in columns.values() if c.name))
+    if not names or len(names) > MAX_POINTS:
+        raise InputError.at(
+            grid.file, f"row {header}", f"{len(names)} points", f"1…{MAX_POINTS} are expected"
+        )
+    wanted = {i: c for i, c in columns.items() if c.what in FIRST and c.name}
+    place = [names.index(c.name) * WIDTH + FIRST[c.what] + c.axis for c in wanted.values()]
+    time = next(i for i, c in columns.items() if c.what == "time")
+    person = next((i for i, c in columns.items() if c.what == "person"), None)
+    t, flat, persons = array("d"), array("d"), []
+    numbers = _Numbers(grid.file)
+    for number, row in _rows(grid, header):
+        cells = [row[i] if i < len(row) else None for i in (time, *wanted)]
+        first, *values = numbers.row(cells, number)
+        t.append(first * scale)
+        flat.extend(values)
+        persons.append(_person(row, person))
+        check_size(grid.file, len(t), len(names) * WIDTH)
+    numbers.check()
+    table = np.full((len(t), len(names) * WIDTH), np.nan)
+    if len(t):
+        table[:, place] = np.frombuffer(flat, float).reshape(len(t), -1)
+    return BodyTable(
+        names=names,
+        t=np.array(t),
+        persons=tuple(persons),
+        values=table.reshape(len(t), len(names), WIDTH),
+        unit=_unit(columns, grid.file),
+        has=frozenset(c.what for c in wanted.values()),
+    )
+
+
+def _by_point(grid: Grid, header: int, columns: dict[int, Column], scale: float) -> BodyTable:
+    index = {c.what: i for i, c in columns.items() if c.what in ("time", "person", "point")}
+    wanted = {i: c for i, c in columns.items() if c.what in FIRST and not c.name}
+    place = [FIRST[c.what] + c.axis for c in wanted.values()]
+    numbers = _Numbers(grid.file)
+    names: dict[str, int] = {}
+    instants: dict[tuple[float, str], int] = {}
+    rows, flat = array("q"), array("d")
+    for number, row in _rows(grid, header):
+        cells = [row[i] if i < len(row) else None for i in (index["time"], *wanted)]
+        t, *values = numbers.row(cells, number)
+        name = str(row[index["point"]]).strip() if index["point"] < len(row) else ""
+        at = names.setdefault(name, len(names))
+        if len(names) > MAX_POINTS:
+            raise InputError.at(grid.file, f"row {number}", f"more than {MAX_POINTS} points")
+        instant = instants.setdefault((t * scale, _person(row, index.get("person"))), len(instants))
+        rows.extend((instant, at))
+        flat.extend(values)
+        if len(flat) > MAX_VALUES:
+            raise InputError.at(
+                grid.file, f"row {number}", f"more than {MAX_VALUES} numbers", "split the file"
+            )
+    numbers.check()
+    check_size(grid.file, len(instants), len(names) * WIDTH)
+    table = np.full((len(instants), len(names), WIDTH), np.nan)
+    if len(rows):
+        which = np.frombuffer(rows, np.int64).reshape(-1, 2)
+        given = np.full((len(which), WIDTH), np.nan)
+        given[:, place] = np.frombuffer(flat, float).reshape(len(which), -1)
+        table[which[:, 0], which[:, 1]] = given
+    return BodyTable(
+        names=tuple(names),
+        t=np.array([t for t, _ in instants]),
+        persons=tuple(person for _, person in instants),
+        values=table,
+        unit=_unit(columns, grid.file),
+        has=frozenset(c.what for c in wanted.values()),
+    )
+
+
+def _person(row: Sequence[object], index: int | None) -> str:
+    if index is None or index >= len(row):
+        return ""
+    text = str(row[index]).strip()
+    return "" if text.lower() in _EMPTY else text

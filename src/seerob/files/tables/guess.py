@@ -1,0 +1,143 @@
+"""What a table probably means, and what has to be asked.
+
+A unit that the header declares is known; one that only the range of the numbers suggests is a
+guess, and a guess is asked, never used: `Guess.questions` says what, `Guess.toml` how to answer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from msgspec import convert, structs
+
+from seerob.core.errors import InputError, Problem
+from seerob.files.tables.candidates import candidates
+from seerob.files.tables.columns import guess_columns
+from seerob.files.tables.layout import Layout, find_layout
+from seerob.files.tables.mapping import Mapping, Motion
+from seerob.files.tables.units_guess import guess_units
+from seerob.workstation.source import Target
+
+
+@dataclass(frozen=True, eq=False)
+class Guess:
+    """A mapping, as far as it can be told from the file, and how sure it is."""
+
+    file: str
+    mapping: Mapping
+    """What was given, completed with what was found and guessed."""
+    questions: dict[str, str]
+    """Key of the mapping → why it is not certain; empty when everything is."""
+    notes: tuple[str, ...]
+    """What whoever reads a result should know: columns left out, units that contradict the header."""
+    layout: Layout = field(repr=False)
+
+    @property
+    def certain(self) -> bool:
+        """Whether nothing needs to be confirmed."""
+        return not self.questions
+
+    def toml(self) -> str:
+        """The table to put below the source in the workstation file, doubtful lines with the reason."""
+        return self.mapping.toml({key: f"please confirm: {text}" for key, text in self.questions.items()})
+
+    def error(self) -> InputError:
+        """The questions as an error whose remedy is the text to paste."""
+        problems = [Problem(self.file, f"mapping.{key}", text) for key, text in self.questions.items()]
+        remedy = (
+            "put this below the source in the workstation file, with what is wrong corrected:\n\n"
+            + self.toml()
+        )
+        problems[-1] = problems[-1]._replace(remedy=remedy)
+        return InputError(problems)
+
+
+def guess(
+    path: Path,
+    given: Mapping | None = None,
+    *,
+    name: str | None = None,
+    target: Target | None = None,
+    motion: Motion = Motion.JOINTS,
+) -> Guess:
+    """Look at a table of motion and say what its columns mean.
+
+    Args:
+        path: A workbook (.xlsx, .xlsm) or delimited text.
+        given: What the user says; it is never overridden.
+        name: The file as messages name it.
+        target: The robot it is to drive; tells which rows are its own when several share the table.
+        motion: Whether joints or the tool are looked for; joints may be missing beside the tool.
+
+    Raises:
+        InputError: No table, no header, no time, no joints, or a mapping that does not fit the file.
+    """
+    given = given or Mapping()
+    if motion is Motion.TOOL:
+        given = given.without_joints()
+    name = name or path.name
+    fitting = [
+        (layout, base)
+        for grid, base in candidates(path, name, given)
+        if (layout := find_layout(grid, given, () if target is None else target.joints, motion)) is not None
+    ]
+    if not fitting:
+        what = f"no row names a time and {motion}"
+        raise InputError.at(name, "header", what, _remedy(path, name, given, motion))
+    # Of several ways to cut the same text into columns, the one with the most joints is meant.
+    guesses = [_one(name, layout, base, given, target, motion) for layout, base in fitting]
+    usable = [g for g in guesses if not isinstance(g, InputError)]
+    if not usable:
+        raise next(g for g in guesses if isinstance(g, InputError))
+    best = max(usable, key=lambda g: _width(g.mapping, motion))
+    others = [g.mapping.sheet for g in usable if g.mapping.sheet != best.mapping.sheet]
+    if others:
+        names = ", ".join(repr(g.mapping.sheet) for g in usable)
+        questions = {"sheet": f"{len(usable)} sheets hold {motion} over time: {names}", **best.questions}
+        best = Guess(best.file, best.mapping, questions, best.notes, best.layout)
+    return best
+
+
+def _one(
+    name: str, layout: Layout, base: Mapping, given: Mapping, target: Target | None, motion: Motion
+) -> Guess | InputError:
+    found = guess_columns(layout, given, target, motion)
+    if found.problems:
+        return InputError(found.problems)
+    units = guess_units(layout, found, given)
+    mapping = structs.replace(
+        base,
+        header_row=layout.header_row,
+        group_row=layout.group_row,
+        unit_row=layout.unit_row,
+        **{k: v for k, v in (*found.mapping.items(), *units.mapping.items()) if v is not None},
+    )
+    questions = {**found.questions, **units.questions}
+    if given.decimal_comma is None and mapping.decimal_comma and units.thousands:
+        questions["decimal_comma"] = "every comma is followed by three digits: decimal comma or thousands?"
+    asked = {k: v for k, v in questions.items() if getattr(given, k) is None}
+    notes = (*found.notes, *units.notes)
+    whole = convert(structs.asdict(given.over(mapping)), Mapping)
+    return Guess(name, whole, asked, notes, layout)
+
+
+def _width(mapping: Mapping, motion: Motion) -> int:
+    if motion is Motion.TOOL:
+        return len(mapping.tcp_position or ()) + len(mapping.tcp_orientation or ())
+    return len(mapping.joints) if isinstance(mapping.joints, tuple) else 1000
+
+
+def _remedy(path: Path, name: str, given: Mapping, motion: Motion) -> str:
+    if given.header_row is not None:
+        return f"header_row = {given.header_row} is beyond the table"
+    shown = []
+    for grid, _ in candidates(path, name, given):
+        for row in grid.rows():
+            text = [str(c) for c in row if c is not None and str(c).strip()]
+            if text:
+                shown.append(" | ".join(text)[:120])
+                break
+    seen = f" (the first row reads: {shown[0]})" if shown else " (the table is empty)"
+    columns = "joints" if motion is Motion.JOINTS else "tcp_position, tcp_orientation, tcp_convention"
+    return f"name the columns in [sources.mapping]: header_row, time, {columns} and their units" + seen

@@ -1,0 +1,141 @@
+"""An Excel workbook as grids, one per sheet; values only, formulas as last calculated."""
+
+from __future__ import annotations
+
+import warnings
+import zipfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from seerob.core.errors import InputError
+from seerob.files.tables.grid import MAX_COLUMNS, Cell
+from seerob.files.tables.text import check_file
+
+MAX_BYTES = 1 << 30
+MAX_UNPACKED = 4 << 30
+MAX_ROWS = 1_048_576
+"""Excel's own bound; a file that states a larger row number is not Excel's."""
+MAX_STRINGS = 256 << 20
+"""Largest table of shared strings, which is held in memory."""
+
+SAVE_AS = "open it in Excel or LibreOffice and save it as .xlsx"
+
+
+def check_workbook(path: Path, name: str) -> None:
+    """InputError unless the file is a workbook of a bearable size, packed and unpacked."""
+    head = check_file(path, name, MAX_BYTES)
+    if head.startswith(b"\xd0\xcf\x11\xe0"):
+        raise InputError.at(name, "", "an old Excel file (.xls) or one with a password", SAVE_AS)
+    if path.suffix.lower() not in (".xlsx", ".xlsm"):
+        raise InputError.at(name, "", f"{path.suffix or 'no'} extension, not .xlsx or .xlsm", SAVE_AS)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            parts = archive.infolist()
+            names = {part.filename for part in parts}
+            if "[Content_Types].xml" not in names or not any(n.startswith("xl/") for n in names):
+                raise InputError.at(name, "", "a zip archive, but not a workbook", SAVE_AS)
+            unpacked = sum(part.file_size for part in parts)
+            strings = sum(p.file_size for p in parts if p.filename.endswith("sharedStrings.xml"))
+            if unpacked > MAX_UNPACKED or strings > MAX_STRINGS:
+                raise InputError.at(name, "", f"unpacks to {unpacked} bytes, more than is taken", "split it")
+            # No workbook has a document type; one that has is after the parser's entities.
+            for part in parts:
+                if part.filename.endswith((".xml", ".rels")):
+                    with archive.open(part) as stream:
+                        if b"<!DOCTYPE" in stream.read(4096):
+                            raise InputError.at(name, part.filename, "declares a document type", SAVE_AS)
+    except InputError:
+        raise
+    except Exception as error:  # zipfile and zlib raise many things over a broken archive
+        raise InputError.at(name, "", f"not a workbook: {error}", SAVE_AS) from error
+
+
+@dataclass(frozen=True)
+class SheetGrid:
+    """One sheet of a workbook."""
+
+    path: Path
+    file: str
+    sheet: str
+
+    def rows(self) -> Iterator[Sequence[Cell]]:
+        """Rows as tuples of cells."""
+        with _opened(self.path, self.file) as book:
+            sheet = book[self.sheet]
+            # The stated extent may be wrong by any amount; what is there counts.
+            sheet.reset_dimensions()
+            cells = _parsed(sheet.iter_rows(values_only=True), self.file, self.sheet)
+            for count, row in enumerate(cells, start=1):
+                if count > MAX_ROWS:
+                    raise InputError.at(self.file, f"sheet {self.sheet!r}", f"more than {MAX_ROWS} rows")
+                if len(row) > MAX_COLUMNS:
+                    what = f"{len(row)} columns, more than {MAX_COLUMNS}"
+                    raise InputError.at(self.file, f"sheet {self.sheet!r}", what)
+                yield row
+
+    def uncalculated(self) -> Iterator[tuple[int, int]]:
+        """Row and column, from 1, of formulas whose result the file does not hold.
+
+        Programs that write workbooks without calculating leave them so; their cells look empty.
+        """
+        with (
+            _opened(self.path, self.file) as book,
+            _opened(self.path, self.file, formulas=True) as written,
+        ):
+            sheets = book[self.sheet], written[self.sheet]
+            for sheet in sheets:
+                sheet.reset_dimensions()
+            values, formulas = (_parsed(sheet.iter_rows(), self.file, self.sheet) for sheet in sheets)
+            for row, cells in enumerate(zip(values, formulas, strict=True), start=1):
+                for column, (value, formula) in enumerate(zip(*cells, strict=False), start=1):
+                    # An empty text is a result.
+                    if formula.data_type == "f" and value.value is None and value.data_type == "n":
+                        yield row, column
+
+
+@contextmanager
+def _opened(path: Path, name: str, *, formulas: bool = False) -> Iterator[Any]:
+    from openpyxl import load_workbook
+
+    # A file of its own: openpyxl leaves the one that it opens open when a part is broken.
+    with path.open("rb") as file:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                book = load_workbook(file, read_only=True, data_only=not formulas)
+        except Exception as error:  # openpyxl raises whatever a broken part makes it raise
+            raise InputError.at(name, "", f"not a workbook: {error}", SAVE_AS) from error
+        try:
+            yield book
+        finally:
+            book.close()
+
+
+def _parsed(rows: Iterator[Sequence[Any]], name: str, sheet: str) -> Iterator[Sequence[Any]]:
+    iterator = iter(rows)
+    count = 0
+    while True:
+        count += 1
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                row = next(iterator)
+        except StopIteration:
+            return
+        except Exception as error:  # as above: a broken part of the file
+            where = f"sheet {sheet!r} row {count}"
+            raise InputError.at(name, where, f"cannot be read: {error}", SAVE_AS) from error
+        yield row
+
+
+def sheets(path: Path, name: str) -> tuple[SheetGrid, ...]:
+    """The sheets with cells, in order; InputError when the file is no workbook."""
+    check_workbook(path, name)
+    with _opened(path, name) as book:
+        found = tuple(SheetGrid(path, name, sheet.title) for sheet in book.worksheets)
+    if not found:
+        raise InputError.at(name, "", "a workbook without a sheet of cells", SAVE_AS)
+    return found

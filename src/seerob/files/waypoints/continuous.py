@@ -1,0 +1,227 @@
+"""Waypoints into one continuous motion: which joint positions they are, pieces between them, their timing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from seerob.core.errors import InputError, Problem
+from seerob.core.transforms import Array, rotation_from_wxyz
+from seerob.files.trajectories.trajectory import MAX_SAMPLES, Trajectory
+from seerob.files.waypoints.arm import Arm
+from seerob.files.waypoints.blending import Leg, meet, rounded
+from seerob.files.waypoints.branches import Branch
+from seerob.files.waypoints.goals import Goals
+from seerob.files.waypoints.joint_limits import JointLimits
+from seerob.files.waypoints.pieces import SINGULAR, Piece, joint_line, tool_way
+from seerob.files.waypoints.timing import Limits, Profile, profile
+from seerob.files.waypoints.waypoint import Program, Waypoint
+
+NO_BLEND = 1e-6
+FAST_TURN = 1.0
+"""A tool that turns faster on a way of its own is pointed out [rad/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wish:
+    """What the program does not say itself; None where nobody said it."""
+
+    joint_speed: float | None = None
+    """Of the leading joint [rad/s or m/s]."""
+    joint_acceleration: float | None = None
+    joint_jerk: float | None = None
+    tool_speed: float | None = None
+    """[m/s]"""
+    tool_acceleration: float | None = None
+    tool_jerk: float | None = None
+    tool_turn: float | None = None
+    """Largest turning speed of the tool on its own ways [rad/s]; not limited when not given."""
+    period: float = 0.008
+    """Of the samples [s]."""
+    start: tuple[float, ...] | None = None
+    """Where the robot stands before the first waypoint [rad or m]."""
+    branch: Branch | None = None
+    """Of poses that a joint move goes to; the one nearest to where the robot is when not given."""
+
+
+@dataclass(frozen=True, eq=False)
+class Continuous:
+    """A motion through waypoints."""
+
+    trajectory: Trajectory
+    at: tuple[Array, ...]
+    """Joint positions of each waypoint [rad or m]."""
+    remarks: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = field(default=())
+    """What may differ on a controller, or was changed."""
+
+
+def continuous(program: Program, arm: Arm, wish: Wish, *, limits: JointLimits) -> Continuous:
+    """A continuous motion through all waypoints.
+
+    Args:
+        program: Waypoints, poses in the arm's base.
+        arm: The robot.
+        wish: Speeds and the like that the program does not give.
+        limits: What the joints may do. Moves that need more are slowed as a whole, and said.
+
+    Raises:
+        InputError: With every limit that nobody gave, or the first waypoint that cannot be reached.
+    """
+    _complete(program, wish)
+    goals = Goals(program, arm, start=wish.start, branch=wish.branch)
+    legs: list[Leg] = []
+    doubts: list[str] = []
+    remarks: list[str] = []
+    rests = 0.0
+    for k, (before, waypoint, q) in enumerate(goals.steps()):
+        piece = _piece(program, arm, before, waypoint, q)
+        if piece is None:
+            if legs:
+                legs[-1].pause += waypoint.pause
+            else:
+                rests += waypoint.pause
+            continue
+        goals.reached(piece.last)
+        leg = Leg(piece, _limits(waypoint, wish, piece), waypoint.shown, waypoint.duration, waypoint.pause)
+        _slowed(leg, limits, wish.tool_turn, arm, doubts)
+        if piece.least < SINGULAR:
+            doubts.append(
+                f"{waypoint.shown}: near a singularity at {100 * piece.least_at:.0f} % of the way (least "
+                f"singular value {piece.least:.2g}): joints turn fast there, and controllers differ"
+            )
+        if piece.turning:
+            remarks.append(f"{waypoint.shown}: the tool only turns; its speed is taken as rad/s")
+        elif wish.tool_turn is None and (rate := piece.turn * leg.limits.speed) > FAST_TURN:
+            doubts.append(
+                f"{waypoint.shown}: the tool turns at up to {rate:.2g} rad/s on this way (give tool_turn): "
+                "how fast a controller lets it turn is not modelled"
+            )
+        legs.append(leg)
+        leg.blend = waypoint.blend > NO_BLEND and k + 1 < len(program.waypoints)
+    legs = rounded(legs, program, arm, limits, doubts)
+    meet(legs)
+    trajectory = _sampled(legs, program.file, wish.period, goals.first, rests)
+    if any(leg.piece.tool for leg in legs):
+        remarks.append(_of_joints(trajectory, arm, limits))
+    remarks += goals.remarks
+    return Continuous(trajectory, tuple(goals.found), tuple(remarks), (*goals.doubts, *doubts))
+
+
+def _complete(program: Program, wish: Wish) -> None:
+    """InputError with everything that nobody gave."""
+    wanted: dict[str, str] = {}
+    for w in program.waypoints:
+        kind = "tool" if w.move.of_tool else "joint"
+        unit = "m" if w.move.of_tool else "rad"
+        wanted.setdefault(f"{kind}_jerk", f"{unit}/s³")
+        if w.speed is None:
+            wanted.setdefault(f"{kind}_speed", f"{unit}/s")
+        if w.acceleration is None:
+            wanted.setdefault(f"{kind}_acceleration", f"{unit}/s²")
+    missing = [
+        Problem(program.file, key, "nobody gave it", f"give {key} [{unit}] in the source (none is assumed)")
+        for key, unit in wanted.items()
+        if getattr(wish, key) is None
+    ]
+    if not program.waypoints:
+        missing.append(Problem(program.file, "", "no waypoints", "give at least one"))
+    if missing:
+        raise InputError(missing)
+
+
+def _limits(waypoint: Waypoint, wish: Wish, piece: Piece) -> Limits:
+    kind = "tool" if waypoint.move.of_tool else "joint"
+    given = {"speed": waypoint.speed, "acceleration": waypoint.acceleration, "jerk": None}
+    figures = [
+        own if own is not None else float(getattr(wish, f"{kind}_{key}")) for key, own in given.items()
+    ]
+    scale = 1.0 if piece.tool else piece.leading
+    return Limits(*(figure / scale for figure in figures))
+
+
+def _piece(program: Program, arm: Arm, before: Array, waypoint: Waypoint, q: Array) -> Piece | None:
+    if not waypoint.move.of_tool:
+        return joint_line(before, q)
+    if waypoint.pose is not None:
+        rotation, position = rotation_from_wxyz(waypoint.pose.wxyz), np.array(waypoint.pose.position)
+    else:
+        at = arm.posture(q)
+        rotation, position = at.rotation, at.position
+    via = None if waypoint.via is None else np.array(waypoint.via.position)
+    return tool_way(arm, before, rotation, position, via=via, file=program.file, place=waypoint.shown)
+
+
+def _slowed(leg: Leg, limits: JointLimits, tool_turn: float | None, arm: Arm, doubts: list[str]) -> None:
+    """A move in which a joint or the tool would do more than it may is slowed as a whole."""
+    possible = float(np.min(limits.speed / np.maximum(leg.piece.fastest(), 1e-12)))
+    if tool_turn is not None and leg.piece.turn > 0:
+        possible = min(possible, tool_turn / leg.piece.turn)
+    unit = "m/s" if leg.piece.tool else "rad/s of the leading joint"
+    scale = 1.0 if leg.piece.tool else leg.piece.leading
+    if possible < leg.limits.speed:
+        doubts.append(
+            f"{leg.place}: slowed from {leg.limits.speed * scale:.3g} to {possible * scale:.3g} {unit}, "
+            "which the speed limits of the joints or tool_turn allow; a controller may do otherwise"
+        )
+        leg.limits = Limits(possible, leg.limits.acceleration, leg.limits.jerk)
+    k, what, joint = limits.stretch(leg.piece, leg.limits)
+    if k > 1:
+        was = leg.limits
+        leg.limits = Limits(was.speed / k, was.acceleration / k**2, was.jerk / k**3)
+        doubts.append(
+            f"{leg.place}: slowed by {k:.3g} (to {leg.limits.speed * scale:.3g} {unit} at most), so that "
+            f"{arm.joints[joint].name} keeps its limit of {what}; a controller may do otherwise"
+        )
+
+
+def _of_joints(motion: Trajectory, arm: Arm, limits: JointLimits) -> str:
+    """What the joints do on linear and circular moves, by differences over the period."""
+    period = float(motion.t[1] - motion.t[0])
+    said = []
+    for order, what in ((2, "acceleration"), (3, "jerk")):
+        # The last sample is no whole period after the one before.
+        size = np.abs(np.diff(motion.q[:-1], order, axis=0)).max(axis=0, initial=0.0) / period**order
+        i = int(np.argmax(size))
+        unit = f"{'m' if arm.slides[i] else 'rad'}/s{'²' if order == 2 else '³'}"
+        said.append(f"{what} of {size[i]:.3g} {unit} ({arm.joints[i].name})")
+    named = {"acceleration": limits.acceleration, "jerk": limits.jerk}
+    open_ = [f"{name}_limits" for name, given in named.items() if np.isinf(given).any()]
+    rest = f": tool moves do not limit them without {' and '.join(open_)} of the robot" if open_ else ""
+    return f"joints reach, over {period:g} s, at most an {' and a '.join(said)}{rest}"
+
+
+def _timing(leg: Leg, file: str) -> Profile:
+    if leg.rounding is None:
+        return profile(
+            leg.piece.length, leg.v0, leg.v1, leg.limits, duration=leg.duration, file=file, place=leg.place
+        )
+    v = leg.v0
+    return Profile(leg.piece.length / v, lambda t: (v * t, v))
+
+
+def _sampled(legs: list[Leg], file: str, period: float, first: Array, rests: float) -> Trajectory:
+    timed: list[tuple[float, Profile, Leg]] = []
+    t = rests
+    for leg in legs:
+        timing = _timing(leg, file)
+        timed.append((t, timing, leg))
+        t += timing.duration + leg.pause
+    if t / period > MAX_SAMPLES:
+        raise InputError.at(file, "", f"{t:.0f} s at {period:g} s: too many samples", "give a longer period")
+    if t < 1e-6:
+        raise InputError.at(file, "", "nothing moves", "give waypoints that differ from the start")
+    # Whole periods, and the end.
+    times = np.append(np.arange(np.ceil(t / period - 1e-6)) * period, t)
+    q = np.tile(first, (len(times), 1))
+    qd = np.zeros_like(q)
+    for begin, timing, leg in timed:
+        inside = np.flatnonzero((times >= begin) & (times <= begin + timing.duration))
+        if inside.size:
+            states = np.array([timing.at(x) for x in (times[inside] - begin).tolist()])
+            q[inside] = leg.piece.derivative(states[:, 0], 0)
+            qd[inside] = leg.piece.derivative(states[:, 0], 1) * states[:, 1:]
+        later = times > begin + timing.duration
+        q[later], qd[later] = leg.piece.last, 0.0
+    return Trajectory(file=file, t=times, q=q, qd=qd)

@@ -1,0 +1,291 @@
+"""URScript programs: the waypoints of ``movej``, ``movel``, ``movep``, ``movec`` with constants.
+
+A program is parsed, never executed. What would need execution (branches, loops, variables that sensors or
+functions set) is named with its line and refused, because the motion behind it is not known; statements
+and blocks that move nothing are left out and counted. A program that goes round for ever is read as one
+round. Defaults of speed and acceleration are those of [URScript]_.
+"""
+
+from __future__ import annotations
+
+import re
+from math import isfinite
+
+import numpy as np
+
+from seerob.core.errors import InputError, Problem
+from seerob.core.orientation import wxyz_from
+from seerob.files.waypoints.script_blocks import APART, ASSIGNMENT, ENDLESS, OPENING, Block, moving
+from seerob.files.waypoints.script_values import Call, Inverse, NotConstant, PoseValue, Reader, Value, tokens
+from seerob.files.waypoints.waypoint import MAX_WAYPOINTS, Move, Program, ToolPose, Waypoint
+
+MAX_BYTES = 16 << 20
+MAX_LINES = 200_000
+MAX_PROBLEMS = 20
+JOINT_SPEED, JOINT_ACCELERATION = 1.05, 1.4
+"""Of ``movej`` where it does not say [rad/s, rad/s²]."""
+TOOL_SPEED, TOOL_ACCELERATION = 0.25, 1.2
+"""Of the others [m/s, m/s²]."""
+SIGNATURES = {
+    "movej": (Move.JOINT, ("q", "a", "v", "t", "r")),
+    "movel": (Move.LINEAR, ("pose", "a", "v", "t", "r")),
+    "movep": (Move.PROCESS, ("pose", "a", "v", "r")),
+    "movec": (Move.CIRCULAR, ("pose_via", "pose_to", "a", "v", "r", "mode")),
+}
+BLOCKS = ("elif", "else", "return", "break", "continue", "kill", "join")
+DEFINITION = re.compile(r"^(def|sec)\s+[A-Za-z_]\w*\s*\(\s*\)\s*:$")
+NODE = re.compile(r"\$\s*\d+\b")
+"""Marks the node of PolyScope's tree that a statement comes from."""
+REMEDY = "export a program without it, or record the motion on the controller"
+
+
+def read_urscript(content: bytes, file: str) -> Program:
+    """The waypoints of a program.
+
+    Args:
+        content: The file.
+        file: Its name, for messages.
+
+    Raises:
+        InputError: With every statement whose motion is not known, by line.
+    """
+    if len(content) > MAX_BYTES:
+        raise InputError.at(file, "", f"{len(content)} bytes", f"at most {MAX_BYTES} are read")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError.at(file, "", f"is not text: {error}", "give a .script file") from error
+    lines = text.splitlines()
+    if len(lines) > MAX_LINES:
+        raise InputError.at(file, "", f"{len(lines)} lines", f"at most {MAX_LINES} are read")
+    found = _Script(file)
+    for number, line in enumerate(lines, start=1):
+        statement = _bare(line)
+        if statement:
+            found.take(number, statement)
+        if len(found.problems) >= MAX_PROBLEMS:
+            break
+    return found.program()
+
+
+class _Script:
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.problems: list[Problem] = []
+        self._waypoints: list[Waypoint] = []
+        self._names: dict[str, Value | None] = {}
+        self._changing: set[str] = set()
+        """Names that something beside the program gives a value."""
+        self._open = self._definitions = 0
+        self._tcp: ToolPose | None = None
+        self._left_out: dict[str, int] = {}
+        self._block: Block | None = None
+        self._round: int | None = None
+        """Blocks that are open around the loop that never ends; None without one."""
+        self._round_line = 0
+        self._after = False
+        """Whether that loop has ended."""
+
+    def take(self, line: int, statement: str) -> None:
+        word = re.split(r"\W", statement, maxsplit=1)[0]
+        begun = self._definitions or self._waypoints
+        if self._block is not None:
+            if self._block.take(word, statement):
+                self._leave_out(self._block)
+                self._block = None
+        elif NODE.match(statement):
+            pass
+        elif ENDLESS.fullmatch(statement) and self._round is None and self._open == self._definitions:
+            self._round, self._round_line = self._open, line
+            self._open += 1
+        elif statement.endswith(":") and (word in OPENING or (word in APART and begun)):
+            self._block = Block(line, word)
+        elif DEFINITION.match(statement):
+            self._definitions += 1
+            self._open += 1
+        elif statement == "end" and self._open:
+            self._open -= 1
+            self._after |= self._open == self._round
+        elif word in BLOCKS or statement.endswith(":") or word == "def":
+            self._wrong(line, f"`{word}`", "what is done there only a controller knows")
+        elif (match := ASSIGNMENT.match(statement)) is not None:
+            self._assign(line, match[1], match[2])
+        else:
+            self._statement(line, word, statement)
+
+    def _leave_out(self, block: Block) -> None:
+        """What a block does to the names is known to a controller alone."""
+        self._names |= dict.fromkeys(block.names)
+        self._changing |= block.names if block.apart else set()
+        if block.matters:
+            self._wrong(block.line, f"`{block.word}`", "what is done there only a controller knows")
+        else:
+            self._left_out[block.word] = self._left_out.get(block.word, 0) + 1
+
+    def _assign(self, line: int, name: str, text: str) -> None:
+        if call := moving(text):
+            self._wrong(line, f"`{call}`", "what moves the robot stands in a statement of its own")
+        # A name that is no constant matters only where a waypoint needs it.
+        try:
+            reader = Reader(tokens(text), self._names)
+            value = reader.value()
+            reader.end()
+        except NotConstant:
+            self._names[name] = None
+            return
+        # A name that is given twice is the latest, as the program runs from top to bottom.
+        self._names[name] = None if name in self._changing else value
+
+    def _statement(self, line: int, name: str, statement: str) -> None:
+        known = name in SIGNATURES or name in ("sleep", "set_tcp")
+        try:
+            call = Reader(tokens(statement), self._names).call() if known else None
+            if call is None:
+                started = re.fullmatch(r"run\s+\w+\s*\(\s*\)", statement)
+                if not (started or re.fullmatch(r"[A-Za-z_]\w*\s*\(.*\)", statement)):
+                    raise NotConstant("is no statement that is known here")
+                if moving(statement):
+                    raise NotConstant("moves the robot in a way that is not modelled")
+                self._left_out[name] = self._left_out.get(name, 0) + 1
+            elif name == "sleep":
+                self._sleep(call)
+            elif name == "set_tcp":
+                self._set_tcp(call)
+            elif self._after:
+                raise NotConstant("stands behind a loop that never ends")
+            else:
+                self._waypoints.append(self._waypoint(line, call))
+                if len(self._waypoints) > MAX_WAYPOINTS:
+                    raise NotConstant(f"more than {MAX_WAYPOINTS} waypoints")
+        except NotConstant as error:
+            self._wrong(line, f"`{name}`", str(error))
+
+    def _sleep(self, call: Call) -> None:
+        seconds = _arguments(call, ("t",)).get("t")
+        if not isinstance(seconds, float) or isinstance(seconds, bool) or not 0 <= seconds <= 1e5:
+            raise NotConstant("needs a time of 0 s or more")
+        if self._waypoints:
+            self._waypoints[-1] = self._waypoints[-1].waiting(seconds)
+
+    def _set_tcp(self, call: Call) -> None:
+        pose = next(iter(_arguments(call, ("pose", "tcp_name")).values()), None)
+        if not isinstance(pose, PoseValue):
+            raise NotConstant("needs a constant pose")
+        new = _pose(pose)
+        if self._waypoints and self._tcp != new:
+            raise NotConstant("changes the tool point after the first move; split the program there")
+        self._tcp = new
+
+    def _waypoint(self, line: int, call: Call) -> Waypoint:
+        move, names = SIGNATURES[call.name]
+        given = _arguments(call, names)
+        goal = given.get("pose_to") if move is Move.CIRCULAR else given.get(names[0])
+        q = pose = via = near = None
+        if isinstance(goal, Inverse):
+            pose, near = _pose(goal.pose), goal.near
+        elif isinstance(goal, PoseValue):
+            pose = _pose(goal)
+        elif isinstance(goal, tuple):
+            q = goal
+        else:
+            raise NotConstant("needs constant joint positions or a constant pose")
+        if move is Move.CIRCULAR:
+            middle = given.get("pose_via")
+            if not isinstance(middle, PoseValue) or pose is None:
+                raise NotConstant("via and goal must be constant poses (joint positions are not read here)")
+            via = _pose(middle)
+            if given.get("mode", 0.0) not in (0.0, 1.0):
+                raise NotConstant("mode is 0 or 1")
+            if given.get("mode") == 1.0:
+                raise NotConstant("mode = 1 (orientation fixed relative to the tangent) is not modelled")
+        tool = move.of_tool
+        duration = _positive(given, "t", None)
+        speed = _positive(given, "v", TOOL_SPEED if tool else JOINT_SPEED)
+        acceleration = _positive(given, "a", TOOL_ACCELERATION if tool else JOINT_ACCELERATION)
+        radius = given.get("r", 0.0)
+        if isinstance(radius, bool) or not isinstance(radius, float) or not 0 <= radius <= 10:
+            raise NotConstant("r is a radius of 0 m or more")
+        return Waypoint(
+            place=f"line {line}",
+            move=move,
+            q=q,
+            pose=pose,
+            near=near,
+            via=via,
+            speed=speed,
+            acceleration=acceleration,
+            duration=duration,
+            blend=radius,
+        )
+
+    def _wrong(self, line: int, what: str, why: str) -> None:
+        self.problems.append(Problem(self.file, f"line {line}", f"{what}: {why}", REMEDY))
+
+    def program(self) -> Program:
+        if self._block is not None:
+            self._wrong(self._block.line, f"`{self._block.word}`", "its `end` is missing")
+        if self._round is not None and not self._after:
+            self._wrong(self._round_line, "`while`", "its `end` is missing")
+        if not self.problems and not self._waypoints:
+            self.problems.append(
+                Problem(self.file, "", "no move with constants", "give a program that moves")
+            )
+        if self.problems:
+            raise InputError(self.problems)
+        remarks = [
+            "parsed, not executed; speeds and accelerations that a move does not give are the defaults of "
+            f"URScript: {JOINT_SPEED:g} rad/s and {JOINT_ACCELERATION:g} rad/s² of the leading joint, "
+            f"{TOOL_SPEED:g} m/s and {TOOL_ACCELERATION:g} m/s² of the tool point"
+        ]
+        if self._round is not None:
+            remarks.append("the program goes round for ever; it is read as one round")
+        if self._left_out:
+            each = ", ".join(f"{name} ({count})" for name, count in sorted(self._left_out.items())[:12])
+            remarks.append(f"statements taken to move nothing were left out, with their waiting: {each}")
+        return Program(self.file, tuple(self._waypoints), tuple(remarks), self._tcp, controller=True)
+
+
+def _bare(line: str) -> str:
+    """A line without its comment, which may stand behind a text that holds ``#``."""
+    quote = ""
+    for i, c in enumerate(line):
+        if quote:
+            quote = "" if c == quote else quote
+        elif c in "\"'":
+            quote = c
+        elif c == "#":
+            return line[:i].strip()
+    return line.strip()
+
+
+def _arguments(call: Call, names: tuple[str, ...]) -> dict[str, Value]:
+    if len(call.arguments) > len(names):
+        raise NotConstant(f"has {len(call.arguments)} arguments, not at most {len(names)}")
+    given = dict(zip(names, call.arguments, strict=False))
+    for key, value in call.named.items():
+        # movej is documented with q and movel with pose; both take either.
+        name = names[0] if key in ("q", "pose") and names[0] in ("q", "pose") else key
+        if name not in names or name in given:
+            raise NotConstant(f"argument {key!r} is unknown or given twice")
+        given[name] = value
+    return given
+
+
+def _positive(given: dict[str, Value], key: str, default: float | None) -> float | None:
+    value = given.get(key, 0.0 if key == "t" else default)
+    if isinstance(value, bool) or not isinstance(value, float) or not isfinite(value):
+        raise NotConstant(f"{key} is no number")
+    if key == "t" and value == 0:
+        return None
+    if not 0 < value <= 1e4:
+        raise NotConstant(f"{key} = {value:g} is not above 0")
+    return value
+
+
+def _pose(value: PoseValue) -> ToolPose:
+    x, y, z, *turn = value.numbers
+    try:
+        w, i, j, k = wxyz_from("rotation_vector", np.array([turn]))[0].tolist()
+    except ValueError as error:
+        raise NotConstant(str(error)) from error
+    return ToolPose((x, y, z), (w, i, j, k))

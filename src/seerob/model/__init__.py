@@ -1,0 +1,1 @@
+"""The compiled workstation: one MjModel, names → indices, volumes."""

@@ -1,0 +1,360 @@
+"""The compiled workstation: everything that does not change while it runs.
+
+One `mujoco.MjModel` for the whole workstation, exact distance geometry, and the way from every
+name in the file to an index. Names are resolved here, once; the loop only sees indices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.errors import InputError, Problem, UnknownName
+from seerob.core.shapes.geometry import Solid
+from seerob.core.snapshot import Finding, LinkMass, Origin
+from seerob.core.transforms import Array
+from seerob.description.description import Description, Joint, Quantity
+from seerob.distance.least import Query, Shapes
+from seerob.workstation.variables.dictionary import Variable
+from seerob.workstation.workstation import Workstation
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """One named rigid body with a shape: a link, a tool, a workpiece, a part, a bone."""
+
+    index: int
+    """Slot in `State.rotations`, in distance queries and in `Snapshot.poses`."""
+    name: str
+    """Unique full name."""
+    role: str
+    """``robot``, ``tool``, ``workpiece``, ``part`` or ``human``."""
+    owner: str
+    """The table entry it comes from."""
+    carrier: str
+    """The robot that moves it, the human it is part of, or empty."""
+    mj: int
+    """Body of the `mujoco.MjModel`."""
+    solids: tuple[Solid, ...]
+    corners: Array
+    """Points in its own frame whose convex hull, dilated by ``radius``, contains it, shape (k, 3) [m]."""
+    radius: float
+    """[m]"""
+    mass: Quantity | None
+    mesh: str | None
+    """Hash of the display mesh."""
+    triangles: int
+    note: str
+    holder: str = ""
+    """The gripper that picks it up and lets it go: where it is, or whether it is here, depends on it."""
+
+    @property
+    def mover(self) -> str:
+        """Whoever decides where it is: the robot or the person that carries it, or a gripper; or empty."""
+        return self.carrier or self.holder
+
+    @property
+    def deviation(self) -> float:
+        """How far the real surface may lie outside the shape used for distances [m]."""
+        return max((solid.deviation for solid in self.solids), default=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A point of interest fixed to a body."""
+
+    name: str
+    mj: int
+    """Body of the `mujoco.MjModel`."""
+    body_from_frame: Array
+    """Shape (4, 4)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """A robot or a human: joints that are driven, bodies that follow."""
+
+    name: str
+    role: str
+    """``robot`` or ``human``."""
+    description: Description
+    joints: tuple[Joint, ...]
+    """The n joints that are commanded."""
+    q_address: Indices
+    """Of all joints, mimics included, in ``MjData.qpos``, shape (m,)."""
+    v_address: Indices
+    """In ``MjData.qvel``, shape (m,)."""
+    coupling: Array
+    """All joints from the commanded ones: ``q_all = coupling @ q + offset``, shape (m, n)."""
+    offset: Array
+    """Shape (m,)."""
+    own: Indices
+    """Row of each commanded joint among all of them, shape (n,)."""
+    home: Array
+    """Where it stands when nothing drives it, shape (n,) [rad or m]."""
+    home_given: bool
+    """Whether the file says so."""
+    tip: Frame
+    """Its point of interest: the tool's working point."""
+    bodies: tuple[int, ...]
+    """Its own bodies with a shape."""
+    carried: tuple[int, ...]
+    """Bodies of tools and workpieces mounted on it."""
+    moving: tuple[int, ...]
+    """Of both, those that its joints move."""
+    mj_bodies: Indices
+    """Every `mujoco` body that its joints move, tools and workpieces included."""
+    masses: tuple[LinkMass, ...]
+    """What each of its links weighs, and each thing on it."""
+    unweighed: tuple[int, ...]
+    """Bodies of `mujoco` that have another mass than nobody gave: what moves the twin in its place."""
+    load: frozenset[int]
+    """Bodies of `mujoco` that count as its load: what is mounted on it, by its own file too."""
+    unknown_masses: tuple[str, ...]
+    """What of its moving bodies has a mass that nobody gave, one sentence each."""
+    velocity_limits: tuple[Quantity | None, ...]
+    effort_limits: tuple[Quantity | None, ...]
+    rotor_inertia_known: bool
+    impossible_masses: tuple[Problem, ...] = ()
+    """What files say of those that no body has, such as 0 kg."""
+    on: str = ""
+    """Robot or machine that carries it; empty when it stands in the world."""
+    riders: tuple[str, ...] = ()
+    """Machines that are mounted on it: their bodies are among its own, their joints are not."""
+    holders: tuple[str, ...] = ()
+    """Those of them that pick things up: what it weighs depends on them."""
+    unseen: tuple[str, ...] = ()
+    """Full names of what has a mass, some of which lies where nothing of it has a shape."""
+
+    @property
+    def links(self) -> frozenset[str]:
+        """Full names of its own links, which no name of a tool is taken for."""
+        return frozenset(f"{self.name}/{link.name}" for link in self.description.links)
+
+    @property
+    def alone(self) -> bool:
+        """Whether all that its bodies do follows from its own joints."""
+        return not self.on and not self.riders
+
+    def require_masses(self, who: str) -> None:
+        """Refuse a figure that rests on masses that cannot be; those that nobody gave leave it undecided.
+
+        Args:
+            who: The criterion whose figure it is.
+
+        Raises:
+            InputError: With every such mass.
+        """
+        if self.impossible_masses:
+            remedy = f"give it in masses of {self.name} in the workstation file, or mend that file"
+            raise InputError(
+                p._replace(what=f"{p.what}; {who} needs it", remedy=f"{p.remedy}: {remedy}")
+                for p in self.impossible_masses
+            )
+
+    @property
+    def lower(self) -> Array:
+        """Lower position limits [rad or m], -inf where there is none, shape (n,)."""
+        return np.array([-np.inf if j.lower is None else j.lower for j in self.joints])
+
+    @property
+    def upper(self) -> Array:
+        """Upper position limits [rad or m], inf where there is none, shape (n,)."""
+        return np.array([np.inf if j.upper is None else j.upper for j in self.joints])
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """``rad`` or ``m`` per joint."""
+        return tuple("rad" if joint.kind == "revolute" else "m" for joint in self.joints)
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """A distance question between two named sets, bound once."""
+
+    query: Query
+    a: tuple[int, ...]
+    """Bodies of the first set."""
+    b: tuple[int, ...]
+    carriers: tuple[str, ...]
+    """Robots and humans whose pose the answer depends on."""
+    deviation: float
+    """How much nearer the real surfaces may be than the shapes used, as far as known [m]."""
+    notes: tuple[str, ...]
+    """What the shapes are when they are not the real thing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A compiled workstation; frozen. Made by `seerob.model.mounting.compilation.compile_workstation`."""
+
+    workstation: Workstation
+    mj: Any
+    """The `mujoco.MjModel` of the whole workstation."""
+    bodies: tuple[Body, ...]
+    frames: dict[str, Frame]
+    """Every link by full name, also those without a shape."""
+    mechanisms: dict[str, Mechanism]
+    shapes: Shapes
+    meshes: dict[str, bytes]
+    """Display meshes, binary glTF by hash."""
+    findings: tuple[Finding, ...]
+    files: dict[str, bytes]
+    """The workstation file and every file it names, by the name that it gives them."""
+    dictionary: dict[str, Variable] = field(default_factory=dict)
+    """Variables of controllers and machines by their names here."""
+    _gaps: dict[tuple[tuple[int, ...], tuple[int, ...]], Gap] = field(default_factory=dict)
+
+    @property
+    def estimates(self) -> dict[str, float]:
+        """How far bones that nobody sees may be off [m], of the people whose estimate the file accepts."""
+        people = self.workstation.humans
+        return {h.name: h.unseen_uncertainty for h in people if h.unseen_uncertainty is not None}
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the workstation file."""
+        return Path(self.workstation.folder)
+
+    def mechanism(self, name: str) -> Mechanism:
+        """The robot or human of that name; UnknownName when there is none."""
+        if name not in self.mechanisms:
+            raise UnknownName("robot or human", name, self.mechanisms)
+        return self.mechanisms[name]
+
+    def robot(self, name: str) -> Mechanism:
+        """The robot of that name; UnknownName when there is none."""
+        robots = {n: m for n, m in self.mechanisms.items() if m.role == "robot"}
+        if name not in robots:
+            raise UnknownName("robot", name, robots)
+        return robots[name]
+
+    def mover(self, name: str) -> Mechanism:
+        """The robot or machine of that name; UnknownName when there is none."""
+        movers = {n: m for n, m in self.mechanisms.items() if m.role != "human"}
+        if name not in movers:
+            raise UnknownName("robot or machine", name, movers)
+        return movers[name]
+
+    def carriers_of(self, name: str) -> tuple[str, ...]:
+        """Machines that carry a robot or machine, the nearest first."""
+        found: list[str] = []
+        above = self.mechanisms[name].on
+        while above:
+            found.append(above)
+            above = self.mechanisms[above].on
+        return tuple(found)
+
+    def moving_of(self, name: str) -> tuple[int, ...]:
+        """Moving bodies of a robot or machine, and of what carries it: whoever stops it stops both."""
+        names = (self.mover(name).name, *self.carriers_of(name))
+        return tuple(dict.fromkeys(i for each in names for i in self.mechanisms[each].moving))
+
+    def human(self, name: str) -> Mechanism:
+        """The human of that name; UnknownName when there is none."""
+        humans = {n: m for n, m in self.mechanisms.items() if m.role == "human"}
+        if name not in humans:
+            raise UnknownName("human", name, humans)
+        return humans[name]
+
+    def frame(self, name: str) -> Frame:
+        """A point of interest: a robot's name means its tool's working point, else a link's full name."""
+        if name in self.mechanisms:
+            return self.mechanisms[name].tip
+        if name not in self.frames:
+            raise UnknownName("link or frame", name, [*self.mechanisms, *self.frames])
+        return self.frames[name]
+
+    def carrier(self, frame: Frame) -> Mechanism:
+        """The robot, human or machine that moves a frame: of several the robot, else the innermost.
+
+        Raises:
+            UnknownName: None does.
+        """
+        movers = [m for m in self.mechanisms.values() if frame.mj in m.mj_bodies]
+        if movers:
+            return min(movers, key=lambda m: (m.role == "machine", len(m.mj_bodies)))
+        raise UnknownName("robot or human that moves", frame.name, self.mechanisms)
+
+    def select(self, name: str) -> tuple[int, ...]:
+        """Bodies that a name means.
+
+        A robot's name means all of its links and everything mounted on it, and what carries it: a cart
+        that hits somebody is no less of the robot that stands on it (``arm/*`` means its links alone). A
+        human's means the whole person; a tool's or part's name, or a prefix that ends before a ``/``,
+        everything below it; ``*`` stands for any characters. A safety area is meant by its own name only.
+
+        Raises:
+            UnknownName: The name means no body that has a shape.
+        """
+        if name in self.mechanisms:
+            mechanism = self.mechanisms[name]
+            found: tuple[int, ...] = mechanism.bodies + mechanism.carried
+            carriers = [self.mechanisms[each] for each in self.carriers_of(name)]
+            if mechanism.role == "robot":
+                every = (i for each in carriers for i in (*each.bodies, *each.carried))
+                found = tuple(dict.fromkeys((*found, *every)))
+        else:
+            found = tuple(
+                body.index
+                for body in self.bodies
+                if name in (body.name, body.owner)
+                or (
+                    body.role != "area" and (body.name.startswith(name + "/") or fnmatchcase(body.name, name))
+                )
+            )
+        if not found:
+            raise UnknownName("robot, human, tool or part with a shape", name, self.names())
+        return found
+
+    def unseen(self, names: Iterable[str]) -> str:
+        """What no shape shows of robots and links that names mean, in a sentence; empty for nothing.
+
+        Names are those of `select`.
+        """
+        found: dict[str, None] = {}
+        for name in names:
+            found |= dict.fromkeys(
+                link
+                for m in self.mechanisms.values()
+                for link in m.unseen
+                if name in (m.name, link) or link.startswith(name + "/") or fnmatchcase(link, name)
+            )
+        links = ", ".join(found)
+        return f"no shape shows {links}, which has a mass: give it one, or mount one on it" if links else ""
+
+    def names(self) -> tuple[str, ...]:
+        """Every name that `select` takes without wildcards."""
+        shaped = (name for name, m in self.mechanisms.items() if m.bodies or m.carried)
+        found: dict[str, None] = dict.fromkeys(shaped)
+        for body in self.bodies:
+            pieces = body.name.split("/")
+            found.update(dict.fromkeys("/".join(pieces[:i]) for i in range(1, len(pieces) + 1)))
+        return tuple(found)
+
+    def gap(self, a: Iterable[int], b: Iterable[int]) -> Gap:
+        """The distance question between two sets of bodies; equal questions are the same object."""
+        key = (tuple(a), tuple(b))
+        if key not in self._gaps:
+            chosen = [self.bodies[i] for i in (*key[0], *key[1])]
+            self._gaps[key] = Gap(
+                query=Query(self.shapes, key[0], key[1]),
+                a=key[0],
+                b=key[1],
+                carriers=tuple(dict.fromkeys(body.mover for body in chosen if body.mover)),
+                deviation=sum(max(self.bodies[i].deviation for i in side) for side in key),
+                notes=tuple(dict.fromkeys(f"{b.owner}: {b.note}" for b in chosen if b.note)),
+            )
+        return self._gaps[key]
+
+    def mass_origin(self, body: Body) -> Origin:
+        """Where the mass of a body comes from."""
+        return Origin.MISSING if body.mass is None else body.mass.origin

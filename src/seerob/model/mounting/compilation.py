@@ -1,0 +1,408 @@
+"""From a `Workstation` to a `Model`: read every file, mount everything, compile one MuJoCo model."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from seerob.core.errors import InputError, Problem, UnknownName
+from seerob.core.snapshot import Finding
+from seerob.core.transforms import Array
+from seerob.description.description import Inertial, Link, Quantity
+from seerob.description.humans import posture
+from seerob.description.loader import load_robot
+from seerob.description.robots.calibration import calibrated_by
+from seerob.distance.least import Shapes
+from seerob.model.model import Body, Frame, Mechanism, Model
+from seerob.model.mounting import machines as machine_mounting
+from seerob.model.mounting.areas import mount_sensor, mount_swept
+from seerob.model.mounting.body_list import listed
+from seerob.model.mounting.by_hand import by_hand, home
+from seerob.model.mounting.chains import assumed, payload, placeholder
+from seerob.model.mounting.contacts import add_contacts
+from seerob.model.mounting.in_place import implausible
+from seerob.model.mounting.mechanisms import Chain, Riders, mechanism
+from seerob.model.mounting.people import describe
+from seerob.model.mounting.picked_up import picked_up
+from seerob.model.mounting.specification import Mounting
+from seerob.model.mounting.specification import pose_matrix as pose_matrix  # noqa: PLC0414
+from seerob.model.mounting.things import (
+    AREA_COLOR,
+    PART_COLOR,
+    TOOL_COLOR,
+    WORKPIECE_COLOR,
+    MadeArea,
+    load_thing,
+)
+from seerob.model.mounting.unasked import unasked
+from seerob.model.variables import Bound, bound
+from seerob.recording.filing import filed
+from seerob.workstation.workstation import Area, Human, Machine, Mounted, Robot, Tool, Workpiece, Workstation
+
+# MuJoCo's own way is a file in the folder where the user happens to be.
+mujoco.set_mju_user_warning(logging.getLogger("mujoco").debug)
+
+Progress = Callable[[str], None]
+
+
+def compile_workstation(
+    station: Workstation,
+    *,
+    cache: Path | None = None,
+    progress: Progress = lambda _: None,
+    made: Mapping[str, MadeArea] = MappingProxyType({}),
+) -> Model:
+    """Read every file that the workstation names and compile the twin.
+
+    Args:
+        station: From `seerob.session.reading.read`.
+        cache: Folder for distance trees and convex pieces that take long to make.
+        progress: Told what is being read.
+        made: Areas that are swept, by name.
+
+    Raises:
+        InputError: With every mistake in every file.
+    """
+    return _Compiler(station, cache, progress, made).run()
+
+
+class _Compiler:
+    def __init__(
+        self, station: Workstation, cache: Path | None, progress: Progress, made: Mapping[str, MadeArea]
+    ) -> None:
+        self.station, self.made = station, made
+        self.cache = cache
+        self.progress = progress
+        self.folder = Path(station.folder)
+        self.file = next(iter(station.files), "workstation")
+        self.mounting = Mounting(self.file)
+        self.problems: list[Problem] = []
+        self.chains: dict[str, Chain] = {}
+        self.carriers: dict[str, str] = {}
+        self.bound = Bound({}, {}, ())
+
+    def run(self) -> Model:
+        self.mounting.option(timestep=self.station.engine.timestep, gravity=self.station.engine.gravity)
+        self._try("", self._variables, None)
+        for i, robot in enumerate(self.station.robots):
+            if robot.on is None:
+                self._try(f"robots[{i}]", self._robot, robot)
+        for i, human in enumerate(self.station.humans):
+            self._try(f"humans[{i}]", self._human, human)
+        for i, part in enumerate(self.station.parts):
+            self._try(f"parts[{i}]", self._part, part)
+        for i, machine in enumerate(self.station.machines):
+            if machine.on is None:
+                self._try(f"machines[{i}]", self._machine, machine)
+        if not self.problems:
+            self._mount_all()
+        if not self.problems:
+            for i, area in enumerate(self.station.areas):
+                self._try(f"areas[{i}]", self._area, area)
+            for i, sensor in enumerate(self.station.sensors):
+                self._try(f"sensors[{i}]", partial(mount_sensor, self.mounting, self.carriers), sensor)
+        if self.problems:
+            raise InputError(self.problems)
+        bodies = listed(self.mounting)
+        self._actuators()
+        add_contacts(self.mounting, bodies, self.station.contacts, file=self.file, cache=self.cache)
+        self.progress("compiling")
+        try:
+            mj = self.mounting.spec.compile()
+        except ValueError as error:
+            raise InputError.at(self.file, "", f"MuJoCo refuses the model: {error}") from error
+        return self._model(mj, bodies)
+
+    def _try(self, key: str, build: Callable[[Any], None], table: Any) -> None:
+        try:
+            build(table)
+        except InputError as error:
+            self.problems += [
+                p._replace(key=f"{key} ({p.key})" if p.key and key else p.key or key) for p in error.problems
+            ]
+        except UnknownName as error:
+            self.problems.append(Problem(self.file, key, str(error)))
+
+    def _variables(self, _: None) -> None:
+        self.bound = bound(self.station)
+        self.mounting.findings += self.bound.findings
+        self.mounting.files |= self.bound.files
+
+    # -- robots and humans ------------------------------------------------------------------
+
+    def _robot(self, robot: Robot) -> None:
+        self.progress(f"reading {robot.name} ({robot.model})")
+        if robot.arguments and not robot.model.lower().endswith(".xacro"):
+            what = f"{robot.model} is not a xacro file and takes none"
+            raise InputError.at(self.file, "arguments", what, "leave them out, or name the .xacro file")
+        description = load_robot(
+            robot.model,
+            folder=self.folder,
+            packages=robot.packages,
+            meshes=robot.meshes,
+            arguments=robot.arguments,
+            name=robot.name,
+        )
+        description = by_hand(description, robot, self.file)
+        if robot.calibration is not None:
+            description = calibrated_by(description, robot.calibration, self.folder)
+        q = home(description, robot, self.file)
+        on = self._above(robot.on, "on", ("machine",))
+        chain = Chain(description, "robot", q, robot.q is not None, on=on)
+        self._chain(robot.name, chain, pose_matrix(robot.base))
+        self.mounting.files |= filed(
+            robot.name,
+            description.files,
+            folder=self.folder,
+            references=(robot.model, robot.meshes, robot.calibration),
+            packages=robot.packages,
+        )
+        if robot.tool is not None:
+            self.chains[robot.name].tip = self._tip_frame(robot)
+
+    def _tip_frame(self, robot: Robot) -> Frame | None:
+        assert robot.tool is not None
+        if any(tool.name == robot.tool for tool in self.station.tools):
+            return None  # set when the tool is mounted
+        name = robot.tool if "/" in robot.tool else f"{robot.name}/{robot.tool}"
+        if not self.mounting.has(name):
+            links = [f"{robot.name}/{link.name}" for link in self.chains[robot.name].description.links]
+            wrong = UnknownName("link or tool", robot.tool, links + [t.name for t in self.station.tools])
+            raise InputError.at(self.file, "tool", str(wrong))
+        return Frame(name, -1, np.eye(4))
+
+    def _human(self, human: Human) -> None:
+        self.progress(f"making {human.name}")
+        description, said = describe(human, touches=bool(self.station.contacts))
+        self.mounting.findings += said
+        q = posture.posture(description, human.posture, joints=human.joints, file=f"{human.name}.joints")
+        self._chain(human.name, Chain(description, "human", q, True), pose_matrix(human.at))
+
+    def _chain(self, name: str, chain: Chain, above_from_base: Array) -> None:
+        self.chains[name] = chain
+        self.mounting.findings += chain.description.findings
+        for link in chain.description.links:
+            self._link(name, chain, link, above_from_base)
+
+    def _link(self, owner: str, chain: Chain, link: Link, above_from_base: Array) -> None:
+        full = f"{owner}/{link.name}"
+        if link.parent is None:
+            parent, pose = chain.on or None, above_from_base @ link.parent_from_link
+        else:
+            parent, pose = f"{owner}/{link.parent}", link.parent_from_link
+        body = self.mounting.body(full, parent, pose)
+        self.carriers[full] = owner
+        for joint in link.joints:
+            self.mounting.joint(body, f"{owner}/{joint.name}", joint)
+        mass = None
+        if link.inertial is not None:
+            self.mounting.inertial(body, link.inertial)
+            mass = _weight(link.inertial)
+        elif link.joints and link.solids:
+            self.mounting.inertial(body, placeholder(link.solids))
+        elif link.joints:
+            self.mounting.massless(body)
+        if link.solids or link.visual:
+            self.mounting.shape(
+                full,
+                role=chain.role,
+                owner=owner,
+                carrier=owner,
+                solids=link.solids,
+                visual=link.visual,
+                mass=mass,
+            )
+
+    # -- things -----------------------------------------------------------------------------
+
+    def _part(self, part: Any) -> None:
+        self._thing(part, "part", None, pose_matrix(part.at), PART_COLOR)
+
+    def _machine(self, machine: Machine) -> None:
+        description, thing = machine_mounting.loaded(machine, self.folder, file=self.file)
+        start = machine_mounting.home(machine.motion)
+        on = self._above(machine.on, "on", ("robot", "machine"))
+        chain = Chain(description, "machine", start, True, on=on)
+        self._chain(machine.name, chain, pose_matrix(machine.at))
+        self.mounting.files |= filed(
+            machine.name, thing.files, folder=self.folder, references=(machine.mesh,)
+        )
+
+    def _area(self, area: Area) -> None:
+        on = None if area.on is None else self._body(area.on)
+        if on is not None and not self.mounting.has(on):
+            raise UnknownName("link, tool or bone", area.on or "", self.carriers)
+        if area.swept is not None:
+            mount_swept(self.mounting, area, self.made, file=self.file)
+        else:
+            self._thing(area, "area", on, pose_matrix(area.at), AREA_COLOR)
+
+    def _mount_all(self) -> None:
+        """Mount what is on something else; what that is may come later in the file."""
+        mounted: tuple[tuple[str, Callable[[Any], None], Any], ...] = (
+            *((f"robots[{i}]", self._robot, robot) for i, robot in enumerate(self.station.robots)),
+            *((f"machines[{i}]", self._machine, machine) for i, machine in enumerate(self.station.machines)),
+        )
+        waiting: list[tuple[str, Callable[[Any], None], Any]] = [
+            *(entry for entry in mounted if entry[2].on is not None),
+            *((f"tools[{i}]", partial(self._mount, "tool"), t) for i, t in enumerate(self.station.tools)),
+            *(
+                (f"workpieces[{i}]", partial(self._mount, "workpiece"), w)
+                for i, w in enumerate(self.station.workpieces)
+            ),
+        ]
+        while waiting:
+            ready = [entry for entry in waiting if self.mounting.has(self._body(entry[2].on))]
+            if not ready:
+                known = list(self.carriers)
+                self.problems += [
+                    Problem(self.file, f"{key}.on", str(UnknownName("link or tool", thing.on, known)))
+                    for key, _, thing in waiting
+                ]
+                return
+            for entry in ready:
+                waiting.remove(entry)
+                self._try(*entry)
+
+    def _body(self, on: str) -> str:
+        """Full name of the body that ``on`` means: a machine's name means what moves of it."""
+        machine = on in self.chains and self.chains[on].role == "machine"
+        return f"{on}/{machine_mounting.BODY}" if machine else on
+
+    def _above(self, on: str | None, key: str, roles: tuple[str, ...]) -> str:
+        """The same of what carries a chain of joints; empty for the world.
+
+        Raises:
+            InputError: It is carried by what cannot carry it.
+        """
+        if on is None:
+            return ""
+        carrier = self.carriers.get(self._body(on), "")
+        if not carrier or self.chains[carrier].role not in roles:
+            what = f"{on} carries no joints"
+            raise InputError.at(self.file, key, what, f"name what moves: a {' or a '.join(roles)}")
+        return self._body(on)
+
+    def _mount(self, role: str, thing: Mounted) -> None:
+        color = TOOL_COLOR if role == "tool" else WORKPIECE_COLOR
+        on = self._body(thing.on)
+        self._thing(thing, role, on, pose_matrix(thing.at), color)
+        if isinstance(thing, Workpiece) and thing.rest is not None:
+            machine = next((m for m in self.station.machines if m.name == thing.on), None)
+            picked_up(self.mounting, thing, machine, pose_matrix(thing.rest), file=self.file)
+        if isinstance(thing, Tool):
+            carrier = self.carriers[on]
+            wanted = next((r.tool for r in self.station.robots if r.name == carrier), None)
+            if thing.tcp is not None and wanted in (None, thing.name):
+                self.chains[carrier].tip = Frame(thing.name, -1, pose_matrix(thing.tcp))
+
+    def _thing(
+        self,
+        thing: Any,
+        role: str,
+        parent: str | None,
+        parent_from_thing: Array,
+        color: tuple[float, float, float, float],
+    ) -> None:
+        self.progress(f"reading {thing.name}")
+        moves = role in ("tool", "workpiece")
+        loaded = load_thing(thing, self.folder, color, needs_mass=moves, file=self.file)
+        self.mounting.findings += loaded.findings
+        self.mounting.files |= filed(thing.name, loaded.files, folder=self.folder, references=(thing.mesh,))
+        carrier = "" if parent is None else self.carriers[parent]
+        body = self.mounting.body(thing.name, parent, parent_from_thing)
+        if carrier:
+            self.carriers[thing.name] = carrier
+        mass = None
+        if loaded.inertial is not None:
+            self.mounting.inertial(body, loaded.inertial)
+            mass = _weight(loaded.inertial)
+        for piece in loaded.pieces:
+            name = f"{thing.name}/{piece.name}" if piece.name else thing.name
+            if piece.name:
+                self.mounting.body(name, thing.name, np.eye(4))
+                if carrier:
+                    self.carriers[name] = carrier
+            self.mounting.shape(
+                name,
+                role=role,
+                owner=thing.name,
+                carrier=carrier,
+                solids=piece.solids,
+                visual=piece.visual,
+                mass=mass if piece is loaded.pieces[0] else None,
+            )
+
+    # -- the model --------------------------------------------------------------------------
+
+    def _actuators(self) -> None:
+        """One per degree of freedom, in the same order; the engine sets gains and limits."""
+        for joint in self.mounting.spec.joints:
+            self.mounting.spec.add_actuator(
+                name=joint.name,
+                target=joint.name,
+                trntype=mujoco.mjtTrn.mjTRN_JOINT,
+                gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+                biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            )
+
+    def _model(self, mj: Any, bodies: Sequence[Body]) -> Model:
+        numbered = tuple(replace(body, mj=_body_id(mj, body.name)) for body in bodies)
+        frames = {
+            name: Frame(name, _body_id(mj, name), np.eye(4))
+            for name in (*self.carriers, *(part.name for part in self.station.parts))
+        }
+        self.progress("building distance trees")
+        shapes = Shapes.build([(body.name, body.solids) for body in numbered], cache=self.cache)
+        riders = self._riders()
+        mechanisms = {
+            name: mechanism(mj, name, chain, riders, self.carriers, numbered)
+            for name, chain in self.chains.items()
+        }
+        model = Model(
+            workstation=self.station,
+            mj=mj,
+            bodies=numbered,
+            frames=frames,
+            mechanisms=mechanisms,
+            shapes=shapes,
+            meshes=self.mounting.meshes,
+            findings=(
+                *self.mounting.findings,
+                *(f for robot in self.station.robots for f in self._about(robot, mechanisms[robot.name])),
+            ),
+            files={**self.station.files, **self.mounting.files},
+            dictionary=self.bound.variables,
+        )
+        findings = (*model.findings, *self._too_small(model), *implausible(model), *unasked(model))
+        return replace(model, findings=findings)
+
+    def _too_small(self, model: Model) -> Iterator[Finding]:
+        """What is said of areas that something sweeps of which no shape shows a part."""
+        for area in self.station.areas:
+            if area.swept is not None and (unseen := model.unseen((area.swept.of,))):
+                text = f"{area.name} is swept by what is not all shown: {unseen}"
+                yield Finding(level="warning", subject=area.name, text=text, holds=(area.name,))
+
+    def _riders(self) -> Riders:
+        return Riders(self.chains, self.carriers, self.mounting.entries)
+
+    def _about(self, robot: Robot, mechanism: Mechanism) -> list[Finding]:
+        given = self.chains[robot.name].tip is not None or robot.model.startswith("library:")
+        return [*assumed(mechanism, tip_given=given), *payload(robot.name, self._riders().things(robot.name))]
+
+
+def _weight(inertial: Inertial) -> Quantity:
+    return Quantity(inertial.mass, inertial.origin, inertial.source, inertial.error)
+
+
+def _body_id(mj: Any, name: str) -> int:
+    return int(mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name))

@@ -1,0 +1,327 @@
+"""What follows from the compiled workstation and can be implausible: where things are, how large and heavy.
+
+The questions are asked once, of everybody at home; of whom a recorded source moves, when it was opened, of
+where its samples begin. Whom a live source moves is asked for what depends on that when heard, see
+`seerob.criteria.as_heard`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from types import MappingProxyType
+
+import mujoco
+import numpy as np
+
+from seerob.core.snapshot import Finding
+from seerob.core.transforms import Array
+from seerob.description.lint import box
+from seerob.distance.depth import Depths
+from seerob.distance.least import Query
+from seerob.model.model import Body, Mechanism, Model
+from seerob.model.mounting.chains import beyond_flange
+from seerob.workstation.plausibility.of_file import entries_of, findings, listed
+from seerob.workstation.plausibility.ranges import Quantity, data, quantities
+from seerob.workstation.variables.dictionary import VARIABLE
+
+SUPPORTED = ("foot", "toes", "pelvis", "thigh", "shank")
+"""Bones that a person stands, sits or kneels with."""
+LEVEL = 0.05
+"""What is not farther from z = 0 stands there [m]."""
+SIGHT = 50.0
+"""Farther apart is not measured [m]."""
+
+
+def implausible(model: Model) -> tuple[Finding, ...]:
+    """Everything that is implausible of a workstation, and what its file confirms of that."""
+    station = model.workstation
+    every = [*listed(entries_of(station), station.engine), *_variables(model), *_following(model)]
+    return tuple(findings(every, station.confirmed))
+
+
+def _variables(model: Model) -> Iterator[Quantity]:
+    """What the dictionary says of variables: what asks them, and what moves by them, rests on it."""
+    for name, variable in model.dictionary.items():
+        moved = [m.name for m in model.workstation.machines if name in m.motion.variables()]
+        about = (VARIABLE + name, *moved)
+        yield from quantities(variable, key=f"variables.{name}", kind="variables", about=about)
+
+
+def _following(model: Model) -> Iterator[Quantity]:
+    yield from _sizes(model)
+    yield from _links(model)
+    yield from _payloads(model)
+    yield from _published(model)
+    yield from _people(model)
+    place = _Home(model)
+    yield from _feet(model, place, place.still)
+    yield from _overlaps(model, place, {*place.still, *(robot.name for robot in model.workstation.robots)})
+    yield from _parts(model, place)
+    yield from _nobody(model, [place])
+
+
+def implausible_motion(model: Model, q: Mapping[str, Sequence[Array]]) -> tuple[Finding, ...]:
+    """The same of where recorded motions go.
+
+    Args:
+        model: The compiled workstation.
+        q: Joint positions by robot or human at some instants of its motion, the first one first, shape (n,).
+    """
+    if not q:
+        return ()
+    places = [
+        _Home(model, {name: at[min(k, len(at) - 1)] for name, at in q.items()}) for k in range(_most(q))
+    ]
+    people = q.keys() & {human.name for human in model.workstation.humans}
+    every = [*_feet(model, places[0], people), *_overlaps(model, places[0], people)]
+    if people:
+        every += _nobody(model, places)
+    return tuple(findings(every, model.workstation.confirmed))
+
+
+def placed(model: Model, q: Mapping[str, Array]) -> Iterator[Quantity]:
+    """What can be implausible of where robots and people are, of whom that was heard.
+
+    Args:
+        model: The compiled workstation.
+        q: Joint positions by robot or human, shape (n,).
+    """
+    place = _Home(model, q)
+    people = q.keys() & {human.name for human in model.workstation.humans}
+    yield from _feet(model, place, people)
+    yield from _overlaps(model, place, people)
+    yield from _nobody(model, [place], "where they are heard to be")
+
+
+def _most(q: Mapping[str, Sequence[Array]]) -> int:
+    return max(len(at) for at in q.values())
+
+
+# -- sizes and masses ---------------------------------------------------------------------------
+
+
+def _sizes(model: Model) -> Iterator[Quantity]:
+    """Extent of every thing, its mass where a density tells it, and its density where it does not."""
+    for group in ("tools", "workpieces", "parts", "machines"):
+        for i, thing in enumerate(getattr(model.workstation, group)):
+            bodies = [body for body in model.bodies if body.owner == thing.name]
+            solids = [solid for body in bodies for solid in body.solids]
+            if not solids:
+                continue
+            low, high = box(solids)
+            read = f", {thing.mesh} read in {thing.units}" if thing.units else ""
+            figures = [("extent", "m", float((high - low).max()), f"its largest edge{read}")]
+            mass = next((body.mass.value for body in bodies if body.mass is not None), None)
+            volume = float((high - low).prod())
+            if mass is not None and thing.mass is None:
+                figures.append(("mass", "kg", mass, f"of its shape at {thing.density:g} kg/m³{read}"))
+            elif mass is not None and volume > 0:
+                said = f"{mass:g} kg in a box of {volume:.3g} m³{read}"
+                figures.append(("bulk_density", "kg/m³", mass / volume, said))
+            for name, unit, value, said in figures:
+                yield Quantity(f"{group}[{i}].{name}", f"{group}.{name}", unit, (value,), (thing.name,), said)
+
+
+def _links(model: Model) -> Iterator[Quantity]:
+    """Density of every link whose mass the workstation file gives, in the box around its shape."""
+    for i, robot in enumerate(model.workstation.robots):
+        for link, given in robot.masses.items():
+            name, what = f"{robot.name}/{link}", f"masses.{link}.bulk_density"
+            solids = [solid for body in model.bodies if body.name == name for solid in body.solids]
+            low, high = box(solids) if solids else (0.0, 0.0)
+            volume = float(np.prod(np.subtract(high, low)))
+            if volume > 0:
+                said, density = f"{given.mass:g} kg in a box of {volume:.3g} m³", (given.mass / volume,)
+                key, kind = f"robots[{i}].{what}", f"robots.{what}"
+                yield Quantity(key, kind, "kg/m³", density, (robot.name,), said)
+
+
+def _payloads(model: Model) -> Iterator[Quantity]:
+    """What hangs on each robot, as a share of what its maker rates it for."""
+    for i, robot in enumerate(model.workstation.robots):
+        row = next((row for row in data().payloads if robot.model in row.models), None)
+        if row is None:
+            continue
+        bodies = [model.bodies[k] for k in model.mechanisms[robot.name].carried]
+        masses = {body.owner: body.mass.value for body in bodies if body.mass is not None}
+        total = sum(masses.values())
+        said = (
+            f"{', '.join(f'{name} {m:.4g} kg' for name, m in masses.items())} of {row.kg:g} kg: {row.source}"
+        )
+        yield Quantity(f"robots[{i}].payload", "robots.payload", "", (total / row.kg,), (robot.name,), said)
+
+
+def _published(model: Model) -> Iterator[Quantity]:
+    """What the links of each robot weigh, as a share of what its maker says that it weighs."""
+    for i, robot in enumerate(model.workstation.robots):
+        if robot.published_mass is None:
+            continue
+        mechanism = model.mechanisms[robot.name]
+        beyond = {f"{robot.name}/{link}" for link in beyond_flange(mechanism.description)}
+        rows = [row for row in mechanism.masses if row.name in mechanism.links - beyond]
+        total, unknown = sum(row.mass or 0.0 for row in rows), any(row.mass is None for row in rows)
+        share = total / robot.published_mass
+        if unknown and share < 1:
+            continue  # what nobody weighed is undecided by itself
+        said = f"{total:.4g} kg of {robot.published_mass:g} kg: {robot.published_mass_source}"
+        name = "published_mass.share"
+        yield Quantity(f"robots[{i}].{name}", f"robots.{name}", "", (share,), (robot.name,), said)
+
+
+def _people(model: Model) -> Iterator[Quantity]:
+    """Stature where a population tells it, and mass over its square."""
+    for i, human in enumerate(model.workstation.humans):
+        stature = human.stature
+        if isinstance(stature, float | int):
+            bmi = human.mass / stature**2
+            said = f"{human.mass:g} kg, {stature:g} m"
+            yield Quantity(f"humans[{i}].bmi", "humans.bmi", "kg/m²", (bmi,), (human.name,), said)
+
+
+# -- places -------------------------------------------------------------------------------------
+
+
+class _Home:
+    """Everybody at home, or where motions put them."""
+
+    def __init__(self, model: Model, q: Mapping[str, Array] = MappingProxyType({})) -> None:
+        data = mujoco.MjData(model.mj)
+        for mechanism in model.mechanisms.values():
+            at = q.get(mechanism.name, mechanism.home)
+            data.qpos[mechanism.q_address] = mechanism.coupling @ at + mechanism.offset
+        mujoco.mj_kinematics(model.mj, data)
+        ids = [body.mj for body in model.bodies]
+        self.rotations: Array = data.xmat[ids].reshape(-1, 3, 3).copy()
+        self.positions: Array = data.xpos[ids].copy()
+        self.shapes = model.shapes
+        driven = {source.target() for source in model.workstation.sources}
+        self.still = {
+            name
+            for name, m in model.mechanisms.items()
+            if name in q or (name not in driven and (m.home_given or not m.joints))
+        }
+        """Robots, people and machines that stand where they are now, as far as the file says."""
+
+    def lowest(self, bodies: Sequence[Body]) -> float:
+        """Height of the lowest point of bodies [m]."""
+        heights = [
+            float((self.rotations[b.index] @ b.corners.T)[2].min() + self.positions[b.index][2] - b.radius)
+            for b in bodies
+            if len(b.corners)
+        ]
+        return min(heights, default=0.0)
+
+    def distance(self, a: Sequence[int], b: Sequence[int], cap: float) -> float:
+        """Between two sets of bodies [m], at most ``cap``."""
+        return Query(self.shapes, a, b, cap=cap).minimum(self.rotations, self.positions).distance
+
+    def depth(self, outer: Body, inner: Body) -> float:
+        """How deep one reaches into the other [m]."""
+        if self.distance((outer.index,), (inner.index,), 0.1) >= 0:
+            return 0.0
+        pairs = [(outer.index, inner.index), (inner.index, outer.index)]
+        asked = Depths(self.shapes).ask(self.rotations, self.positions, pairs)
+        # Of a thin plate through a body, only the body says how deep.
+        return max(found.at_least for found in asked)
+
+
+def _seen(bodies: Sequence[Body]) -> list[Body]:
+    return [body for body in bodies if body.solids and body.role != "area"]
+
+
+def _standing(model: Model) -> list[Body]:
+    """Bodies that nobody moves: parts, bases of robots."""
+    moved = {i for m in model.mechanisms.values() for i in m.moving}
+    fixed = [b for b in _seen(model.bodies) if not b.mover or (b.role == "robot" and b.index not in moved)]
+    return [b for b in fixed if not b.holder]
+
+
+def _of(model: Model, mechanism: Mechanism) -> list[Body]:
+    return _seen([model.bodies[i] for i in (*mechanism.bodies, *mechanism.carried)])
+
+
+def _feet(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity]:
+    """How far people who stand still are from what they stand or sit on."""
+    parts = [b for b in _seen(model.bodies) if b.role in ("part", "machine")]
+    under = [b.index for b in parts]
+    # Where nothing stands at 0, the origin is somewhere else, such as at the base of the robot.
+    floor = any(abs(place.lowest([b])) <= LEVEL for b in parts)
+    for i, human in enumerate(model.workstation.humans):
+        if human.name not in who:
+            continue
+        bodies = _of(model, model.mechanisms[human.name])
+        gap = place.lowest(bodies)
+        if gap < 0 and not floor:
+            continue
+        feet = [b.index for b in bodies if b.name.rpartition("/")[2].endswith(SUPPORTED)]
+        said = f"the lowest point of {human.name} is {gap:.3g} m above the floor z = 0"
+        if gap > 0 and feet and under:
+            on = place.distance(feet, under, gap)
+            if on < gap:
+                gap, said = max(on, 0.0), f"from what {human.name} stands or sits on"
+        yield Quantity(f"humans[{i}].feet", "humans.feet", "m", (gap,), (human.name,), said)
+
+
+def _overlaps(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity]:
+    """How deep people and bases of robots reach into what stands."""
+    standing = _standing(model)
+    owners: dict[str, list[Body]] = {}
+    for body in standing:
+        owners.setdefault(body.owner, []).append(body)
+    for group in ("humans", "robots"):
+        for i, table in enumerate(getattr(model.workstation, group)):
+            if table.name not in who:
+                continue
+            own = (
+                _of(model, model.mechanisms[table.name]) if group == "humans" else owners.get(table.name, [])
+            )
+            for owner, bodies in owners.items():
+                if owner == table.name or not own:
+                    continue
+                a, b = [body.index for body in own], [body.index for body in bodies]
+                if place.distance(a, b, 0.1) >= 0:
+                    continue
+                deep, inner, outer = max(
+                    ((place.depth(y, x), x.name, y.name) for x in own for y in bodies),
+                    key=lambda found: found[0],
+                )
+                said = f"{inner} in {outer}"
+                about = (table.name, owner)
+                yield Quantity(
+                    f"{group}[{i}].inside.{owner}", f"{group}.inside.{owner}", "m", (deep,), about, said
+                )
+
+
+def _parts(model: Model, place: _Home) -> Iterator[Quantity]:
+    """How deep parts that stand reach into each other."""
+    every = [[b for b in _seen(model.bodies) if b.owner == part.name] for part in model.workstation.parts]
+    for i, (part, own) in enumerate(zip(model.workstation.parts, every, strict=True)):
+        for other, bodies in zip(model.workstation.parts[:i], every, strict=False):
+            a, b = [body.index for body in own], [body.index for body in bodies]
+            if not own or not bodies or place.distance(a, b, 0.1) >= 0:
+                continue
+            deep = max(place.depth(y, x) for x in own for y in bodies)
+            about = (part.name, other.name)
+            key = f"parts[{i}].inside.{other.name}"
+            yield Quantity(
+                key, f"parts.inside.{other.name}", "m", (deep,), about, f"{part.name} in {other.name}"
+            )
+
+
+def _nobody(
+    model: Model, places: Sequence[_Home], where: str = "where the file puts them"
+) -> Iterator[Quantity]:
+    """How near anybody comes to each robot and machine."""
+    place = places[0]
+    people = [model.mechanisms[h.name] for h in model.workstation.humans]
+    still = [b.index for m in people if m.name in place.still for b in _of(model, m)]
+    if not still or len({m.name for m in people} - place.still):
+        return  # somebody comes from elsewhere
+    for group in ("robots", "machines"):
+        for i, table in enumerate(getattr(model.workstation, group)):
+            own = [b.index for b in _of(model, model.mechanisms[table.name])]
+            if own:
+                near = max(min(at.distance(still, own, SIGHT) for at in places), 0.0)
+                said = f"from {table.name} to whoever is nearest, {where}"
+                key = "nobody_within"
+                yield Quantity(f"{group}[{i}].{key}", f"{group}.{key}", "m", (near,), (table.name,), said)

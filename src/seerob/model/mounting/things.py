@@ -1,0 +1,386 @@
+"""Tools, workpieces and parts: from a table of the file to named pieces with shape and mass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from seerob.core.errors import InputError, Problem
+from seerob.core.shapes.floor_polygon import prism_mesh
+from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.core.snapshot import Finding, Origin
+from seerob.core.transforms import Array
+from seerob.description import lint
+from seerob.description.description import Inertial, Link
+from seerob.description.mesh import load_meshes
+from seerob.description.shapes import detail, mass_properties, shapes
+from seerob.description.shapes.mesh_bodies import is_closed, joined
+from seerob.description.shapes.moments import signed_volume
+from seerob.description.shapes.split_surfaces import enclosing
+from seerob.workstation.workstation import Area, Shape, Thing
+from seerob.workstation.workstation import Body as BodyTable
+
+Color = tuple[float, float, float, float]
+TOOL_COLOR: Color = (0.33, 0.38, 0.45, 1.0)
+WORKPIECE_COLOR: Color = (0.80, 0.62, 0.36, 1.0)
+PART_COLOR: Color = (0.55, 0.58, 0.62, 1.0)
+AREA_COLOR: Color = (0.99, 0.92, 0.57, 0.25)
+
+CYLINDER_SIDES = 96
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One rigid piece of a thing, in the thing's frame."""
+
+    name: str
+    """Empty for a thing of one piece, else the mesh's name in the file."""
+    visual: tuple[Mesh, ...]
+    solids: tuple[Solid, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedThing:
+    """A thing that has been read."""
+
+    pieces: tuple[Piece, ...]
+    inertial: Inertial | None
+    """Of all pieces together, in the thing's frame; None when nobody gave a mass or a density."""
+    findings: tuple[Finding, ...]
+    files: dict[str, bytes]
+
+
+@dataclass(frozen=True, eq=False)
+class MadeArea:
+    """An area that was made from a motion, in the world's frame."""
+
+    mesh: Mesh
+    note: str
+    """What of it is not as it looks."""
+    findings: tuple[Finding, ...]
+
+
+def load_thing(
+    thing: Thing, folder: Path, color: Color, *, needs_mass: bool, file: str = "workstation"
+) -> LoadedThing:
+    """Read a tool, a workpiece or a part.
+
+    Args:
+        thing: Its table.
+        folder: What its mesh path is relative to.
+        color: For what has no colour of its own.
+        needs_mass: Whether it moves, so that a mass from the shape is worth computing.
+        file: The workstation file, for messages.
+
+    Raises:
+        InputError: The mesh cannot be read, a mass was asked for that the shape cannot give, or no body
+            of this shape has the given centre of mass or inertia.
+    """
+    if thing.color is not None:
+        color = (*thing.color, 1.0)
+    findings: tuple[Finding, ...] = ()
+    files: dict[str, bytes] = {}
+    if thing.mesh is not None:
+        path = folder / thing.mesh
+        loaded = load_meshes(path, units=thing.units, up=thing.up)
+        findings = tuple(replace_subject(f, thing.name) for f in loaded.findings)
+        files = loaded.files
+        single = len(loaded.meshes) == 1
+        own_color = thing.color is not None
+        meshes = [
+            (m.name, Mesh(m.mesh.vertices, m.mesh.faces, color) if own_color else m.mesh)
+            for m in loaded.meshes
+        ]
+        pieces = tuple(_piece("" if single else name, mesh) for name, mesh in meshes)
+        source = f"shape of {thing.mesh}"
+        whole = [mesh for _, mesh in meshes]
+        if not all(map(is_closed, whole)):
+            around = enclosing(whole)
+            if around is None:
+                findings += (_hole(thing, path),)
+            else:
+                # Split by colour or by name, none of the pieces has an inside; all of them together do.
+                inside = Solid(mesh=detail.physics_mesh(around))
+                pieces = (replace(pieces[0], solids=(*pieces[0].solids, inside)), *pieces[1:])
+    else:
+        assert thing.shape is not None
+        piece, whole = _simple(thing.shape, color)
+        pieces, source = (piece,), "shape in the workstation file"
+    solids = tuple(solid for piece in pieces for solid in piece.solids)
+    findings += _odd(thing, solids, whole)
+    inertial: Inertial | None = None
+    more: tuple[Finding, ...] = ()
+    if needs_mass and (thing.mass is not None or thing.density is not None):
+        inertial, more = _inertial(thing, whole, source)
+    elif thing.mass is not None and thing.com is not None:
+        # It stands still, so only what the user wrote is looked at.
+        inertial = by_hand(thing.mass, thing.com, thing.inertia or (0.0,) * 6, source)
+    if inertial is not None:
+        inertial, noticed = _possible(
+            inertial, solids, thing, thing.name, file, "", lambda: _spread(thing, whole)
+        )
+        findings += more + noticed
+    if not needs_mass:
+        inertial = None
+    return LoadedThing(pieces, inertial, findings, files)
+
+
+def replace_subject(finding: Finding, subject: str) -> Finding:
+    """The same finding about another subject."""
+    return Finding(level=finding.level, subject=subject, text=finding.text)
+
+
+def _piece(name: str, mesh: Mesh) -> Piece:
+    display = detail.display_mesh(mesh)
+    return Piece(name, (display,), (Solid(mesh=detail.physics_mesh(mesh), name=name),))
+
+
+def _round(shape: Shape | None) -> tuple[float, float] | None:
+    """Radius and length along z of a ball or capsule [m]; None for any other shape."""
+    if shape is None:
+        return None
+    return (shape.sphere, 0.0) if shape.sphere is not None else shape.capsule
+
+
+def _simple(shape: Shape, color: Color) -> tuple[Piece, list[Mesh]]:
+    rounded = _round(shape)
+    if rounded is not None:
+        end = np.array([0.0, 0.0, rounded[1] / 2])
+        solid = capsule(-end, end, rounded[0])
+        from seerob.description.shapes.glb import solid_mesh
+
+        mesh = solid_mesh(solid, color=color)
+        return Piece("", (mesh,), (solid,)), [mesh]
+    if shape.box is not None:
+        half = np.array(shape.box) / 2
+        mesh = shapes.box_mesh(-half, half, color=color)
+        return Piece("", (mesh,), (Solid(mesh=mesh),)), [mesh]
+    if shape.polygon is not None:
+        assert shape.height is not None
+        mesh = prism_mesh(shape.polygon, *shape.height, color)
+        return Piece("", (mesh,), (Solid(mesh=mesh),)), [mesh]
+    assert shape.cylinder is not None
+    radius, height = shape.cylinder
+    ends = np.array([[0, 0, -height / 2], [0, 0, height / 2]])
+    # Corners outside the circle, sides on it: never nearer to the person than it looks.
+    outer = radius / np.cos(np.pi / CYLINDER_SIDES)
+    mesh = shapes.cylinder_mesh(ends[0], ends[1], outer, sides=CYLINDER_SIDES, color=color)
+    note = f"prism around the cylinder, at most {(outer - radius) * 1e3:.2f} mm larger"
+    return Piece("", (mesh,), (Solid(mesh=mesh, note=note),)), [mesh]
+
+
+def _inertial(thing: Thing, meshes: list[Mesh], source: str) -> tuple[Inertial, tuple[Finding, ...]]:
+    if thing.mass is not None and thing.com is not None and thing.inertia is not None:
+        return by_hand(thing.mass, thing.com, thing.inertia, "workstation file"), ()
+    inertial, findings = _spread(thing, meshes)
+    if thing.com is not None:
+        inertial = replace(inertial, com=np.array(thing.com, float))
+    if thing.mass is not None:
+        # The mass itself was given; only how it is spread follows from the shape.
+        inertial = replace(inertial, origin=Origin.GIVEN, error=0.0, source=f"workstation file; {source}")
+        return inertial, findings
+    figure = f"mass {inertial.mass:.4g} kg"
+    if not any(finding.text.startswith(figure) for finding in findings):
+        text = f"{figure} estimated: {inertial.source}, error ±{100 * inertial.error:.2g} %"
+        findings += (Finding(level="note", subject=thing.name, text=text),)
+    return inertial, findings
+
+
+def _spread(thing: Thing, meshes: list[Mesh]) -> tuple[Inertial, tuple[Finding, ...]]:
+    """Mass properties at uniform density, and what was noticed."""
+    rounded = _round(thing.shape)
+    if rounded is None:
+        try:
+            return mass_properties.from_shape(
+                meshes, density=thing.density, mass=thing.mass, subject=thing.name
+            )
+        except InputError as error:
+            source = thing.mesh or thing.name
+            raise InputError([problem._replace(file=source) for problem in error.problems]) from None
+    volume, moments = _capsule(*rounded)
+    what = "capsule" if rounded[1] else "sphere"
+    mass, origin, source = thing.mass, Origin.GIVEN, f"{what}, shape in the workstation file"
+    if mass is None:
+        mass = volume * (thing.density or 0.0)
+        origin, source = Origin.ESTIMATED, f"{thing.density:g} kg/m³ × volume of the {what}"
+    return Inertial(mass, np.zeros(3), np.diag(mass * moments), origin, source), ()
+
+
+def _capsule(radius: float, length: float) -> tuple[float, Array]:
+    """Volume [m³] and moments of inertia about the centre per mass [m²] (3,) of a capsule along z."""
+    middle, ends = np.pi * radius**2 * length, 4 / 3 * np.pi * radius**3
+    across = middle * (length**2 / 12 + radius**2 / 4)
+    across += ends * (0.4 * radius**2 + length**2 / 4 + 3 / 8 * length * radius)
+    along = middle * radius**2 / 2 + ends * 0.4 * radius**2
+    volume = float(middle + ends)
+    return volume, np.array([across, across, along]) / volume
+
+
+def _hole(thing: Thing, path: Path) -> Finding:
+    """What an open surface means for distances.
+
+    Raises:
+        InputError: An area, of which only the inside matters.
+    """
+    if isinstance(thing, Area):
+        raise InputError.at(
+            path,
+            "mesh",
+            "the mesh is open: nothing can be said to be inside of it",
+            "close it, or give a shape",
+        )
+    return Finding(level="note", subject=thing.name, text=lint.OPEN)
+
+
+def _odd(thing: Thing, solids: tuple[Solid, ...], meshes: list[Mesh]) -> tuple[Finding, ...]:
+    """Warnings for a size, a mass or a density that speaks of a wrong unit."""
+    low, high = lint.box(solids)
+    texts = [lint.odd_extent(float((high - low).max()), unit=thing.units)]
+    if thing.mass is not None:
+        texts.append(_odd_mass(thing.mass, thing, meshes))
+    if thing.density is not None:
+        odd = lint.odd_density(thing.density)
+        texts.append(f"density is {odd}" if odd else "")
+    return tuple(Finding(level="warning", subject=thing.name, text=text) for text in texts if text)
+
+
+def _odd_mass(mass: float, thing: Thing, meshes: list[Mesh]) -> str:
+    """What is odd about a mass in this shape, whose hull bounds its volume where it is not closed."""
+    rounded = _round(thing.shape)
+    if rounded is not None:
+        return lint.odd_mass(mass, _capsule(*rounded)[0], exact=True)
+    mesh, _ = joined([m for m in meshes if len(m.faces)])
+    hull = _hull_volume(mesh)
+    volume = signed_volume(mesh) if is_closed(mesh) else 0.0
+    if 1e-9 * hull < volume <= hull * (1 + 1e-9):
+        return lint.odd_mass(mass, volume, exact=True)
+    return lint.odd_mass(mass, hull, exact=False)
+
+
+def _hull_volume(mesh: Mesh) -> float:
+    """[m³]; 0 when the mesh is flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return float(ConvexHull(mesh.vertices).volume)
+    except (QhullError, ValueError):
+        return 0.0
+
+
+Spread = Callable[[], tuple[Inertial, tuple[Finding, ...]]]
+
+
+def _possible(
+    inertial: Inertial,
+    solids: Sequence[Solid],
+    table: Thing | BodyTable,
+    subject: str,
+    file: str,
+    key: str,
+    spread: Spread,
+) -> tuple[Inertial, tuple[Finding, ...]]:
+    """Mass properties that a body of this shape can have, rounding mended, and what is odd about them.
+
+    Args:
+        inertial: What follows from the table.
+        solids: The shape; empty when there is none.
+        table: What the user gave.
+        subject: Full name of the body.
+        file: The workstation file, for messages.
+        key: Of the table in the file, ends in a dot; empty for the table itself.
+        spread: Mass properties at uniform density, to propose.
+
+    Raises:
+        InputError: No body of this shape has the given centre of mass or inertia.
+    """
+    problems = []
+    findings: list[Finding] = []
+    if table.com is not None and solids:
+        low, high = lint.box(solids)
+        what = lint.misplaced_com(inertial.com, low, high)
+        if what:
+            remedy = f"its box is {np.round(low, 4).tolist()} to {np.round(high, 4).tolist()} m"
+            problems.append(Problem(file, f"{key}com", what, f"{remedy}; millimetres go into com_mm"))
+    if table.inertia is not None:
+        what = lint.impossible_inertia(inertial.inertia)
+        if what:
+            problems.append(Problem(file, f"{key}inertia", what, _proposed(spread)))
+        else:
+            mended, level, text = lint.plausible_inertial(inertial, body=True)
+            if mended is not None and text:
+                inertial = mended
+                findings.append(Finding(level=level, subject=subject, text=text))
+    if problems:
+        raise InputError(problems)
+    if table.com is not None or table.inertia is not None:
+        body = Link(subject, None, np.eye(4), inertial=inertial, solids=tuple(solids))
+        findings += [Finding(level=a, subject=b, text=c) for a, b, c in lint.misplaced_mass(body)]
+    return inertial, tuple(findings)
+
+
+def _proposed(spread: Spread) -> str:
+    """What an inertia could be, in words."""
+    order = "ixx, iyy, izz, ixy, ixz, iyz about the centre of mass in kg·m²"
+    try:
+        inertia = spread()[0].inertia
+    except InputError:
+        return f"give {order}"
+    six = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+    return f"give {order}; at uniform density [{', '.join(f'{x:.4g}' for x in six)}]"
+
+
+def by_hand(
+    mass: float,
+    com: tuple[float, float, float],
+    inertia: tuple[float, float, float, float, float, float],
+    source: str,
+) -> Inertial:
+    """Mass properties that the user wrote: kg, m, kg·m² as ixx, iyy, izz, ixy, ixz, iyz."""
+    return Inertial(mass, np.array(com, float), symmetric(inertia), Origin.GIVEN, source)
+
+
+def symmetric(six: tuple[float, float, float, float, float, float]) -> Array:
+    """Matrix (3, 3) of ixx, iyy, izz, ixy, ixz, iyz."""
+    xx, yy, zz, xy, xz, yz = six
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def link_by_hand(
+    table: BodyTable, link: Link, *, robot: str, file: str
+) -> tuple[Inertial, tuple[Finding, ...]]:
+    """Mass properties of a link from its table; what the table leaves out follows from the shape.
+
+    Args:
+        table: What the user gave.
+        link: The link as read.
+        robot: Name of its robot.
+        file: The workstation file, for messages.
+
+    Returns:
+        The mass properties, and what is odd about them.
+
+    Raises:
+        InputError: Something was left out and the link has no shape to compute it from, or no body of
+            this shape has the given centre of mass or inertia.
+    """
+    key = f"masses.{link.name}"
+
+    def spread() -> tuple[Inertial, tuple[Finding, ...]]:
+        from seerob.description.shapes.glb import solid_mesh
+
+        if not link.solids:
+            raise InputError.at(file, key, "has no shape to compute com and inertia from", "give both")
+        meshes = [s.mesh if s.mesh is not None else solid_mesh(s) for s in link.solids]
+        return mass_properties.from_shape(meshes, mass=table.mass, subject=f"{robot}/{link.name}")
+
+    if table.com is not None and table.inertia is not None:
+        inertial = by_hand(table.mass, table.com, table.inertia, table.source)
+    else:
+        inertial = spread()[0]
+        com = inertial.com if table.com is None else np.array(table.com, float)
+        inertia = inertial.inertia if table.inertia is None else symmetric(table.inertia)
+        inertial = Inertial(table.mass, com, inertia, Origin.GIVEN, f"{table.source}; rest from the shape")
+    return _possible(inertial, link.solids, table, f"{robot}/{link.name}", file, f"{key}.", spread)

@@ -1,0 +1,1 @@
+"""Volumes in voxels: swept and reachable."""

@@ -1,1 +1,0 @@
-"""Readers of robot descriptions and meshes, one file per format."""

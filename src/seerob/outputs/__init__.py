@@ -1,0 +1,1 @@
+"""Sinks: the recorder, tables, workbooks, the report."""

@@ -1,0 +1,1 @@
+"""The recording as it is written, for ourselves and for foreign viewers."""

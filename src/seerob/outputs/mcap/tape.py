@@ -1,0 +1,247 @@
+"""Writes one recording: what `seerob.recording.recording` reads back, and what foreign viewers show."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from mcap.writer import Writer as McapWriter
+from mcap_protobuf.schema import register_schema
+from msgspec.structs import replace
+
+from seerob.core.samples import Sample
+from seerob.core.snapshot import Basis, Result, Scene, Snapshot
+from seerob.outputs.mcap.foxglove import frame_transforms, marker_update, scene_update
+from seerob.outputs.versions import versions
+from seerob.recording.format import (
+    BASIS,
+    END_METADATA,
+    FILE_PREFIX,
+    MESH_PREFIX,
+    METADATA,
+    SAMPLES,
+    SCENE,
+    SNAPSHOT,
+    VERSION,
+    VIEW_FRAMES,
+    VIEW_MARKERS,
+    VIEW_PEOPLE,
+    VIEW_RESULTS,
+    VIEW_SCENE,
+    BasisChange,
+    Tick,
+    nanoseconds,
+)
+
+VIEW_PERIOD = 0.05
+"""Least run time between two messages that only viewers read [s]."""
+
+_RESULTS_SCHEMA = {
+    "type": "object",
+    "properties": {
+        "t": {"type": "number"},
+        "results": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "properties": {
+                    "name": {"type": "string"},
+                    "value": {"type": ["number", "null"]},
+                    "limit": {"type": ["number", "null"]},
+                    "unit": {"type": "string"},
+                    "verdict": {"type": ["string", "null"]},
+                    "reason": {"type": "string"},
+                },
+            },
+        },
+    },
+}
+_NUMBERS = {"type": "object", "additionalProperties": {"type": ["number", "null"]}}
+_PEOPLE_SCHEMA = {
+    "type": "object",
+    "properties": {
+        "t": {"type": "number"},
+        "people": {
+            "type": "object",
+            "additionalProperties": {
+                "type": "object",
+                "properties": {
+                    "joints": _NUMBERS,
+                    "errors": {"type": "object", "additionalProperties": _NUMBERS},
+                },
+            },
+        },
+    },
+}
+
+
+class McapTape:
+    """An MCAP file that is only ever appended to."""
+
+    def __init__(self, path: Path, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes]) -> None:
+        """Write everything that does not change; on disk when this returns.
+
+        Raises:
+            OSError: The file exists or cannot be written.
+        """
+        self._scene = scene
+        self._people = {m.name: [j.name for j in m.joints] for m in scene.mechanisms if m.role == "human"}
+        self._encode = msgspec.msgpack.Encoder(enc_hook=_plain).encode
+        self._bases: dict[tuple[int, str], Basis | None] = {}
+        self._next_view = -math.inf
+        self.ticks = 0
+        """Ticks that were taken."""
+        self.kept = 0
+        """Of these, ticks that are on disk."""
+        self._file = path.open("xb")
+        try:
+            # The library types its constructor only.
+            self._mcap: Any = McapWriter(self._file, enable_crcs=True)
+            self._mcap.start(profile="", library=f"seerob {scene.version}")
+            self._mcap.add_metadata(
+                METADATA,
+                {"layout": VERSION, "created": datetime.now(UTC).isoformat(timespec="seconds"), **versions()},
+            )
+            for name, data in files.items():
+                self._mcap.add_attachment(0, 0, FILE_PREFIX + name, "application/octet-stream", data)
+            for key, data in meshes.items():
+                self._mcap.add_attachment(0, 0, f"{MESH_PREFIX}{key}.glb", "model/gltf-binary", data)
+            self._channels = self._register()
+            self._put(SCENE, 0, 0, self._encode(scene))
+            self.flush()
+            self._put(VIEW_SCENE, 0, 0, scene_update(scene, meshes).SerializeToString())
+            self.flush()
+        except BaseException:
+            self._file.close()
+            path.unlink(missing_ok=True)
+            raise
+
+    def _register(self) -> dict[str, int]:
+        from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+        from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+
+        channels = {
+            topic: self._mcap.register_channel(topic, "msgpack", 0)
+            for topic in (SCENE, SAMPLES, SNAPSHOT, BASIS)
+        }
+        update = register_schema(self._mcap, SceneUpdate)
+        transforms = register_schema(self._mcap, FrameTransforms)
+        results = self._mcap.register_schema(
+            "seerob.Results", "jsonschema", json.dumps(_RESULTS_SCHEMA).encode()
+        )
+        people = 0
+        if self._people:
+            people = self._mcap.register_schema(
+                "seerob.People", "jsonschema", json.dumps(_PEOPLE_SCHEMA).encode()
+            )
+        for topic, encoding, schema in (
+            (VIEW_SCENE, "protobuf", update),
+            (VIEW_MARKERS, "protobuf", update),
+            (VIEW_FRAMES, "protobuf", transforms),
+            (VIEW_RESULTS, "json", results),
+            *([(VIEW_PEOPLE, "json", people)] if self._people else []),
+        ):
+            channels[topic] = self._mcap.register_channel(topic, encoding, schema)
+        return channels
+
+    def tick(self, seq: int, t: float, samples: tuple[Sample, ...], snapshot: Snapshot | None) -> None:
+        """Append one tick; ``snapshot`` is None when it was dropped and only its input is kept."""
+        self.ticks += 1
+        self._put(SAMPLES, seq, t, self._encode(Tick(seq=seq, t=t, samples=samples)))
+        if snapshot is None:
+            return
+        self._put(SNAPSHOT, seq, t, self._encode(self._without_basis(snapshot)))
+        if t >= self._next_view:
+            self._next_view = t + VIEW_PERIOD * (1 - 1e-6)
+            self._put(VIEW_FRAMES, seq, t, frame_transforms(self._scene, snapshot).SerializeToString())
+            self._put(VIEW_MARKERS, seq, t, marker_update(snapshot).SerializeToString())
+            self._put(VIEW_RESULTS, seq, t, _results_json(snapshot))
+            if self._people:
+                self._put(VIEW_PEOPLE, seq, t, self._people_json(snapshot))
+
+    def _people_json(self, snapshot: Snapshot) -> bytes:
+        people = {
+            name: {
+                "joints": dict(zip(joints, snapshot.joints.get(name, ()), strict=False)),
+                "errors": {
+                    bone: {"position": position, "angle": angle}
+                    for bone, (position, angle) in snapshot.bones.get(name, {}).items()
+                },
+            }
+            for name, joints in self._people.items()
+        }
+        return msgspec.json.encode({"t": snapshot.t, "people": people}, enc_hook=_plain)
+
+    def flush(self) -> None:
+        """End the chunk and hand it to the disk: what was written so far survives the process."""
+        self._mcap.flush()
+        os.fsync(self._file.fileno())
+        self.kept = self.ticks
+
+    def finish(self, counts: dict[str, int]) -> None:
+        """Write the end mark and the index, and close."""
+        try:
+            self._mcap.flush()
+            self._mcap.add_metadata(END_METADATA, {k: str(n) for k, n in counts.items()})
+            self._mcap.finish()
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        finally:
+            self._file.close()
+
+    def abandon(self) -> None:
+        """Close as it is, after an error."""
+        with suppress(OSError):  # a full disk does not take what waits to be written either
+            self._file.close()
+
+    def _put(self, topic: str, seq: int, t: float, data: bytes) -> None:
+        time = nanoseconds(t)
+        self._mcap.add_message(self._channels[topic], time, data, time, seq & 0xFFFFFFFF)
+
+    def _without_basis(self, snapshot: Snapshot) -> Snapshot:
+        stripped: list[Result] = []
+        for i, result in enumerate(snapshot.results):
+            place, basis = (i, result.name), result.basis
+            known = self._bases.get(place)
+            if basis is not known and basis != known:
+                change = BasisChange(seq=snapshot.seq, index=i, name=result.name, basis=basis)
+                self._put(BASIS, snapshot.seq, snapshot.t, self._encode(change))
+            self._bases[place] = basis
+            stripped.append(result if basis is None else replace(result, basis=None))
+        return replace(snapshot, results=tuple(stripped))
+
+
+def _results_json(snapshot: Snapshot) -> bytes:
+    # msgspec writes nan and infinity as null, which is what JSON can say of them.
+    return msgspec.json.encode(
+        {
+            "t": snapshot.t,
+            "results": [
+                {
+                    "name": r.name,
+                    "value": r.value,
+                    "limit": r.limit,
+                    "unit": r.unit,
+                    "verdict": r.verdict,
+                    "reason": r.reason,
+                }
+                for r in snapshot.results
+            ],
+        },
+        enc_hook=_plain,
+    )
+
+
+def _plain(value: Any) -> object:
+    """Numpy's scalars as Python's: a criterion may leave one in a result."""
+    item: Callable[[], object] | None = getattr(value, "item", None)
+    if item is None or getattr(value, "ndim", 1) != 0:
+        raise TypeError(f"{type(value).__name__} cannot be recorded")
+    return item()

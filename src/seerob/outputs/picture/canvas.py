@@ -1,0 +1,201 @@
+"""A picture being drawn: opaque bodies first, then what lies over them, then words."""
+
+from __future__ import annotations
+
+from functools import cache
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.transforms import Array
+from seerob.kernels.paint import averaged, darken, glaze, outline, solid, stroke
+from seerob.kernels.raster import raster
+from seerob.outputs.picture.camera import NEAR, Camera
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+    from PIL.ImageFont import FreeTypeFont
+
+Color = tuple[float, float, float]
+
+PAPER: Color = (0.955, 0.965, 0.975)
+OVERSAMPLING = 2
+_LIGHT = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
+"""Toward the light, in the world."""
+
+
+class Canvas:
+    """Buffers of one view, drawn at `OVERSAMPLING` times the size and averaged at the end."""
+
+    def __init__(self, camera: Camera) -> None:
+        self.camera = camera
+        self.fine = camera.scaled(OVERSAMPLING)
+        shape = (self.fine.height, self.fine.width)
+        self.depth = np.zeros(shape)
+        self.owner = np.full(shape, -1, np.int32)
+        ramp = np.linspace(1.0, 0.93, shape[0], dtype=np.float32)[:, None, None]
+        self.rgb: NDArray[np.float32] = np.empty((*shape, 3), np.float32)
+        self.rgb[:] = np.array(PAPER, np.float32) * ramp
+        self._scratch: tuple[Array, Array, NDArray[np.int32]] | None = None
+
+    def bodies(
+        self, vertices: Array, normals: Array, faces: NDArray[np.int32], ids: NDArray[np.int32], colors: Array
+    ) -> None:
+        """Draw opaque triangles with their outlines.
+
+        Args:
+            vertices: World [m], shape (n, 3).
+            normals: World, unit, shape (n, 3).
+            faces: Shape (m, 3).
+            ids: Row of ``colors`` per triangle, shape (m,).
+            colors: sRGB 0…1 per id, shape (k, 3).
+        """
+        screen, inverse = self.fine.project(vertices)
+        lit = np.zeros_like(self.depth)
+        shade = brightness(vertices, normals, self.camera.eye)
+        raster(screen, inverse, shade, faces, ids, self.depth, lit, self.owner)
+        solid(self.rgb, self.owner, lit, np.ascontiguousarray(colors, float).reshape(-1, 3))
+        outline(self.rgb, self.owner, self.depth)
+
+    def shadow(self, vertices: Array, faces: NDArray[np.int32], floor: float) -> None:
+        """Darken the floor at a height [m] below the bodies, lit almost from above; call before `bodies`."""
+        height = np.maximum(vertices[:, 2] - floor, 0.0)
+        flat = vertices - height[:, None] * np.array([0.15, -0.2, 1.0])
+        screen, inverse = self.fine.project(flat)
+        depth, lit, owner = self._layer()
+        raster(screen, inverse, np.zeros(len(flat)), faces, np.zeros(len(faces), np.int32), depth, lit, owner)
+        darken(self.rgb, owner, 0.9)
+
+    def veil(self, vertices: Array, faces: NDArray[np.int32], color: Color, alpha: float) -> None:
+        """Draw a translucent surface, world [m], where nothing opaque is before it."""
+        corners = in_front(self.camera, vertices[faces])
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+        points = corners.reshape(-1, 3)
+        screen, inverse = self.fine.project(points)
+        depth, lit, owner = self._layer()
+        index = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
+        shade = brightness(points, np.repeat(normal, 3, axis=0), self.camera.eye)
+        raster(screen, inverse, shade, index, np.zeros(len(index), np.int32), depth, lit, owner)
+        glaze(self.rgb, self.depth, owner, depth, lit, np.array(color, float), alpha)
+
+    def line(
+        self, start: Array, end: Array, color: Color, *, width: float, alpha: float = 1.0, hidden: float = 0.0
+    ) -> None:
+        """Draw a line between two points of the world [m].
+
+        Args:
+            start: Shape (3,).
+            end: Shape (3,).
+            color: sRGB.
+            width: [px]
+            alpha: Opacity where it is in sight.
+            hidden: Opacity where a body is before it; drawn dashed there.
+        """
+        ends = clipped(self.camera, np.array([start, end], float))
+        if ends is None:
+            return
+        screen, inverse = self.fine.project(ends)
+        if float(np.hypot(*(screen[1] - screen[0]))) < 1e-9:
+            return
+        half, dash = width * OVERSAMPLING / 2, 14.0 * OVERSAMPLING
+        stroke(self.rgb, self.depth, screen, inverse, np.array(color, float), half, alpha, hidden, dash)
+
+    def _layer(self) -> tuple[Array, Array, NDArray[np.int32]]:
+        """Empty buffers (1/z, brightness, owner) for one surface; the next call takes them back."""
+        if self._scratch is None:
+            self._scratch = np.zeros_like(self.depth), np.zeros_like(self.depth), np.full_like(self.owner, -1)
+        else:
+            self._scratch[0].fill(0)
+            self._scratch[2].fill(-1)
+        return self._scratch
+
+    def dot(self, point: Array, color: Color, *, radius: float) -> None:
+        """A filled disc of ``radius`` [px] with a light rim, never hidden."""
+        screen, inverse = self.fine.project(point)
+        if inverse[0] <= 0:
+            return
+        reach = (radius + 3) * OVERSAMPLING
+        edge = np.array([self.fine.width, self.fine.height])
+        low = np.clip(np.floor(screen[0] - reach), 0, edge).astype(int)
+        high = np.clip(np.ceil(screen[0] + reach), 0, edge).astype(int)
+        if (high <= low).any():
+            return
+        ys, xs = np.mgrid[low[1] : high[1], low[0] : high[0]] + 0.5
+        window = (slice(low[1], high[1]), slice(low[0], high[0]))
+        off = np.hypot(xs - screen[0, 0], ys - screen[0, 1])
+        for size, paint in ((radius + 1.5, (1.0, 1.0, 1.0)), (radius, color)):
+            cover = np.clip(size * OVERSAMPLING + 0.5 - off, 0, 1)[..., None]
+            self.rgb[window] += (cover * (np.array(paint) - self.rgb[window])).astype(np.float32)
+
+    def pixels(self) -> NDArray[np.uint8]:
+        """The picture so far, shape (height, width, 3)."""
+        return np.asarray(averaged(self.rgb, OVERSAMPLING))
+
+
+def brightness(vertices: Array, normals: Array, eye: Array) -> Array:
+    """Lambert's law with a soft sky and a weak light at the eye, both sides lit; shape (n,)."""
+    toward = eye - vertices
+    toward /= np.maximum(np.linalg.norm(toward, axis=1, keepdims=True), 1e-12)
+    facing = np.einsum("ij,ij->i", normals, toward)
+    outward = normals * np.where(facing < 0, -1.0, 1.0)[:, None]
+    key = np.maximum(outward @ _LIGHT, 0)
+    return np.asarray(0.42 + 0.10 * outward[:, 2] + 0.42 * key + 0.16 * np.abs(facing))
+
+
+def clipped(camera: Camera, ends: Array) -> Array | None:
+    """The part of a segment (2, 3) in front of the camera; None when nothing is."""
+    z = camera.local(ends)[:, 2] - 2 * NEAR
+    if (z <= 0).all():
+        return None
+    if (z > 0).all():
+        return ends
+    at = z[0] / (z[0] - z[1])
+    cut = ends[0] + at * (ends[1] - ends[0])
+    return np.array([cut, ends[1]]) if z[0] <= 0 else np.array([ends[0], cut])
+
+
+def in_front(camera: Camera, corners: Array) -> Array:
+    """The part of triangles (m, 3, 3) in front of the camera, as triangles (k, 3, 3)."""
+    z = camera.local(corners)[:, 2].reshape(-1, 3) - 2 * NEAR
+    whole = corners[(z > 0).all(axis=1)]
+    cut = (z > 0).any(axis=1) & (z <= 0).any(axis=1)
+    made = []
+    for triangle, depth in zip(corners[cut], z[cut], strict=True):
+        kept = []
+        for k in range(3):
+            a, b = depth[k], depth[k - 2]
+            if a > 0:
+                kept.append(triangle[k])
+            if (a > 0) != (b > 0):
+                kept.append(triangle[k] + a / (a - b) * (triangle[k - 2] - triangle[k]))
+        made += [[kept[0], kept[k], kept[k + 1]] for k in range(1, len(kept) - 1)]
+    return np.concatenate([whole, np.array(made, float).reshape(-1, 3, 3)])
+
+
+@cache
+def font(size: int) -> FreeTypeFont:
+    """A font that has ✓, ✕ and ↔, which comes along with matplotlib."""
+    from pathlib import Path
+
+    import matplotlib
+    from PIL import ImageFont
+
+    return ImageFont.truetype(Path(matplotlib.get_data_path()) / "fonts/ttf/DejaVuSans-Bold.ttf", size)
+
+
+def words(draw: ImageDraw, at: tuple[float, float], text: str, color: Color, type_: FreeTypeFont) -> None:
+    """Text centred at a pixel, with a light rim that keeps it readable on anything."""
+    fill = tuple(round(255 * c) for c in color)
+    draw.text(at, text, fill=fill, font=type_, anchor="mm", stroke_width=3, stroke_fill=(255, 255, 255))
+
+
+def png(pixels: NDArray[np.uint8]) -> bytes:
+    """PNG of an image (height, width, 3)."""
+    from PIL import Image
+
+    out = BytesIO()
+    Image.fromarray(pixels).save(out, "PNG", compress_level=6)
+    return out.getvalue()

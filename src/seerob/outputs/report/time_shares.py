@@ -1,0 +1,80 @@
+"""How the scores of ergonomics rules are spread over the run, for the report and the workbook."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from seerob.core.figures import figure
+from seerob.core.snapshot import CriterionInfo, Level
+from seerob.outputs.html import Html, joined, table, tag
+from seerob.outputs.sentences import percent
+from seerob.outputs.workbook.sheet_rows import Cell
+from seerob.recording.distribution import distribution
+from seerob.recording.result_log import ResultLog
+from seerob.recording.series import Series
+
+HEAD: list[Cell] = [
+    "criterion", "part", "coverage [%]", "what", "value", "first at [s]", "share of time [%]",
+    "longest stretch [s]",
+]  # fmt: skip
+
+_WHOLE = ("", "right", "left")
+"""Parts whose values have the levels of the rule."""
+_FEW = 12
+"""A component with more values than this has no scores, but a measure."""
+
+
+def spread_over_time(info: CriterionInfo | None, series: Series) -> Html | None:
+    """Shares, percentiles and extremes of one rule; nothing for what is no ergonomics rule."""
+    found = None if info is None or info.group != "ergonomics" else distribution(series, info.levels)
+    if found is None or info is None:
+        return None
+    marks = [(f"P{p}", at) for p, at in found.percentiles]
+    rows = [
+        [name, figure(at.value, series.unit), f"{at.t:.2f} s"]
+        for name, at in (("least", found.minimum), *marks, ("largest", found.maximum))
+    ]
+    levels = [[s.name, percent(s.share), f"{s.longest:.2f} s"] for s in found.levels]
+    return joined(
+        [
+            tag("h4", "Over time"),
+            table(["", "value", "first at"], rows),
+            table(["level", "share of time", "longest stretch"], levels) if levels else None,
+            tag(
+                "p",
+                f"Coverage {percent(found.coverage)} of the evaluated ticks; their mean, "
+                f"{figure(found.mean, series.unit)}, hides what stands above.",
+                class_="lead",
+            ),
+        ]
+    )
+
+
+def time_rows(log: ResultLog, infos: dict[str, CriterionInfo]) -> Iterator[list[Cell]]:
+    """Rows of a sheet: for each ergonomics rule, side and component its levels, percentiles and extremes."""
+    for name, info in infos.items():
+        series = log.get(name)
+        if info.group != "ergonomics" or series is None:
+            continue
+        for part, one in {"": series, **series.parts}.items():
+            found = distribution(one, info.levels if part in _WHOLE else _scores(one))
+            if found is None:
+                yield [name, part, 0.0, "never assessed", None, None, None, None]
+                continue
+            covered = 100 * found.coverage
+            marks = [("least", found.minimum), *((f"P{p}", at) for p, at in found.percentiles)]
+            for what, at in (*marks, ("largest", found.maximum)):
+                yield [name, part, covered, what, at.value, at.t, None, None]
+            yield [name, part, covered, "mean, beside the others", found.mean, None, None, None]
+            for level in found.levels:
+                yield [name, part, covered, level.name, None, None, 100 * level.share, level.longest]
+
+
+def _scores(series: Series) -> tuple[Level, ...]:
+    """The scores that a component had, the lowest first; none when its values are no scores."""
+    values = np.unique(series.values[~np.isnan(series.values)])
+    if len(values) > _FEW or not np.array_equal(values, np.round(values)):
+        return ()
+    return tuple(Level(up_to=float(value), name=f"score {value:.0f}") for value in values)

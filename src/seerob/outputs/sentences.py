@@ -1,0 +1,215 @@
+"""What a colleague would write about a run: sentences from numbers, no judgement beyond the verdict."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+from seerob.core.figures import against, between, figure, margin, with_unit
+from seerob.core.snapshot import Verdict
+from seerob.recording.result_log import ResultLog
+from seerob.recording.series import CODES, Series, Worst
+
+_NUMBERS = (
+    "no",
+    "one",
+    "two",
+    "three",
+    "four",
+    "five",
+    "six",
+    "seven",
+    "eight",
+    "nine",
+    "ten",
+    "eleven",
+    "twelve",
+)
+
+_LISTED = 15
+"""Names in a sentence."""
+
+
+def number(value: float | None, unit: str = "") -> str:
+    """Four significant digits with the unit, for inputs; a dash for what is not there."""
+    if value is None or math.isnan(value):
+        return "–"
+    text = f"{value:.4g}".replace("-", "−")
+    return f"{text} {unit}".rstrip()
+
+
+def reached(worst: Worst, series: Series) -> str:
+    """The worst value with its unit, not kinder than it is."""
+    if worst.value is None or worst.limit is None:
+        return figure(worst.value, series.unit)
+    return with_unit(
+        against(worst.value, worst.limit, series.unit, at_most=series.at_most).value, series.unit
+    )
+
+
+def extremum(worst: Worst, series: Series) -> str:
+    """The worst value; where nothing is judged, with the side on which it is the extreme one."""
+    text = reached(worst, series)
+    if series.verdict is not None or worst.value is None:
+        return text
+    return f"{'largest' if series.at_most else 'smallest'} {text}"
+
+
+def bound(worst: Worst, series: Series) -> str:
+    """The limit at the worst instant with its unit, not kinder than it is."""
+    if worst.value is None or worst.limit is None:
+        return figure(worst.limit, series.unit)
+    return with_unit(
+        against(worst.value, worst.limit, series.unit, at_most=series.at_most).limit, series.unit
+    )
+
+
+def shortened(text: str, most: int) -> str:
+    """A text of at most so many characters: what is left out is in its middle, its end often is a figure."""
+    end = (most - 1) // 2
+    return text if len(text) <= most else f"{text[: most - 1 - end]}…{text[len(text) - end :]}"
+
+
+def percent(share: float) -> str:
+    """A share 0…1; never rounded to 0 or to 100 % when it is neither."""
+    if 0 < share < 0.001:
+        return "< 0.1 %"
+    if 0.999 < share < 1:
+        return "> 99.9 %"
+    return f"{100 * share:.1f} %".replace(".0 %", " %")
+
+
+def counted(n: int, what: str, many: str | None = None) -> str:
+    """``one criterion``, ``two criteria``."""
+    name = _NUMBERS[n] if n < len(_NUMBERS) else str(n)
+    return f"{name} {what if n == 1 else many or what + 's'}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """``a, b and c``; of very many the first, as the table has all."""
+    if len(names) > _LISTED:
+        names = [*names[: _LISTED - 1], f"{len(names) - _LISTED + 1} more"]
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def summary(log: ResultLog) -> list[str]:
+    """What the first paragraph says."""
+    span = (log.end or 0.0) - (log.start or 0.0)
+    by: dict[Verdict | None, list[str]] = {v: [] for v in (*Verdict, None)}
+    for series in log.values():
+        by[series.verdict].append(series.name)
+    if not log.ticks:
+        return ["Nothing was evaluated: the run has no tick."]
+    criteria = counted(len(log), "criterion was", "criteria were")
+    said = [f"Over {figure(span, 's')} of motion ({log.ticks} ticks) {criteria} evaluated."]
+    if names := by[Verdict.EXCEEDED]:
+        said.append(
+            f"{counted(len(names), 'limit was', 'limits were').capitalize()} exceeded: {listed(names)}."
+        )
+    if names := by[Verdict.UNDECIDED]:
+        said.append(
+            f"{counted(len(names), 'criterion', 'criteria').capitalize()} could not be decided for at least "
+            f"a part of the run: {listed(names)}. Undecided is not a pass; what is missing is said below."
+        )
+    if names := by[Verdict.WITHIN]:
+        said.append(
+            f"{counted(len(names), 'criterion', 'criteria').capitalize()} stayed within the limit throughout."
+        )
+    if names := by[None]:
+        said.append(
+            f"{counted(len(names), 'figure').capitalize()} without a limit for information: {listed(names)}."
+        )
+    return said
+
+
+def covered(series: Series) -> str:
+    """Of which share of the run a verdict speaks: ``decided 40 % of the run, did not apply in 60 %``.
+
+    Empty when that is all of it, or when there is no verdict.
+    """
+    times = series.times()
+    if series.verdict is None or times.decided > 1 - 1e-12:
+        return ""
+    said = [f"decided {percent(times.decided)} of the run"]
+    for share, what in (
+        (times.undecided, "undecided in"),
+        (times.open, "not asked in"),
+        (times.muted, "did not apply in"),
+        (times.nothing, "nothing to judge in"),
+    ):
+        if share > 1e-12:
+            said.append(f"{what} {percent(share)}")
+    return ", ".join(said)
+
+
+def about(series: Series) -> list[str]:
+    """What the paragraph of one criterion says."""
+    if not series.known:
+        return [
+            "This criterion was set up but never gave a result, so nothing can be said. It is not a pass: "
+            "find out why it was silent."
+        ]
+    worst, shares = series.worst(), series.shares()
+    said = []
+    if share := shares.get(Verdict.EXCEEDED):
+        beyond = "above" if series.at_most else "below"
+        said.append(
+            f"The value was {beyond} the limit in {percent(share)} of the evaluated ticks, "
+            f"{_stretches(series, Verdict.EXCEEDED)}."
+        )
+        said.append(f"Worst at {worst.t:.2f} s: {reached(worst, series)}{_against(series)}.")
+    if share := shares.get(Verdict.UNDECIDED):
+        said.append(
+            f"In {percent(share)} of the evaluated ticks nothing can be said, "
+            f"{_stretches(series, Verdict.UNDECIDED)}. {_reasons(series)}"
+        )
+    if gap := series.gap():
+        said.append(f"{gap[0].upper()}{gap[1:]}.")
+    if part := covered(series):
+        said.append(f"{part[0].upper()}{part[1:]}.")
+    if series.verdict is Verdict.WITHIN:
+        when = "whenever it applied" if part else "throughout"
+        said.append(
+            f"Within the limit {when}. Closest to it at {worst.t:.2f} s: {reached(worst, series)}"
+            f"{_against(series)}."
+        )
+    if series.verdict is None:
+        extreme = "Largest" if series.at_most else "Smallest"
+        said.append(f"No limit was given. {extreme} value {reached(worst, series)} at {worst.t:.2f} s.")
+    if worst.interval is not None and worst.value is not None:
+        there = between(*worst.interval, series.unit)
+        said.append(f"Given the tolerances of the inputs, the true value there is between {there}.")
+    if worst.verdict is not Verdict.UNDECIDED and (worst.reason or worst.part):
+        governs = worst.reason or worst.part
+        extra = f" ({worst.part})" if worst.part and worst.part not in governs else ""
+        said.append(f"What governs there: {governs}{extra}.")
+    return said
+
+
+def _stretches(series: Series, verdict: Verdict) -> str:
+    found = series.intervals(verdict)
+    longest = figure(max(b - a for a, b in found), "s")
+    return f"in {counted(len(found), 'stretch', 'stretches')}; the longest lasted {longest}"
+
+
+def _against(series: Series) -> str:
+    worst = series.worst()
+    if worst.limit is None or worst.value is None:
+        return ""
+    gap = worst.limit - worst.value if series.at_most else worst.value - worst.limit
+    side = "inside" if gap >= 0 else "beyond"
+    size = margin(worst.value, worst.limit, series.unit, at_most=series.at_most)
+    return f", {size} {side} the limit of {bound(worst, series)}"
+
+
+def _reasons(series: Series) -> str:
+    """The most frequent reasons; those that differ in their numbers only count as one."""
+    seen: dict[str, list[str]] = {}
+    for verdict, reason in zip(series.verdicts.tolist(), series.reasons, strict=False):
+        if verdict == CODES[Verdict.UNDECIDED]:
+            seen.setdefault(re.sub(r"\d+(\.\d+)?", "0", reason), []).append(reason or "no reason given")
+    most = sorted(seen.values(), key=len, reverse=True)
+    texts = [alike[0] + (" and alike" if len(set(alike)) > 1 else "") for alike in most[:3]]
+    more = f"; and {len(most) - 3} more" if len(most) > 3 else ""
+    return ("Reason: " if len(most) == 1 else "Reasons: ") + "; ".join(texts) + more + "."

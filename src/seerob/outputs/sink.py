@@ -1,0 +1,68 @@
+"""What a sink is: something that snapshots, and the samples behind them, are written to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol, Self, runtime_checkable
+
+from msgspec import Struct
+
+from seerob.core.samples import Sample
+from seerob.core.snapshot import Scene, Snapshot
+from seerob.recording.result_log import ResultLog
+
+
+class Writer(Protocol):
+    """An open sink. A slow one must drop frames of its own, never block the loop."""
+
+    def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
+        """Take one tick: what goes out, and what came in to make it."""
+
+    def close(self) -> None:
+        """Finish files; nothing half-written stays behind."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+
+class Closing:
+    """What most writers do alike: they are closed at the end, however it comes."""
+
+    def close(self) -> None:
+        """Nothing to finish."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+@runtime_checkable
+class KeepsResults(Protocol):
+    """A writer that needs every result of the run: hours of them are kept once, not once per writer."""
+
+    def share(self, log: ResultLog) -> None:
+        """Use the log of the run; adding a snapshot that is in it changes nothing."""
+
+
+class Sink(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of every sink: one file, one class, one ``kind``. The fields are its table in the file."""
+
+    def open(self, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes], folder: Path) -> Writer:
+        """Open for one run.
+
+        Args:
+            scene: What does not change during the run.
+            meshes: Binary glTF per mesh hash of the scene's nodes.
+            files: The workstation file and every file it names (relative name → content), so that
+                a recording can be recomputed anywhere.
+            folder: Where to write.
+        """
+        raise NotImplementedError

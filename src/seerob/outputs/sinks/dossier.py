@@ -1,0 +1,146 @@
+"""One HTML page that says what was evaluated, what came out, and what it rests on."""
+
+from __future__ import annotations
+
+import os
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta
+
+from seerob.core.errors import InputError
+from seerob.core.files.whole_file import whole_file
+from seerob.core.report_section import ReportSection
+from seerob.core.samples import Sample
+from seerob.core.snapshot import Basis, Finding, Scene, Snapshot
+from seerob.outputs.at_end import AtEndWithResults
+from seerob.outputs.sink import Sink
+from seerob.recording.result_log import result_named
+
+
+class Dossier(Sink, frozen=True, kw_only=True):
+    """Write a self-contained HTML report at the end of the run."""
+
+    file: Annotated[
+        str, Meta(pattern=r"^[^/\\]+\.(html|htm)$", description="a file name that ends in .html")
+    ] = "report.html"
+    """Name in the run's folder; an earlier report of that name is replaced."""
+    pictures: Annotated[int, Meta(ge=0)] = 12
+    """Largest number of pictures of worst instants; the worst criteria come first."""
+
+    def open(
+        self, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes], folder: Path
+    ) -> DossierWriter:
+        """Start to collect; nothing is written before `DossierWriter.close`.
+
+        Raises:
+            InputError: The file's name or the number of pictures is wrong.
+        """
+        if self.file != Path(self.file).name or not self.file.endswith((".html", ".htm")):
+            raise InputError.at(
+                folder, "dossier.file", f"{self.file!r} is not a file name", "such as report.html"
+            )
+        if self.pictures < 0:
+            raise InputError.at(folder, "dossier.pictures", f"{self.pictures} is negative", "0 or more")
+        return DossierWriter(scene, meshes, files, folder / self.file, pictures=self.pictures)
+
+
+class DossierWriter(AtEndWithResults):
+    """Collects results; keeps one snapshot per criterion, that of its worst instant.
+
+    Of its progress every picture is a step, and so is the page.
+    """
+
+    def __init__(
+        self, scene: Scene, meshes: dict[str, bytes], files: dict[str, bytes], path: Path, *, pictures: int
+    ) -> None:
+        """Use `Dossier.open`."""
+        super().__init__(scene.criteria)
+        self.path = path
+        self.findings: list[Finding] = list(scene.findings)
+        """What the report lists as found; the run may add to it."""
+        self.sections: list[ReportSection] = []
+        """What a command adds to the report, after the criteria."""
+        self._scene, self._meshes, self._files, self._pictures = scene, meshes, files, pictures
+        self._worst: dict[str, Snapshot] = {}
+
+    def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
+        """Take one tick."""
+        for name in self.log.add(snapshot):
+            self._worst[name] = snapshot
+
+    def close(self) -> None:
+        """Draw and write the page, whole or not at all.
+
+        Raises:
+            InputError: It cannot be written.
+        """
+        from seerob.outputs.report.page import page
+        from seerob.outputs.report.report import Report
+        from seerob.outputs.report.setup import command, setup
+        from seerob.outputs.versions import versions
+
+        pictures = self._drawn()
+        report = Report(
+            scene=self._scene,
+            log=self.log,
+            files=self._files,
+            bases=self._bases(),
+            pictures=pictures,
+            versions=versions(),
+            date=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %z"),
+            findings=tuple(self.findings),
+            setup=setup(self._files),
+            command=command(),
+            sections=tuple(self.sections),
+        )
+        write_whole(self.path, page(report).encode())
+        self._tell(len(pictures) + 1, len(pictures) + 1)
+
+    def _drawn(self) -> dict[str, bytes]:
+        from seerob.outputs.picture.picture import Stage
+
+        # A figure without a verdict is worth a picture only when it draws something.
+        chosen = []
+        for series in self.log.ranked():
+            snapshot = self._worst.get(series.name)
+            result = None if snapshot is None else result_named(snapshot, series.name)
+            if snapshot is None or result is None or not result.markers:
+                continue
+            chosen.append((snapshot, result))
+        chosen = chosen[: self._pictures]
+        if not chosen:
+            return {}
+        subjects = {info.name: info.subjects for info in self._scene.criteria}
+        stage = Stage(self._scene, self._meshes)
+        self.findings.extend(stage.findings)
+        drawn = {}
+        for k, (snapshot, result) in enumerate(chosen):
+            drawn[result.name] = stage.picture(snapshot, result, subjects=subjects.get(result.name, ()))
+            self._tell(k + 1, len(chosen) + 1)
+        return drawn
+
+    def _bases(self) -> dict[str, Basis]:
+        found = {info.name: info.basis for info in self._scene.criteria if info.basis is not None}
+        for name, snapshot in self._worst.items():
+            result = result_named(snapshot, name)
+            if result is not None and result.basis is not None:
+                found[name] = result.basis
+        return found
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file so that it is there whole or as it was before.
+
+    Raises:
+        InputError: The folder does not exist or may not be written.
+    """
+    try:
+        with whole_file(path) as hidden, hidden.open("xb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        what = f"cannot be written: {error.strerror}"
+        raise InputError.at(path, "", what, "give a folder that exists and may be written") from error

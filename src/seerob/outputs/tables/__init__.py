@@ -1,0 +1,1 @@
+"""Rows of a run, for tables of any format."""

@@ -1,0 +1,125 @@
+"""Sheets of a workbook as a person reads them: widths that fit, a header that stays, and units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from seerob.core.figures import DECIMALS
+from seerob.outputs.workbook.book import book
+from seerob.outputs.workbook.cell_formats import HEAD, WRAP, Formats
+from seerob.outputs.workbook.sheet_rows import Cell, SheetRows
+
+if TYPE_CHECKING:
+    from xlsxwriter import Workbook
+
+EXCEL_ROWS = 1_048_576
+"""Rows of a sheet, header included; longer data goes on in a further sheet."""
+MOST_COLUMNS = 16_384
+"""Columns of a sheet."""
+_NOT_IN_SHEET_NAME = re.compile(r"[\[\]:*?/\\\x00-\x1f'\ud800-\udfff\ufffe\uffff]")
+_UNIT = re.compile(r"\[([^\[\]]*)\]$")
+_NARROWEST, _WIDEST, _TEXT_COLUMN = 9, 60, 44
+_MORE = 2
+"""Places shown beyond `DECIMALS`: here the figures are for further work. The cell holds 16 digits."""
+_OWN_UNIT = ("worst value", "limit", "value")
+"""Columns whose unit stands in the row."""
+
+
+@contextmanager
+def workbook(file: IO[bytes] | Path) -> Iterator[Sheets]:
+    """A workbook to add sheets to; see `seerob.outputs.workbook.book.book`.
+
+    Raises:
+        OSError: The disk refuses.
+    """
+    with book(file) as made:
+        yield Sheets(made)
+
+
+class Sheets:
+    """Adds sheets to a workbook; made by `workbook`."""
+
+    def __init__(self, book: Workbook) -> None:
+        self._book, self._formats = book, Formats(book)
+        self._names: set[str] = set()
+
+    def add(
+        self, name: str, head: Sequence[Cell], rows: Iterable[Sequence[Cell]], *, fit: bool = False
+    ) -> None:
+        """Add a sheet, and further ones when the rows do not fit.
+
+        Args:
+            name: Made unique and fit for Excel.
+            head: Titles; a unit in brackets at the end of one gives its column's number format. Columns
+                beyond those of a sheet are left out, which the last title says.
+            rows: Cells; words of verdicts get their colour.
+            fit: Whether columns are as wide as their text, which is wrapped beyond a limit; the rows
+                must be a list then, with their units in a column named ``unit``, if any.
+        """
+        wide = len(head) > MOST_COLUMNS
+        if wide:
+            left_out = f"(left out: {len(head) - MOST_COLUMNS + 1} columns; see the CSV files)"
+            head = [*head[: MOST_COLUMNS - 1], left_out]
+        widths = _widths(head, rows if fit and isinstance(rows, list) else [])
+        looks = [_format(_unit(title)) for title in head]
+        unit_at = list(head).index("unit") if fit and "unit" in head else -1
+        word = WRAP if fit else ""
+        sheet = self._begin(name, head, widths, looks)
+        for row in rows:
+            if sheet.full or sheet.rows >= EXCEL_ROWS:
+                sheet.close()
+                sheet = self._begin(name, head, widths, looks)
+            own = self._formats.of(_format(str(row[unit_at] or ""))) if 0 <= unit_at < len(row) else None
+            formats = [own if title in _OWN_UNIT else None for title in head] if own else ()
+            sheet.append(row[: MOST_COLUMNS - 1] if wide else row, formats, word=word)
+        sheet.close()
+
+    def _begin(
+        self, name: str, head: Sequence[Cell], widths: Sequence[float], looks: Sequence[str]
+    ) -> SheetRows:
+        sheet = self._book.add_worksheet(self._unique(name))
+        sheet.freeze_panes(1, 1)
+        for k, (width, look) in enumerate(zip(widths, looks, strict=True)):
+            sheet.set_column(k, k, width, self._formats.of(look))
+        rows = SheetRows(sheet, self._formats)
+        rows.append([str(title) for title in head], word=HEAD)
+        return rows
+
+    def _unique(self, name: str) -> str:
+        stem = _NOT_IN_SHEET_NAME.sub("_", name).strip() or "sheet"
+        stem = stem if stem.casefold() != "history" else "history_"
+        for k in range(1, 10_000):
+            tail = "" if k == 1 else f" ({k})"
+            unique = stem[: 31 - len(tail)] + tail
+            if unique.casefold() not in self._names:
+                self._names.add(unique.casefold())
+                return unique
+        raise ValueError(f"too many sheets named {stem!r}")
+
+
+def _widths(head: Sequence[Cell], rows: Sequence[Sequence[Cell]]) -> list[float]:
+    # Shorter rows are remarks below the table.
+    found = []
+    for k, title in enumerate(head):
+        texts = [str(title), *(str(r[k]) for r in rows if len(r) == len(head) and isinstance(r[k], str))]
+        longest = max(map(len, texts)) + 2
+        if title in ("reason", "text"):
+            longest = max(longest, _TEXT_COLUMN)
+        found.append(float(min(max(longest, _NARROWEST), 90 if title == "text" else _WIDEST)))
+    return found
+
+
+def _unit(title: Cell) -> str:
+    match = _UNIT.search(str(title))
+    return match[1] if match else ""
+
+
+def _format(unit: str) -> str:
+    """Number format of a unit; none for a unit that is not known."""
+    if unit not in DECIMALS:
+        return ""
+    return "0." + "0" * (DECIMALS[unit] + (_MORE if unit != "s" else 1))

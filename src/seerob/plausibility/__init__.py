@@ -1,1 +1,0 @@
-"""Is it plausible? What a workstation file says, against ranges that are data, and where its things are."""

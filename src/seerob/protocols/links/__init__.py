@@ -1,0 +1,1 @@
+"""What carries bytes: connections, datagrams, sockets of the web, and how numbers lie in them."""

@@ -1,0 +1,215 @@
+"""Datagrams (UDP) that others send to this machine: received, time-stamped, bounded, and answered at once."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+import time
+from collections import deque
+from collections.abc import AsyncGenerator, Callable
+from contextlib import asynccontextmanager
+from typing import Any, NamedTuple
+
+from seerob.protocols.links.bell import Bell
+from seerob.protocols.links.reception import Reception
+
+WAITING = 512
+"""Datagrams that wait for whoever reads; after that the oldest is dropped."""
+AT_ONCE = 64
+"""Datagrams that are read before others in the same loop have their turn."""
+LARGEST = 1 << 16
+"""More than any datagram has [B]."""
+
+
+class Datagram(NamedTuple):
+    """What arrived."""
+
+    arrived: float
+    """Host's monotonic time [s]: when the kernel received it, where the platform says so."""
+    data: bytes
+
+
+Answer = Callable[[bytes], bytes | None]
+"""What is sent back to whoever sent a datagram; None for nothing."""
+
+
+class Datagrams(asyncio.DatagramProtocol):
+    """What arrives at one port.
+
+    Attributes:
+        port: Of this machine.
+        dropped: Datagrams that nobody read in time.
+        strangers: Datagrams from other addresses than the one that is listened to.
+    """
+
+    def __init__(self, senders: frozenset[str] | None, answer: Answer | None) -> None:
+        self._senders, self._answer = senders, answer
+        self._loop = asyncio.get_running_loop()
+        self._waiting: deque[Datagram] = deque(maxlen=WAITING)
+        self._bell = Bell()
+        self._error: OSError | None = None
+        self._send: Callable[[bytes, Any], object] = lambda data, to: None
+        self.port = 0
+        self.dropped = self.strangers = 0
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Called by the loop."""
+        if isinstance(transport, asyncio.DatagramTransport):
+            self._send = transport.sendto
+        self.port = transport.get_extra_info("sockname")[1]
+
+    def attach(self, link: socket.socket) -> Callable[[], None]:
+        """Call back for a loop that says when the socket can be read."""
+        reception, loop = Reception(link), self._loop
+        self.port = link.getsockname()[1]
+
+        def send(data: bytes, to: Any) -> None:
+            # An answer that cannot be delivered, or not now, is no reason to stop listening.
+            with contextlib.suppress(OSError):
+                link.sendto(data, to)
+
+        def read(left: int = AT_ONCE) -> None:
+            try:
+                arrived, data, sender = reception.read(LARGEST)
+            except OSError:  # all was read, or an answer was refused
+                return
+            self._take(arrived, data, sender)
+            if left > 1:
+                # Whoever waits for it has it first: each look at the socket lets other threads go ahead.
+                loop.call_soon(read, left - 1)
+
+        self._send = send
+        return read
+
+    def datagram_received(self, data: bytes, addr: tuple[str | Any, int]) -> None:
+        """Called by the loop."""
+        self._take(time.monotonic(), data, addr)
+
+    def _take(self, arrived: float, data: bytes, sender: tuple[str | Any, int]) -> None:
+        if self._senders is not None and plain(sender[0]) not in self._senders:
+            self.strangers += 1
+            return
+        self.dropped += len(self._waiting) == WAITING
+        self._waiting.append(Datagram(arrived, data))
+        self._bell.ring()
+        if self._answer is not None:
+            self._loop.call_soon(self._reply, data, sender)
+
+    def _reply(self, data: bytes, sender: Any) -> None:
+        if self._answer is not None and (reply := self._answer(data)) is not None:
+            self._send(reply, sender)
+
+    def send(self, data: bytes, to: tuple[str, int]) -> None:
+        """Send a datagram from this port."""
+        self._send(data, to)
+
+    def error_received(self, exc: Exception) -> None:
+        """Called by the loop: an answer could not be delivered, which is no reason to stop listening."""
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Called by the loop."""
+        self._error = exc if isinstance(exc, OSError) else OSError("closed")
+        self._bell.ring()
+
+    async def receive(self, silence: float) -> AsyncGenerator[Datagram, None]:
+        """What arrives, oldest first.
+
+        Args:
+            silence: Longest pause [s].
+
+        Raises:
+            TimeoutError: Nothing for so long.
+            OSError: The socket is gone.
+        """
+        while True:
+            while self._waiting:
+                yield self._waiting.popleft()
+            if self._error is not None:
+                raise self._error
+            try:
+                await self._bell.wait(silence)
+            except TimeoutError as error:
+                # On a busy machine this thread may have slept, with data waiting: the loop looks twice.
+                await asyncio.sleep(0)
+                await asyncio.sleep(0)
+                if not self._waiting:
+                    raise TimeoutError(f"nothing sent to port {self.port} for {silence:g} s") from error
+
+
+def plain(address: Any) -> str:
+    """An address as its sender calls it: IPv4 looks otherwise through a socket of IPv6."""
+    return str(address).lower().removeprefix("::ffff:")
+
+
+@asynccontextmanager
+async def listening(
+    bind: str,
+    port: int,
+    *,
+    sender: str | None = None,
+    answer: Answer | None = None,
+    group: str | None = None,
+) -> AsyncGenerator[Datagrams, None]:
+    """Listen on a port of this machine.
+
+    Args:
+        bind: Own address to listen on.
+        port: 0 is any free one.
+        sender: Name or address of whose datagrams count; anyone's when None.
+        answer: Asked at once for each datagram that counts; must not raise.
+        group: Multicast group to join, on the interface that has the address ``bind``.
+
+    Raises:
+        OSError: The port is taken, the address is not of this machine, or nobody knows the sender's name.
+    """
+    loop = asyncio.get_running_loop()
+    senders: frozenset[str] | None = None
+    if sender is not None:
+        known = await loop.getaddrinfo(sender, None, type=socket.SOCK_DGRAM)
+        senders = frozenset(plain(address[0]) for *_, address in known)
+    (found, *_) = await loop.getaddrinfo(bind, port, type=socket.SOCK_DGRAM)
+    link = _bound(found[0], found[4]) if group is None else _member(bind, port, group)
+    heard = Datagrams(senders, answer)
+    try:
+        loop.add_reader(link, heard.attach(link))
+    except NotImplementedError:  # a loop of Windows
+        transport, _ = await loop.create_datagram_endpoint(lambda: heard, sock=link)
+        leave: Callable[[], object] = transport.abort
+    else:
+
+        def leave() -> None:
+            loop.remove_reader(link)
+            link.close()
+
+    try:
+        yield heard
+    finally:
+        leave()
+
+
+def _bound(family: int, address: Any) -> socket.socket:
+    """A socket with an address of this machine."""
+    link = socket.socket(family, socket.SOCK_DGRAM)
+    try:
+        link.bind(address)
+        link.setblocking(False)
+    except OSError:
+        link.close()
+        raise
+    return link
+
+
+def _member(bind: str, port: int, group: str) -> socket.socket:
+    """A socket that hears a multicast group, beside others on this machine that do."""
+    link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        link.bind(("", port))
+        membership = socket.inet_aton(group) + socket.inet_aton(bind)
+        link.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+        link.setblocking(False)
+    except OSError:
+        link.close()
+        raise
+    return link

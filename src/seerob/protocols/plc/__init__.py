@@ -1,0 +1,1 @@
+"""Protocols of machines and their controllers (PLC)."""

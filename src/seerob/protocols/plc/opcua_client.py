@@ -1,0 +1,387 @@
+"""An OPC UA client that only reads: sessions, nodes by names that last, and changes, the newest of each.
+
+Namespaces are meant by their URI and resolved at every connection: their numbers may change when a
+server restarts.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import time
+import traceback
+from collections.abc import AsyncGenerator, Mapping
+from contextlib import asynccontextmanager, suppress
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import msgspec
+from msgspec import Meta
+
+from seerob.core.errors import InputError, SeerobError
+from seerob.protocols import ProtocolError
+from seerob.protocols.links.plain_cancel import plainly_cancelled
+from seerob.protocols.plc.opcua_address import Address, browse_name, node_name
+from seerob.protocols.plc.opcua_link import hang_up, hung_up_on_failure
+from seerob.protocols.plc.opcua_units import unit
+
+if TYPE_CHECKING:
+    from asyncua.client.client import Client
+    from asyncua.common.node import Node
+    from asyncua.ua import NodeId, QualifiedName
+
+PATIENCE = 2.0
+"""With each answer [s]."""
+SESSION = 60_000
+"""Time-out of a session [ms]: some servers lose shorter ones in storms."""
+BEAT = 0.5
+"""A server of which nothing was heard is asked so often whether it is there [s]."""
+SILENT = ("asyncua", "asyncua.client.ua_client", "asyncua.common.subscription")
+
+
+STATE = 2259
+"""Number of Server_ServerStatus_State, which every server has (OPC 10000-6, NodeIds)."""
+
+
+class Security(StrEnum):
+    """How a session is protected."""
+
+    NONE = "none"
+    SIGN = "sign"
+    ENCRYPT = "encrypt"
+    """Basic256Sha256, signed and encrypted."""
+
+
+class Way(msgspec.Struct, frozen=True, kw_only=True):
+    """How to get to a server."""
+
+    url: Annotated[
+        str, Meta(pattern=r"^opc\.tcp://[^\s/]+", description="an address such as opc.tcp://192.168.0.1:4840")
+    ]
+    security: Security = Security.NONE
+    certificate: str | None = None
+    """Own certificate (PEM or DER), which the server must trust."""
+    key: str | None = None
+    """Its private key (PEM)."""
+    server_certificate: str | None = None
+    """The server's own; what another shows is refused."""
+    user: str | None = None
+    password_env: str | None = None
+    """Environment variable that holds the password."""
+
+
+class Said(NamedTuple):
+    """What a server says of one node."""
+
+    value: Any
+    doubt: str
+    """Its status, when that is not good."""
+    age: float
+    """By its own stamps [s]."""
+    stamp: float | None
+    """Source's time [s since 1970]."""
+
+
+def needed() -> None:
+    """Check that asyncua is installed.
+
+    Raises:
+        InputError: It is not.
+    """
+    try:
+        import asyncua  # noqa: F401
+    except ModuleNotFoundError as error:
+        remedy = "pip install seerob[opcua]"
+        raise InputError.at("sources", "kind", "OPC UA needs the package asyncua", remedy) from error
+
+
+@asynccontextmanager
+async def connect(way: Way, folder: Path) -> AsyncGenerator[Client, None]:
+    """A session, until the block ends.
+
+    Args:
+        way: How to get there.
+        folder: Where relative paths of certificates start.
+
+    Raises:
+        OSError: There is no connection.
+        ProtocolError: The server refuses.
+        InputError: asyncua is not installed.
+    """
+    needed()
+    from asyncua.client.client import Client
+    from asyncua.ua.uaerrors import UaError
+
+    for name in SILENT:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    client = Client(way.url, timeout=PATIENCE)
+    client.session_timeout = SESSION
+    client.name = client.description = "seerob"
+    if way.user is not None:
+        client.set_user(way.user)
+        client.set_password(os.environ.get(way.password_env or "", ""))
+    try:
+        if way.security is not Security.NONE:
+            await _protect(client, way, folder)
+        async with asyncio.timeout(3 * PATIENCE):
+            with plainly_cancelled(), hung_up_on_failure(client):
+                await client.connect()
+    except TimeoutError as error:
+        raise TimeoutError("no answer in time") from error
+    except UaError as error:
+        raise ProtocolError(f"the server refuses: {_text(error)}") from error
+    except ValueError as error:
+        raise ProtocolError(str(error)) from error
+    except Exception as error:
+        _refuse_garbled(error)
+        raise
+    link = client.uaclient.protocol
+    try:
+        with plainly_cancelled():
+            yield client
+    except UaError as error:
+        raise ProtocolError(f"the server says: {_text(error)}") from error
+    except Exception as error:
+        _refuse_garbled(error)
+        raise
+    finally:
+        # Whatever is left to be said, a stop does not wait long for it.
+        with suppress(Exception):
+            async with asyncio.timeout(PATIENCE / 2):
+                with plainly_cancelled():
+                    await client.disconnect()
+        # A link that broke while it was closed counts as closed there, and its socket stays open.
+        hang_up(link)
+        await asyncio.sleep(0)
+
+
+def _refuse_garbled(error: Exception) -> None:
+    """Raise a ProtocolError for bytes on which asyncua failed: they are the server's mistake, not ours."""
+    if isinstance(error, OSError | SeerobError):
+        return
+    frames = (frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__))
+    if any(name.startswith("asyncua.") for name in frames):
+        what = f"{type(error).__name__}: {_text(error)[:100]}"
+        raise ProtocolError(f"what the server says is no OPC UA ({what})") from error
+
+
+async def _protect(client: Client, way: Way, folder: Path) -> None:
+    from asyncua import ua
+    from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
+
+    encrypt = ua.MessageSecurityMode.SignAndEncrypt
+    mode = encrypt if way.security is Security.ENCRYPT else ua.MessageSecurityMode.Sign
+    if way.certificate is None or way.key is None:
+        raise ProtocolError("a protected session needs certificate and key")
+    server = None if way.server_certificate is None else content(folder / way.server_certificate)
+    await client.set_security(
+        SecurityPolicyBasic256Sha256,
+        certificate=content(folder / way.certificate),
+        private_key=content(folder / way.key),
+        server_certificate=server,
+        mode=mode,
+    )
+
+
+def content(path: Path) -> Any:
+    """A certificate or key, PEM or DER by what is in it: asyncua goes by the end of the name."""
+    from asyncua.crypto.uacrypto import CertProperties
+
+    data = path.read_bytes()
+    return CertProperties(path_or_content=data, extension="pem" if data.startswith(b"-----") else "der")
+
+
+async def find(client: Client, where: str | Address) -> Node:
+    """The node of an address.
+
+    Raises:
+        ProtocolError: The server has no such namespace or node.
+    """
+    from asyncua.ua.uaerrors import UaError
+
+    try:
+        if isinstance(where, str):
+            return client.get_node(await _node_id(client, where))
+        names = [await _browse_name(client, name) for name in where.browse]
+        return await client.nodes.objects.get_child(names)
+    except (UaError, ValueError) as error:
+        raise ProtocolError(
+            f"no node {where if isinstance(where, str) else '/'.join(where.browse)}: {_text(error)}"
+        ) from error
+
+
+async def _node_id(client: Client, text: str) -> NodeId:
+    name = node_name(text)
+    return name.node_id(await _namespace(client, name.uri) if name.uri else name.number)
+
+
+async def _browse_name(client: Client, text: str) -> QualifiedName:
+    from asyncua import ua
+
+    uri, name = browse_name(text)
+    return ua.QualifiedName(name, ua.Int16(await _namespace(client, uri) if uri else 0))
+
+
+async def _namespace(client: Client, uri: str) -> int:
+    try:
+        return int(await client.get_namespace_index(uri))
+    except ValueError:
+        raise ProtocolError(f"the server has no namespace {uri!r}") from None
+
+
+async def stated_unit(node: Node) -> str:
+    """Unit that the server states for a variable, as the dictionary spells it; empty when it does not."""
+    from asyncua.ua.uaerrors import UaError
+
+    try:
+        found = await (await node.get_child("0:EngineeringUnits")).read_value()
+    except (UaError, ValueError):
+        return ""
+    return unit(getattr(found, "UnitId", 0) or 0)
+
+
+async def said_unit(node: Node) -> str:
+    """The same, but in the server's own words where the dictionary has no spelling for it."""
+    from asyncua.ua.uaerrors import UaError
+
+    try:
+        found = await (await node.get_child("0:EngineeringUnits")).read_value()
+    except (UaError, ValueError):
+        return ""
+    number = getattr(found, "UnitId", 0) or 0
+    shown = getattr(getattr(found, "DisplayName", None), "Text", None)
+    return unit(number) or str(shown or "")[:40] or (f"number {number}" if number else "")
+
+
+async def write_bool(node: Node, value: bool) -> None:
+    """Write a bool to a node that is one.
+
+    Raises:
+        ProtocolError: It is no bool, or the server refuses.
+    """
+    from asyncua import ua
+    from asyncua.ua.uaerrors import UaError
+
+    try:
+        kind = await node.read_data_type_as_variant_type()
+        if kind is not ua.VariantType.Boolean:
+            raise ProtocolError(f"a {kind.name}: only a Boolean is written")
+        # Without stamps: many controllers refuse a writing that brings its own.
+        await node.write_value(ua.DataValue(ua.Variant(value, ua.VariantType.Boolean)))
+    except UaError as error:
+        raise ProtocolError(f"the server refuses: {_text(error)}") from error
+
+
+class Changes:
+    """Changes of nodes as they come: of each node only the newest waits."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[str, Said] = {}
+        self._names: dict[Any, list[str]] = {}
+        self._arrived = asyncio.Event()
+        self.revised: float | None = None
+        """Publishing interval that the server grants [s]."""
+        self._watched = time.monotonic()
+        """When it was asked to be told."""
+
+    async def watch(self, client: Client, nodes: Mapping[str, Node], interval: float) -> dict[str, str]:
+        """Subscribe to nodes by name; returns why some cannot be watched.
+
+        Raises:
+            OSError: The connection is gone.
+        """
+        from asyncua.ua.uaerrors import UaError
+
+        self._names, self._watched = {}, time.monotonic()
+        for name, node in nodes.items():
+            self._names.setdefault(node.nodeid, []).append(name)
+        subscription = await client.create_subscription(1e3 * interval, self)
+        self.revised = 1e-3 * float(subscription.parameters.RequestedPublishingInterval)
+        refused: dict[str, str] = {}
+        sampling: Any = 1e3 * interval
+        for names in self._names.values():
+            node = nodes[names[0]]
+            try:
+                await subscription.subscribe_data_change(node, queuesize=1, sampling_interval=sampling)
+            except UaError as error:
+                refused |= dict.fromkeys(names, _text(error))
+        return refused
+
+    def datachange_notification(self, node: Node, value: Any, data: Any) -> None:
+        """Called by asyncua, in the loop."""
+        for name in self._names.get(node.nodeid, ()):
+            self._waiting[name] = said(data.monitored_item.Value)
+            self._arrived.set()
+
+    async def heard(
+        self, client: Client, pulse: float = BEAT
+    ) -> AsyncGenerator[tuple[dict[str, Said], float], None]:
+        """What has changed, if anything, and until when the server has said everything that it had to say.
+
+        The server is asked again and again whether it is there. Its answer comes after what it said before
+        it was asked: who is told of changes alone would not see that they come late.
+
+        Args:
+            client: Connected, and watching.
+            pulse: Between two questions, at least [s].
+
+        Yields:
+            Changes by name; when the newest question was asked that was answered, host's monotonic time [s].
+
+        Raises:
+            OSError: The connection is gone, or the server does not answer.
+        """
+        shown, asked = self._watched, 0.0
+        asking: asyncio.Task[None] | None = None
+        try:
+            while True:
+                changed, self._waiting = self._waiting, {}
+                self._arrived.clear()
+                yield changed, shown
+                while not self._arrived.is_set():
+                    left = asked + pulse - time.monotonic()
+                    if asking is None and left <= 0:
+                        asked = time.monotonic()
+                        asking = asyncio.create_task(self._ask(client))
+                    with suppress(TimeoutError):
+                        async with asyncio.timeout(left if asking is None else None):
+                            await self._arrived.wait()
+                if asking is not None and asking.done():
+                    asking.result()
+                    asking, shown = None, asked
+        finally:
+            if asking is not None:
+                asking.cancel()
+                await asyncio.gather(asking, return_exceptions=True)
+
+    async def _ask(self, client: Client) -> None:
+        """Whether the server is there."""
+        from asyncua import ua
+
+        try:
+            await client.check_connection()
+            await client.get_node(ua.NodeId(ua.Int32(STATE))).read_value()
+        finally:
+            self._arrived.set()
+
+
+def said(value: Any) -> Said:
+    """What a data value says."""
+    status = value.StatusCode
+    doubt = "" if status is None or status.is_good() else f"the server says {status.name}"
+    stamp = _seconds(value.SourceTimestamp)
+    # Of two clocks that differ nothing is known; what lies ahead is as new as can be.
+    return Said(value.Value.Value, doubt, 0.0 if stamp is None else max(0.0, time.time() - stamp), stamp)
+
+
+def _seconds(stamp: datetime | None) -> float | None:
+    if stamp is None or stamp.year < 1990:
+        return None
+    return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
+
+
+def _text(error: BaseException) -> str:
+    return str(error).split("(", 1)[0].strip()[:200] or type(error).__name__

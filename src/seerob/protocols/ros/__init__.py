@@ -1,0 +1,1 @@
+"""What ROS says, and the wires on which it says it."""

@@ -1,0 +1,1 @@
+"""Protocols of motion capture: suits, cameras, trackers."""

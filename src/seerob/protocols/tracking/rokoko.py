@@ -1,0 +1,231 @@
+"""Rokoko Studio's live stream: one JSON object per datagram, plain or in an LZ4 frame.
+
+Version 3 has the persons under ``scene.actors``, version 2 under ``actors``; a datagram that calls itself 3
+and has ``trackers`` is a version 2. Metres, y up, left-handed, as Unity has it (from memory, as is the
+port); here turned into a right-handed world with z up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+from msgspec import Meta, Struct
+
+from seerob.core.transforms import Array
+from seerob.description.capture.captured import Layout, Seen
+from seerob.protocols import ProtocolError
+
+PORT = 14043
+LARGEST = 1 << 17
+"""Of a datagram [byte]; Studio's own are 80 kB at most."""
+UNPACKED = 1 << 20
+"""Of what an LZ4 frame may hold [byte]."""
+MOST_ACTORS = 32
+
+SEGMENTS = (
+    "hip",
+    "spine",
+    "chest",
+    "neck",
+    "head",
+    *(
+        f"{side}{part}"
+        for side in ("left", "right")
+        for part in ("Shoulder", "UpperArm", "LowerArm", "Hand", "UpLeg", "Leg", "Foot", "Toe")
+    ),
+)
+LAYOUT = Layout(seen=Seen.JOINTS, names=SEGMENTS, convention="rokoko")
+WORLD_FROM_UNITY = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+"""z is forward there, x right, y up: x forward, y left, z up. Its determinant is -1."""
+_LZ4 = b"\x04\x22\x4d\x18"
+_Name = Annotated[str, Meta(max_length=200)]
+
+
+class Vector(Struct):
+    """A position or, with ``w``, a rotation."""
+
+    x: float | None = None
+    y: float | None = None
+    z: float | None = None
+    w: float | None = None
+
+
+class Segment(Struct):
+    """One bone as the datagram has it."""
+
+    position: Vector
+    rotation: Vector | None = None
+
+
+class ActorObject(Struct):
+    """One person as the datagram has it; ``body`` in version 3, the segments themselves in version 2."""
+
+    name: _Name = ""
+    body: dict[str, Any] | None = None
+
+
+class SceneObject(Struct):
+    """What version 3 puts around the persons."""
+
+    timestamp: float | None = None
+    actors: Annotated[list[msgspec.Raw], Meta(max_length=MOST_ACTORS)] = []
+
+
+class Datagram(Struct):
+    """The whole object; keys that are not known are left alone."""
+
+    version: str | float | None = None
+    fps: float | None = None
+    scene: SceneObject | None = None
+    timestamp: float | None = None
+    actors: Annotated[list[msgspec.Raw], Meta(max_length=MOST_ACTORS)] = []
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Actor:
+    """One person."""
+
+    name: str
+    positions: Array
+    """World, z up [m], shape (21, 3) in the order of `SEGMENTS`; NaN where not said."""
+    orientations: Array
+    """World from segment, w first, shape (21, 4); NaN where not said."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Scene:
+    """Everybody at one instant."""
+
+    t: float
+    """On Studio's clock [s]; NaN when it does not say."""
+    version: str
+    """``2`` or ``3``."""
+    actors: tuple[Actor, ...]
+    fps: float | None = None
+
+
+_datagrams = msgspec.json.Decoder(Datagram)
+_actors = msgspec.json.Decoder(ActorObject)
+_segments = msgspec.json.Decoder(dict[str, msgspec.Raw])
+_segment = msgspec.json.Decoder(Segment)
+
+
+def decode(data: bytes | str) -> Scene:
+    """One datagram.
+
+    Raises:
+        ProtocolError: It is none of Studio's, or too large, or a damaged LZ4 frame.
+    """
+    raw = data.encode() if isinstance(data, str) else bytes(data)
+    if len(raw) > LARGEST:
+        raise ProtocolError(f"a datagram of {len(raw)} bytes, more than {LARGEST}")
+    try:
+        return _scene(_unpacked(raw) if raw.startswith(_LZ4) else raw)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise ProtocolError(f"not a datagram of Rokoko Studio in JSON: {error}") from error
+    except RecursionError as error:
+        raise ProtocolError("not a datagram of Rokoko Studio: nested too deep") from error
+
+
+def _unpacked(raw: bytes) -> bytes:
+    from lz4.frame import LZ4FrameDecompressor
+
+    frame = LZ4FrameDecompressor()
+    try:
+        text: bytes = frame.decompress(raw, max_length=UNPACKED + 1)
+    except (RuntimeError, MemoryError, ValueError) as error:
+        raise ProtocolError(f"a damaged LZ4 frame: {error}") from error
+    if len(text) > UNPACKED:
+        raise ProtocolError(f"an LZ4 frame of more than {UNPACKED} bytes")
+    if not frame.eof:
+        raise ProtocolError("an LZ4 frame that is cut short")
+    return text
+
+
+def _scene(text: bytes) -> Scene:
+    said = _datagrams.decode(text)
+    # One that says 3 and has its persons at the root is really a 2.
+    if said.scene is not None:
+        version, when, actors = "3", said.scene.timestamp, said.scene.actors
+    elif said.actors or said.timestamp is not None:
+        version, when, actors = "2", said.timestamp, said.actors
+    else:
+        raise ProtocolError("neither scene nor actors: not a datagram of Rokoko Studio in JSON v2 or v3")
+    return Scene(
+        t=float("nan") if when is None else float(when),
+        version=version,
+        actors=tuple(_actor(raw) for raw in actors),
+        fps=said.fps,
+    )
+
+
+def _actor(raw: msgspec.Raw) -> Actor:
+    name = _actors.decode(raw).name
+    parts = _segments.decode(raw)
+    body = parts.get("body")
+    if body is not None:
+        parts = _segments.decode(body)
+    positions = np.full((len(SEGMENTS), 3), np.nan)
+    turns = np.full((len(SEGMENTS), 4), np.nan)
+    for row, segment in enumerate(SEGMENTS):
+        if segment not in parts:
+            continue
+        said = _segment.decode(parts[segment])
+        positions[row] = _three(said.position)
+        if said.rotation is not None:
+            r = said.rotation
+            turns[row] = np.nan if r.w is None else r.w, *_three(r)
+    return Actor(name, positions @ WORLD_FROM_UNITY.T, _mirrored(turns))
+
+
+def _three(v: Vector) -> tuple[float, float, float]:
+    return tuple(float("nan") if c is None else c for c in (v.x, v.y, v.z))  # type: ignore[return-value]
+
+
+def _mirrored(wxyz: Array) -> Array:
+    """Rotations of a left-handed frame, in the world: ``M R Mᵀ``, whose axis is ``det(M) M`` times theirs."""
+    out = wxyz.copy()
+    out[:, 1:] = -(wxyz[:, 1:] @ WORLD_FROM_UNITY.T)
+    return out
+
+
+def encode(scene: Scene, *, compressed: bool = False) -> bytes:
+    """A datagram as Studio sends it; what is NaN becomes null."""
+    actors = [_actor_object(actor, nested=scene.version == "3") for actor in scene.actors]
+    when = None if np.isnan(scene.t) else scene.t
+    if scene.version == "3":
+        said: dict[str, Any] = {
+            "version": "3,0",
+            "fps": scene.fps,
+            "scene": {"timestamp": when, "actors": actors, "props": []},
+        }
+    else:
+        said = {"version": 2, "timestamp": when, "props": [], "trackers": [], "faces": [], "actors": actors}
+    text = msgspec.json.encode(said)
+    if not compressed:
+        return text
+    import lz4.frame
+
+    packed: bytes = lz4.frame.compress(text)
+    return packed
+
+
+def _actor_object(actor: Actor, *, nested: bool) -> dict[str, Any]:
+    positions = (actor.positions @ WORLD_FROM_UNITY).tolist()
+    turns = actor.orientations.copy()
+    turns[:, 1:] = -(turns[:, 1:] @ WORLD_FROM_UNITY)
+    body = {
+        name: {
+            "position": dict(zip("xyz", positions[row], strict=True)),
+            "rotation": dict(zip("wxyz", turns[row].tolist(), strict=True)),
+        }
+        for row, name in enumerate(SEGMENTS)
+    }
+    return (
+        {"name": actor.name, "meta": {"hasBody": True}, "body": body}
+        if nested
+        else {"name": actor.name, **body}
+    )

@@ -1,0 +1,1 @@
+"""What a run leaves: results over time in bounded memory, and recordings read back."""

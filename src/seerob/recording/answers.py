@@ -1,0 +1,102 @@
+"""What a criterion says of many instants, in arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.snapshot import Verdict
+from seerob.core.transforms import Array
+from seerob.core.verdict import ROUNDING
+from seerob.recording.series import CODES, NO_VERDICT
+
+Codes = NDArray[np.uint8]
+"""Verdicts; see `seerob.recording.series.CODES`."""
+Flags = NDArray[np.bool_]
+
+WITHIN, EXCEEDED, UNDECIDED = CODES[Verdict.WITHIN], CODES[Verdict.EXCEEDED], CODES[Verdict.UNDECIDED]
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """Values, limits and verdicts of N instants."""
+
+    value: Array
+    """In the criterion's unit, shape (N,); NaN where there is none."""
+    limit: Array
+    """Likewise."""
+    verdict: Codes
+    """Shape (N,)."""
+    interval: tuple[Array, Array] | None = None
+    """Where the true values lie, as far as tolerances are known, shape (N,) each."""
+    nothing: Flags | None = None
+    """Where there is nothing to judge, shape (N,); without that, who says nothing is UNDECIDED."""
+
+    @classmethod
+    def against(cls, value: Array, limit: Array | float | None, *, at_most: bool) -> Answers:
+        """Values against a limit or limits, by the rule of `seerob.criteria.criterion.judge`."""
+        limits = np.full(value.shape, np.nan) if limit is None else np.broadcast_to(limit, value.shape)
+        return cls(value, limits, judge_many(value, limit, at_most=at_most))
+
+    def between(self, low: Array, high: Array, *, at_most: bool) -> Answers:
+        """The same of values between two; the rule is `seerob.criteria.criterion.judge_interval`."""
+        ends = [judge_many(end, self.limit, at_most=at_most) for end in (low, high)]
+        either = np.where(ends[0] == ends[1], ends[0], UNDECIDED).astype(np.uint8)
+        verdict = np.where(np.isnan(self.limit), self.verdict, either)
+        return replace(self, verdict=verdict, interval=(low, high))
+
+    def finite(self) -> Answers:
+        """The same without values that are infinite; the verdicts stay, and without one nothing is judged."""
+        none = np.isinf(self.value)
+        value = np.where(none, np.nan, self.value)
+        return replace(self, value=value).without_verdict(none & (self.verdict == NO_VERDICT))
+
+    def exceeded(self, where: Flags) -> Answers:
+        """The same, exceeded at some instants."""
+        return replace(self, verdict=np.where(where, EXCEEDED, self.verdict).astype(np.uint8))
+
+    def without_verdict(self, where: Flags) -> Answers:
+        """The same with nothing to judge at some instants."""
+        verdict = np.where(where, NO_VERDICT, self.verdict).astype(np.uint8)
+        return replace(self, verdict=verdict, nothing=where if self.nothing is None else self.nothing | where)
+
+    def open(self) -> Answers:
+        """The same where limits may be worse than they say: what is within them is undecided."""
+        verdict = np.where(self.verdict == WITHIN, UNDECIDED, self.verdict)
+        return replace(self, verdict=verdict.astype(np.uint8))
+
+    def contradictions(self, *, at_most: bool) -> NDArray[np.object_]:
+        """Why each instant cannot be what it says, or says nothing, shape (N,); empty where it can."""
+        low, high = (self.value, self.value) if self.interval is None else self.interval
+        ends = np.array([self.value, low, high], float)
+        kept = keep_many(ends, self.limit, at_most=at_most).all(axis=0) & np.isfinite(self.value)
+        nothing = np.zeros(len(self.value), bool) if self.nothing is None else self.nothing
+        within, silent = self.verdict == WITHIN, (self.verdict == NO_VERDICT) & ~nothing
+        told = np.where(
+            np.isnan(self.limit), "it is within, and has no limit", "it is within, beyond its limit"
+        )
+        told = np.where(np.isfinite(self.value), told, "it is within, and has no value")
+        told = np.where(nothing, "it is within, and says that there is nothing to judge", told)
+        told = np.where(within & (nothing | ~kept), told, "")
+        empty = np.isnan(self.value) & np.isnan(low)
+        told = np.where(silent & ~np.isnan(self.limit), "it has a limit and no verdict", told)
+        return np.where(silent & empty, "it says nothing, neither a figure nor a verdict", told).astype(
+            object
+        )
+
+
+def judge_many(value: Array, limit: Array | float | None, *, at_most: bool) -> Codes:
+    """Verdicts of values against a limit or limits; the rule is `seerob.criteria.criterion.judge`."""
+    if limit is None:
+        return np.where(np.isnan(value), UNDECIDED, NO_VERDICT).astype(np.uint8)
+    within = keep_many(value, limit, at_most=at_most)
+    return np.where(np.isnan(value), UNDECIDED, np.where(within, WITHIN, EXCEEDED)).astype(np.uint8)
+
+
+def keep_many(value: Array, limit: Array | float, *, at_most: bool = True) -> Flags:
+    """Whether computed figures keep a limit or limits; the rule is `seerob.core.verdict.keeps`."""
+    limits = np.asarray(limit, float)
+    room = np.where(np.isinf(limits), 0.0, ROUNDING * np.maximum(1.0, np.abs(limits)))
+    return np.asarray(value <= limits - room if at_most else value >= limits + room)

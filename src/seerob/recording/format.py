@@ -1,0 +1,61 @@
+"""What our recordings hold, in one place for the writer and the reader.
+
+A recording is an MCAP file. Per tick there is one message on `SAMPLES` (what came in) and one on
+`SNAPSHOT` (what went out), both MessagePack with float64. A result's basis is long and rarely
+changes: it is taken out of the snapshots and written to `BASIS` when it changes. `SCENE` is the
+first message. Attachments hold the meshes and every input file. All other channels serve foreign
+viewers only and are never read back.
+"""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from seerob.core.samples import BodySample, JointSample, PoseSample, SignalSample
+from seerob.core.snapshot import Basis
+
+VERSION = "1"
+"""Of this layout; a reader refuses one that it does not know."""
+
+METADATA = "seerob"
+"""Name of the metadata record at the start: layout, versions, wall-clock time."""
+END_METADATA = "seerob.end"
+"""Name of the metadata record at the end: how many ticks, how many were left out."""
+
+SCENE = "/seerob/scene"
+SAMPLES = "/seerob/samples"
+SNAPSHOT = "/seerob/snapshot"
+BASIS = "/seerob/basis"
+
+VIEW_SCENE, VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS = "/scene", "/markers", "/tf", "/results"
+VIEW_PEOPLE = "/people"
+VIEWS = (VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS, VIEW_PEOPLE)
+"""For foreign viewers; `VIEW_SCENE` is sent once, these from time to time."""
+
+MESH_PREFIX = "mesh/"
+"""Attachments ``mesh/<hash>.glb``."""
+FILE_PREFIX = "file/"
+"""Attachments ``file/<relative name>``."""
+
+
+class Tick(Struct, frozen=True, kw_only=True):
+    """One tick's input: what the engine consumed before it stepped."""
+
+    seq: int
+    t: float
+    """Run time [s]."""
+    samples: tuple[JointSample | PoseSample | BodySample | SignalSample, ...] = ()
+
+
+class BasisChange(Struct, frozen=True, kw_only=True):
+    """From snapshot ``seq`` on, the result at ``index`` named ``name`` rests on ``basis``."""
+
+    seq: int
+    index: int
+    name: str
+    basis: Basis | None
+
+
+def nanoseconds(t: float) -> int:
+    """Log time [ns] of a run time [s]."""
+    return max(0, round(t * 1e9))

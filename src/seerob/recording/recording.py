@@ -1,0 +1,320 @@
+"""Reading a recording back: its scene, its snapshots at any time, and its samples for exact replay."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from pathlib import Path, PurePosixPath
+from threading import Lock
+from typing import TypeVar
+
+import msgspec
+from msgspec.structs import replace
+
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Basis, Finding, Scene, Snapshot
+from seerob.recording.format import (
+    BASIS,
+    END_METADATA,
+    FILE_PREFIX,
+    MESH_PREFIX,
+    METADATA,
+    SAMPLES,
+    SCENE,
+    SNAPSHOT,
+    VERSION,
+    VIEW_SCENE,
+    VIEWS,
+    BasisChange,
+    Tick,
+    nanoseconds,
+)
+from seerob.recording.mcap_index import (
+    ChunkPlace,
+    Damaged,
+    McapIndex,
+    Message,
+    read_attachment,
+    read_chunk,
+    scan,
+)
+
+T = TypeVar("T")
+
+_POSE = 7 * 4
+_CACHED_CHUNKS = 8
+_TICK = {SAMPLES, SNAPSHOT}
+_TICK_VIEWS = {SAMPLES, SNAPSHOT, BASIS, *VIEWS}
+_REMEDY = "give a recording (.mcap) made by seerob"
+
+_decode_scene = msgspec.msgpack.Decoder(Scene).decode
+_decode_snapshot = msgspec.msgpack.Decoder(Snapshot).decode
+_decode_tick = msgspec.msgpack.Decoder(Tick).decode
+_decode_basis = msgspec.msgpack.Decoder(BasisChange).decode
+
+
+class Recording:
+    """A recording on disk. Opened with `open`; keeps no file handle, may be read from several threads.
+
+    A recording whose writer was killed opens as far as it was written; `complete` and `findings`
+    say what is missing. A damaged stretch is left out, never filled.
+    """
+
+    def __init__(self, path: Path, index: McapIndex) -> None:
+        """Use `open`."""
+        self.path = path
+        self._index = index
+        self._lock = Lock()
+        self._cache: OrderedDict[int, list[Message]] = OrderedDict()
+        self._topics: dict[int, str] = {}
+        self._damage: dict[str, None] = {}
+        self.scene = self._read_scene()
+        """What did not change during the run."""
+        self._bases = self._read_bases()
+        self._tick_chunks = [c for c in index.chunks if self._has(c, SAMPLES, SNAPSHOT)]
+        self._starts = [c.start for c in self._tick_chunks]
+        self.start, self.end = self._span()
+
+    @classmethod
+    def open(cls, path: Path | str) -> Recording:
+        """Open and index a recording.
+
+        Raises:
+            InputError: No such file, not an MCAP file, not one of ours, or cut off before its scene.
+        """
+        path = Path(path)
+        index = scan(path)
+        layout = index.metadata.get(METADATA, {}).get("layout")
+        if layout is None and index.finished:
+            raise InputError.at(path, "", "is an MCAP file, but not one of seerob", _REMEDY)
+        if layout is not None and layout != VERSION:
+            raise InputError.at(
+                path,
+                "layout",
+                f"is {layout!r}, this version reads {VERSION!r}",
+                "use the seerob that wrote it",
+            )
+        return cls(path, index)
+
+    # -- what it is -----------------------------------------------------------------------------
+
+    start: float
+    """Run time of the first tick [s]; 0 when there is none."""
+    end: float
+    """Run time of the last tick that can be read [s]; 0 when there is none."""
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last tick [s]."""
+        return self.end - self.start
+
+    @property
+    def complete(self) -> bool:
+        """Whether the writer finished the file and nothing read so far was damaged."""
+        return self._index.finished and not self._damage
+
+    @property
+    def metadata(self) -> dict[str, str]:
+        """Versions of the software and wall-clock time of the start, as the recorder wrote them."""
+        return dict(self._index.metadata.get(METADATA, {}))
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is missing from this recording, as far as it is known by now."""
+        texts = list(self._damage)
+        if not self._index.finished:
+            texts.append(
+                f"the recording was cut off: it can be read until t = {self.end:.3f} s, less than a second "
+                f"after that may be lost ({self._index.unread} bytes at the end hold no whole record)"
+            )
+        end = self._index.metadata.get(END_METADATA, {})
+        for key, text in (
+            ("dropped", "snapshots were dropped because the disk could not keep up; their samples are there"),
+            ("lost", "ticks are missing altogether because the disk could not keep up: replay is not exact"),
+            ("out_of_order", "ticks were left out because their time did not advance"),
+        ):
+            if end.get(key, "0") != "0":
+                texts.append(f"{end[key]} {text}")
+        return tuple(Finding(level="warning", subject=self.path.name, text=text) for text in texts)
+
+    @cached_property
+    def meshes(self) -> dict[str, bytes]:
+        """Binary glTF per mesh hash."""
+        found = self._attachments(MESH_PREFIX)
+        return {name.removesuffix(".glb"): data for name, data in found.items()}
+
+    @cached_property
+    def files(self) -> dict[str, bytes]:
+        """The workstation file and every file that it named: relative name → content.
+
+        Names come from the recording; use `extract` to write them to disk.
+        """
+        return self._attachments(FILE_PREFIX)
+
+    def extract(self, folder: Path) -> None:
+        """Write `files` below ``folder``.
+
+        Raises:
+            InputError: A name leads out of the folder; nothing is written then.
+        """
+        for name in self.files:
+            parts = PurePosixPath(name.replace("\\", "/")).parts
+            if not parts or ".." in parts or parts[0] == "/" or ":" in parts[0]:
+                what = "leads out of the folder"
+                raise InputError.at(self.path, FILE_PREFIX + name, what, "do not trust this recording")
+        for name, data in self.files.items():
+            target = folder / PurePosixPath(name.replace("\\", "/"))
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(data)
+
+    # -- what happened --------------------------------------------------------------------------
+
+    def snapshots(self, start: float | None = None, end: float | None = None) -> Iterator[Snapshot]:
+        """Snapshots with ``start <= t <= end`` [s] in order; all of them when not given.
+
+        Raises:
+            InputError: A snapshot is not what it should be.
+        """
+        first = 0 if start is None else max(0, bisect_right(self._starts, nanoseconds(start) - 1) - 1)
+        for chunk in self._tick_chunks[first:]:
+            if end is not None and chunk.start > nanoseconds(end) + 1:
+                return
+            if start is not None and chunk.end < nanoseconds(start) - 1:
+                continue
+            for message in self._messages(chunk, SNAPSHOT):
+                snapshot = self._snapshot(message)
+                if (start is None or snapshot.t >= start) and (end is None or snapshot.t <= end):
+                    yield snapshot
+
+    def snapshot_at(self, t: float) -> Snapshot:
+        """The last snapshot at or before ``t`` [s]; the first one when all are later.
+
+        Raises:
+            InputError: The recording holds no snapshot, or this one is broken.
+        """
+        last = bisect_right(self._starts, nanoseconds(t) + 1) - 1
+        for chunk in reversed(self._tick_chunks[: last + 1]):
+            for message in reversed(self._messages(chunk, SNAPSHOT)):
+                if message.time <= nanoseconds(t) + 1:
+                    snapshot = self._snapshot(message)
+                    if snapshot.t <= t:
+                        return snapshot
+        for snapshot in self.snapshots():
+            return snapshot
+        raise InputError.at(self.path, "", "holds no snapshot", "record at least one tick")
+
+    def ticks(self) -> Iterator[Tick]:
+        """What the engine consumed at each tick, in order: playing it back repeats the run exactly.
+
+        Raises:
+            InputError: A tick is not what it should be.
+        """
+        for chunk in self._tick_chunks:
+            for message in self._messages(chunk, SAMPLES):
+                yield self._decode(_decode_tick, message, SAMPLES)
+
+    # -- inside ---------------------------------------------------------------------------------
+
+    def _decode(self, decode: Callable[[bytes], T], message: Message, topic: str) -> T:
+        try:
+            return decode(message.data)
+        except msgspec.DecodeError as error:
+            place = f"{topic} at {message.time / 1e9:.3f} s"
+            raise InputError.at(self.path, place, f"is not what it should be: {error}", _REMEDY) from error
+
+    def _snapshot(self, message: Message) -> Snapshot:
+        snapshot: Snapshot = self._decode(_decode_snapshot, message, SNAPSHOT)
+        if len(snapshot.poses) != _POSE * len(self.scene.nodes):
+            what = f"has {len(snapshot.poses)} bytes of poses for {len(self.scene.nodes)} nodes"
+            raise InputError.at(self.path, f"{SNAPSHOT} seq {snapshot.seq}", what, _REMEDY)
+        results = snapshot.results
+        if not self._bases or not results:
+            return snapshot
+        restored = tuple(
+            r if (basis := self._basis(i, r.name, snapshot.seq)) is None else replace(r, basis=basis)
+            for i, r in enumerate(results)
+        )
+        return replace(snapshot, results=restored)
+
+    def _basis(self, index: int, name: str, seq: int) -> Basis | None:
+        changes = self._bases.get((index, name))
+        if changes is None:
+            return None
+        k = bisect_right(changes[0], seq) - 1
+        return changes[1][k] if k >= 0 else None
+
+    def _read_scene(self) -> Scene:
+        for chunk in self._index.chunks[:4]:
+            for message in self._messages(chunk, SCENE):
+                scene: Scene = self._decode(_decode_scene, message, SCENE)
+                return scene
+        if self._index.finished:
+            raise InputError.at(self.path, "", f"has no readable {SCENE}", _REMEDY)
+        raise InputError.at(self.path, "", "was cut off before anything was recorded", "record again")
+
+    def _read_bases(self) -> dict[tuple[int, str], tuple[list[int], list[Basis | None]]]:
+        bases: dict[tuple[int, str], tuple[list[int], list[Basis | None]]] = {}
+        for chunk in self._index.chunks:
+            if self._has(chunk, BASIS):
+                for message in self._messages(chunk, BASIS):
+                    change: BasisChange = self._decode(_decode_basis, message, BASIS)
+                    seqs, values = bases.setdefault((change.index, change.name), ([], []))
+                    seqs.append(change.seq)
+                    values.append(change.basis)
+        return bases
+
+    def _span(self) -> tuple[float, float]:
+        first = next((t for c in self._tick_chunks for t in self._times(c)), 0.0)
+        last = next((t for c in reversed(self._tick_chunks) for t in reversed(self._times(c))), first)
+        return first, last
+
+    def _times(self, chunk: ChunkPlace) -> list[float]:
+        ticks = self._messages(chunk, SAMPLES)
+        ends = ticks if len(ticks) < 2 else [ticks[0], ticks[-1]]
+        return [
+            tick.t
+            for tick in (self._decode(_decode_tick, m, SAMPLES) for m in ends)
+            if isinstance(tick, Tick)
+        ]
+
+    def _has(self, chunk: ChunkPlace, *topics: str) -> bool:
+        listed = [self._topics.get(channel) for channel in chunk.channels]
+        # Message indexes have no checksum: what no recorder would write is looked up in the chunk.
+        plausible = len(set(listed)) == len(listed) and None not in listed
+        if not plausible or (
+            listed not in ([SCENE], [VIEW_SCENE]) and not _TICK <= set(listed) <= _TICK_VIEWS
+        ):
+            listed = [self._topics.get(m.channel) for m in self._chunk(chunk)]
+        return any(topic in topics for topic in listed)
+
+    def _messages(self, chunk: ChunkPlace, topic: str) -> list[Message]:
+        return [m for m in self._chunk(chunk) if self._topics.get(m.channel) == topic]
+
+    def _chunk(self, chunk: ChunkPlace) -> list[Message]:
+        with self._lock:
+            if chunk.offset in self._cache:
+                self._cache.move_to_end(chunk.offset)
+                return self._cache[chunk.offset]
+            try:
+                topics, messages = read_chunk(self.path, chunk)
+            except (Damaged, OSError) as error:
+                where = f"from {chunk.start / 1e9:.3f} to {chunk.end / 1e9:.3f} s"
+                self._damage[f"what was recorded {where} cannot be read: {error}"] = None
+                topics, messages = {}, []
+            self._topics.update(topics)
+            self._cache[chunk.offset] = messages
+            if len(self._cache) > _CACHED_CHUNKS:
+                self._cache.popitem(last=False)
+            return messages
+
+    def _attachments(self, prefix: str) -> dict[str, bytes]:
+        found = {}
+        for name, attachment in self._index.attachments.items():
+            if name.startswith(prefix):
+                try:
+                    found[name.removeprefix(prefix)] = read_attachment(self.path, attachment)
+                except (Damaged, OSError) as error:
+                    self._damage[str(error)] = None
+        return found

@@ -1,0 +1,456 @@
+"""One criterion over time, in columns that grow without being copied at each tick.
+
+What a run is, is said here once. It is exceeded when an instant of it is. It is within when at every instant
+at which the criterion applied it was within: also between the instants at which it was asked, as far as that
+is bounded, or accepted (`CriterionInfo.between`). It is undecided when any of that is not known, when the
+criterion never applied, or when it was never heard. Without any limit it has no verdict, and informs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.errors import Undecided
+from seerob.core.snapshot import Result, Snapshot, Trace, Verdict
+from seerob.core.transforms import Array
+from seerob.recording.column import Column, Spill
+
+NO_VERDICT = 255
+CODES: dict[Verdict | None, int] = {
+    Verdict.WITHIN: 0,
+    Verdict.EXCEEDED: 1,
+    Verdict.UNDECIDED: 2,
+    None: NO_VERDICT,
+}
+"""Verdict → the byte that stands for it in arrays, as in `snapshot.Trace`."""
+
+MAX_REASONS = 4096
+"""Distinct reasons kept per series; a reason with a changing number in it must not fill the memory."""
+
+STILL = "accepted: no source moves anybody"
+"""Of `CriterionInfo.between`: one instant then is all of a run."""
+
+ONE_INSTANT = "the run is one instant, and sources say that something moves"
+
+_RANK = {Verdict.EXCEEDED: 0, Verdict.UNDECIDED: 1, Verdict.WITHIN: 2, None: 3}
+
+
+class Worst(NamedTuple):
+    """The instant that decides: the worst verdict and, within it, the smallest margin to the limit."""
+
+    t: float
+    """Instant the result speaks of [s]."""
+    seq: int
+    """Of the snapshot that it is in."""
+    value: float | None
+    limit: float | None
+    verdict: Verdict | None
+    reason: str
+    """Why UNDECIDED, or what governs."""
+    part: str
+    """The part whose verdict this is; empty when no part has it."""
+    interval: tuple[float, float] | None = None
+    """Where the true value lies, given the tolerances of the inputs; of a whole criterion only."""
+
+
+class Times(NamedTuple):
+    """How a run is divided, each a share of it, 0…1; of a run of one instant, 1 of what that is."""
+
+    within: float
+    exceeded: float
+    undecided: float
+    muted: float
+    """It did not apply."""
+    nothing: float
+    """It was asked, and there was nothing to judge, or no limit to judge by."""
+    open: float
+    """It was not asked, and nothing says what it would have said."""
+
+    @property
+    def decided(self) -> float:
+        """Share in which it was within or exceeded."""
+        return self.within + self.exceeded
+
+
+_WITHIN, _EXCEEDED, _UNDECIDED, _MUTED, _NOTHING, _OPEN = range(6)
+_STATE: dict[Verdict | None, int] = {
+    Verdict.WITHIN: _WITHIN,
+    Verdict.EXCEEDED: _EXCEEDED,
+    Verdict.UNDECIDED: _UNDECIDED,
+    None: _NOTHING,
+}
+
+
+class Spread(NamedTuple):
+    """A mean is never given without what it hides."""
+
+    minimum: float
+    mean: float
+    maximum: float
+
+
+def worst_verdict(verdicts: Iterable[Verdict | None]) -> Verdict | None:
+    """EXCEEDED before UNDECIDED before WITHIN before none."""
+    return min(verdicts, key=_RANK.__getitem__, default=None)
+
+
+def margin(result: Result) -> float:
+    """Distance to the limit in the direction that matters, negative beyond it; nan when unknown.
+
+    Without a limit it is the distance to 0, so that the largest speed and the smallest distance
+    still come out as the extreme ones.
+    """
+    if result.value is None:
+        return math.nan
+    limit = 0.0 if result.limit is None else result.limit
+    return limit - result.value if result.at_most else result.value - limit
+
+
+def severity(result: Result) -> tuple[int, float]:
+    """Sort key: smaller is worse. An exceedance of unknown size counts as the largest."""
+    size = margin(result)
+    if math.isnan(size):
+        size = -math.inf if result.verdict is Verdict.EXCEEDED else math.inf
+    return _RANK[result.verdict], size
+
+
+class WorstTracker:
+    """Keeps the worst result so far; of equal ones the first."""
+
+    def __init__(self) -> None:
+        self._key = (len(_RANK), math.inf)
+        self.worst: Worst | None = None
+
+    def take(self, result: Result, snapshot: Snapshot) -> bool:
+        """Whether ``result`` is worse than all before it."""
+        key = severity(result)
+        if self.worst is not None and key >= self._key:
+            return False
+        self._key = key
+        # A part without this verdict informs; it governs nothing.
+        judged = [p for p in result.parts if p.verdict is not None and p.verdict is result.verdict]
+        part = min(judged, key=severity).name if judged else ""
+        self.worst = Worst(
+            snapshot.t if result.t is None else result.t,
+            snapshot.seq,
+            result.value,
+            result.limit,
+            result.verdict,
+            result.reason,
+            part,
+            result.interval,
+        )
+        return True
+
+
+class Series:
+    """One criterion, or one part of it, over a run. Arrays are read-only copies of what is there now."""
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        unit: str,
+        at_most: bool,
+        tracker: WorstTracker | None = None,
+        spill: Spill | None = None,
+        between: str | None = None,
+    ) -> None:
+        """Begin.
+
+        Args:
+            name: Of the criterion or part.
+            unit: Of its values.
+            at_most: Whether limits bound from above.
+            tracker: Of its worst instant; a part has none.
+            spill: Takes full blocks.
+            between: As of `CriterionInfo`; None of what no run announced, whose instants are all there is.
+        """
+        self.between = between
+        self._seconds = [0.0] * 6
+        self._instants = [0] * 6
+        self._snapshots = 0
+        self.name = name
+        self.open = "" if between is None or between.startswith("accepted: ") else between
+        """Why the time between its instants is not within although they are; empty when that is known."""
+        self.unit = unit
+        self.at_most = at_most
+        """Whether limits bound from above."""
+        self._tracker = tracker
+        self._spill = spill = Spill() if spill is None else spill
+        self._t, self._values, self._limits = Column("d", spill), Column("d", spill), Column("d", spill)
+        self._reasons = Column("i", spill)
+        self._reason_of: dict[str, int] = {"": 0}
+        self._parts: dict[str, Series] = {}
+        self._last_t: float | None = None
+        self._last_verdict: Verdict | None = None
+        self._said: set[int] = set()
+        self._has_limit = False
+        # Appended last at each tick: its length is how many ticks are whole.
+        self._verdicts = Column("B", spill)
+
+    @property
+    def known(self) -> bool:
+        """Whether anything was heard."""
+        return len(self._verdicts) > 0
+
+    def repeats(self, result: Result) -> bool:
+        """Whether this is the last result of a criterion with a period, shown again, and no worse since."""
+        again = result.t is not None and result.t == self._last_t
+        return again and _RANK[result.verdict] >= _RANK[self._last_verdict]
+
+    def pass_time(self, result: Result | None, dt: float) -> None:
+        """Count the time since the snapshot before [s] for what the criterion says in this one.
+
+        Args:
+            result: None when it is not in the snapshot.
+            dt: Not below 0.
+        """
+        self._snapshots += 1
+        if result is None:
+            state = _OPEN
+        elif result.muted:
+            state = _MUTED
+        else:
+            state = _STATE[result.verdict]
+            if state == _WITHIN and self.open:
+                self._instants[_WITHIN] += 1
+                self._seconds[_OPEN] += dt
+                return
+        self._seconds[state] += dt
+        self._instants[state] += 1
+
+    def times(self) -> Times:
+        """How the run is divided so far; of what no run announced, its instants."""
+        counted: list[float] | list[int] = self._seconds if sum(self._seconds) > 0 else self._instants
+        if not sum(counted):
+            counted = [int((self.verdicts == CODES[v]).sum()) for v in Verdict] if self.known else []
+            shares = dict(zip((_STATE[v] for v in Verdict), counted, strict=False))
+            counted = [shares.get(state, 0) for state in range(6)]
+            counted[_NOTHING] = len(self) - sum(counted)
+        whole = sum(counted) or 1.0
+        return Times(*(part / whole for part in counted))
+
+    @property
+    def _is_open(self) -> bool:
+        return self.between is not None and self._seconds[_OPEN] > 0
+
+    @property
+    def _is_one_instant(self) -> bool:
+        return self.between is not None and self._snapshots == 1 and self.between != STILL
+
+    def gap(self) -> str:
+        """Why what was within whenever it was asked is not known to be within throughout; empty if it is."""
+        if self._is_open:
+            why = self.open or "it was not asked"
+            return f"not known in {self._seconds[_OPEN]:.4g} s of the run: {why}"
+        if self._is_one_instant:
+            return ONE_INSTANT
+        return ""
+
+    def append(self, result: Result, t: float) -> None:
+        """Add what the criterion said in the snapshot at run time ``t`` [s]."""
+        self._last_t, self._last_verdict = result.t, result.verdict
+        self._t.append(t)
+        self._values.append(math.nan if result.value is None else result.value)
+        self._limits.append(math.nan if result.limit is None else result.limit)
+        code = self._reason_of.get(result.reason, -1)
+        if code < 0 and len(self._reason_of) < MAX_REASONS:
+            code = self._reason_of[result.reason] = len(self._reason_of)
+        self._reasons.append(code)
+        for part in result.parts:
+            series = self._parts.get(part.name)
+            if series is None:
+                series = Series(name=part.name, unit=part.unit, at_most=part.at_most, spill=self._spill)
+                self._parts[part.name] = series
+            series.append(part, t)
+        self._said.add(CODES[result.verdict])
+        self._has_limit = self._has_limit or result.limit is not None
+        self._verdicts.append(CODES[result.verdict])
+
+    def __len__(self) -> int:
+        return len(self._verdicts)
+
+    def _floats(self, data: Column) -> Array:
+        n = len(self._verdicts)
+        return np.frombuffer(data.tobytes(), np.float64)[:n]
+
+    @property
+    def t(self) -> Array:
+        """Run time of the snapshots [s], shape (n,)."""
+        return self._floats(self._t)
+
+    @property
+    def values(self) -> Array:
+        """In `unit`, shape (n,); nan where there was none."""
+        return self._floats(self._values)
+
+    @property
+    def limits(self) -> Array:
+        """In `unit`, shape (n,); nan where there was none."""
+        return self._floats(self._limits)
+
+    @property
+    def verdicts(self) -> NDArray[np.uint8]:
+        """0 within, 1 exceeded, 2 undecided, 255 none, shape (n,)."""
+        return np.frombuffer(self._verdicts.tobytes(), np.uint8)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why UNDECIDED or what governs, per tick; ``…`` beyond the `MAX_REASONS` distinct ones kept."""
+        texts = (*self._reason_of, "…")
+        codes = np.frombuffer(self._reasons.tobytes(), np.intc)[: len(self)]
+        return tuple(texts[code] for code in codes.tolist())
+
+    @property
+    def parts(self) -> Mapping[str, Series]:
+        """The same per link or body area."""
+        return MappingProxyType(self._parts)
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """Of the whole run so far; see above."""
+        if not self.known:
+            return Verdict.UNDECIDED
+        found = worst_verdict(v for v, code in CODES.items() if code in self._said)
+        if found is None and (self._never_judged() or self._never_applied()):
+            return Verdict.UNDECIDED
+        open_ = self._is_open or self._is_one_instant
+        return Verdict.UNDECIDED if found is Verdict.WITHIN and open_ else found
+
+    def _never_applied(self) -> bool:
+        return self._instants[_MUTED] > 0 and self._instants[_MUTED] == sum(self._instants)
+
+    def _never_judged(self) -> bool:
+        """Whether a criterion, not a part of one, has a limit and a run too short to judge it by."""
+        return self._tracker is not None and self._has_limit
+
+    def max(self) -> float:
+        """Largest value.
+
+        Raises:
+            Undecided: There was never a value.
+        """
+        return self.spread().maximum
+
+    def min(self) -> float:
+        """Smallest value.
+
+        Raises:
+            Undecided: There was never a value.
+        """
+        return self.spread().minimum
+
+    def spread(self) -> Spread:
+        """Smallest, mean and largest of the values that there are.
+
+        Raises:
+            Undecided: There was never a value.
+        """
+        values = self.values
+        values = values[~np.isnan(values)]
+        if not len(values):
+            raise Undecided(f"{self.name} had no value in this run")
+        return Spread(float(values.min()), float(values.mean()), float(values.max()))
+
+    def worst(self) -> Worst:
+        """The instant that decides.
+
+        Raises:
+            Undecided: Nothing was heard.
+        """
+        if self._tracker is not None and self._tracker.worst is not None:
+            worst, verdict = self._tracker.worst, self.verdict
+            if verdict is worst.verdict:
+                return worst
+            reason = "; ".join(filter(None, (self.gap() if worst.verdict else "", worst.reason)))
+            return worst._replace(verdict=verdict, reason=reason)
+        if not self.known:
+            raise Undecided(f"{self.name} was never heard in this run")
+        return self._worst_of_arrays()
+
+    def _worst_of_arrays(self) -> Worst:
+        best: tuple[tuple[int, float], int, Verdict | None] | None = None
+        values, limits, codes = self.values, self.limits, self.verdicts
+        reach = np.nan_to_num(limits, nan=0.0)
+        margins = reach - values if self.at_most else values - reach
+        for verdict, code in CODES.items():
+            where = np.flatnonzero(codes == code)
+            if not len(where):
+                continue
+            unknown = -np.inf if verdict is Verdict.EXCEEDED else np.inf
+            sizes = np.where(np.isnan(margins[where]), unknown, margins[where])
+            k = int(np.argmin(sizes))
+            key = (_RANK[verdict], float(sizes[k]))
+            if best is None or key < best[0]:
+                best = key, int(where[k]), verdict
+        assert best is not None
+        _, i, verdict = best
+        value, limit = float(values[i]), float(limits[i])
+        return Worst(
+            float(self.t[i]),
+            -1,
+            None if math.isnan(value) else value,
+            None if math.isnan(limit) else limit,
+            verdict,
+            self.reasons[i],
+            "",
+        )
+
+    def shares(self) -> dict[Verdict | None, float]:
+        """Share of the evaluated ticks per verdict, 0…1, in the order of severity; empty when none."""
+        if not self.known:
+            return {}
+        codes = self.verdicts
+        counts = {v: int(np.count_nonzero(codes == code)) for v, code in CODES.items()}
+        return {v: counts[v] / len(codes) for v in sorted(counts, key=_RANK.__getitem__) if counts[v]}
+
+    def intervals(self, verdict: Verdict | None = Verdict.EXCEEDED) -> tuple[tuple[float, float], ...]:
+        """Stretches of consecutive evaluated ticks with a verdict: run time of the first and the last [s]."""
+        hit = np.concatenate([[False], self.verdicts == CODES[verdict], [False]])
+        edges = np.flatnonzero(hit[1:] != hit[:-1])
+        t = self.t
+        return tuple((float(t[a]), float(t[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True))
+
+    def thinned(self, max_points: int = 2000) -> NDArray[np.int64]:
+        """Indices of at most ``max_points`` ticks that keep the picture true.
+
+        Per bucket: its first tick, its smallest and largest value, its smallest margin and its worst
+        verdict. The first and the last tick are always there.
+        """
+        if max_points < 7:
+            raise ValueError(f"max_points must be at least 7, not {max_points}")
+        n = len(self)
+        if n <= max_points:
+            return np.arange(n)
+        values, limits, codes = self.values[:n], self.limits[:n], self.verdicts[:n]
+        margins = limits - values if self.at_most else values - limits
+        rank = np.array([2, 0, 1, *[3] * 253], np.uint8)[codes]
+        buckets = max((max_points - 1) // 5, 1)
+        edges = np.linspace(0, n, buckets + 1).astype(np.int64)
+        keep = {n - 1}
+        for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+            keep.update((a, a + int(rank[a:b].argmin())))
+            for data in (values[a:b], -values[a:b], margins[a:b]):
+                if not np.isnan(data).all():
+                    keep.add(a + int(np.nanargmin(data)))
+        return np.array(sorted(keep), np.int64)
+
+    def thin(self, max_points: int = 2000) -> Trace:
+        """For plots: at most ``max_points`` ticks, no extremum and no exceedance lost."""
+        n = len(self)
+        i = self.thinned(max_points)
+        i = i[i < n]
+        return Trace(
+            name=self.name,
+            t=self.t[i].astype("<f8").tobytes(),
+            values=self.values[i].astype("<f4").tobytes(),
+            limits=self.limits[i].astype("<f4").tobytes(),
+            verdicts=self.verdicts[i].tobytes(),
+        )

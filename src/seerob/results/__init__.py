@@ -1,1 +1,0 @@
-"""What a run said over time, in bounded memory."""

@@ -1,0 +1,1 @@
+"""A run from file to results; batches, permissible speeds, plans."""

@@ -1,0 +1,481 @@
+"""Criteria over many instants at once: for recordings, for research, for optimisation.
+
+The road judges one instant after the other; here a stretch of instants is placed, and each criterion that
+can (`Criterion.batch`) judges it in a few array operations, on all cores. Its figures are those of the
+road for the same states to rounding, and its verdicts are by the same rules. What cannot, or has a
+memory of earlier instants, is asked instant by instant as on the road, in the order of time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+
+import mujoco
+import numpy as np
+from msgspec.structs import replace as changed
+
+from seerob.core.errors import Undecided, UnknownName
+from seerob.core.snapshot import Finding, Result, Verdict
+from seerob.core.transforms import Array
+from seerob.criteria.criterion import Criterion, EvaluateMany
+from seerob.criteria.judging import Judge, held, held_names, needed, told, unmentioned
+from seerob.model.model import Model
+from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
+from seerob.recording.series import CODES, ONE_INSTANT
+from seerob.session.run import Bound, Feed, engine_of, settled
+from seerob.twin.spans import Path
+from seerob.twin.state import Hearing, State
+from seerob.twin.states import Bench, Motion, Questions, Reasons, States
+from seerob.twin.whereabouts.hearing import SLACK, STANDS
+
+STRETCH = 256
+"""Instants that are placed together: enough for the arrays to pay, few enough for the processor's cache."""
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """What one criterion says of every instant."""
+
+    name: str
+    unit: str
+    at_most: bool
+    answers: Answers
+    reasons: Reasons
+    """Why an instant is UNDECIDED, as far as it is said, shape (N,)."""
+    note: str = ""
+    """Why it was asked instant by instant; empty when it was not."""
+    between: str = ""
+    """See `seerob.core.snapshot.CriterionInfo.between`; empty where the instants are no motion."""
+
+    @property
+    def value(self) -> Array:
+        """In ``unit``, NaN where there is none, shape (N,)."""
+        return self.answers.value
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """Of the whole: EXCEEDED before UNDECIDED before WITHIN before none."""
+        there = set(np.unique(self.answers.verdict).tolist())
+        order = (Verdict.EXCEEDED, Verdict.UNDECIDED, Verdict.WITHIN)
+        found = next((verdict for verdict in order if CODES[verdict] in there), None)
+        known = not self.between or self.between.startswith("accepted: ")
+        return found if known or found is not Verdict.WITHIN else Verdict.UNDECIDED
+
+
+@dataclass(frozen=True, eq=False)
+class Batch(Mapping[str, Column]):
+    """What all criteria say of N instants, by the criterion's name."""
+
+    t: Array
+    """[s], shape (N,)."""
+    columns: Mapping[str, Column]
+
+    def __getitem__(self, name: str) -> Column:
+        try:
+            return self.columns[name]
+        except KeyError:
+            raise UnknownName("result", name, self.columns) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+
+class _Whereabouts(State):
+    """Where everybody is, and nothing of what follows from it."""
+
+    def refresh(self, t: float) -> None:
+        """See `State.refresh`."""
+        self.t = t
+
+
+def recorded(model: Model, feed: Feed, end: float) -> Motion:
+    """Where everybody is at every tick of a feed, without physics: where the samples say.
+
+    Args:
+        model: The compiled workstation, whose sources drive it.
+        feed: Samples per tick.
+        end: When the motion ends, and the last tick with it [s].
+    """
+    station = model.workstation
+    placed = changed(station, engine=changed(station.engine, physics=False))
+    engine = engine_of(replace(model, workstation=placed))
+    engine.end = end
+    engine.state = _Whereabouts(model, engine.state.data, engine.state.hearings, engine.state.signals)
+    t, q, v = [], [], []
+    ways: list[Path] = []
+    doubts: dict[str, list[str]] = {name: [] for name in engine.model.mechanisms}
+    noise: dict[str, list[Array | None]] = {name: [] for name in engine.model.mechanisms}
+    for seq, samples in enumerate(feed):
+        engine.take(samples)
+        state = engine.tick() if seq else engine.start()
+        t.append(state.t)
+        q.append(state.data.qpos.copy())
+        v.append(state.data.qvel.copy())
+        if state.path is not None:
+            ways.append(state.path)
+        for name, found in doubts.items():
+            found.append(state.doubt(name))
+            noise[name].append(state.hearings[name].speed_error(state.t))
+    reasons = {name: np.array(found, object) for name, found in doubts.items()}
+    n = {name: len(mechanism.joints) for name, mechanism in engine.model.mechanisms.items()}
+    errors = {
+        name: np.array([np.zeros(n[name]) if one is None else one for one in every])
+        for name, every in noise.items()
+        if any(one is not None for one in every)
+    }
+    arrays = np.array(t), np.array(q), np.array(v)
+    return Motion(*arrays, reasons, ways=tuple(ways), foreseen=True, speed_errors=errors)
+
+
+def judged(
+    model: Model,
+    bound: Sequence[Bound],
+    motion: Motion,
+    *,
+    threads: int,
+    findings: Iterable[Finding] = (),
+) -> Batch:
+    """Judge a motion.
+
+    Args:
+        model: The compiled workstation.
+        bound: Its criteria.
+        motion: Where everybody is.
+        threads: How many work at once.
+        findings: Of sources, besides those of the model (`Finding.holds`).
+    """
+    n = len(motion.t)
+    findings = tuple(dict.fromkeys((*model.findings, *findings)))
+    asked, notes = _able(model, bound, findings, noisy=bool(motion.speed_errors))
+    parts = [motion.part(begin, end) for begin, end in pairwise([*range(0, n, STRETCH), n]) if begin < end]
+    questions = Questions(model)
+    found: dict[str, list[tuple[Answers, Reasons]]] = {name: [] for name in asked}
+    speeds: list[Array] = []
+    if asked and parts:
+        # Learns what distances are asked, so that every stretch asks for all of them together.
+        _stretch(Bench(model, questions), asked, parts[0].part(0, 1))
+        with ThreadPoolExecutor(max(1, threads), "seerob batch") as pool:
+            shares = [parts[k::threads] for k in range(max(1, threads))]
+            made = list(pool.map(lambda share: _share(model, questions, asked, share), shares))
+        for k in range(len(parts)):
+            stretch, fast = made[k % len(shares)][k // len(shares)]
+            speeds.append(fast)
+            for name, answers in stretch.items():
+                found[name].append(answers)
+    slow = [one for one in bound if one.criterion.name not in asked]
+    walked = _walked(model, slow, motion, findings) if slow else {}
+    walked |= {name: _joined(answers) for name, answers in found.items()}
+    if motion.ways and asked:
+        for one, spans in list(_uncleared(model, bound, asked, motion, walked, np.concatenate(speeds))):
+            again = _walked(model, [one], motion, findings, spans)
+            walked[one.criterion.name] = _with(walked[one.criterion.name], again[one.criterion.name], spans)
+    columns = {}
+    for one in bound:
+        name = one.criterion.name
+        said, reasons = walked[name]
+        criterion, between = one.criterion, one.between if motion.ways is not None else ""
+        if n == 1 and motion.foreseen and model.workstation.sources:
+            between = ONE_INSTANT
+        columns[name] = Column(
+            name, criterion.unit, criterion.at_most, said, reasons, notes.get(name, ""), between
+        )
+    return Batch(motion.t, columns)
+
+
+def _uncleared(
+    model: Model,
+    bound: Sequence[Bound],
+    asked: Mapping[str, _Able],
+    motion: Motion,
+    said: Stretch,
+    speeds: Array,
+) -> Iterator[tuple[Bound, Flags]]:
+    """Criteria that were judged together, and at which instants the way there is to be looked at.
+
+    The same bounds as on the road (`seerob.criteria.between_ticks`) clear the others.
+    """
+    assert motion.ways is not None
+    watches = {b.criterion.name: b for b in bound if b.criterion.name in asked and b.watch is not None}
+    ends: dict[str, tuple[Array, Array]] = {}
+    open_ = {name: np.zeros(len(motion.t), bool) for name in watches}
+    for name, one in watches.items():
+        answers, verdict = said[name][0], said[name][0].verdict
+        at_most, off = one.criterion.at_most, np.zeros(len(verdict))
+        bare = answers.limit - answers.value if at_most else answers.value - answers.limit
+        if answers.interval is not None:
+            low, high = answers.interval
+            off = high - answers.value if at_most else answers.value - low
+        ends[name] = bare, off
+        within, exceeded = verdict == WITHIN, verdict == CODES[Verdict.EXCEEDED]
+        either = (within[1:] | within[:-1]) & ~(exceeded[1:] | exceeded[:-1])
+        open_[name][1:] = either & ~(within[1:] & within[:-1])
+    # A figure without a limit, or one that is never within, has nothing to lose on the way.
+    watches = {name: one for name, one in watches.items() if (said[name][0].verdict == WITHIN).any()}
+    points = next((one.watch.points for one in watches.values() if one.watch is not None), None)
+    ids = np.array([body.mj for body in model.bodies], np.int64)
+    for k, way in enumerate(motion.ways if points is not None else ()):
+        assert points is not None
+        span = points.span(way, float(motion.t[k]), float(motion.t[k + 1]), ids, model.mj)
+        span.between_speeds(speeds[k], speeds[k + 1])
+        for name, one in watches.items():
+            verdict = said[name][0].verdict
+            if verdict[k] != WITHIN or verdict[k + 1] != WITHIN:
+                continue
+            assert one.watch is not None
+            assert one.watch.falls is not None  # who judges many instants at once has no other bound
+            bare, off = ends[name]
+            m, other = bare[k], bare[k + 1]
+            fall, bend = one.watch.falls(span, min(m - off[k], other - off[k + 1]))
+            low = np.maximum((m + other - fall) / 2, min(m, other) - bend) - max(off[k], off[k + 1])
+            open_[name][k + 1] = not np.min(low) >= 0
+    for name, one in watches.items():
+        if open_[name].any():
+            yield one, open_[name]
+
+
+def _with(
+    said: tuple[Answers, Reasons], again: tuple[Answers, Reasons], where: Flags
+) -> tuple[Answers, Reasons]:
+    """The same with what was said of some instants once the way there was looked at."""
+    (answers, reasons), (then, why) = said, again
+    picked = {key: np.where(where, getattr(then, key), getattr(answers, key)) for key in ("value", "limit")}
+    verdict = np.where(where, then.verdict, answers.verdict).astype(np.uint8)
+    return replace(answers, **picked, verdict=verdict), np.where(where, why, reasons)
+
+
+def _able(
+    model: Model, bound: Sequence[Bound], findings: Sequence[Finding], *, noisy: bool
+) -> tuple[dict[str, _Able], dict[str, str]]:
+    """Criteria that judge many instants at once; why others do not."""
+    able: dict[str, _Able] = {}
+    names = held_names(findings, model)
+    notes: dict[str, str] = {}
+    for one in bound:
+        criterion = one.criterion
+        many = criterion.batch(model)
+        if many is None:
+            notes[criterion.name] = "asked instant by instant: with these options it is not made for batches"
+        elif held(criterion, model, findings) or unmentioned(criterion, model):
+            notes[criterion.name] = "asked instant by instant: a finding holds what it is about"
+        elif criterion.heavier_is_worse and any(m.unknown_masses for m in model.mechanisms.values()):
+            notes[criterion.name] = "asked instant by instant: masses are not known"
+        elif noisy and criterion.by_speed:
+            notes[criterion.name] = "asked instant by instant: speeds are derived from noisy positions"
+        elif criterion.variables():
+            notes[criterion.name] = "asked instant by instant: it follows variables"
+        else:
+            able[criterion.name] = _Able(criterion, many, names, _movers(criterion, model))
+    return able, notes
+
+
+@dataclass(frozen=True)
+class _Able:
+    """A criterion that judges many instants at once."""
+
+    criterion: Criterion
+    many: EvaluateMany
+    held: Mapping[str, str]
+    """By name that findings hold, why nothing that depends on it is within."""
+    needs: tuple[str, ...]
+    """Who must be where the motion says, whatever it asks (`seerob.criteria.judging.needed`)."""
+
+
+def _movers(criterion: Criterion, model: Model) -> tuple[str, ...]:
+    """Robots, people and machines that a criterion needs, and whoever moves the bodies that it needs."""
+    names, bodies = needed(criterion, model)
+    movers = (model.bodies[i].mover for i in bodies if model.bodies[i].mover)
+    return tuple(dict.fromkeys((*names, *movers)))
+
+
+Stretch = dict[str, tuple[Answers, Reasons]]
+
+
+def _share(
+    model: Model,
+    questions: Questions,
+    asked: dict[str, _Able],
+    parts: Sequence[Motion],
+) -> list[tuple[Stretch, Array]]:
+    """The work of one thread."""
+    bench = Bench(model, questions)
+    return [_stretch(bench, asked, part) for part in parts]
+
+
+def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Stretch, Array]:
+    states = bench.place(motion)
+    found: Stretch = {}
+    for name, one in asked.items():
+        states.asked.clear()
+        answers, reasons = _said(one, states)
+        for who in sorted(states.asked):
+            reasons = np.where(motion.doubts[who] != "", motion.doubts[who], reasons)
+        answers = _doubted(answers, one.criterion, reasons)
+        if texts := [text for held_name, text in one.held.items() if held_name in states.asked]:
+            reasons = np.where(answers.verdict == WITHIN, "; ".join(dict.fromkeys(texts)), reasons)
+            answers = answers.open()
+        found[name] = answers, reasons
+    return found, states.largest_speeds() if motion.ways is not None else np.zeros((len(states), 0))
+
+
+def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:
+    """What a criterion says, as far as it may be green, and why it is not: by the rules of `Judge`."""
+    criterion, n = one.criterion, len(states)
+    states.require(*one.needs)
+    reasons = np.full(n, "", object)
+    try:
+        answers = one.many(states)
+        why = _misshapen(answers, n)
+    except Undecided as reason:
+        why = str(reason)
+    except Exception as error:
+        # One's own criterion that fails must not end a batch that others are judged in.
+        why = f"{criterion.name} failed: {told(error)}"
+    if why:
+        reasons[:] = why
+        return _nothing(criterion, n), reasons
+    found = answers.contradictions(at_most=criterion.at_most)
+    reasons = np.where(found == "", reasons, f"{criterion.name}: " + found)
+    verdict = np.where(found == "", answers.verdict, UNDECIDED).astype(np.uint8)
+    return replace(answers, verdict=verdict), reasons
+
+
+def _misshapen(answers: Answers, n: int) -> str:
+    """Why what a criterion returned cannot be read; empty where it can."""
+    if type(answers) is not Answers:
+        return f"it returns {type(answers).__name__}, not seerob.api.Answers"
+    ends = () if answers.interval is None else answers.interval
+    shapes = {np.shape(column) for column in (answers.value, answers.limit, answers.verdict, *ends)}
+    if shapes != {(n,)}:
+        return f"it returns shapes {sorted(shapes)} of {n} instants, not ({n},) each"
+    if unknown := set(np.unique(answers.verdict).tolist()) - set(CODES.values()):
+        return f"its verdicts {sorted(unknown)} are none of seerob.recording.series.CODES"
+    return ""
+
+
+def _doubted(answers: Answers, criterion: Criterion, reasons: Reasons) -> Answers:
+    """The same where nothing is said of instants that are in doubt."""
+    doubted = reasons != ""
+    if not doubted.any():
+        return answers
+    nothing = _nothing(criterion, len(reasons))
+    return Answers(
+        np.where(doubted, nothing.value, answers.value),
+        np.where(doubted, nothing.limit, answers.limit),
+        np.where(doubted, nothing.verdict, answers.verdict).astype(np.uint8),
+        None if answers.interval is None else _blanked(answers.interval, doubted),
+    )
+
+
+def _blanked(interval: tuple[Array, Array], where: Array) -> tuple[Array, Array]:
+    low, high = (np.where(where, np.nan, end) for end in interval)
+    return low, high
+
+
+def _nothing(criterion: Criterion, n: int) -> Answers:
+    """Of instants at which nobody knows."""
+    limit = getattr(criterion, "limit", None)
+    limits = np.full(n, np.nan if limit is None else limit, float)
+    return Answers(np.full(n, np.nan), limits, np.full(n, UNDECIDED, np.uint8))
+
+
+def _joined(parts: Sequence[tuple[Answers, Reasons]]) -> tuple[Answers, Reasons]:
+    said = [answers for answers, _ in parts]
+    ends = [answers.interval for answers in said if answers.interval is not None]
+    interval = None
+    if ends and len(ends) == len(said):
+        interval = np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
+    joined = Answers(
+        np.concatenate([np.zeros(0), *(answers.value for answers in said)]),
+        np.concatenate([np.zeros(0), *(answers.limit for answers in said)]),
+        np.concatenate([np.zeros(0, np.uint8), *(answers.verdict for answers in said)]),
+        interval,
+    )
+    return joined, np.concatenate([np.zeros(0, object), *(reasons for _, reasons in parts)])
+
+
+def _walked(
+    model: Model,
+    bound: Sequence[Bound],
+    motion: Motion,
+    findings: Sequence[Finding],
+    only: Flags | None = None,
+) -> Stretch:
+    """The same instant by instant, as on the road, each criterion at every instant.
+
+    Args:
+        model: The compiled workstation.
+        bound: The criteria.
+        motion: Where everybody is.
+        findings: See `judged`.
+        only: Instants that are asked, each with the one before; all of them when None. Of others it says
+            nothing that counts.
+    """
+    # Between two instants nobody is silent, however long it is.
+    hearings = {name: Hearing(given=False, driven=True, timeout=np.inf) for name in model.mechanisms}
+    data = mujoco.MjData(model.mj)
+    state = State(model, data, hearings)
+    # With criteria that were bound for another run, what they remember of it would be in the way.
+    fresh = [
+        Bound(changed(one.criterion, every=None), one.group, one.criterion.bind(model), one.basis, one.watch)
+        for one in bound
+    ]
+    judge = Judge(fresh, findings)
+    if motion.foreseen:
+        state.foresee = partial(_foresee, model, motion, state)
+    rows: list[tuple[Result, ...]] = []
+    with settled():
+        for k, t in enumerate(motion.t.tolist()):
+            if only is not None and not (only[k] or only[min(k + 1, len(only) - 1)]):
+                rows.append(())
+                continue
+            data.qpos[:], data.qvel[:] = motion.q[k], motion.v[k]
+            since = max(k - 1, 0)
+            for name, hearing in hearings.items():
+                said = [motion.doubts[name][i].removeprefix(f"{name}: ") for i in range(since, k + 1)]
+                hearing.heard = list(zip(motion.t[since : k + 1].tolist(), said, strict=True))
+                hearing.torques = [None] * len(said)
+                errors = motion.speed_errors.get(name)
+                hearing.speed_errors = [None if errors is None else errors[i] for i in range(since, k + 1)]
+            state.path = motion.ways[k - 1] if motion.ways and k and rows[-1] else None
+            state.refresh(t)
+            rows.append(judge(state))
+    said_nothing = tuple(Result(name=one.criterion.name) for one in bound)
+    rows = [row or said_nothing for row in rows]
+    return {one.criterion.name: _of_results([row[i] for row in rows]) for i, one in enumerate(bound)}
+
+
+def _foresee(
+    model: Model, motion: Motion, state: State, name: str, t: Array
+) -> tuple[Array, Array, str] | None:
+    """See `seerob.twin.state.Foresee`: the motion itself, at its own instants."""
+    rows = np.searchsorted(motion.t, t - SLACK)
+    beyond, rows = bool(len(rows)) and rows[-1] >= len(motion.t), np.minimum(rows, len(motion.t) - 1)
+    columns = state.columns[name]
+    q, qd = motion.q[rows][:, columns.own_q], motion.v[rows][:, columns.own_v]
+    why = next(filter(None, motion.doubts[name][rows].tolist()), "")
+    if beyond and np.abs(motion.v[-1][columns.own_v]).max(initial=0.0) > STANDS:
+        why = why or "the motion ends, and what it does after is not known"
+    return q, qd, why
+
+
+def _of_results(results: Sequence[Result]) -> tuple[Answers, Reasons]:
+    def numbers(values: Sequence[float | None]) -> Array:
+        return np.array([np.nan if value is None else value for value in values], float)
+
+    answers = Answers(
+        numbers([r.value for r in results]),
+        numbers([r.limit for r in results]),
+        np.array([CODES[r.verdict] for r in results], np.uint8),
+    )
+    if any(r.interval for r in results):
+        low, high = (numbers([r.interval[k] if r.interval else r.value for r in results]) for k in range(2))
+        answers = replace(answers, interval=(low, high))
+    reasons = [r.reason if r.verdict is Verdict.UNDECIDED else "" for r in results]
+    return answers, np.array(reasons, object)

@@ -1,0 +1,422 @@
+r"""Does the model explain a log? Inverse dynamics against measured torques, and what would close the gap.
+
+.. math:: \tau_i = (M \ddot q + c + g)_i + Y(q, \dot q, \ddot q)_i\,\varphi
+          + F_{c,i}\,\mathrm{sgn}(\dot q_i) + F_{v,i}\,\dot q_i + o_i + \varepsilon_i
+
+:math:`\varphi = (m, h, \Sigma)` is a payload on the flange beside what the file has there: its mass, its
+first and second moments in the flange's frame. The equation is linear in all that is fitted: weighted least
+squares, weights from the residuals of a first fit, per joint. Residuals of neighbouring samples are alike,
+so variances are raised by (1 + ρ)/(1 − ρ), ρ their correlation per joint. Intervals: 95 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.errors import InputError
+from seerob.core.transforms import Array
+from seerob.model.model import Mechanism, Model
+from seerob.twin.own_words import Said
+
+SLOW = {"rad": 0.02, "m": 0.002}
+"""Below it a joint may stick: its friction is anything up to Coulomb's, and its rows are left out."""
+HALF_WINDOW = 0.02
+"""Accelerations are slopes of the speeds over so long before and after [s], or one sample either way."""
+MOST = 4000
+"""Samples that are used, in stretches that are spread evenly."""
+LEAST = 20
+"""Samples with a moving joint that a fit needs."""
+NORMAL_95 = 1.959964
+"""Quantile of the normal distribution: 95 % lie between ± it."""
+TOLD = 1e5
+"""Condition number above which a direction of the parameters is not told by the motion [scaled columns]."""
+ASKED = 0.05
+"""A joint is explained when what is left is at most this share of its torque limit, or of the largest torque
+where nobody knows a limit: about what friction changes by with temperature."""
+PAYLOAD = 0.02, 0.1
+"""A payload is as the file has it when less than this share of what moves is missing, or so many kg."""
+MOMENTS = tuple(combinations_with_replacement(range(3), 2))
+POINTS = np.array([[0, 0, 0], *np.eye(3), *-np.eye(3), [1, 1, 0], [1, 0, 1], [0, 1, 1]], float) * 0.1
+"""Ten points in the flange's frame whose point masses span all rigid bodies [m], shape (10, 3)."""
+
+
+# -- mathematics --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A fitted number."""
+
+    value: float
+    half: float
+    """Half of the interval in which the true value is with 95 %; infinite when the motion tells nothing."""
+
+    @property
+    def told(self) -> bool:
+        """Whether the motion tells it at all."""
+        return bool(np.isfinite(self.half))
+
+    def __str__(self) -> str:
+        return f"{self.value:.4g} ± {self.half:.2g}" if self.told else "not told by this motion"
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A weighted least-squares fit."""
+
+    values: Array
+    """Shape (p,)."""
+    covariance: Array
+    """Shape (p, p)."""
+    told: Array
+    """Which parameters the rows tell, shape (p,), bool."""
+    residuals: Array
+    """Shape (N, n); NaN where a row was left out."""
+    condition: float
+    """Of the scaled columns that are told."""
+
+
+def slopes(t: Array, values: Array, half: float) -> Array:
+    """Slope of a straight line through the samples within ``half`` of each instant, at least one either side.
+
+    Args:
+        t: [s], shape (N,), increasing, N >= 3.
+        values: Shape (N, n).
+        half: [s]
+    """
+    n, half = len(t), half * (1 + 1e-6)  # a step that is the half window but for rounding is in it
+    first = np.minimum(np.searchsorted(t, t - half, side="left"), np.arange(n) - 1).clip(0)
+    last = np.maximum(np.searchsorted(t, t + half, side="right") - 1, np.arange(n) + 1).clip(None, n - 1)
+    origin = t[0]
+    x = t - origin
+    sums = [
+        np.concatenate([[np.zeros_like(a[0])], np.cumsum(a, axis=0)])
+        for a in (x, x * x, values, x[:, None] * values)
+    ]
+    sx, sxx, sy, sxy = (s[last + 1] - s[first] for s in sums)
+    count = (last - first + 1).astype(float)
+    below = count * sxx - sx**2
+    return np.asarray((count[:, None] * sxy - sx[:, None] * sy) / below[:, None])
+
+
+def friction(qd: Array) -> Array:
+    """What Coulomb and viscous friction and an offset add to each torque, per unit, from speeds (N, n).
+
+    Returns:
+        Shape (N, n, 3 n): first the Coulomb frictions of all joints, then the viscous ones, then the offsets.
+    """
+    n = qd.shape[1]
+    found = np.zeros((*qd.shape, 3 * n))
+    j = np.arange(n)
+    found[:, j, j], found[:, j, n + j], found[:, j, 2 * n + j] = np.sign(qd), qd, 1.0
+    return found
+
+
+def fit(columns: Array, measured: Array, used: NDArray[np.bool_]) -> Fitted:
+    """Weighted least squares with a variance per joint and correlated neighbours.
+
+    Args:
+        columns: Shape (N, n, p).
+        measured: Shape (N, n).
+        used: Which rows count, shape (N, n), bool.
+    """
+    p = columns.shape[-1]
+    A, b = columns[used], measured[used]
+    joint = np.broadcast_to(np.arange(measured.shape[1]), used.shape)[used]
+    scale = np.linalg.norm(A, axis=0)
+    alive = scale > 0
+    scaled = A / np.where(alive, scale, 1.0)
+    weights = np.ones(len(b))
+    keep, told = _basis(scaled)
+    x = np.zeros(p)
+    for _ in range(3):
+        W = (scaled * weights[:, None]) @ keep
+        # TOLD bounds the condition, so that its square is far from what a float holds.
+        x = keep @ np.linalg.solve(W.T @ W, W.T @ (weights * b))
+        r = b - scaled @ x
+        sigma = np.array(
+            [
+                np.sqrt(np.mean(r[joint == j] ** 2)) if (joint == j).any() else 1.0
+                for j in range(used.shape[1])
+            ]
+        )
+        weights = 1.0 / np.maximum(sigma[joint], 1e-9)
+    residuals = np.full(measured.shape, np.nan)
+    residuals[used] = r
+    W = (scaled * weights[:, None]) @ keep
+    inverse = np.linalg.inv(W.T @ W)
+    inflation = _inflation(residuals)[joint]
+    alone = float((1 / inflation).sum())  # rows, as many as would say as much if each were alone
+    freedom = alone / max(alone - keep.shape[1], 1.0)
+    middle = (W * inflation[:, None]).T @ W * freedom
+    covariance = keep @ inverse @ middle @ inverse @ keep.T
+    singular = np.linalg.svd(W, compute_uv=False)
+    back = np.where(alive, scale, 1.0)
+    return Fitted(
+        x / back,
+        covariance / np.outer(back, back),
+        told & alive,
+        residuals,
+        float(singular[0] / singular[-1]),
+    )
+
+
+def _basis(scaled: Array) -> tuple[Array, Array]:
+    """Directions of the parameters that the rows tell, shape (p, k); which parameters lie in them wholly."""
+    _, s, vt = np.linalg.svd(np.linalg.qr(scaled, mode="r"), full_matrices=True)
+    s = np.concatenate([s, np.zeros(vt.shape[0] - len(s))])
+    good = s * TOLD > s[0]
+    hidden = (vt[~good] ** 2).sum(axis=0)
+    return vt[good].T, hidden < 1e-6
+
+
+def _inflation(residuals: Array) -> Array:
+    """How much variances grow because neighbouring residuals are alike, per joint, at least 1, shape (n,)."""
+    found = []
+    for r in residuals.T:
+        both = np.isfinite(r[1:]) & np.isfinite(r[:-1])
+        if both.sum() < LEAST:
+            found.append(1.0)
+            continue
+        a, b = r[1:][both], r[:-1][both]
+        rho = float((a * b).sum() / max(np.sqrt((a * a).sum() * (b * b).sum()), 1e-300))
+        rho = min(max(rho, 0.0), 0.999)
+        found.append((1 + rho) / (1 - rho))
+    return np.array(found)
+
+
+# -- the robot ----------------------------------------------------------------------------------
+
+
+class Dynamics:
+    """Inverse dynamics of one robot as the file has it, and of a payload on its flange."""
+
+    def __init__(self, model: Model, mechanism: Mechanism) -> None:
+        self._mj = model.mj.__copy__()
+        self._data = mujoco.MjData(self._mj)
+        self._robot = mechanism
+        self.flange = model.frames[f"{mechanism.name}/{mechanism.description.tip}"].mj
+        points = np.array([[1, *x, *(x[i] * x[j] for i, j in MOMENTS)] for x in POINTS])
+        self._of_points = np.linalg.inv(points)
+
+    def _needed(self) -> Array:
+        mj, data, found = self._mj, self._data, np.zeros(self._mj.nv)
+        mujoco.mj_comPos(mj, data)
+        mujoco.mj_comVel(mj, data)
+        mujoco.mj_rne(mj, data, 1, found)
+        found += mj.dof_armature * data.qacc
+        return np.asarray(self._robot.coupling.T @ found[self._robot.v_address])
+
+    def __call__(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
+        """Torques that the motion needs (N, n) [N·m or N], and of each figure of a payload (N, n, 10)."""
+        mj, data, robot = self._mj, self._data, self._robot
+        N, n = q.shape
+        needed, columns = np.zeros((N, n)), np.zeros((N, n, len(POINTS)))
+        own = [x[self.flange].copy() for x in (mj.body_mass, mj.body_ipos, mj.body_inertia)]
+        for i in range(N):
+            data.qpos[robot.q_address] = robot.coupling @ q[i] + robot.offset
+            data.qvel[robot.v_address] = robot.coupling @ qd[i]
+            data.qacc[:] = 0.0
+            data.qacc[robot.v_address] = robot.coupling @ qdd[i]
+            mujoco.mj_kinematics(mj, data)
+            needed[i] = self._needed()
+            mj.body_mass[self.flange], mj.body_inertia[self.flange] = 0.0, 0.0
+            mujoco.mj_kinematics(mj, data)
+            empty = self._needed()
+            mj.body_mass[self.flange] = 1.0
+            for k, point in enumerate(POINTS):
+                mj.body_ipos[self.flange] = point
+                mujoco.mj_kinematics(mj, data)
+                columns[i, :, k] = self._needed() - empty
+            mj.body_mass[self.flange], mj.body_ipos[self.flange], mj.body_inertia[self.flange] = own
+        # Each point mass is a payload; all payloads are sums of them.
+        return needed, columns @ self._of_points.T
+
+
+@dataclass(frozen=True, eq=False)
+class JointExplained:
+    """How well a joint's torques are explained."""
+
+    name: str
+    unit: str
+    mean: float
+    """Of measured less needed, with the file's model [N·m or N]."""
+    rms: float
+    largest: float
+    """By size."""
+    coulomb: Figure
+    """[N·m or N]"""
+    viscous: Figure
+    """[N·m·s/rad or N·s/m]"""
+    offset: Figure
+    """[N·m or N]"""
+    moves: bool
+    """Whether it moves in the log; else its friction is not told, and may hold it."""
+    left: float
+    """Root mean square that the fit leaves [N·m or N]; of a joint that does not move, the payload alone."""
+    asked: float
+    """What may be left for it to be explained."""
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What explains the torques of a log."""
+
+    robot: str
+    source: str
+    samples: int
+    moving: int
+    """Of them, those in which some joint moves."""
+    joints: tuple[JointExplained, ...]
+    payload: Figure
+    """Mass on the flange beside what the file has there [kg]."""
+    com: tuple[Figure, Figure, Figure]
+    """Its centre of mass in the flange's frame [m]; not told where there is no mass to speak of."""
+    carried: float
+    """Mass that the file has there [kg]."""
+    mass: float
+    """Of all that the joints move, as the file has it [kg]."""
+    condition: float
+
+    @property
+    def unexplained(self) -> tuple[str, ...]:
+        """Joints that move, of which more is left than asked."""
+        return tuple(j.name for j in self.joints if j.moves and j.left > j.asked)
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Joints that stand, of which more is left than asked: friction may hold them, or something else."""
+        return tuple(j.name for j in self.joints if not j.moves and j.left > j.asked)
+
+    @property
+    def slack(self) -> float:
+        """Up to this a mass that is missing does not count [kg]."""
+        return max(PAYLOAD[0] * self.mass, PAYLOAD[1])
+
+    @property
+    def explains(self) -> bool | None:
+        """Whether the model of the file explains the log, friction apart; None when the motion tells not."""
+        low, high = self.payload.value - self.payload.half, self.payload.value + self.payload.half
+        if self.unexplained or low > self.slack or high < -self.slack:
+            return False
+        told = self.payload.told and max(abs(low), abs(high)) <= self.slack
+        return True if told and not self.held else None
+
+
+def explain(model: Model, name: str, said: Said) -> Explanation:
+    """Compare measured torques with those that the model needs, and fit what would close the gap.
+
+    Args:
+        model: The compiled workstation.
+        name: The robot.
+        said: What its source says; torques are needed.
+
+    Raises:
+        InputError: No torques, too little motion, masses that nobody gave, or a robot that is moved.
+    """
+    robot = model.robot(name)
+    _refuse(model, robot, said)
+    assert said.tau is not None
+    qd = said.qd if said.qd is not None else slopes(said.t, said.q, HALF_WINDOW)
+    qdd = slopes(said.t, qd, HALF_WINDOW)
+    rows = _spread(len(said.t), MOST)
+    q, qd, qdd, tau = (np.asarray(x[rows]) for x in (said.q, qd, qdd, said.tau))
+    dynamics = Dynamics(model, robot)
+    needed, payload = dynamics(q, qd, qdd)
+    n = len(robot.joints)
+    used = np.abs(qd) > np.array([SLOW[unit] for unit in robot.units])
+    moving = int(used.any(axis=1).sum())
+    gap = tau - needed
+    if moving < LEAST:
+        what = f"{name} moves in {moving} of {len(rows)} samples: a joint that stands may stick"
+        raise InputError.at(
+            said.file, "torques", what, f"log a motion in which joints move, {LEAST} samples or more"
+        )
+    found = fit(np.concatenate([payload, friction(qd)], axis=-1), gap, used)
+    figures = [
+        Figure(float(x), float(NORMAL_95 * np.sqrt(max(v, 0.0))) if told else float("inf"))
+        for x, v, told in zip(found.values, np.diag(found.covariance), found.told, strict=True)
+    ]
+    joints = []
+    for j, joint in enumerate(robot.joints):
+        limit = robot.effort_limits[j]
+        asked = ASKED * (float(np.abs(tau[:, j]).max()) if limit is None else limit.value)
+        moves = bool(used[:, j].any())
+        r = (
+            found.residuals[used[:, j], j]
+            if moves
+            else gap[:, j] - payload[:, j] @ found.values[: len(POINTS)]
+        )
+        joints.append(
+            JointExplained(
+                joint.name,
+                "N·m" if robot.units[j] == "rad" else "N",
+                float(gap[:, j].mean()),
+                float(np.sqrt((gap[:, j] ** 2).mean())),
+                float(np.abs(gap[:, j]).max()),
+                figures[len(POINTS) + j],
+                figures[len(POINTS) + n + j],
+                figures[len(POINTS) + 2 * n + j],
+                moves=moves,
+                left=float(np.sqrt((r**2).mean())),
+                asked=asked,
+            )
+        )
+    carried = {model.bodies[i].owner: model.bodies[i].mass for i in robot.carried}
+    return Explanation(
+        robot=name,
+        source=said.file,
+        samples=len(rows),
+        moving=moving,
+        joints=tuple(joints),
+        payload=figures[0],
+        com=_centre(found, figures),
+        carried=sum(mass.value for mass in carried.values() if mass is not None),
+        mass=float(model.mj.body_mass[robot.mj_bodies].sum()),
+        condition=found.condition,
+    )
+
+
+def _centre(found: Fitted, figures: list[Figure]) -> tuple[Figure, Figure, Figure]:
+    """Centre of mass h / m, its variance to first order."""
+    m, vm = found.values[0], found.covariance[0, 0]
+    none = Figure(float("nan"), float("inf"))
+    if not figures[0].told or abs(m) <= 2 * figures[0].half:
+        return none, none, none
+    parts = []
+    for k in range(1, 4):
+        c = found.values[k] / m
+        v = (found.covariance[k, k] - 2 * c * found.covariance[0, k] + c * c * vm) / m**2
+        parts.append(Figure(float(c), float(NORMAL_95 * np.sqrt(max(v, 0.0)))) if figures[k].told else none)
+    return parts[0], parts[1], parts[2]
+
+
+def _spread(n: int, most: int) -> NDArray[np.int64]:
+    """At most so many rows, evenly, and in stretches so that neighbours stay neighbours."""
+    if n <= most:
+        return np.arange(n, dtype=np.int64)
+    stretch, count = most // 20, 20
+    starts = np.linspace(0, n - stretch, count).astype(int)
+    return np.unique((starts[:, None] + np.arange(stretch)).ravel()).astype(np.int64)
+
+
+def _refuse(model: Model, robot: Mechanism, said: Said) -> None:
+    if said.tau is None:
+        remedy = "log measured torques: actual_current_as_torque of RTDE, measured torques of FRI"
+        raise InputError.at(said.file, "torques", f"the source of {robot.name} measures none", remedy)
+    if len(said.t) < LEAST:
+        raise InputError.at(said.file, "torques", f"{len(said.t)} valid samples", f"log {LEAST} or more")
+    robot.require_masses("seerob explain")
+    if robot.unknown_masses:
+        what = "; ".join(robot.unknown_masses)
+        raise InputError.at(said.file, robot.name, what, f"give them in masses of {robot.name}")
+    if not robot.alone:
+        what = f"{robot.name} is moved, or moves others: what that takes is in its torques"
+        raise InputError.at(
+            said.file, robot.name, what, "explain a log of the robot alone, in a cell without them"
+        )

@@ -1,0 +1,227 @@
+"""Opening the sources of a workstation: what each is told of what it drives, and how long it counts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import islice
+
+import numpy as np
+from msgspec.structs import replace
+
+from seerob.core.errors import InputError, Problem
+from seerob.core.plugin import home, kind_of
+from seerob.core.samples import JointSample
+from seerob.core.snapshot import Finding
+from seerob.core.transforms import Array
+from seerob.devices.live.listening import LiveSource, delay_of
+from seerob.devices.live.looked_at import looked_at
+from seerob.devices.variables.live_source import VariablesSource
+from seerob.files.plausible import noise_of_speeds, quantities
+from seerob.files.trajectories.trajectory import TrajectorySamples
+from seerob.model.model import Model
+from seerob.model.mounting.compilation import pose_matrix
+from seerob.model.mounting.in_place import implausible_motion
+from seerob.twin.own_words import compared, said_by
+from seerob.workstation.plausibility.of_file import findings as implausible
+from seerob.workstation.source import Matrix4, Opened, Source, Target
+
+FIRST, LOOKS = 2000, 8
+"""Samples at the begin of a recorded motion, and how many of them are looked at for where it goes."""
+MOST_NAMED = 5
+"""Variables in one finding."""
+
+
+def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
+    """Open every source of the workstation and check it against what it drives.
+
+    Raises:
+        InputError: With every mistake in every file.
+    """
+    opened: list[tuple[Source, Opened]] = []
+    problems: list[Problem] = []
+    file = next(iter(model.workstation.files), "workstation")
+    delay = delay_of(model.workstation.sources)
+    for i, source in enumerate(model.workstation.sources):
+        if isinstance(source, LiveSource) and source.timeout <= delay:
+            what = (
+                f"{source.timeout:g} s is not longer than the delay of {delay:g} s of the slowest live source"
+            )
+            problems.append(Problem(file, f"sources[{i}].timeout", what, "give a longer one"))
+        problems += _too_short(model, source, delay)
+        try:
+            driven = source_target(model, source)
+            found = source.open(model.folder, driven)
+            if not (_ships(source) or isinstance(source, LiveSource)):
+                found = looked_at(found, source.name or kind_of("sources", source), driven)
+            found = replace(found, findings=(*found.findings, *_lateness(model, source)))
+            opened.append((source, _compared(model, i, source, found)))
+        except InputError as error:
+            problems += (_placed(problem, source, f"sources[{i}].file", file) for problem in error.problems)
+    if problems:
+        raise InputError(problems)
+    if opened and (found := implausible_motion(model, _begins(model, opened))):
+        source, first = opened[0]
+        opened[0] = source, replace(first, findings=(*first.findings, *found))
+    return tuple(opened)
+
+
+def _ships(source: Source) -> bool:
+    """Whether it is one of those whose files are looked at where they are read."""
+    return type(source).__module__.startswith(f"{home('sources')}.")
+
+
+def _begins(model: Model, opened: Sequence[tuple[Source, Opened]]) -> dict[str, list[Array]]:
+    """Joint positions of robots and people at some instants of the first samples of recorded sources."""
+    found: dict[str, list[Array]] = {}
+    for source, one in opened:
+        if isinstance(source, LiveSource) or source.target() not in model.mechanisms:
+            continue
+        # What devices saw of a person becomes a posture only in the loop.
+        if not isinstance(next(iter(one.samples), None), JointSample):
+            continue
+        said = [s for s in islice(one.samples, FIRST) if isinstance(s, JointSample) and s.placed]
+        n = len(model.mechanisms[source.target()].joints)
+        q = [np.array(s.q) for s in said[:: max(1, -(-len(said) // LOOKS))] if len(s.q) == n]
+        if q and np.isfinite(q).all():
+            found[source.target()] = q
+    return found
+
+
+def _too_short(model: Model, source: Source, delay: float) -> Iterator[Problem]:
+    """Variables that would be too old whenever they are shown."""
+    for variable in model.dictionary.values() if isinstance(source, LiveSource) else ():
+        if variable.source == source.name and variable.timeout <= delay and not variable.write:
+            what = f"{variable.timeout:g} s is not longer than the delay of {delay:g} s of the slowest source"
+            key = f"variables ({variable.name}).timeout"
+            yield Problem(model.workstation.variables or "", key, what, "give a longer one")
+
+
+def _lateness(model: Model, source: Source) -> Iterator[Finding]:
+    """What nobody would see of how late variables are heard."""
+    if not isinstance(source, VariablesSource):
+        return
+    blind = [
+        v.name
+        for v in model.dictionary.values()
+        if v.source == source.name and not (v.write or source.times(v))
+    ]
+    if not blind:
+        return
+    shown = ", ".join(blind[:MOST_NAMED]) + (" …" if len(blind) > MOST_NAMED else "")
+    text = f"no time is sent with {shown}: a delay on the way is not seen"
+    if source.delay is None:
+        yield Finding(
+            level="warning",
+            subject=source.name,
+            text=f"{text}, and what moves by it is undecided: give the time of the value, or delay",
+        )
+    else:
+        yield Finding(
+            level="assumed", subject=source.name, text=f"{text}; the file says {source.delay:g} s at most"
+        )
+
+
+def _compared(model: Model, i: int, source: Source, opened: Opened) -> Opened:
+    """The same, with what is implausible of it, and what it says of itself compared with what it drives."""
+    name = source.target()
+    if isinstance(source, LiveSource) or name not in model.mechanisms:
+        return opened
+    found = list(opened.findings)
+    if isinstance(opened.samples, TrajectorySamples):
+        limits = [None if v is None else v.value for v in model.mechanisms[name].velocity_limits]
+        every = quantities(opened.samples.trajectory, limits, key=f"sources[{i}]", about=name)
+        found += implausible(every, model.workstation.confirmed)
+        motion = opened.samples.trajectory
+        if motion.qd is None or opened.samples.qd is not motion.qd:
+            noise = noise_of_speeds(motion, model.mechanisms[name].description, name)
+            found += [] if noise is None else [noise]
+    said = said_by(opened.samples, getattr(source, "file", source.name))
+    if said is not None:
+        found += compared(model, name, said)
+    return replace(opened, findings=tuple(found))
+
+
+def _placed(problem: Problem, source: Source, key: str, file: str) -> Problem:
+    """Of a data file that cannot be read at all, the place where the workstation file names it."""
+    if problem.key or problem.file != getattr(source, "file", None):
+        return problem
+    return Problem(file, key, f"{problem.file}: {problem.what}", problem.remedy)
+
+
+def target(model: Model, name: str) -> Target | None:
+    """What a source needs to know of the robot or human it drives; None for no name."""
+    if not name:
+        return None
+    mechanism = model.mechanism(name)
+    table = next((r for r in model.workstation.robots if r.name == name), None)
+    return Target(
+        name=name,
+        joints=tuple(joint.name for joint in mechanism.joints),
+        units=mechanism.units,
+        lower=tuple(mechanism.lower.tolist()),
+        upper=tuple(mechanism.upper.tolist()),
+        velocity=tuple(None if v is None else v.value for v in mechanism.velocity_limits),
+        acceleration=() if table is None else table.acceleration_limits or (),
+        jerk=() if table is None else table.jerk_limits or (),
+        description=mechanism.description,
+        world_from_base=_world_from_base(model, name),
+        frames=tuple(f.name for f in model.frames.values() if f.mj in mechanism.mj_bodies),
+    )
+
+
+def source_target(model: Model, source: Source) -> Target | None:
+    """What a source needs to know: of what it drives, or of the variables that it reads."""
+    driven = target(model, source.target())
+    variables = tuple(v for v in model.dictionary.values() if v.source == source.name)
+    if not source.reads_variables:
+        return driven
+    return replace(driven or Target(), variables=variables, folder=str(model.folder))
+
+
+def signal_timeouts(model: Model) -> tuple[dict[str, float], dict[str, float]]:
+    """Time-outs [s] of the variables, and of the machines that follow those, by name.
+
+    Of a variable its own counts, or that of its source when that is shorter, whether or not the source still
+    has a connection; of one that is read from a file only that of the file, which is not asked.
+    """
+    delay = delay_of(model.workstation.sources)
+    sources = {s.name: s for s in model.workstation.sources}
+    timeouts = {
+        name: min(variable.timeout, source.timeout) - delay
+        if isinstance(source, LiveSource)
+        else source.timeout
+        for name, variable in model.dictionary.items()
+        if (source := sources[variable.source]).reads_variables
+    }
+    followed = {m.name: m.motion.variables() for m in model.workstation.machines}
+    return timeouts, {name: min(timeouts[v] for v in by) for name, by in followed.items() if by}
+
+
+def untimed(model: Model) -> dict[str, str]:
+    """Why nobody knows how late a variable is heard, by name: its device sends no time, the file no bound."""
+    sources = {s.name: s for s in model.workstation.sources}
+    return {
+        name: f"{name}: {source.name} sends no time and cannot be asked for it: nobody knows how late "
+        "it is; give the time of the value, or a bound on its lateness as delay of the source"
+        for name, variable in model.dictionary.items()
+        if isinstance(source := sources[variable.source], VariablesSource)
+        and source.delay is None
+        and not variable.write
+        and not source.times(variable)
+    }
+
+
+def _world_from_base(model: Model, name: str) -> Matrix4 | None:
+    station = model.workstation
+    standing = {r.name: r.base for r in station.robots if r.on is None}
+    places = {**standing, **{h.name: h.at for h in station.humans}}
+    if name not in places:
+        return None
+    a, b, c, d = (tuple(row) for row in pose_matrix(places[name]).tolist())
+    return a, b, c, d
+
+
+def coarse(model: Model) -> dict[str, str]:
+    """Robots and humans that are heard too coarsely for energies and forces, and why."""
+    said = ((source.target(), source.coarse(model.folder)) for source in model.workstation.sources)
+    return {name: why for name, why in said if why}

@@ -1,0 +1,150 @@
+"""Where everybody else is while the robot moves: the twin of a run, kept tick by tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from seerob.core.errors import Undecided
+from seerob.core.snapshot import Result
+from seerob.core.transforms import Array
+from seerob.model.model import Mechanism, Model
+from seerob.twin.state import Hearing, State
+from seerob.twin.whereabouts.hearing import Places
+from seerob.workstation.variables.dictionary import Value
+
+
+class Seen(NamedTuple):
+    """How far bones may be from where the twin has them; see `seerob.twin.whereabouts.hearing.Hearing`."""
+
+    bones: dict[str, tuple[float | None, float | None]]
+    unaimed: Mapping[str, float]
+    """Hands, feet and heads of which only the joint was seen, each with a bound [rad]."""
+    slack: Mapping[str, float]
+    """Bones that are held or seen elsewhere, too, each with how much farther they may be [m]."""
+
+
+class Witness:
+    """Stands beside the judge of a run and keeps where the twin is and what may be doubted.
+
+    Attributes:
+        t: Instants of the ticks [s].
+    """
+
+    def __init__(self, judge: Callable[[State], tuple[Result, ...]]) -> None:
+        self._judge = judge
+        self.t: list[float] = []
+        self._qpos: list[Array] = []
+        self._qvel: list[Array] = []
+        self._doubts: list[dict[str, str]] = []
+        self._heard: list[dict[str, Value | Undecided]] = []
+        self._seen: list[dict[str, Seen]] = []
+
+    def __call__(self, state: State) -> tuple[Result, ...]:
+        """Take one tick; what the judge says goes on."""
+        self.t.append(state.t)
+        self._qpos.append(np.array(state.data.qpos))
+        self._qvel.append(np.array(state.data.qvel))
+        self._doubts.append({name: state.doubt(name) for name in state.hearings})
+        asked = {c.active for c in state.model.workstation.safety if c.active is not None}
+        self._heard.append({name: _heard(state, name) for name in asked})
+        people = {name: h for name, h in state.hearings.items() if h.bones}
+        t = state.t
+        self._seen.append({name: Seen(dict(h.bones), h.unaimed(t), h.slack(t)) for name, h in people.items()})
+        return self._judge(state)
+
+    def _tick(self, t: float) -> int:
+        """The tick that is nearest to an instant [s]."""
+        k = int(np.clip(np.searchsorted(self.t, t), 1, max(len(self.t) - 1, 1)))
+        if k >= len(self.t):
+            return len(self.t) - 1
+        return k if self.t[k] - t < t - self.t[k - 1] else k - 1
+
+    def others(self, t: float) -> tuple[Array, Array, dict[str, str]]:
+        """Positions, velocities and doubts of the whole twin at the tick that is nearest to ``t`` [s]."""
+        k = self._tick(t)
+        return self._qpos[k], self._qvel[k], self._doubts[k]
+
+    def heard(self, t: float) -> tuple[dict[str, Value | Undecided], dict[str, Seen]]:
+        """What switches criteria, as machines said it at the tick that is nearest to ``t`` [s], or why not.
+
+        Also how far bones of people whom devices see may be from where the twin has them.
+        """
+        k = self._tick(t)
+        return self._heard[k], self._seen[k]
+
+    def moves(self, mechanism: Mechanism) -> bool:
+        """Whether somebody ever moved."""
+        q = np.array(self._qpos)[:, mechanism.q_address]
+        return bool((np.ptp(q, axis=0) > 1e-3).any()) if len(q) else False
+
+
+def _heard(state: State, name: str) -> Value | Undecided:
+    try:
+        return state.signals.value(name, state.t)
+    except Undecided as why:
+        return why
+
+
+class Posed(State):
+    """A state that is put together: the robot where the path has it, all others as they were seen."""
+
+    def __init__(self, model: Model, robot: Mechanism, witness: Witness) -> None:
+        """At home until `place` is called."""
+        data: Any = mujoco.MjData(model.mj)
+        hearings = {name: Hearing(given=True, driven=False) for name in model.mechanisms}
+        super().__init__(model, data, hearings)
+        self._robot, self._witness = robot, witness
+        self.doubts: dict[str, str] = {}
+        """Why somebody's place may not be relied on, by name; empty when it may."""
+        self._said: dict[str, Value | Undecided] = {}
+        self.foresee = self._steady
+
+    def _steady(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
+        """A speed that a place permits is one that is held there; the run of the plan knows better."""
+        if name != self._robot.name:
+            return None
+        q, qd = self.joint_positions(self._robot), self.data.qvel[self.columns[name].own_v]
+        return np.tile(q, (len(t), 1)), np.tile(qd, (len(t), 1)), ""
+
+    def place(self, t: float, others_at: float, q: Array, qd: Array, own_doubt: str = "") -> None:
+        """Put everybody where they are.
+
+        Args:
+            t: Instant that criteria with a memory are told [s].
+            others_at: When the others were seen [s].
+            q: Of the robot [rad or m], shape (n,).
+            qd: Likewise [rad/s or m/s].
+            own_doubt: Why the robot's position may not be relied on.
+        """
+        qpos, qvel, doubts = self._witness.others(others_at)
+        self.data.qpos[:], self.data.qvel[:] = qpos, qvel
+        robot = self._robot
+        self.data.qpos[robot.q_address] = robot.coupling @ q + robot.offset
+        self.data.qvel[robot.v_address] = robot.coupling @ qd
+        self.doubts = {**doubts, robot.name: own_doubt}
+        self._said, seen = self._witness.heard(others_at)
+        for name, hearing in self.hearings.items():
+            hearing.bones, unaimed, slack = seen.get(name, Seen({}, {}, {}))
+            hearing.aims = [(t, unaimed)]
+            hearing.places = [(t, Places(frozenset(), frozenset(), slack))]
+        self.asked.clear()
+        self.refresh(t)
+
+    def whole_doubt(self, name: str) -> str:
+        """See `State.whole_doubt`; of the others what the run knew of them then, of any bone."""
+        return self.doubts.get(name, "")
+
+    def signal(self, name: str) -> Value:
+        """See `State.signal`; what the run heard then, of variables that switch criteria."""
+        said = self._said[name]
+        if isinstance(said, Undecided):
+            raise said
+        return said
+
+
+Clock = Callable[[float], float]
+"""When the others are to be seen, for when the given motion was there [s]."""

@@ -1,0 +1,199 @@
+"""A plan: postures to go through, and what is known of the way between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seerob.core.errors import InputError, Problem
+from seerob.core.transforms import Array
+from seerob.model.model import Mechanism, Model
+from seerob.session.planning.clearance import Clearance
+from seerob.session.planning.others import made_for, movers
+from seerob.session.planning.search import NoPath, search
+
+LIMIT = 1e-9
+"""Beyond a limit by less is rounding [rad or m]."""
+MOST = 20_000
+"""Postures tried per way."""
+PERSON = "; where people go is not known"
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A path of one robot, straight in joint space from posture to posture."""
+
+    robot: str
+    joints: tuple[str, ...]
+    q: Array
+    """Postures [rad or m], shape (k, n)."""
+    margin: float
+    """Kept everywhere on it [m]; proven for the shapes of the twin."""
+    least: float
+    """Bound from below on the distance to anything, on all of it [m]."""
+    nearest: str
+    """What is nearest to what at the posture of the path that is nearest to anything."""
+    seed: int
+    asked: int
+    """Postures whose distances were computed."""
+    left_out: tuple[str, ...]
+    """Pairs of the robot's own bodies that are not watched."""
+    at: tuple[int, ...] = ()
+    """Rows of ``q`` at which the start and each goal are."""
+    around: tuple[str, ...] = ()
+    """How everybody else was taken, one sentence each."""
+
+    @property
+    def others(self) -> str:
+        """That everything else stands, or that what is said of it follows."""
+        return "; of the others:" if self.around else ", while everything else stands."
+
+    def toml(self) -> str:
+        """A file of waypoints, for the source ``waypoints``."""
+        head = [
+            f"# Planned for {self.robot} with seed {self.seed}: straight joint moves between these postures",
+            f"# keep at least {self.margin:g} m from everything, by the twin's shapes{self.others}",
+            *(f"# - {text}" for text in self.around),
+            "# A blend would leave the proven way. Preliminary: not executed by any controller.",
+            f"# joints: {', '.join(self.joints)}",
+        ]
+        rows = [f"[[waypoints]]\nq = [{', '.join(f'{x:.9f}' for x in q)}]" for q in self.q.tolist()]
+        return "\n".join([*head, "", "\n\n".join(rows), ""])
+
+
+def plan(
+    model: Model,
+    robot: str,
+    goals: Sequence[ArrayLike],
+    *,
+    start: Sequence[float] | None = None,
+    margin: float = 0.02,
+    seed: int = 1,
+    seconds: float = 60.0,
+    keep_out: Sequence[str] = (),
+    places: Mapping[str, Array] | None = None,
+    swept: Collection[str] = (),
+    say: Callable[[int], bool] = lambda tried: False,
+) -> Plan:
+    """A path from a start through goals that keeps a margin from everything, proven between postures too.
+
+    Everybody else stands where ``places`` or the workstation file puts them, unless an area that they sweep
+    is in their place. Areas are looked at only where ``keep_out`` names them.
+
+    Args:
+        model: The compiled workstation.
+        robot: Who moves.
+        goals: Joint positions to go through, (n,) each [rad or m]; or (k, n), of which the
+            first that is clear is taken: the ways of reaching one pose.
+        start: Where it begins [rad or m]; its ``q`` in the file when not given.
+        margin: Least distance from anything, itself included [m].
+        seed: Same model, same seed, same path.
+        seconds: Longest time per goal [s].
+        keep_out: Areas that are kept away from like everything else.
+        places: Joint positions of others by name [rad or m], (n,) each, instead of those of the file.
+        swept: Others that are looked through, as an area of ``keep_out`` is what they sweep.
+        say: Told how many postures were tried; True stops the work.
+
+    Raises:
+        UnknownName: No such robot or area.
+        InputError: No start, a posture of another length, beyond a limit, or nearer than the margin.
+        NoPath: None was found; that there is none is not known.
+        Stopped: ``say`` said so.
+    """
+    mechanism = model.robot(robot)
+    if start is None and not mechanism.home_given:
+        raise InputError.at(
+            "plan",
+            "start",
+            f"nobody says where {robot} is",
+            "give its q in the file, or a start (--from on the command line)",
+        )
+    if not goals:
+        raise InputError.at("plan", "goal", "missing", "give joint positions to go to")
+    if not (margin >= 0 and np.isfinite(margin)):
+        raise InputError.at("plan", "margin", f"{margin} m", "give 0 or more")
+    ways = [
+        np.asarray(mechanism.home if start is None else start, float),
+        *(np.asarray(g, float) for g in goals),
+    ]
+    names = ["start", *(f"goal {i + 1}" for i in range(len(goals)))]
+    problems: list[Problem] = []
+    for name, q in zip(names, ways, strict=True):
+        problems += _wrong(mechanism, name, q)
+    if problems:
+        raise InputError(problems)
+    clearance = Clearance(model, mechanism, ways[0], keep_out=keep_out, places=places, swept=swept)
+    ways = [_first_clear(clearance, q, margin) for q in ways]
+    for name, q in zip(names, ways, strict=True):
+        what = clearance.fault(q, margin)
+        if what:
+            problems.append(Problem("plan", name, what, "choose another posture or a smaller margin"))
+    if problems:
+        raise InputError(problems)
+    path, at = [ways[0]], [0]
+    for (a, b), (first, second) in zip(pairwise(ways), pairwise(names), strict=True):
+        try:
+            path += search(clearance, a, b, margin=margin, seed=seed, most=MOST, seconds=seconds, say=say)[1:]
+        except NoPath as error:
+            remedy = "give a posture in between, more seconds, another seed, or a smaller margin"
+            raise NoPath(f"from {first} to {second}: {error}; {remedy}") from error
+        at.append(len(path) - 1)
+    least = min((clearance.least(a, b) for a, b in pairwise(path)), default=np.inf)
+    near = [found for q in path if (found := clearance.nearest(q)) is not None]
+    return Plan(
+        robot=robot,
+        joints=tuple(j.name for j in mechanism.joints),
+        q=np.array(path),
+        margin=margin,
+        least=float(max(least, margin)),
+        nearest=min(near, key=lambda n: n.distance).what if near else "",
+        seed=seed,
+        asked=clearance.asked,
+        left_out=clearance.left_out,
+        at=tuple(at),
+        around=_around(model, robot, keep_out, places or {}, swept),
+    )
+
+
+def _around(
+    model: Model, robot: str, keep_out: Sequence[str], places: Mapping[str, Array], swept: Collection[str]
+) -> tuple[str, ...]:
+    moving = movers(model.workstation, robot)
+    said = []
+    for name, other in model.mechanisms.items():
+        if name == robot:
+            continue
+        if name in swept:
+            said.append(f"{name}: all that it sweeps while its source plays is kept away from")
+        elif name in places and name in moving:
+            said.append(f"{name}: stands where its source has it at the instant that was given")
+        elif name in moving:
+            said.append(f"{name}: stands where the file puts it, although a source moves it")
+        else:
+            said.append(f"{name}: stands where the file puts it" + PERSON * (other.role == "human"))
+    said += [f"area {name}: kept away from" for name in keep_out if name not in made_for(swept)]
+    looked_through = [a.name for a in model.workstation.areas if a.name not in keep_out]
+    if looked_through:
+        said.append(f"areas that are looked through: {', '.join(looked_through)}")
+    return tuple(said)
+
+
+def _first_clear(clearance: Clearance, ways: Array, margin: float) -> Array:
+    rows = np.atleast_2d(ways)
+    return next((q for q in rows if not clearance.fault(q, margin)), rows[0])
+
+
+def _wrong(robot: Mechanism, name: str, ways: Array) -> Iterator[Problem]:
+    n = len(robot.joints)
+    if ways.ndim not in (1, 2) or not ways.size or ways.shape[-1] != n:
+        yield Problem("plan", name, f"an array of shape {ways.shape}", f"give {n} numbers [rad or m]")
+        return
+    for q in np.atleast_2d(ways):
+        for joint, low, value, high in zip(robot.joints, robot.lower, q, robot.upper, strict=True):
+            if not low - LIMIT <= value <= high + LIMIT:
+                what = f"{joint.name} at {value:.4g} is beyond its limits {low:.4g} and {high:.4g}"
+                yield Problem("plan", name, what, "choose another posture")

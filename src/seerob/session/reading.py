@@ -1,0 +1,207 @@
+"""Reading a workstation file: typed tables, plug-ins by their kind, and every mistake at once."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+from msgspec import Struct
+
+from seerob.core import plugin
+from seerob.core.errors import InputError, Problem, SeerobError
+from seerob.core.files.toml_file import read_toml
+from seerob.criteria.criterion import Criterion
+from seerob.outputs.sink import Sink
+from seerob.workstation import naming
+from seerob.workstation.conversion import convert, tables
+from seerob.workstation.plausibility.of_file import unknown
+from seerob.workstation.source import Source
+from seerob.workstation.tables.controller_zones import zones_of
+from seerob.workstation.workstation import PLUGINS, TABLES, Robot, Workstation, locate
+
+BASES: dict[str, type[Struct]] = {
+    "sources": Source,
+    "safety": Criterion,
+    "ergonomics": Criterion,
+    "sinks": Sink,
+}
+"""Plug-in table → base class of its entries."""
+
+_NOT_IN_FILE = ("folder", "files")
+_MAX_PROBLEMS = 200
+
+
+class Readable(NamedTuple):
+    """What of a workstation file can be read, and every mistake in it."""
+
+    head: Workstation
+    """What is not in a list of tables; what is wrong there is as if it were not given."""
+    entries: dict[str, dict[int, Any]]
+    """List of tables → number of the entry in the file → the entry, where it could be read; of a
+    robot of the library or a human, what is wrong is as if it were not given."""
+    names: list[naming.Named]
+    """What the file declares, also where it cannot be read."""
+    problems: list[Problem]
+    between: list[Problem]
+    """Those of them that an entry has with others: a name that is taken or leads nowhere."""
+
+
+def read(path: Path | str) -> Workstation:
+    """The workstation of a file or of a folder that contains one.
+
+    Raises:
+        InputError: With every mistake in it: unknown keys, missing keys, wrong types and ranges,
+            unknown kinds, names that are taken or lead nowhere.
+    """
+    found = readable(path)
+    if found.problems:
+        raise InputError(shortened(found.problems))
+    return with_entries(found.head, found.entries)
+
+
+def readable(path: Path | str) -> Readable:
+    """What can be read of a file or of a folder that contains one, beside every mistake in it.
+
+    Raises:
+        InputError: There is no such file, or it is not TOML.
+    """
+    file = locate(path)
+    table, raw = read_toml(file)
+    files = {file.name: raw}
+    problems: list[Problem] = []
+    if "zones" in table:
+        zones = zones_of(table["zones"], file.parent, str(file), problems)
+        files |= zones.files
+        own = table.get("areas", [])
+        table |= {"areas": [*own, *zones.areas] if isinstance(own, list) else own}
+    found = _convert(table, str(file))
+    head = msgspec.structs.replace(found.head, folder=str(file.parent.resolve()), files=files)
+    return found._replace(head=head, problems=[*problems, *found.problems])
+
+
+def convert_workstation(table: Mapping[str, Any], file: str) -> tuple[Workstation | None, list[Problem]]:
+    """The typed workstation of a parsed file, and every mistake that was found."""
+    found = _convert(table, file)
+    if found.problems:
+        return None, shortened(found.problems)
+    return with_entries(found.head, found.entries), []
+
+
+def with_entries(head: Workstation, entries: Mapping[str, Mapping[int, Any]]) -> Workstation:
+    """A workstation of its head and its lists of tables."""
+    return msgspec.structs.replace(head, **{g: tuple(found.values()) for g, found in entries.items()})
+
+
+def shortened(problems: list[Problem]) -> list[Problem]:
+    """At most so many mistakes as anybody reads, and how many more there are."""
+    more = len(problems) - _MAX_PROBLEMS
+    if more <= 0:
+        return problems
+    last = Problem(problems[0].file, "", f"and {more} mistakes more", "mend these first")
+    return [*problems[:_MAX_PROBLEMS], last]
+
+
+def _convert(table: Mapping[str, Any], file: str) -> Readable:
+    problems: list[Problem] = []
+    groups = (*TABLES, *PLUGINS)
+    entries: dict[str, dict[int, Any]] = {}
+    for group in groups:
+        entries[group] = {}
+        for i, table_of_entry in enumerate(tables(table.get(group, []), group, file, problems)):
+            entry = _entry(table_of_entry, group, f"{group}[{i}]", file, problems)
+            if entry is not None:
+                entries[group][i] = entry
+    for group in ("sources", "safety", "ergonomics"):
+        entries[group] = _named(entries[group])
+    head = _head({key: value for key, value in table.items() if key not in groups}, file, problems)
+    names = naming.declared(table)
+    between = naming.check(names, entries, file)
+    problems += unknown(entries["confirmed"], entries, head.engine, file)
+    return Readable(head, entries, names, [*problems, *between], between)
+
+
+def _entry(
+    table: Mapping[str, Any], group: str, key: str, file: str, problems: list[Problem]
+) -> Struct | None:
+    if group in PLUGINS:
+        return _plugin(table, group, key, file, problems)
+    before = len(problems)
+    entry = convert(table, TABLES[group], file=file, key=key, problems=problems)
+    if entry is not None or group not in ("robots", "humans"):
+        return entry
+    rest = convert(_right(table, key, problems[before:]), TABLES[group], file=file, key=key, problems=[])
+    # Whether a file can be read may hang on the key that is wrong: packages, arguments.
+    files = isinstance(rest, Robot) and not (rest.model.startswith("library:") and rest.meshes is None)
+    return None if files else rest
+
+
+def _right(table: Mapping[str, Any], place: str, problems: Sequence[Problem]) -> dict[str, Any]:
+    """A table without the keys that problems are in."""
+    start = f"{place}." if place else ""
+    wrong = [problem.key for problem in problems]
+    return {
+        name: value
+        for name, value in table.items()
+        if not any(
+            key == start + name or key.startswith((f"{start}{name}.", f"{start}{name}[")) for key in wrong
+        )
+    }
+
+
+def _head(table: Mapping[str, Any], file: str, problems: list[Problem]) -> Workstation:
+    """What is not in a list of tables; a key that is wrong is left out."""
+    groups = (*TABLES, *PLUGINS)
+    hidden = (*_NOT_IN_FILE, *groups)
+    before = len(problems)
+    head = convert(table, Workstation, file=file, key="", problems=problems, hidden=hidden, beside=groups)
+    if head is not None:
+        return head
+    right = _right(table, "", problems[before:])
+    return convert(right, Workstation, file=file, key="", problems=[], hidden=hidden) or Workstation()
+
+
+def _plugin(
+    entry: Mapping[str, Any], group: str, key: str, file: str, problems: list[Problem]
+) -> Struct | None:
+    kind = entry.get("kind")
+    if not isinstance(kind, str):
+        what = "missing" if kind is None else f"{kind!r} is not text"
+        known = ", ".join(plugin.kinds(group)) or "none ships here; a dotted name is a module of your own"
+        problems.append(Problem(file, f"{key}.kind", what, f"kinds of [[{group}]]: {known}"))
+        return None
+    try:
+        wanted = plugin.load(group, kind, BASES[group])
+    except SeerobError as error:
+        problems.append(Problem(file, f"{key}.kind", str(error)))
+        return None
+    rest = {name: value for name, value in entry.items() if name != "kind"}
+    return convert(rest, wanted, file=file, key=key, problems=problems, beside=("kind",))
+
+
+def _named(entries: Mapping[int, Any]) -> dict[int, Any]:
+    """Give every criterion and source that has no name one that says what it is."""
+    taken = {entry.name for entry in entries.values()}
+    named = {}
+    for i, entry in entries.items():
+        if entry.name:
+            named[i] = entry
+            continue
+        kind = type(entry).__module__.rsplit(".", 1)[-1]
+        subjects = entry.subjects() if isinstance(entry, Criterion) else (entry.target(),)
+        base = default_name(kind, tuple(s for s in subjects if s))
+        name, n = base, 1
+        while name in taken:
+            n += 1
+            name = f"{base} {n}"
+        taken.add(name)
+        named[i] = msgspec.structs.replace(entry, name=name)
+    return named
+
+
+def default_name(kind: str, subjects: tuple[str, ...]) -> str:
+    """``minimum distance ur10 – operator`` of a kind and the names it speaks of."""
+    words = re.sub(r"[_.]+", " ", kind).strip()
+    return f"{words} {' – '.join(subjects)}".strip()

@@ -1,0 +1,46 @@
+"""The workstation of a recording, made again from the files inside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from seerob.core.errors import InputError, Problem
+from seerob.recording.filing import SOURCES
+from seerob.recording.recording import Recording
+from seerob.session.reading import read
+from seerob.session.station import Station
+from seerob.workstation.workstation import FILE_NAME
+
+_REMEDY = "give the workstation that it was made with (--workstation)"
+
+
+def load_recorded(recording: Recording, *, cache: Path | None = None) -> Station:
+    """The workstation that a recording was made with, from the files inside it.
+
+    Raises:
+        InputError: It needs files that the recording does not carry, or that have changed since.
+    """
+    with TemporaryDirectory(prefix="seerob-") as folder:
+        recording.extract(Path(folder))
+        try:
+            station = Station(read(Path(folder) / _workstation_file(recording)), cache=cache)
+        except InputError as error:
+            problems = [p._replace(file=p.file.removeprefix(f"{folder}/")) for p in error.problems]
+            raise InputError(
+                [*problems, Problem(str(recording.path), "", "cannot be computed from itself", _REMEDY)]
+            ) from error
+        # Read while the folder is there.
+        now, then = station.files, recording.files
+        _ = station.bound
+    compared = (name for name in {*now, *then} if not name.startswith(SOURCES))
+    changed = sorted(name for name in compared if now.get(name) != then.get(name))
+    if changed:
+        what = f"was made with other files than are found now: {', '.join(changed[:6])}"
+        raise InputError.at(recording.path, "", what, _REMEDY)
+    return station
+
+
+def _workstation_file(recording: Recording) -> str:
+    names = [name for name in recording.files if "/" not in name and name.endswith(".toml")]
+    return FILE_NAME if FILE_NAME in names or len(names) != 1 else names[0]

@@ -1,0 +1,316 @@
+"""The main path: pump samples in, move the twin, judge it, write it out; once per tick.
+
+Live, replayed and as-fast-as-possible runs are this same loop with another clock.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+
+from seerob.core.errors import InputError, Problem, SeerobError
+from seerob.core.samples import Sample
+from seerob.core.snapshot import Result, Scene, Snapshot, Verdict
+from seerob.criteria.between_ticks import watched
+from seerob.criteria.judging import Bound as Bound  # noqa: PLC0414
+from seerob.criteria.judging import Judge as Judge  # noqa: PLC0414
+from seerob.criteria.judging import bound_to
+from seerob.devices.live.listening import LiveSource, delay_of
+from seerob.devices.live.real_time import Clock
+from seerob.model.model import Model
+from seerob.outputs.sink import KeepsResults, Writer
+from seerob.recording.result_log import ResultLog
+from seerob.session.displays import Looks
+from seerob.session.in_doubt import in_doubt
+from seerob.session.opening import coarse, signal_timeouts, untimed
+from seerob.twin.engine import Engine, last_tick
+from seerob.twin.spans import Points
+from seerob.twin.state import State
+from seerob.workstation.source import Opened, Pump, Source
+
+Feed = Iterator[tuple[Sample, ...]]
+"""For each tick, from t = 0 on, the samples that were heard for it; ends when the run does."""
+
+
+# -- before the run -----------------------------------------------------------------------------
+
+
+def bind(model: Model) -> tuple[Bound, ...]:
+    """Bind every criterion and rule of the workstation.
+
+    Raises:
+        InputError: With every name that does not exist and every option that cannot be.
+    """
+    bound: list[Bound] = []
+    points = Points(model)
+    problems: list[Problem] = []
+    file = next(iter(model.workstation.files), "workstation")
+    for i, display in enumerate(model.workstation.displays):
+        try:
+            model.select(display.of)
+        except SeerobError as error:
+            problems.append(Problem(file, f"displays[{i}].of", str(error)))
+    for group in ("safety", "ergonomics"):
+        for i, criterion in enumerate(getattr(model.workstation, group)):
+            try:
+                one = bound_to(model, criterion, group)
+                bound.append(replace(one, watch=watched(criterion, model, points)))
+            except SeerobError as error:
+                # Many messages begin with the name of the criterion, which the key already says.
+                text = str(error).removeprefix(f"{criterion.name}: ")
+                problems.append(Problem(file, f"{group}[{i}] ({criterion.name})", text))
+    named: set[str] = set()
+    for one in bound:
+        name = one.criterion.name
+        if name in named:
+            # What is said under one name is one criterion to whoever keeps results.
+            what = f"two criteria are called {name!r}" if name else "two criteria have no name"
+            problems.append(Problem(file, one.group, f"{what}: give each a name of its own"))
+        named.add(name)
+    if problems:
+        raise InputError(problems)
+    return tuple(bound)
+
+
+# -- feeds: what is heard for each tick ---------------------------------------------------------
+
+
+def looks_ahead(model: Model) -> Mapping[str, float]:
+    """Of robots, how far ahead the criteria of a workstation ask what their recorded motions do [s]."""
+    found: dict[str, float] = {}
+    for criterion in model.workstation.safety:
+        for name, span in criterion.looks_ahead(model).items():
+            found[name] = max(span, found.get(name, 0.0))
+    return found
+
+
+def ends_at(opened: Sequence[tuple[Source, Opened]]) -> float:
+    """When the last of some recorded sources ends [s]."""
+    return max((one.duration for _, one in opened), default=0.0)
+
+
+def pump(
+    opened: Sequence[tuple[Source, Opened]],
+    period: float,
+    *,
+    endless: bool = False,
+    ahead: Mapping[str, float] | None = None,
+) -> Feed:
+    """Samples of recorded sources as run time passes; of some targets so much ahead [s].
+
+    The last tick ends with the last sample of the last source (`last_tick`): who steps the twin has to be
+    told that instant, `ends_at`. A source that loops does not keep a run going on its own unless
+    ``endless``. Without sources there is one tick.
+    """
+    pumps = [
+        (Pump(o, loop=source.loop, pause=source.loop_pause), (ahead or {}).get(source.target(), 0.0))
+        for source, o in opened
+    ]
+    end = ends_at(opened)
+    last = last_tick(end, period)
+    k = 0
+    while endless or k <= last:
+        # Every sample, not only the newest: the run starts on the first one, and a source that is
+        # faster than the ticks is followed exactly. One ahead, so that references reach to the tick's end.
+        t = k * period if endless or k < last else max(end, k * period)
+        yield tuple(sample for each, more in pumps for sample in each.until(t + more))
+        k += 1
+
+
+# -- the loop -----------------------------------------------------------------------------------
+
+
+class Lateness:
+    """How late live sources are heard, by what they drive, and how late they may be [s].
+
+    Args:
+        model: The compiled workstation.
+    """
+
+    def __init__(self, model: Model) -> None:
+        live = [s for s in model.workstation.sources if isinstance(s, LiveSource) and s.target()]
+        self._drives = {source.name: (source.target(), source.timeout) for source in live}
+        self._late: dict[str, float] = {}
+
+    def take(self, samples: Sequence[Sample]) -> dict[str, tuple[float, float]]:
+        """The latest of each; of several devices of one person the worst."""
+        for sample in samples if self._drives else ():
+            if sample.t_device is not None and sample.source in self._drives:
+                self._late[sample.source] = sample.late
+        found: dict[str, tuple[float, float]] = {}
+        for source, late in self._late.items():
+            target, bound = self._drives[source]
+            found[target] = max((late, bound), found.get(target, (late, bound)))
+        return found
+
+
+def snapshot(
+    state: State,
+    seq: int,
+    results: tuple[Result, ...],
+    looks: Looks | None = None,
+    late: dict[str, tuple[float, float]] | None = None,
+) -> Snapshot:
+    """What goes out of a state."""
+    mechanisms = state.model.mechanisms.values()
+    return Snapshot(
+        seq=seq,
+        t=state.t,
+        poses=state.poses(),
+        joints={m.name: tuple(state.joint_positions(m).tolist()) for m in mechanisms},
+        tracking={m.name: state.hearings[m.name].error for m in mechanisms},
+        bones={m.name: bones for m in mechanisms if (bones := state.hearings[m.name].bones)},
+        late=late or {},
+        results=results,
+        looks={} if looks is None else looks.at(state),
+        doubts=in_doubt(state),
+    )
+
+
+def warm_up(model: Model) -> None:
+    """Ask every criterion once, of the twin at home, and forget it.
+
+    What is compiled or loaded at first use would else make the first tick of a live run late.
+    """
+    engine = Engine(model, controllers=False)
+    judge = Judge(bind(model))
+    judge(engine.start())
+    Engine(model).tick()
+
+
+def engine_of(model: Model) -> Engine:
+    """The twin as the workstation's sources drive it."""
+    # What is shown is a delay old: silence shows that much earlier, so that it shows within the time-out.
+    delay = delay_of(model.workstation.sources)
+    driven: dict[str, float] = {}
+    for source in model.workstation.sources:
+        if source.target():
+            timeout = source.timeout - (delay if isinstance(source, LiveSource) else 0.0)
+            # Devices that complement one another may fall silent one by one.
+            driven[source.target()] = max(timeout, driven.get(source.target(), timeout))
+    live = {s.target() for s in model.workstation.sources if isinstance(s, LiveSource)}
+    signals, following = signal_timeouts(model)
+    engine = Engine(
+        model,
+        driven={**following, **driven},
+        live={*live, *following},
+        signals=signals,
+        untimed=untimed(model),
+    )
+    for name, why in coarse(model).items():
+        engine.state.hearings[name].coarse = why
+    return engine
+
+
+def ticks(
+    engine: Engine, judge: Callable[[State], tuple[Result, ...]], feed: Feed, end: float = math.inf
+) -> Iterator[tuple[Snapshot, tuple[Sample, ...]]]:
+    """The road: for each tick what goes out, and the samples it was made from; ``end`` of `Engine` [s]."""
+    engine.end = end
+    looks, lateness = Looks(engine.model), Lateness(engine.model)
+    for seq, samples in enumerate(feed):
+        engine.take(samples)
+        late = lateness.take(samples)
+        state = engine.tick() if seq else engine.start()
+        yield snapshot(state, seq, judge(state), looks, late), samples
+
+
+@contextmanager
+def settled() -> Iterator[None]:
+    """Spare the garbage collector what was made before the loop: it all lives as long as the loop does.
+
+    Who has done so already, around many loops, is left to it: it took longer than short loops do.
+    """
+    if gc.get_freeze_count():
+        yield
+        return
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a run came to."""
+
+    results: ResultLog
+    scene: Scene
+    ticks: int
+    duration: float
+    """Run time [s]."""
+    wall: float
+    """Time it took [s]."""
+    slipped: float
+    """Real time that was lost in a live run [s]."""
+    late: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Of what live sources drive: by how much its samples came too late at worst, and may have come [s]."""
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """Verdict of the whole run."""
+        return self.results.verdict
+
+
+def run(
+    model: Model,
+    feed: Feed,
+    *,
+    bound: Sequence[Bound],
+    scene: Scene,
+    end: float = math.inf,
+    writers: Sequence[Writer] = (),
+    clock: Clock | None = None,
+    stop: Callable[[], bool] = lambda: False,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Summary:
+    """Run to the end of the feed, or until asked to stop.
+
+    Args:
+        model: The compiled workstation.
+        feed: Samples per tick.
+        bound: Criteria, from `bind`.
+        scene: The same that the writers were opened with.
+        end: When the motion ends, and the last tick with it [s]; inf while nobody knows.
+        writers: Open sinks; they are closed at the end, whatever happens.
+        clock: Real time; as fast as possible when None.
+        stop: Asked once per tick.
+        progress: Told the run time once per tick [s].
+    """
+    log = ResultLog(scene.criteria)
+    begun = time.perf_counter()
+    count, t = 0, 0.0
+    late: dict[str, tuple[float, float]] = {}
+    with ExitStack() as open_writers, settled():
+        for writer in writers:
+            open_writers.enter_context(writer)
+            if isinstance(writer, KeepsResults):
+                writer.share(log)
+        engine = engine_of(model)
+        for out, samples in ticks(engine, Judge(bound, scene.findings), feed, end):
+            count, t = count + 1, out.t
+            for writer in writers:
+                writer.write(out, samples)
+            log.add(out)  # after those who look on
+            for name, latest in out.late.items():
+                late[name] = max(latest, late.get(name, latest))
+            progress(t)
+            if stop():
+                break
+            if clock is not None:
+                clock.wait(t + model.workstation.engine.tick)
+    return Summary(
+        results=log,
+        scene=scene,
+        ticks=count,
+        duration=t,
+        wall=time.perf_counter() - begun,
+        slipped=0.0 if clock is None else clock.slipped,
+        late=late,
+    )

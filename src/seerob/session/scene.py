@@ -1,0 +1,109 @@
+"""What sinks and the page need to know once, before the first snapshot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from importlib.metadata import version
+
+from seerob.core.plugin import kind_of
+from seerob.core.snapshot import CriterionInfo, Finding, JointInfo, MechanismInfo, Node, Scene
+from seerob.criteria.judging import UNBOUNDED, Bound
+from seerob.description.norms.editions import headline
+from seerob.model.model import Model
+from seerob.recording.series import STILL
+from seerob.session.opening import coarse
+from seerob.workstation.workstation import Workstation, content_hash
+
+
+def scene_of(
+    model: Model,
+    bound: Sequence[Bound],
+    findings: Iterable[Finding] = (),
+    *,
+    files: dict[str, bytes],
+    fed: bool = False,
+) -> Scene:
+    """What sinks and the page need to know once.
+
+    Args:
+        model: The compiled workstation.
+        bound: Its criteria.
+        findings: Of sources, besides those of the model.
+        files: What the hash is of.
+        fed: Whether samples come that are of no source of the workstation: then somebody may move.
+    """
+    station = model.workstation
+    too_coarse = coarse(model)
+    return Scene(
+        title=station.title,
+        edition=headline((b.basis for b in bound), station.edition),
+        version=version("seerob"),
+        workstation_hash=content_hash(files),
+        period=station.engine.tick,
+        nodes=tuple(
+            Node(
+                name=body.name,
+                role=body.role,
+                owner=body.owner,
+                mesh=body.mesh,
+                triangles=body.triangles,
+                moves=bool(body.mover),
+                mover=body.mover,
+                mass=None if body.mass is None else body.mass.value,
+                mass_origin=model.mass_origin(body),
+                note=body.note,
+            )
+            for body in model.bodies
+        ),
+        mechanisms=tuple(
+            MechanismInfo(
+                name=m.name,
+                role=m.role,
+                joints=tuple(
+                    JointInfo(name=joint.name, unit=unit, lower=joint.lower, upper=joint.upper)
+                    for joint, unit in zip(m.joints, m.units, strict=True)
+                ),
+                coarse=too_coarse.get(m.name, ""),
+                masses=() if m.role == "human" else m.masses,
+            )
+            for m in model.mechanisms.values()
+        ),
+        criteria=tuple(
+            CriterionInfo(
+                name=b.criterion.name,
+                kind=kind_of(b.group, b.criterion),
+                group=b.group,
+                title=(type(b.criterion).__doc__ or "").strip().split("\n")[0],
+                subjects=b.criterion.subjects(),
+                unit=b.criterion.unit,
+                limit=getattr(b.criterion, "limit", None),
+                at_most=b.criterion.at_most,
+                basis=b.basis,
+                levels=getattr(b.criterion, "levels", ()),
+                between=_between(b, station, fed=fed),
+            )
+            for b in bound
+        ),
+        findings=tuple(dict.fromkeys((*model.findings, *_without_physics(model), *findings))),
+    )
+
+
+def _between(bound: Bound, station: Workstation, *, fed: bool) -> str:
+    """See `CriterionInfo.between`; what lies in a method is of instants as dense as the ticks."""
+    criterion, tick = bound.criterion, station.engine.tick
+    if not station.sources and not fed:
+        return STILL
+    sparse = criterion.every is not None and criterion.every > 1.5 * tick
+    if bound.watch is None and sparse and criterion.between_samples is None:
+        return UNBOUNDED
+    return bound.between
+
+
+def _without_physics(model: Model) -> tuple[Finding, ...]:
+    if model.workstation.engine.physics:
+        return ()
+    text = (
+        "engine.physics = false: the twin is put where the samples say; whether torque limits and contacts "
+        "allow that motion is not looked at"
+    )
+    return (Finding(level="note", subject="engine", text=text),)

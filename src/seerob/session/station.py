@@ -1,0 +1,428 @@
+"""The Python API: a workstation that has been read and compiled, and its runs."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from functools import cached_property
+from pathlib import Path
+
+from msgspec.structs import replace
+from numpy.typing import ArrayLike
+
+from seerob.core.errors import InputError
+from seerob.core.snapshot import Finding, Scene
+from seerob.criteria.contact.measured import curves
+from seerob.criteria.criterion import Criterion
+from seerob.devices.live.ears import Listening
+from seerob.devices.live.listening import LiveSource
+from seerob.devices.live.real_time import Clock, hear, require_recorded
+from seerob.model.model import Model
+from seerob.model.mounting.compilation import Progress, compile_workstation
+from seerob.model.mounting.in_place import implausible
+from seerob.model.mounting.things import MadeArea
+from seerob.outputs.sink import Sink, Writer
+from seerob.recording.filing import source_files
+from seerob.recording.recording import Recording
+from seerob.session import batch
+from seerob.session import run as road
+from seerob.session.batch import Batch
+from seerob.session.explanation import Explanation
+from seerob.session.explanation import explain as explained
+from seerob.session.opening import open_sources, source_target
+from seerob.session.permissible import evaluation
+from seerob.session.permissible.evaluation import PermissibleSpeed, Say, Wish
+from seerob.session.permissible.joint_limits import Given, joint_limits
+from seerob.session.reading import read
+from seerob.session.run import Bound, Feed, Summary
+from seerob.session.scene import scene_of
+from seerob.twin.given_states import motion_of
+from seerob.twin.own_words import said_by
+from seerob.workstation.source import Opened, Source
+from seerob.workstation.workstation import Workstation
+
+
+class Station:
+    """A workstation, read and compiled.
+
+    Attributes:
+        workstation: What the file says.
+        model: The compiled twin.
+    """
+
+    def __init__(
+        self, workstation: Workstation, *, cache: Path | None = None, progress: Progress = lambda _: None
+    ) -> None:
+        """Compile a workstation; see `load` for the usual way.
+
+        Raises:
+            InputError: With every mistake in every file that it names.
+        """
+        self.workstation = workstation
+        made = self._swept_areas(cache, progress)
+        self.model: Model = compile_workstation(workstation, cache=cache, progress=progress, made=made)
+
+    def _swept_areas(self, cache: Path | None, progress: Progress) -> dict[str, MadeArea]:
+        """Areas that are swept, from a run of the same workstation without them."""
+        if not any(area.swept for area in self.workstation.areas):
+            return {}
+        from seerob.session.areas import in_place, make, without_swept
+
+        with in_place(self.workstation):
+            bare = Station(without_swept(self.workstation), cache=cache, progress=progress)
+            bound = bare.bound
+        return make(
+            self.workstation, bare.model, bound, bare.files, lambda writer: bare.run(writers=[writer]),
+            cache=cache, progress=progress,
+        )  # fmt: skip
+
+    @cached_property
+    def bound(self) -> tuple[Bound, ...]:
+        """Its criteria and rules, names resolved."""
+        return road.bind(self.model)
+
+    @cached_property
+    def sources(self) -> tuple[tuple[Source, Opened], ...]:
+        """Its sources, opened and checked."""
+        return open_sources(self.model)
+
+    @property
+    def duration(self) -> float:
+        """Length of its longest source [s]."""
+        return road.ends_at(self.sources)
+
+    def scene(self, *, with_sources: bool = True) -> Scene:
+        """What sinks and the page need to know once."""
+        opened = self.sources if with_sources else ()
+        return scene_of(
+            self.model,
+            self.bound,
+            [f for _, o in opened for f in o.findings],
+            files=self.files,
+            fed=not with_sources,
+        )
+
+    @cached_property
+    def files(self) -> dict[str, bytes]:
+        """The workstation file and every file it names, trajectories and tables of limits included."""
+        station = self.workstation
+        named = [getattr(source, "file", None) for source in station.sources]
+        named += [getattr(rule, "limits", None) for rule in (*station.safety, *station.ergonomics)]
+        named += [getattr(rule, "table", None) for rule in station.ergonomics]
+        named += [getattr(rule, "map", None) for rule in station.safety]
+        measured = [
+            name for rule in station.safety if isinstance(name := getattr(rule, "measurements", None), str)
+        ]
+        named += [*measured, *(curve for name in measured for curve in curves(self.model.folder / name))]
+        references = [name for name in named if isinstance(name, str)]
+        return {**self.model.files, **source_files(references, folder=self.model.folder)}
+
+    def with_criteria(self, *criteria: Criterion) -> Station:
+        """The same compiled workstation with more safety criteria."""
+        other = object.__new__(Station)
+        other.workstation = replace(self.workstation, safety=(*self.workstation.safety, *criteria))
+        from dataclasses import replace as replaced
+
+        model = replaced(self.model, workstation=other.workstation)
+        findings = tuple(dict.fromkeys((*model.findings, *implausible(model))))
+        other.model = replaced(model, findings=findings)
+        return other
+
+    def open_sinks(self, sinks: Sequence[Sink], folder: Path, scene: Scene) -> list[Writer]:
+        """Open sinks for one run, all or none.
+
+        Raises:
+            InputError: One of them cannot be opened; the others are closed again.
+        """
+        opened: list[Writer] = []
+        if not sinks:
+            return opened
+        new = not folder.exists()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            what = f"cannot be made: {error.strerror}"
+            raise InputError.at(folder, "", what, "give a folder that may be written") from error
+        try:
+            for sink in sinks:
+                opened.append(sink.open(scene, self.model.meshes, self.files, folder))
+        except BaseException:
+            for writer in opened:
+                writer.close()
+            if new and not any(folder.iterdir()):
+                folder.rmdir()
+            raise
+        return opened
+
+    def run(
+        self,
+        *,
+        folder: Path | str | None = None,
+        sinks: Sequence[Sink] = (),
+        writers: Sequence[Writer] = (),
+        live: bool = False,
+        feed: Feed | None = None,
+        end: float = math.inf,
+        scene: Scene | None = None,
+        stop: Callable[[], bool] = lambda: False,
+        progress: Callable[[float], None] = lambda _: None,
+    ) -> Summary:
+        """Run from the first to the last sample of the sources.
+
+        Args:
+            folder: Where ``sinks`` write; needed when there are any.
+            sinks: Opened for this run and closed after it.
+            writers: Sinks that are open already; closed after the run too.
+            live: In real time and without end (until ``stop``), instead of as fast as possible.
+            feed: What is heard, instead of the workstation's sources.
+            end: When that ends, and the last tick with it [s]; a motion that ends within a tick is
+                undecided there when not given.
+            scene: The one that ``writers`` were opened with.
+            stop: Asked once per tick.
+            progress: Told the run time once per tick [s].
+
+        Returns:
+            The results by criterion, ``summary.results["tcp speed"].max()``, and how it went.
+
+        Raises:
+            InputError: A source, a criterion or a sink cannot be used as the file has it, or a live
+                source is asked to run in any other than real time.
+            SimulationDiverged: The physics produced a number that is not finite.
+        """
+        if sinks and folder is None:
+            raise InputError.at("run", "folder", "missing", "sinks need a folder to write to")
+        heard: tuple[LiveSource, ...] = ()
+        if feed is None and live:
+            heard = tuple(s for s in self.workstation.sources if isinstance(s, LiveSource))
+        elif feed is None:
+            require_recorded(self.workstation)
+        clock = Clock() if live else None
+        scene = scene or self.scene(with_sources=feed is None)
+        if feed is None:
+            end = math.inf if live else self.duration
+            feed = road.pump(
+                self.sources,
+                self.workstation.engine.tick,
+                endless=live,
+                ahead=road.looks_ahead(self.model),
+            )
+        with ExitStack() as until_the_end:
+            if clock and heard:
+                targets = [(source, source_target(self.model, source)) for source in heard]
+                listening = until_the_end.enter_context(Listening(targets))
+                road.warm_up(self.model)  # while they begin
+                feed = hear(feed, listening, clock)
+            bound = self.bound  # refused, if so, before anything is open
+            opened = self.open_sinks(sinks, Path(folder or "."), scene) if sinks else []
+            return road.run(
+                self.model,
+                feed,
+                bound=bound,
+                scene=scene,
+                end=end,
+                writers=[*opened, *writers],
+                clock=clock,
+                stop=stop,
+                progress=progress,
+            )
+
+    def batch(
+        self,
+        q: Mapping[str, ArrayLike] | None = None,
+        qd: Mapping[str, ArrayLike] | None = None,
+        *,
+        t: ArrayLike | None = None,
+        threads: int | None = None,
+    ) -> Batch:
+        """Every criterion at many instants, in arrays; nothing is pulled, drawn or recorded.
+
+        Every criterion is asked at every instant, also one with a period; see `seerob.session.batch`.
+
+        Args:
+            q: Positions of the commanded joints of robots and humans by name [rad or m], shape (N, n) each;
+                who is not named stands where the file says. Without it, what the workstation's sources
+                say at every tick.
+            qd: Velocities likewise [rad/s or m/s].
+            t: Instants of ``q``, increasing [s], shape (N,); the ways from each to the next are judged too.
+                When not given they are instants of their own, a tick apart.
+            threads: How many work at once; as many as there are processors when not given.
+
+        Returns:
+            By criterion values, limits and verdicts: ``station.batch()["tcp speed"].value``.
+
+        Raises:
+            InputError: Arrays that do not fit, or a live source without them.
+        """
+        findings: list[Finding] = []
+        if q is None:
+            if qd is not None or t is not None:
+                raise InputError.at("batch", "q", "missing", "give positions with qd and t, or none of them")
+            require_recorded(self.workstation)
+            feed = road.pump(self.sources, self.workstation.engine.tick)
+            motion = batch.recorded(self.model, feed, self.duration)
+            findings = [found for _, opened in self.sources for found in opened.findings]
+        else:
+            motion = motion_of(self.model, q, qd or {}, t)
+        threads = threads or os.cpu_count() or 1
+        return batch.judged(self.model, self.bound, motion, threads=threads, findings=findings)
+
+    def explain(self, robot: str) -> Explanation:
+        """Whether the model explains the torques that a recorded source measured, and what would.
+
+        Raises:
+            InputError: No recorded source of that robot measures torques, or too little can be told.
+            UnknownName: There is no such robot.
+        """
+        name = self.model.robot(robot).name
+        for source, opened in self.sources:
+            if source.target() == name and not isinstance(source, LiveSource):
+                file = getattr(source, "file", source.name)
+                said = said_by(opened.samples, file)
+                if said is not None and said.tau is not None:
+                    return explained(self.model, name, said)
+        remedy = (
+            "log them: actual_current_as_torque of RTDE, measured torques of FRI, torque columns of a table"
+        )
+        raise InputError.at("explain", name, "no recorded source of it measures torques", remedy)
+
+    def permissible_speed(
+        self,
+        robot: str | None = None,
+        *,
+        wish: Wish | None = None,
+        sources: evaluation.Sources | None = None,
+        velocity: Given = None,
+        acceleration: Given = None,
+        jerk: Given = None,
+        folder: Path | str | None = None,
+        sinks: Sequence[Sink] = (),
+        writers: Sequence[Writer] = (),
+        ready: Callable[[PermissibleSpeed], None] = lambda found: None,
+        say: Say = lambda what, share: None,
+    ) -> PermissibleSpeed:
+        """How fast a robot may go along its path, a motion that keeps to it, and the criteria asked of that.
+
+        Args:
+            robot: Its name; the only robot when not given.
+            wish: Whose ceilings count, tolerances and spacings.
+            sources: Opened, instead of the workstation's own, such as those of a recording.
+            velocity: Limits of the joints, one for all or one each, instead of the robot's [rad/s or m/s].
+            acceleration: Likewise [rad/s² or m/s²]; never assumed.
+            jerk: Likewise [rad/s³ or m/s³]; never assumed.
+            folder: Where ``sinks`` write.
+            sinks: Of the run of the rescaled motion.
+            writers: Sinks that are open already, of the same run.
+            ready: Told what was found before the rescaled motion is run.
+            say: Told what is done and which share of it, 0 to 1; what it raises stops the work.
+
+        Raises:
+            InputError: A limit that nobody gave, no criterion that limits the speed, a live source, or not
+                exactly one source of the robot's motion.
+        """
+        if sources is None:
+            require_recorded(self.workstation)
+        names = [r.name for r in self.workstation.robots]
+        if robot is None and len(names) != 1:
+            what = f"missing, and there are {len(names)} robots"
+            raise InputError.at(
+                "permissible speed", "robot", what, f"name one of {', '.join(names) or 'none'}"
+            )
+        subject = self.model.robot(names[0] if robot is None else robot)
+        played = self.sources if sources is None else sources
+        motion, solved_from = evaluation.given_motion(self.model, played, subject.name)
+        file = next(iter(self.workstation.files), "workstation")
+        own = next(r for r in self.workstation.robots if r.name == subject.name)
+        asked = {"acceleration": acceleration, "jerk": jerk}
+        limits = joint_limits(
+            subject,
+            velocity=velocity,
+            acceleration=own.acceleration_limits if acceleration is None else acceleration,
+            jerk=own.jerk_limits if jerk is None else jerk,
+            file=file,
+            written=[key for key, value in asked.items() if value is None],
+        )
+        scene = self.scene(with_sources=sources is None)
+        seen = evaluation.witness(self.model, played, self.bound, scene.criteria, say)
+
+        def again(feed: Feed, duration: float) -> Summary:
+            def told(t: float) -> None:
+                say("the rescaled motion", min(1.0, t / duration))
+
+            return self.run(
+                folder=folder,
+                sinks=sinks,
+                writers=writers,
+                feed=feed,
+                end=duration,
+                scene=scene,
+                progress=told,
+            )
+
+        return evaluation.evaluation(
+            self.model,
+            played,
+            seen=seen,
+            motion=motion,
+            solved_from=solved_from,
+            limits=limits,
+            wish=wish or evaluation.Wish(),
+            again=again,
+            ready=ready,
+            say=say,
+        )
+
+    def replay_scene(self, recording: Recording) -> Scene:
+        """The scene of a recording that is computed again, with what was found when it was made."""
+        findings = [f for f in recording.scene.findings if f not in self.model.findings]
+        fed = not self.workstation.sources and any(tick.samples for tick in recording.ticks())
+        return scene_of(self.model, self.bound, findings, files=self.files, fed=fed)
+
+    def replay(
+        self,
+        recording: Recording,
+        *,
+        folder: Path | str | None = None,
+        sinks: Sequence[Sink] = (),
+        writers: Sequence[Writer] = (),
+        stop: Callable[[], bool] = lambda: False,
+        progress: Callable[[float], None] = lambda _: None,
+    ) -> Summary:
+        """Compute a recording again from its samples: same samples, same ticks, same figures.
+
+        Raises:
+            InputError: The recording was made with another tick than this workstation has.
+        """
+        if abs(recording.scene.period - self.workstation.engine.tick) > 1e-12:
+            raise InputError.at(
+                recording.path,
+                "period",
+                f"recorded with a tick of {recording.scene.period} s",
+                f"set engine.tick = {recording.scene.period} in the workstation file",
+            )
+        scene = self.replay_scene(recording)
+        feed = (tuple(tick.samples) for tick in recording.ticks())
+        return self.run(
+            folder=folder,
+            sinks=sinks,
+            writers=writers,
+            feed=feed,
+            end=recording.end,
+            scene=scene,
+            stop=stop,
+            progress=progress,
+        )
+
+
+def load(path: Path | str, *, cache: Path | None = None) -> Station:
+    """Read and compile a workstation.
+
+    Args:
+        path: A workstation file, or a folder with a ``workstation.toml``.
+        cache: Folder that keeps what takes long to make between starts.
+
+    Raises:
+        InputError: With every mistake in the file and in the files it names.
+    """
+    return Station(read(path), cache=cache)

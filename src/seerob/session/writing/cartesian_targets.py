@@ -1,0 +1,188 @@
+"""Cartesian targets out to ROS, over rosbridge or ROS-TCP. Off unless file and command line both allow it.
+
+What a source says of where a tool is to be is published when the twin gets there, in the frame that the
+controller wants. A thread of its own publishes, so a slow network never slows the loop; of what waits, only
+the newest is sent. Nothing that its source does not call good is sent, and nothing is repeated: a controller
+that must stop when targets cease has to see to that itself.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections import deque
+from collections.abc import Sequence
+from threading import Event, Thread
+from typing import Any, Self
+
+import numpy as np
+
+from seerob.core.errors import InputError, SeerobError, UnknownName
+from seerob.core.samples import PoseSample, Quality, Sample
+from seerob.core.snapshot import Snapshot
+from seerob.core.transforms import Array, inverse, rotation_from_wxyz, transform, wxyz_from_rotation
+from seerob.devices.live.listening import because
+from seerob.devices.motion_files.pose_frame import fixed_links
+from seerob.model.model import Model
+from seerob.outputs.sink import Closing
+from seerob.session.opening import target
+from seerob.session.writing.target_wires import Wire, wired
+from seerob.workstation.tables.targets import CartesianTarget, TargetMessage
+
+_log = logging.getLogger(__name__)
+
+AHEAD = 4096
+"""Samples that are kept until the twin gets there."""
+PAUSE = 1.0
+"""Before it is connected again [s]."""
+BEAT = 0.05
+"""How soon the end is noticed [s]."""
+STOP_WITHIN = 3.0
+"""[s]"""
+
+
+def targets_allowed(model: Model, *, on_command_line: bool) -> bool:
+    """Whether anything may be published: only where workstation file and command line both say so."""
+    station = model.workstation
+    return bool(station.targets) and station.allow_writing and on_command_line
+
+
+class _Way:
+    """One target at work: poses in, the newest of those that are due out."""
+
+    def __init__(self, table: CartesianTarget, frame_from_world: Array) -> None:
+        self.table = table
+        self.published = 0
+        self._frame_from_world = frame_from_world
+        self._ahead = deque[PoseSample](maxlen=AHEAD)
+        self._newest = deque[PoseSample](maxlen=1)
+
+    def note(self, now: float, samples: Sequence[Sample]) -> None:
+        """Take what is said of the tool, and find what is due at a run time [s]."""
+        self._ahead.extend(s for s in samples if isinstance(s, PoseSample) and s.target == self.table.at)
+        while self._ahead and self._ahead[0].t <= now:
+            self._newest.append(self._ahead.popleft())
+
+    def take(self) -> dict[str, Any] | None:
+        """The message that is to be published; None when there is nothing new."""
+        if not self._newest:
+            return None
+        sample = self._newest.pop()
+        values = np.array([*sample.position, *sample.wxyz])
+        if sample.quality is not Quality.GOOD or not np.isfinite(values).all() or not values[3:].any():
+            return None
+        world = transform(rotation_from_wxyz(sample.wxyz), sample.position)
+        return message(self.table, self._frame_from_world @ world, time.time())
+
+
+def message(table: CartesianTarget, pose: Array, now: float) -> dict[str, Any]:
+    """A pose as ROS has it.
+
+    Args:
+        table: How it is to be published.
+        pose: In the frame of ROS (4, 4).
+        now: Wall clock, as ROS counts [s since 1970].
+    """
+    place = dict(zip("xyz", pose[:3, 3].tolist(), strict=True))
+    w, x, y, z = wxyz_from_rotation(pose[:3, :3]).tolist()
+    turn = {"x": x, "y": y, "z": z, "w": w}
+    if table.message is TargetMessage.POSE:
+        return {"position": place, "orientation": turn}
+    whole, part = divmod(int(now * 1e9), 10**9)
+    stamp = {"secs": whole, "nsecs": part} if table.ros == 1 else {"sec": whole, "nanosec": part}
+    header = {"stamp": stamp, "frame_id": table.frame_id}
+    if table.message is TargetMessage.POSE_STAMPED:
+        return {"header": header, "pose": {"position": place, "orientation": turn}}
+    moved = {"translation": place, "rotation": turn}
+    return {"header": header, "child_frame_id": table.at.rpartition("/")[2], "transform": moved}
+
+
+class CartesianTargets(Closing):
+    """The Cartesian targets of a run: takes samples like a sink, and publishes to ROS.
+
+    Args:
+        model: The compiled workstation.
+        on_command_line: Whether the command line allows writing.
+
+    Raises:
+        InputError: It is not allowed, or a name is not there.
+    """
+
+    def __init__(self, model: Model, *, on_command_line: bool) -> None:
+        if not targets_allowed(model, on_command_line=on_command_line):
+            remedy = "allow_writing = true in the workstation file and --allow-writing on the command line"
+            raise InputError.at(
+                "targets", "", "publishing Cartesian targets is not allowed", f"it takes both: {remedy}"
+            )
+        self.ways: list[_Way] = []
+        for i, table in enumerate(model.workstation.targets):
+            try:
+                model.carrier(model.frame(table.at))
+                frame = np.eye(4) if table.link is None else _standing(model, table.link)
+            except UnknownName as error:
+                raise InputError.at("workstation", f"targets[{i}]", str(error)) from error
+            self.ways.append(_Way(table, inverse(frame)))
+        self._over = Event()
+        self._threads = [Thread(target=self._run, args=(way,), daemon=True) for way in self.ways]
+
+    def __enter__(self) -> Self:
+        for thread in self._threads:
+            thread.start()
+        return self
+
+    def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
+        """Note what is due; returns at once."""
+        for way in self.ways:
+            way.note(snapshot.t, samples)
+
+    def close(self) -> None:
+        """End; what waits is not published any more."""
+        self._over.set()
+        for thread in self._threads:
+            if thread.is_alive():
+                thread.join(STOP_WITHIN)
+
+    def _run(self, way: _Way) -> None:
+        asyncio.run(self._publish(way))
+
+    async def _publish(self, way: _Way) -> None:
+        table, failing = way.table, False
+        while not self._over.is_set():
+            try:
+                async with wired(table) as wire:
+                    _log.info("%s: targets of %s are published", table.topic, table.at)
+                    failing = False
+                    await self._session(way, wire)
+            except (OSError, EOFError, SeerobError) as error:
+                if not failing:
+                    _log.warning("%s: cannot be published: %s", table.topic, because(error))
+                failing = True
+                await asyncio.to_thread(self._over.wait, PAUSE)
+
+    async def _session(self, way: _Way, wire: Wire) -> None:
+        table, due = way.table, 0.0
+        way.take()  # what was meant before there was a connection is no longer meant
+        while not self._over.is_set():
+            now = time.monotonic()
+            said = way.take() if now >= due else None
+            if said is not None:
+                await wire.publish(said)
+                way.published += 1
+                due = now + table.every
+            await wire.listen(min(BEAT, table.every))
+        await wire.end()
+
+
+def _standing(model: Model, link: str) -> Array:
+    """World from a link that no joint moves (4, 4), by its full name."""
+    robots = [target(model, robot.name) for robot in model.workstation.robots]
+    known = {
+        name: np.array(robot.world_from_base) @ base_from_link
+        for robot in robots
+        if robot is not None and robot.world_from_base is not None
+        for name, base_from_link in fixed_links(robot).items()
+    }
+    if link not in known:
+        raise UnknownName("link that stands still", link, known)
+    return known[link]

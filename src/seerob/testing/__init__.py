@@ -1,0 +1,502 @@
+"""Whether criteria can be wrongly green: one line for those that ship and for one's own.
+
+``never_within("my_cell")`` takes a workstation in which every criterion is within (or informs), says where
+everybody is, and then spoils what is said: of each robot, person and machine that a criterion depends on,
+and of its variables. A criterion fails when it, a part, a row or a marker of it is within all the same; when
+it rests on somebody whom it does not declare (`Criterion.depends`); or when it is no criterion (no basis, a
+result that contradicts itself).
+
+``sources_never_within("my_cell")`` takes one in which every criterion is within while its files are played,
+and lets each source lie: it stops, fails, repeats itself, goes back in time, speaks of the future, jumps,
+says what is no number or of the wrong shape.
+
+As a plug-in of pytest, without a test file: ``pytest -p seerob.testing my_cell/workstation.toml`` asks both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from msgspec.structs import replace as changed
+
+from seerob.core.errors import SeerobError, UnknownName
+from seerob.core.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
+from seerob.core.snapshot import Finding, Result, Verdict
+from seerob.core.transforms import Array
+from seerob.criteria.criterion import Criterion
+from seerob.criteria.judging import Judge, bound_to
+from seerob.description.humans.skeleton import BONES
+from seerob.devices.live.listening import LiveSource
+from seerob.devices.live.looked_at import LookedAt
+from seerob.model.model import Mechanism, Model
+from seerob.session.opening import source_target
+from seerob.session.run import engine_of, pump, ticks
+from seerob.session.station import Station, load
+from seerob.twin.engine import Engine
+from seerob.twin.state import VARIABLE, State
+from seerob.workstation.source import Opened, Source
+from seerob.workstation.variables.dictionary import Kind, Value, Variable
+
+TICKS = 18
+TIMEOUT = 4
+"""Ticks of silence after which nobody is known to be where they were."""
+SPOILED = 8
+"""Tick from which what is said is spoiled."""
+SWING = 1e-3
+"""Amplitude of the motion of every joint of a robot [rad or m]."""
+ELSEWHERE = 0.2
+"""By how much joints of those who must not matter are moved [rad or m]."""
+MUTE = "seerob.testing/asked"
+
+Said = Callable[[JointSample, int], JointSample | None]
+
+
+@dataclass(frozen=True)
+class Spoiling:
+    """One way in which what is said can be wrong."""
+
+    what: str
+    said: Said
+    """What is said instead at a tick; None for nothing."""
+    ticks: range
+    """In which nothing that depends on it may be within."""
+
+
+def _number(k: int, sample: JointSample, **more: Any) -> JointSample:
+    return sample if k < SPOILED else changed(sample, **more)
+
+
+_NAN = float("nan")
+_LATER = range(SPOILED + TIMEOUT + 2, TICKS)
+SPOILINGS = (
+    Spoiling("never heard", lambda s, k: None, range(TICKS)),
+    Spoiling("stale", lambda s, k: s if k < SPOILED else None, _LATER),
+    Spoiling("heard at every eighth tick only", lambda s, k: None if k % 8 else s, range(6, 8)),
+    Spoiling("late by more than its time-out", lambda s, k: changed(s, t=s.t - 1.0), range(TICKS)),
+    Spoiling("repeated", lambda s, k: s if k < SPOILED else changed(s, t=(SPOILED - 1) * _PERIOD), _LATER),
+    Spoiling("set back in time", lambda s, k: _number(k, s, t=s.t - SPOILED * _PERIOD), _LATER),
+    Spoiling(
+        "not a number",
+        lambda s, k: _number(k, s, q=(_NAN,) * len(s.q)),
+        range(SPOILED + 1, TICKS),
+    ),
+    Spoiling(
+        "one joint not a number",
+        lambda s, k: _number(k, s, q=(*s.q[:-1], _NAN)),
+        range(SPOILED + 1, TICKS),
+    ),
+    Spoiling(
+        "speeds not a number",
+        lambda s, k: _number(k, s, qd=(_NAN,) * len(s.q)),
+        range(SPOILED + 1, TICKS),
+    ),
+    Spoiling(
+        "jumping to and fro",
+        lambda s, k: _number(k, s, q=tuple(q + 2.0 * (k % 2) for q in s.q)),
+        range(SPOILED + 1, TICKS),
+    ),
+    Spoiling(
+        "called invalid by its source",
+        lambda s, k: _number(k, s, quality=Quality.INVALID),
+        range(SPOILED + 1, TICKS),
+    ),
+    Spoiling(
+        "called degraded by its source",
+        lambda s, k: _number(k, s, quality=Quality.DEGRADED),
+        range(SPOILED + 1, TICKS),
+    ),
+)
+_PERIOD = 0.01
+
+
+def never_within(
+    cell: Station | Path | str, values: Mapping[str, Value] | None = None, *, names: Sequence[str] = ()
+) -> None:
+    """Fail unless every criterion of a workstation is within when all is known, and never when it is not.
+
+    Args:
+        cell: A workstation, or its file or folder; nobody but this harness drives it.
+        values: Of variables, by name, where all is known; else false, 0 and an empty text.
+        names: Criteria that are asked, by name; all of them when not given.
+
+    Raises:
+        AssertionError: With every criterion that is within where it must not be, or is none.
+        InputError: The workstation cannot be used.
+    """
+    station = cell if isinstance(cell, Station) else load(cell)
+    asked = [
+        (criterion, group)
+        for group in ("safety", "ergonomics")
+        for criterion in getattr(station.workstation, group)
+        if not names or criterion.name in names
+    ]
+    failures = _Harness(station.model, values or {}, asked).failures()
+    if failures:
+        raise AssertionError("\n".join(dict.fromkeys(failures)))
+
+
+@dataclass(frozen=True)
+class Lie:
+    """One way in which a source can be wrong from an instant on."""
+
+    what: str
+    said: Callable[[Sample, float], Sample | None]
+    """What it yields instead of a sample from that instant on, which is given [s]; None for nothing."""
+
+
+def _numberless(sample: Sample, since: float) -> Sample:
+    if isinstance(sample, JointSample):
+        return changed(sample, q=(_NAN,) * len(sample.q))
+    if isinstance(sample, PoseSample):
+        return changed(sample, position=(_NAN,) * 3)
+    if isinstance(sample, BodySample):
+        nowhere = (_NAN,) * 3, (_NAN,) * 4
+        points = [
+            changed(
+                point,
+                position=None if point.position is None else nowhere[0],
+                wxyz=None if point.wxyz is None else nowhere[1],
+            )
+            for point in sample.points
+        ]
+        return changed(sample, points=tuple(points))
+    # What can be no number; of the rest it says nothing.
+    return changed(sample, values={n: _NAN for n, v in sample.values.items() if type(v) is float})
+
+
+def _fails(sample: Sample, since: float) -> Sample:
+    raise OSError("the disk is gone")
+
+
+def _misshapen(sample: Sample, since: float) -> Sample | None:
+    if isinstance(sample, JointSample):
+        return changed(sample, q=sample.q[:-1], qd=None)
+    return changed(sample, t=None)
+
+
+LIES = (
+    Lie("stops", lambda s, t: None),
+    Lie("fails", _fails),
+    Lie("says what is no number", _numberless),
+    Lie("says no time", lambda s, t: changed(s, t=_NAN)),
+    Lie("goes back in time", lambda s, t: changed(s, t=s.t - t)),
+    Lie("says everything at one instant", lambda s, t: changed(s, t=t)),
+    Lie("speaks of the future", lambda s, t: changed(s, t=s.t + 10.0)),
+    Lie("says what has the wrong shape", _misshapen),
+    Lie("calls it invalid", lambda s, t: changed(s, quality=Quality.INVALID)),
+)
+LIES_FROM = 0.3
+"""Share of a source's duration after which it lies."""
+
+
+def sources_never_within(cell: Station | Path | str, *, names: Sequence[str] = ()) -> None:
+    """Fail unless every criterion is within while files are played, and not once a source lies.
+
+    Args:
+        cell: A workstation, or its file or folder. Its live sources are left out: what they say is looked
+            at where it is heard.
+        names: Sources that lie, one after the other, by name; all of them when not given.
+
+    Raises:
+        AssertionError: With every criterion that is within where it must not be, or never.
+        InputError: The workstation or a file cannot be used.
+    """
+    station = cell if isinstance(cell, Station) else load(cell)
+    told: list[str] = []
+    for i, (source, _) in enumerate(station.sources):
+        if isinstance(source, LiveSource) or (names and source.name not in names):
+            continue
+        told += _Played(station, i).failures()
+    if told:
+        raise AssertionError("\n".join(dict.fromkeys(told)))
+
+
+class _Played:
+    """A workstation whose files are played, one source of which lies.
+
+    Args:
+        station: The workstation.
+        which: Number of that source.
+    """
+
+    def __init__(self, station: Station, which: int) -> None:
+        self._model, self._sources, self._which = station.model, station.sources, which
+        self._findings = station.scene().findings
+        source, opened = station.sources[which]
+        self._name = source.name or type(source).__module__
+        self._since = LIES_FROM * opened.duration
+        """Instant from which it lies [s]."""
+        self._from = self._since + source.timeout + 2 * station.workstation.engine.tick
+        """From which nothing may be within [s]."""
+        self._bound = [one for one in station.bound if self._concerns(source, one.criterion)]
+
+    def _concerns(self, source: Source, criterion: Criterion) -> bool:
+        variables = (self._model.dictionary.get(name) for name in criterion.variables())
+        if any(v is not None and v.source == source.name for v in variables):
+            return True
+        return source.target() in _declared(self._model, criterion.depends(self._model))
+
+    def failures(self) -> list[str]:
+        """What is wrong, one sentence each."""
+        if not self._bound:
+            return [f"{self._name}: no criterion depends on what it says: add one"]
+        end = self._sources[self._which][1].duration
+        if self._from >= end:
+            return [f"{self._name}: give more than {self._from / LIES_FROM:.3g} s, it says {end:.3g} s"]
+        honest = self._within(None, 0.0)
+        told = [
+            f"{one.criterion.name}: give a motion in which it is within, as {self._name} says it"
+            for one in self._bound
+            if one.criterion.name not in honest and getattr(one.criterion, "limit", None) is not None
+        ]
+        for lie in LIES:
+            for name, (where, t) in self._within(lie, self._from).items():
+                told.append(f"{name}: {where} is within at {t:.3f} s although {self._name} {lie.what}")
+        return told
+
+    def _within(self, lie: Lie | None, start: float) -> dict[str, tuple[str, float]]:
+        """By criterion that is within from an instant on, what of it, and when first."""
+        source, opened = self._sources[self._which]
+        target = source_target(self._model, source)
+        sources = list(self._sources)
+        if lie is not None:
+            lying = LookedAt(_Lying(opened, lie, self._since), self._name, target)
+            sources[self._which] = source, changed(opened, samples=lying)
+        feed = pump(sources, self._model.workstation.engine.tick)
+        found: dict[str, tuple[str, float]] = {}
+        try:
+            for out, _ in ticks(engine_of(self._model), Judge(self._bound, self._findings), feed):
+                for result in out.results if out.t >= start else ():
+                    if result.name not in found and (where := _within(result)):
+                        found[result.name] = where, out.t
+        except (SeerobError, OSError):
+            if lie is None:  # what ends a run is no verdict
+                raise
+        return found
+
+
+class _Lying:
+    """What a source yields, and from an instant on [s] something else."""
+
+    def __init__(self, opened: Opened, lie: Lie, since: float) -> None:
+        self._opened, self._lie, self._since = opened, lie, since
+
+    def __iter__(self) -> Iterator[Sample]:
+        for sample in self._opened.samples:
+            said = self._lie.said(sample, self._since) if sample.t >= self._since else sample
+            if said is not None:
+                yield said
+
+
+class _Harness:
+    """One workstation, without physics, whose robots, people and machines are all driven from here."""
+
+    def __init__(
+        self, model: Model, values: Mapping[str, Value], asked: Sequence[tuple[Criterion, str]]
+    ) -> None:
+        station = changed(
+            model.workstation,
+            engine=changed(model.workstation.engine, physics=False, tick=_PERIOD),
+        )
+        mute = Variable(name=MUTE, source="seerob.testing", address="", type=Kind.BOOL)
+        dictionary = {**model.dictionary, MUTE: mute}
+        self.model = replace(model, workstation=station, dictionary=dictionary)
+        self._values = {MUTE: True, **{v.name: _usual(v) for v in model.dictionary.values()}, **values}
+        self._asked = [(changed(criterion, every=None), group) for criterion, group in asked]
+
+    def failures(self) -> list[str]:
+        """What is wrong, one sentence each."""
+        criteria = [criterion for criterion, _ in self._asked]
+        declared = [_declared(self.model, criterion.depends(self.model)) for criterion in criteria]
+        variables = [set(criterion.variables()) for criterion in criteria]
+        clean = list(self._run())
+        told: list[str] = []
+        for i, criterion in enumerate(criteria):
+            results = [said[i][0] for _, said in clean]
+            bad = [r for r in results if r.verdict is Verdict.EXCEEDED]
+            bad += [r for r in results[-1:] if r.verdict is Verdict.UNDECIDED]
+            if bad:
+                what = f"it is {bad[0].verdict}, {bad[0].reason}"
+                told.append(f"{criterion.name}: give a workstation in which it is within: {what}")
+            wrong = [r.reason for r in results if " failed: " in r.reason or "contradicts itself" in r.reason]
+            told += [f"{criterion.name}: {reason}" for reason in wrong[:1]]
+            known = {*declared[i], *(VARIABLE + name for name in variables[i])}
+            rests = set().union(*(said[i][1] for _, said in clean))
+            if strangers := sorted(rests - known):
+                what = f"it depends on {', '.join(strangers)}: say so in depends, or in variables"
+                told.append(f"{criterion.name}: {what}")
+        for name in self.model.mechanisms:
+            concerned = [i for i, names in enumerate(declared) if name in names]
+            moved = self._run(elsewhere=name) if len(concerned) < len(criteria) else ()
+            for (_, before), (_, after) in zip(clean, moved, strict=False):
+                told += [
+                    f"{c.name}: it changes when {name} moves, and does not declare that (depends)"
+                    for i, c in enumerate(criteria)
+                    if i not in concerned and not _alike(before[i][0], after[i][0])
+                ]
+            for spoiling in SPOILINGS if concerned else ():
+                spoiled = self._run(spoil={name: spoiling.said})
+                told += self._green(spoiled, concerned, f"{name} is {spoiling.what}", spoiling.ticks)
+            if concerned:
+                finding = Finding(level="warning", subject=name, text="seerob.testing", holds=(name,))
+                told += self._green(self._run(findings=(finding,)), concerned, f"a finding holds {name}")
+            if concerned and self.model.mechanisms[name].role == "human":
+                hidden = self._run(hidden=name)
+                told += self._green(hidden, concerned, f"no bone of {name} is sure")
+        asking = [i for i, names in enumerate(variables) if names]
+        told += self._green(self._run(quiet=True), asking, "no variable was heard")
+        told += self._green(self._run(muted=True), range(len(criteria)), "it is muted")
+        return told
+
+    def _green(
+        self,
+        run: Iterable[tuple[int, list[tuple[Result, set[str]]]]],
+        concerned: Iterable[int],
+        why: str,
+        ticks: range = range(TICKS),
+    ) -> list[str]:
+        """Who of those concerned is within although nothing may be."""
+        concerned, told = list(concerned), {}
+        for k, said in run:
+            for i in concerned if k in ticks else ():
+                if i not in told and (where := _within(said[i][0])):
+                    told[i] = f"{self._asked[i][0].name}: {where} is within at tick {k} although {why}"
+        return list(told.values())
+
+    def _run(
+        self,
+        *,
+        spoil: Mapping[str, Said] | None = None,
+        elsewhere: str = "",
+        findings: Sequence[Finding] = (),
+        hidden: str = "",
+        quiet: bool = False,
+        muted: bool = False,
+    ) -> Iterator[tuple[int, list[tuple[Result, set[str]]]]]:
+        """What every criterion says at every tick, and on whom that depends."""
+        model = self.model
+        sources = {v.source: TIMEOUT * _PERIOD for v in model.dictionary.values()}
+        driven = dict.fromkeys(model.mechanisms, (TIMEOUT + 0.5) * _PERIOD)
+        engine = Engine(model, driven=driven, live=driven, signals=sources)
+        judges = [
+            Judge([bound_to(model, changed(c, active=MUTE) if muted else c, group)], findings)
+            for c, group in self._asked
+        ]
+        values = {**self._values, MUTE: not muted}
+        for k in range(TICKS):
+            said = []
+            for mechanism in model.mechanisms.values():
+                sample = _sample(mechanism, k, ELSEWHERE if mechanism.name == elsewhere else 0.0)
+                spoiled = spoil[mechanism.name](sample, k) if spoil and mechanism.name in spoil else sample
+                said += [] if spoiled is None else [spoiled]
+            engine.take(said)
+            if not quiet:
+                engine.take([*self._signals(k, values)])
+            state: State = engine.tick() if k else engine.start()
+            if hidden:
+                doubt = "seerob.testing", tuple(BONES)
+                state.hearings[hidden].parts = [(state.t, (doubt,))]
+            results = []
+            for judge in judges:
+                (result,) = judge(state)
+                results.append((result, set(state.asked)))
+            yield k, results
+
+    def _signals(self, k: int, values: Mapping[str, Value]) -> Iterator[SignalSample]:
+        for source in {v.source for v in self.model.dictionary.values()}:
+            own = {n: values[n] for n, v in self.model.dictionary.items() if v.source == source}
+            yield SignalSample(source=source, seq=k, t=k * _PERIOD, values=own)
+
+
+def _declared(model: Model, names: Sequence[str]) -> tuple[str, ...]:
+    """Robots, people and machines that names mean, with what carries them and what is on them."""
+    found = dict[str, None]()
+    for name in names:
+        if name in model.mechanisms:
+            found[name] = None
+            continue
+        try:
+            found |= dict.fromkeys(filter(None, (model.bodies[i].mover for i in model.select(name))))
+        except UnknownName:  # a link without a shape
+            at = model.frames[name].mj if name in model.frames else -1
+            found |= dict.fromkeys(m.name for m in model.mechanisms.values() if at in m.mj_bodies)
+    for name in tuple(found):
+        mechanism = model.mechanisms[name]
+        found |= dict.fromkeys((*mechanism.riders, *mechanism.holders))
+        while mechanism.on:
+            found[mechanism.on] = None
+            mechanism = model.mechanisms[mechanism.on]
+    return tuple(found)
+
+
+def _sample(mechanism: Mechanism, k: int, elsewhere: float) -> JointSample:
+    """Where somebody is at a tick: about their home, robots in motion."""
+    t = k * _PERIOD
+    swing = SWING if mechanism.role == "robot" else 0.0
+    q: Array = mechanism.home + swing * np.sin(2 * np.pi * t) + elsewhere
+    qd = np.full(len(q), 2 * np.pi * swing * math.cos(2 * np.pi * t))
+    return JointSample(
+        source="seerob.testing",
+        seq=k,
+        t=t,
+        target=mechanism.name,
+        q=tuple(q.tolist()),
+        qd=tuple(qd.tolist()),
+        tau=(0.0,) * len(q) if mechanism.role == "robot" else None,
+    )
+
+
+def _usual(variable: Variable) -> Value:
+    if variable.type is Kind.BOOL:
+        return False
+    return 0.0 if variable.type is Kind.NUMBER else next(iter(variable.choices.values()), "")
+
+
+def _within(result: Result) -> str:
+    """What of a result is within, it or a part, a row, a marker; empty for nothing."""
+    if result.verdict is Verdict.WITHIN:
+        return "it"
+    for part in result.parts:
+        if _within(part):
+            return f"its part {part.name}"
+    for row in result.rows:
+        if row.verdict is Verdict.WITHIN:
+            return f"its row {row.name}"
+    return "a marker of it" if any(m.verdict is Verdict.WITHIN for m in result.markers) else ""
+
+
+def _alike(a: Result, b: Result) -> bool:
+    if a.verdict is not b.verdict or (a.value is None) != (b.value is None):
+        return False
+    return a.value is None or b.value is None or math.isclose(a.value, b.value, rel_tol=1e-6, abs_tol=1e-9)
+
+
+# -- plug-in of pytest ----------------------------------------------------------------------------
+
+
+def pytest_collect_file(parent: Any, file_path: Path) -> Any:
+    """Collect a ``workstation.toml`` that is named on the command line."""
+    if file_path.suffix != ".toml" or not parent.session.isinitpath(file_path):
+        return None
+    import pytest
+
+    class Cell(pytest.Item):
+        def runtest(self) -> None:
+            station = load(file_path)
+            never_within(station)
+            if not all(isinstance(source, LiveSource) for source in station.workstation.sources):
+                sources_never_within(station)
+
+        def reportinfo(self) -> tuple[Path, None, str]:
+            return file_path, None, f"never within: {file_path}"
+
+    class File(pytest.File):
+        def collect(self) -> Iterator[Cell]:
+            yield Cell.from_parent(self, name="never_within")
+
+    return File.from_parent(parent, path=file_path)

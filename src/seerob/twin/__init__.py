@@ -1,0 +1,1 @@
+"""The engine, the state, and what is known of whom."""

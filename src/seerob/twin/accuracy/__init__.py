@@ -1,0 +1,1 @@
+"""How far what is known may be off, and what that makes of distances and masses."""

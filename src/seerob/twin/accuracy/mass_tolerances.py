@@ -1,0 +1,267 @@
+r"""Mass matrices of a robot whose masses are known within tolerances.
+
+A body whose mass is off by a share has that share more or less of its inertia too: its part of the mass
+matrix, :math:`M_b = m J_c^T J_c + J_\omega^T I J_\omega`, is scaled. Every part is positive semi-definite, so
+that with a larger mass of any body
+
+- :math:`\dot q^T M \dot q` is larger or the same,
+- :math:`M^{-1}` is smaller in the order of Loewner, :math:`u^T J_v M^{-1} J_v^T u` too, and the effective
+  mass along any direction larger or the same,
+- :math:`M/2 + m_L` is larger.
+
+All three are monotone in every mass, whatever the others are: their ends are at the ends of the masses.
+
+A density that is off is a mass that is off. A centre of mass that is off by d, in any direction, changes
+:math:`J_c` by no more than :math:`\delta = |d|` times :math:`J_\omega`, so that for every
+:math:`0 < \epsilon < 1`, in the order of Loewner,
+
+.. math:: (1-\epsilon) J_c^T J_c - (1/\epsilon - 1)\,\delta^2 J_\omega^T J_\omega
+    \le J_{c+d}^T J_{c+d} \le (1+\epsilon) J_c^T J_c + (1 + 1/\epsilon)\,\delta^2 J_\omega^T J_\omega
+
+(Young's inequality). Both sides are bounds, not ends: ε is chosen by the present motion, for which the
+larger one is then reached where :math:`d \perp v`. The lesser is no less than a body that weighs nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from seerob.core.tolerances import Shifts, Tolerance
+from seerob.core.transforms import Array
+from seerob.model.model import Mechanism, Model
+from seerob.twin.state import State
+
+EXACT = 1e-4
+"""Relative error of a volume up to which it is told as exact."""
+
+
+class MassTolerances:
+    """Masses of one robot, with everything mounted on it, that are known within tolerances.
+
+    Args:
+        model: The compiled workstation.
+        robot: The robot.
+    """
+
+    def __init__(self, model: Model, robot: Mechanism) -> None:
+        self._model, self.robot = model, robot
+        names = {int(i): str(model.mj.body(int(i)).name) for i in robot.mj_bodies}
+        station = model.workstation
+        found: list[_Off] = []
+        for table in station.robots:
+            if table.name == robot.name:
+                links = [i for i, name in names.items() if name in robot.links]
+                found += _offs(table.name, links, mass=table.mass_tolerance, com=table.com_tolerance)
+        for thing in (*station.tools, *station.workpieces):
+            bodies = [i for i, name in names.items() if name == thing.name]
+            found += _offs(
+                thing.name,
+                bodies,
+                mass=thing.mass_tolerance,
+                density=thing.density_tolerance,
+                com=thing.com_tolerance,
+            )
+        found += _estimates(model, robot)
+        self.tolerances = tuple(off.tolerance for off in found)
+        self._offs = found
+        masses = model.mj.body_mass
+        # Of M/2 + m_L: links by half, what is mounted in full. A centre of mass changes nothing in it.
+        self._simplified = np.array(
+            [
+                off.share * sum(float(masses[i]) * (1 if i in robot.load else 0.5) for i in off.bodies)
+                for off in found
+            ]
+        )
+
+    def heaviest_load(self) -> float:
+        """What is mounted on the robot [kg], at most."""
+        masses, load = self._model.mj.body_mass, self.robot.load
+        off = sum(o.share * float(masses[i]) for o in self._offs for i in o.bodies if i in load)
+        return float(sum(float(masses[i]) for i in sorted(load))) + off
+
+    def __len__(self) -> int:
+        """How many tolerances there are."""
+        return len(self.tolerances)
+
+    def heaviest(self, body: int) -> tuple[float, float]:
+        """Factor on the mass of one of MuJoCo's bodies, and way of its centre of mass [m], at most."""
+        offs = [off for off in self._offs if body in off.bodies]
+        factor = max(1 + sum(off.share for off in offs), *(off.heavier for off in offs), 1.0)
+        return factor, sum(off.way for off in offs)
+
+    def simplified(self, nominal: float, shifts: Shifts) -> float:
+        """M/2 + m_L at shifted masses [kg].
+
+        Args:
+            nominal: As given [kg].
+            shifts: Of each tolerance.
+        """
+        return nominal + float(self._simplified @ np.array(shifts, float)) if shifts else nominal
+
+    def weighed(self, mj: Any, shifts: Shifts) -> Any:
+        """A `mujoco.MjModel` with shifted masses, and moments of inertia with them.
+
+        Centres of mass stay where they are: `moved` names those that may be off.
+
+        Args:
+            mj: With masses as given.
+            shifts: Of each tolerance.
+        """
+        found, factors = mj.__copy__(), np.ones(mj.nbody)
+        for off, shift in zip(self._offs, shifts, strict=True):
+            factors[list(off.bodies)] += shift * off.share
+        found.body_mass *= factors
+        found.body_inertia *= factors[:, None]
+        mujoco.mj_setConst(found, mujoco.MjData(found))
+        return found
+
+    @property
+    def moved(self) -> tuple[str, ...]:
+        """Tolerances of centres of mass, in words."""
+        return tuple(str(off.tolerance) for off in self._offs if off.way)
+
+    def matrices(self, state: State) -> Matrices:
+        """Mass matrices of a state, to be asked at shifted masses.
+
+        Raises:
+            Undecided: Not heard, or a mass that nobody gave.
+        """
+        M = state.mass_matrix(self.robot)
+        qd = state.qd(self.robot)
+        parts = [off.parts(state, self.robot, qd) for off in self._offs]
+        return Matrices(M, parts)
+
+
+class _Bounds(NamedTuple):
+    """What one input makes of a mass matrix at its ends, shape (n, n) each."""
+
+    lost: Array
+    lost_at_most: Array
+    """Never more than a body has: another bound, which leaves the matrix one that can be inverted."""
+    gained: Array
+
+
+@dataclass(frozen=True)
+class _Off:
+    """One input of some bodies that may be off."""
+
+    tolerance: Tolerance
+    bodies: tuple[int, ...]
+    """Of `mujoco`."""
+    share: float = 0.0
+    """Of their masses."""
+    way: float = 0.0
+    """Of their centres of mass [m]."""
+    lighter: float = 1.0
+    """Least factor on the masses whose centres may be off."""
+    heavier: float = 1.0
+    """Largest one."""
+
+    def parts(self, state: State, robot: Mechanism, qd: Array) -> _Bounds:
+        """What it makes of the mass matrix at its ends."""
+        n = len(robot.joints)
+        found = [np.zeros((n, n)) for _ in range(3)]
+        for body in self.bodies:
+            part = _Part.of(state, robot, body)
+            each = part.shifted(self, qd) if self.way else (self.share * part.matrix,) * 3
+            found = [a + b for a, b in zip(found, each, strict=True)]
+        return _Bounds(*found)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What one body makes of the mass matrix."""
+
+    m: float
+    J_c: Array
+    J_w: Array
+    inertia: Array
+    """In world axes (3, 3) [kg·m²]."""
+
+    @classmethod
+    def of(cls, state: State, robot: Mechanism, body: int) -> _Part:
+        """Of a body of `mujoco`."""
+        mj, data = state.model.mj, state.data_of(robot.name)
+        linear, angular = np.zeros((3, mj.nv)), np.zeros((3, mj.nv))
+        mujoco.mj_jacBodyCom(mj, data, linear, angular, body)
+        J_c, J_w = (rows[:, robot.v_address] @ robot.coupling for rows in (linear, angular))
+        turn = data.ximat[body].reshape(3, 3)
+        return cls(float(mj.body_mass[body]), J_c, J_w, turn @ np.diag(mj.body_inertia[body]) @ turn.T)
+
+    @property
+    def matrix(self) -> Array:
+        """Shape (n, n)."""
+        return np.asarray(self.m * self.J_c.T @ self.J_c + self.J_w.T @ self.inertia @ self.J_w)
+
+    def shifted(self, off: _Off, qd: Array) -> tuple[Array, Array, Array]:
+        """What is lost at most where the centre of mass is off, the same in any case, what is gained."""
+        moved, turned = self.J_c.T @ self.J_c, off.way**2 * self.J_w.T @ self.J_w
+        v, w = (math.sqrt(max(float(qd @ A @ qd), 0.0)) for A in (moved, turned))
+        if not (v > 0 and w > 0):
+            v, w = (math.sqrt(float(np.trace(A))) for A in (moved, turned))
+        # All that moves a body along may be lost; what turns it stays.
+        all_of_it = off.lighter * self.m * moved
+        if not (v > 0 and w > 0):
+            return all_of_it, all_of_it, off.heavier * self.m * turned
+        eps = w / v
+        more = off.heavier * self.m * (eps * moved + (1 + 1 / eps) * turned)
+        less = off.lighter * self.m * (eps * moved + (1 / eps - 1) * turned) if eps < 1 else all_of_it
+        return less, all_of_it, more
+
+
+def _offs(
+    name: str,
+    bodies: Sequence[int],
+    *,
+    mass: float | None = None,
+    density: float | None = None,
+    com: float | None = None,
+) -> Iterator[_Off]:
+    """What of a robot, tool or workpiece is said to be off."""
+    if not bodies:
+        return
+    for key, share in (("mass_tolerance", mass), ("density_tolerance", density)):
+        if share:
+            yield _Off(Tolerance(f"{key} of {name}", 100 * share, "%"), tuple(bodies), share=share)
+    if com:
+        either = (mass or 0.0) + (density or 0.0)
+        tolerance = Tolerance(f"com_tolerance of {name}", com, "m")
+        lighter, heavier = max(1 - either, 0.0), 1 + either
+        yield _Off(tolerance, tuple(bodies), way=com, lighter=lighter, heavier=heavier)
+
+
+def _estimates(model: Model, robot: Mechanism) -> Iterator[_Off]:
+    """Masses that follow from a density and a volume of which only bounds are known."""
+    given = {thing.name: thing for thing in (*model.workstation.tools, *model.workstation.workpieces)}
+    for index in robot.carried:
+        body = model.bodies[index]
+        if body.mass is not None and body.mass.error > EXACT:
+            dense = getattr(given.get(body.owner), "density_tolerance", None) or 0.0
+            share = body.mass.error * (1 + dense)
+            yield _Off(Tolerance(f"volume of {body.owner}", 100 * share, "%"), (body.mj,), share=share)
+
+
+class Matrices:
+    """Mass matrices of one state at the ends of what may be off."""
+
+    def __init__(self, M: Array, parts: Sequence[_Bounds]) -> None:
+        self.M, self.parts = M, parts
+
+    def at(self, shifts: Shifts) -> Array:
+        """M at shifted inputs, shape (n, n): no less than it can be with 1, no more with −1."""
+        found = self._at(shifts, 0)
+        if np.linalg.eigvalsh(found)[0] <= 0:
+            found = self._at(shifts, 1)
+        return found
+
+    def _at(self, shifts: Shifts, bound: int) -> Array:
+        found = self.M
+        for shift, part in zip(shifts, self.parts, strict=True):
+            found = found + (shift * part.gained if shift > 0 else shift * part[bound])
+        return np.asarray(found)

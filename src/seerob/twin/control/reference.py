@@ -1,0 +1,187 @@
+r"""What the twin is pulled toward: a smooth motion through the samples.
+
+Between two samples the reference is the cubic that has their positions and velocities,
+
+.. math:: q(s) = h_{00} q_0 + h_{10} T \dot q_0 + h_{01} q_1 + h_{11} T \dot q_1,\quad s = (t - t_0)/T
+
+so velocity is continuous and acceleration is known, which feed-forward needs. Samples without
+velocities get that of the parabola through them and their neighbours, of the two before for the
+newest. After the newest sample the reference holds its position, of a live source once it has coasted;
+before the oldest it waits there.
+
+Two samples that only an impossible speed could join are a jump, not a motion: the reference stays
+where it was until the later one, and the twin is put there instead of being pulled.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.transforms import Array
+from seerob.kernels.pull import SLACK, along
+
+Knots = tuple[Array, Array, Array, NDArray[np.bool_]]
+
+MAX_KEPT = 4096
+"""Samples kept at most: many times what a fast source sends within one tick."""
+
+
+class Course(NamedTuple):
+    """Where every joint of the workstation is to be at each step of a tick and at its end, in rows."""
+
+    q: Array
+    """[rad or m]"""
+    v: Array
+    """Half a step earlier, as `mujoco.mj_step` counts."""
+    a: Array
+
+
+class Reference:
+    """Motion of one robot or human through its newest samples, several of which may lie ahead."""
+
+    def __init__(self, home: Array, largest_speed: Array | float = np.inf, *, coast: float = 0.0) -> None:
+        """Rest at home.
+
+        Args:
+            home: Position before the first sample [rad or m], shape (n,).
+            largest_speed: Above it a motion is a jump [rad/s or m/s], shape (n,) or one for all.
+            coast: How long it goes on at its speed after the newest sample [s]: the next one of a live
+                source may be late, and a robot in motion does not stop for that.
+        """
+        self._largest = largest_speed
+        self._coast = coast
+        self._jumps: list[float] = []
+        self._landings: list[float] = []
+        self._zero = np.zeros(len(home))
+        self._times: list[float] = []
+        self._points: list[Array] = [home.astype(float).copy()]
+        self._velocities: list[Array] = [self._zero]
+        self._guessed = [True]
+        self._knots: Knots | None = None
+
+    @property
+    def newest(self) -> Array:
+        """Position of the newest sample, or the home position, shape (n,) [rad or m]."""
+        return self._points[-1]
+
+    @property
+    def leaves_at(self) -> float:
+        """Largest speed of a joint at the newest sample [rad/s or m/s]; 0 before the first."""
+        return float(np.abs(self._velocities[-1]).max(initial=0.0))
+
+    @property
+    def instants(self) -> tuple[float, ...]:
+        """Of the samples that are kept, and of its rest after the newest [s], increasing.
+
+        Between two of them the motion is one cubic.
+        """
+        ends = (self.until + self._coast,) if self._coast and self._times else ()
+        return (*self._times, *ends)
+
+    @property
+    def until(self) -> float:
+        """Instant of the newest sample [s]; -inf before the first."""
+        return self._times[-1] if self._times else -np.inf
+
+    def take(self, t: float, q: Array, qd: Array | None, *, anew: bool = False) -> bool:
+        """Make a sample the newest one; False for one that is not newer than the last, which is dropped.
+
+        Args:
+            t: Its instant [s].
+            q: Position [rad or m], shape (n,).
+            qd: Velocity [rad/s or m/s], shape (n,); derived when None.
+            anew: After a silence: nobody knows how it came there, so the twin is put there at once and
+                set in motion when its instant has come.
+        """
+        self._knots = None
+        q, qd = np.asarray(q, float), None if qd is None else np.asarray(qd, float)
+        if anew and t > self.until:
+            self._times, self._jumps, self._landings = [], [], [-np.inf, t]
+        if not self._times:
+            self._times, self._points = [t], [q]
+            self._velocities = [self._zero if qd is None else qd]
+            self._guessed = [qd is None]
+            return True
+        if t <= self._times[-1]:
+            return False
+        self._times.append(t)
+        self._points.append(q)
+        self._velocities.append(self._zero if qd is None else qd)
+        self._guessed.append(qd is None)
+        self._drop(len(self._times) - MAX_KEPT)
+        self._guess()
+        return True
+
+    def _guess(self) -> None:
+        """Velocities of the newest two samples where none were given."""
+        t, q, v = self._times, self._points, self._velocities
+        T = t[-1] - t[-2]
+        chord = (q[-1] - q[-2]) / T
+        if self._impossible(chord, v[-2], v[-1]):
+            self._jumps.append(t[-1])
+            self._landings.append(t[-1])
+            if self._guessed[-1] or self._impossible(v[-1]):
+                v[-1] = self._zero
+            return
+        before, after = chord, chord
+        if len(t) > 2 and t[-2] not in self._jumps:
+            T0 = t[-2] - t[-3]
+            bend = (chord - (q[-2] - q[-3]) / T0) / (T + T0)
+            before, after = chord - T * bend, chord + T * bend
+        if self._guessed[-2]:
+            v[-2] = before
+        if self._guessed[-1]:
+            v[-1] = after
+
+    def _impossible(self, *speeds: Array) -> bool:
+        return any(bool((np.abs(speed) > self._largest).any()) for speed in speeds)
+
+    @property
+    def jumped(self) -> bool:
+        """Whether a jump led to the newest sample."""
+        return bool(self._jumps) and self._jumps[-1] == self._times[-1]
+
+    def land(self, t: float) -> None:
+        """Let the twin be put there at ``t`` [s]: it is elsewhere, for it was not known before."""
+        self._landings.append(t)
+
+    def lands(self, t: float) -> bool:
+        """Whether a jump ended by ``t`` [s]; told once."""
+        due = [jump for jump in self._landings if jump <= t + SLACK]
+        del self._landings[: len(due)]
+        return bool(due)
+
+    def forget(self, t: float) -> None:
+        """Drop what is not needed any more from ``t`` [s] on."""
+        self._drop(bisect_right(self._times, t) - 1)
+
+    def _drop(self, count: int) -> None:
+        if count > 0:
+            self._knots = None
+            oldest = self._times[count]
+            self._jumps = [jump for jump in self._jumps if jump >= oldest]
+            for kept in (self._times, self._points, self._velocities, self._guessed):
+                del kept[:count]
+
+    def at(self, t: float) -> tuple[Array, Array, Array]:
+        """Position [rad or m], velocity and acceleration at ``t`` [s], each of shape (n,)."""
+        q, v, a = self.course(np.array([t]))
+        return q[0], v[0], a[0]
+
+    def course(self, t: Array) -> tuple[Array, Array, Array]:
+        """Position [rad or m], velocity and acceleration at many instants [s] (m,), each of shape (m, n)."""
+        if self._knots is None:
+            self._knots = (
+                # Before the first sample it waits at home.
+                np.array(self._times or [np.inf], float),
+                np.array(self._points),
+                np.array(self._velocities),
+                np.array([instant in self._jumps for instant in self._times or [np.inf]]),
+            )
+        found = np.empty((3, len(t), self._zero.shape[0]))
+        along(*self._knots, self._coast, t, found[0], found[1], found[2])
+        return found[0], found[1], found[2]

@@ -1,0 +1,585 @@
+r"""The engine: pulls the twin toward the samples and steps the physics, one `State` per tick.
+
+Each joint is pulled by an actuator with
+
+.. math:: \tau = k_p (q_{ref} - q) + k_d (\dot q_{ref} - \dot q) + \tau_{ff},\quad
+          k_p = \omega^2 \bar M_{ii},\; k_d = 2 \omega \bar M_{ii}
+
+critically damped at the stated bandwidth ω, where :math:`\bar M_{ii}` is the largest diagonal
+element of the mass matrix over a set of poses, tools and payloads included, and
+:math:`\tau_{ff}` are the torques that the reference motion itself needs (recursive Newton–Euler).
+The gains live in MuJoCo's actuators, whose damping `implicitfast` integrates implicitly; the same
+gains as applied forces diverge at a floating root. Torque limits clamp the whole sum.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+
+import mujoco
+import numpy as np
+
+from seerob.core.errors import InputError, SimulationDiverged
+from seerob.core.samples import BodySample, JointSample, PoseSample, Sample, SignalSample
+from seerob.core.transforms import Array, rotation_from_wxyz
+from seerob.description.capture.following import Following
+from seerob.kernels import pull as kernel
+from seerob.model.model import Mechanism, Model
+from seerob.model.mounting.compilation import pose_matrix
+from seerob.twin import own_words
+from seerob.twin.control.actuation import set_gains, set_torque_limits
+from seerob.twin.control.inverse_kinematics import solve_pose
+from seerob.twin.control.reference import Course, Reference
+from seerob.twin.control.sample_values import beyond_limits, is_possible, largest_speed, torques_of
+from seerob.twin.control.task_space import TaskPull
+from seerob.twin.machines.following import HOLD, Machines, Moved
+from seerob.twin.machines.gripping import Grips, own_masses
+from seerob.twin.moving_base import moved_by_poses
+from seerob.twin.signals import Signals
+from seerob.twin.spans import Path
+from seerob.twin.state import Hearing, State
+from seerob.twin.whereabouts.hearing import NOWHERE
+
+DEFAULT_TIMEOUT = 0.2
+"""Of what is heard without a source that states one [s]."""
+WILD = 300.0
+"""Above it the physics has lost a joint [rad/s or m/s]."""
+NEAR = 2e-3
+"""A twin that is nearer to where it is found to be is pulled there [rad or m]: at a bandwidth of 20 Hz its
+speed is off by 0.09 rad/s or m/s for a moment, as much as that of a robot that brakes at 3 rad/s² and was not
+heard for 30 ms. Ordinary jitter stays below."""
+BEATS = 0.05
+"""Between two pictures of a machine that is heard [s]: after that it is silent, and when it was in motion
+nobody says that it stopped."""
+POSE_TOLERANCE = 1e-4
+"""Largest error of a solved Cartesian target [m or rad] that still counts as reached."""
+
+
+def last_tick(duration: float, period: float) -> int:
+    """Number of the last tick of a motion, which ends with it: from half to one and a half as long as others.
+
+    Args:
+        duration: Of the motion [s].
+        period: Of a tick [s].
+    """
+    return 0 if duration <= kernel.SLACK else max(1, math.floor(duration / period + 0.5))
+
+
+class Engine:
+    """The twin in motion.
+
+    Attributes:
+        state: The twin at the last tick; the same object throughout.
+        signals: What machines say, by variable.
+        end: When the motion ends, and the last tick with it [s]; inf while nobody knows.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        *,
+        driven: dict[str, float] | None = None,
+        live: Collection[str] = (),
+        signals: dict[str, float] | None = None,
+        untimed: dict[str, str] | None = None,
+        controllers: bool = True,
+        contacts: bool = True,
+    ) -> None:
+        """Set the twin up at its home position.
+
+        Args:
+            model: The compiled workstation.
+            driven: Time-out [s] of the source of each robot and human that a source drives.
+            live: Those of them whose source is live; when a sample is late they coast, until the time-out;
+                machines do not.
+            signals: Time-out [s] of each variable, or source of variables.
+            untimed: Why nobody knows how late a variable is heard, by name.
+            controllers: Whether the twin is pulled at all; off, it moves freely from where the first
+                samples put it, and nothing that is heard later is compared with it.
+            contacts: Whether the contacts that the file asks for act.
+        """
+        driven = driven or {}
+        self.model = model = own_masses(model)
+        self.controllers = controllers
+        engine = model.workstation.engine
+        # Without controllers there is nothing but physics that could move it.
+        self.physics = engine.physics or not controllers
+        self._mj = model.mj.__copy__()
+        self._mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        if not contacts:
+            self._mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+        if not controllers:
+            # Nothing stiff is left, and Runge–Kutta keeps the energy.
+            self._mj.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+        self._steps = round(engine.tick / engine.timestep)
+        self._dt = engine.timestep
+        self._period = engine.tick
+        self._limit = engine.tracking_limit
+        self._data = mujoco.MjData(self._mj)
+        self._wanted = mujoco.MjData(self._mj)
+        self._shown = mujoco.MjData(self._mj)
+        self._mechanisms = list(model.mechanisms.values())
+        # Without mimics every joint is commanded itself, and a person's 53 by 53 products can be spared.
+        self._coupled = {
+            m.name
+            for m in self._mechanisms
+            if m.offset.any() or not np.array_equal(m.coupling, np.eye(len(m.v_address)))
+        }
+        # What a variable says of a machine stands until it says something else.
+        coasting = set(live) - {machine.name for machine in model.workstation.machines}
+        self._ahead = set(driven) - set(live) - {m.name for m in model.workstation.machines}
+        """Whose future is known: past their newest sample nothing will be said."""
+        following = {machine.name for machine in model.workstation.machines if machine.motion.variables()}
+        self._stands = self._ahead | following
+        """Who stands when nothing more is said, and may not when it was in motion."""
+        self._live = {*live, *following}
+        self._leapt = dict.fromkeys(following, (-np.inf, ""))
+        """Of what follows variables, until when its last jump counts [s], and what is said of it."""
+        self._unread = coasting  # what a file says was looked at when it was read
+        self._references = {
+            m.name: Reference(m.home, largest_speed(m), coast=driven[m.name] if m.name in coasting else 0.0)
+            for m in self._mechanisms
+        }
+        self._hearings = {
+            m.name: Hearing(
+                # What moves freely is where it is, whatever is heard.
+                given=m.home_given or not controllers,
+                driven=m.name in driven and controllers,
+                timeout=driven.get(m.name, DEFAULT_TIMEOUT),
+                grace=BEATS if m.name in following else 0.0,
+            )
+            for m in self._mechanisms
+        }
+        self._dof = self._mj.jnt_dofadr[self._mj.actuator_trnid[:, 0]].astype(np.int64)
+        """Degree of freedom of each actuator."""
+        self._kp, self._kd = set_gains(
+            self._mj, self._wanted, self._mechanisms, engine, self._dof, controllers=controllers
+        )
+        self._limits = set_torque_limits(self._mj, self._mechanisms, self._dof)
+        self._task_pulls = [
+            TaskPull(self._mj, model.mechanisms[human.name], engine.human_bandwidth)
+            for human in model.workstation.humans
+            if human.follow == "task" and controllers
+        ]
+        self._feedforward = np.zeros(self._mj.nv)
+        self._before = np.zeros(self._mj.nv)
+        self._courses: dict[str, tuple[Array, Array, Array]] = {}
+        self._divide(self._steps)
+        self._broken: set[str] = set()
+        """Who was put elsewhere during a tick."""
+        self._force = np.zeros(self._mj.nv)
+        self._almost = 0.999 * self._limits
+        self._said: dict[str, own_words.LiveWords] = {}
+        """By robot, what its live source says of itself."""
+        self._followings: dict[str, Following] = {}
+        """By person that devices see."""
+        self.signals = Signals(model.dictionary, signals or {}, untimed)
+        self._machines = Machines(model.workstation.machines, self.signals)
+        self.state = State(model, self._shown, self._hearings, self.signals)
+        self.state.foresee = self._foresee
+        self._grips = Grips(self.state, self._mj)
+        self._tick = 0
+        self._now = 0.0
+        """Instant of the last tick [s]."""
+        self.end = math.inf
+        self._place(0.0)
+
+    def _divide(self, steps: int) -> None:
+        """Make room for each step of a tick."""
+        self._steps, rows = steps, steps + 1
+        self._course = Course(
+            np.tile(self._mj.qpos0, (rows, 1)), np.zeros((rows, self._mj.nv)), np.zeros((rows, self._mj.nv))
+        )
+        self._way = np.empty((rows, self._mj.nq)), np.empty((rows, self._mj.nv))
+        """Positions and velocities at each step of a tick."""
+
+    # -- what comes in ----------------------------------------------------------------------
+
+    def take(self, samples: Sequence[Sample]) -> None:
+        """Hear samples: what they say is where the twin is pulled from now on."""
+        for sample in samples:
+            if isinstance(sample, SignalSample):
+                self.signals.take(sample)
+                for moved in self._machines.hear(sample):
+                    self._move(moved)
+                continue
+            untimed = sample.late if sample.t_device is None else 0.0
+            if isinstance(sample, BodySample):
+                self._following(sample.target).hear(sample)
+                hearing = self._hearings[sample.target]
+                hearing.older = max(untimed, hearing.older)
+                continue
+            mechanism = self._target(sample)
+            self._hearings[mechanism.name].older = untimed
+            reason = sample.doubt("its source")
+            if not is_possible(sample):
+                # Nothing to be pulled to; not knowing where it is must show all the same.
+                taken, reason = (
+                    bool(np.isfinite(sample.t)),
+                    "its source sends values that are not finite, or beyond 10⁶",
+                )
+            elif isinstance(sample, JointSample):
+                qd = None if sample.qd is None else np.array(sample.qd)
+                if mechanism.name in self._unread:
+                    reason = reason or beyond_limits(sample, mechanism) or self._contradicted(sample)
+                taken = self._take_one(mechanism.name, sample.t, np.array(sample.q), qd)
+            else:
+                taken, missed = self._take_pose(mechanism, sample)
+                reason = reason or missed
+            self._note(mechanism.name, sample.t, reason, sample, taken=taken)
+            if isinstance(sample, JointSample) and not sample.placed:
+                self._hearings[mechanism.name].places.append((sample.t, NOWHERE))
+
+        for name, following in self._followings.items():
+            hearing = self._hearings[name]
+            hearing.driven = self.controllers
+            for found in following.until(self._next()):
+                self._references[name].take(found.t, found.q, None, anew=found.anew and self._tick > 0)
+                hearing.follow(found)
+                hearing.leaves_at = self._references[name].leaves_at if name in self._ahead else 0.0
+
+    def _contradicted(self, sample: JointSample) -> str:
+        """Why what a source says of itself is not the twin; empty when it may be."""
+        if sample.tcp is None and sample.tcp_speed is None and sample.tau is None:
+            return ""
+        if sample.target not in self._said:
+            self._said[sample.target] = own_words.LiveWords(self.model, sample.target)
+        said = self._said[sample.target]
+        found = said.doubt(sample)
+        self._hearings[sample.target].torque_doubt = said.torque_doubt
+        return found
+
+    def _silent(self, name: str) -> bool:
+        """Whether what drives it was silent: of a live source only the newest sample is ever this old."""
+        age = self._now - self._references[name].until
+        return self._tick > 0 and age > self._hearings[name].timeout
+
+    def _take_one(self, name: str, t: float, q: Array, qd: Array | None, *, anew: bool = False) -> bool:
+        """Take what says where somebody is; whether it is newer than what was heard before.
+
+        What comes late finds the twin where it was taken to be meanwhile. It is put where it is found to be:
+        if it were pulled there, it would show a speed that nobody had.
+        """
+        reference, now = self._references[name], self._now
+        anew = anew or self._silent(name)
+        # A file is heard ahead; only what is heard live can be late.
+        late = name in self._live and self._tick > 0 and reference.until < now
+        before = reference.at(now)[0] if late and not anew else None
+        taken = reference.take(t, q, qd, anew=anew)
+        if taken and before is not None:
+            off = float(np.abs(reference.at(now)[0] - before).max(initial=0.0))
+            if off > NEAR:
+                reference.land(now)
+            if off > self._limit:
+                self._hearings[name].lost = now
+        return taken
+
+    def _move(self, moved: Moved) -> None:
+        """A machine follows what its variables say."""
+        taken = self._take_one(moved.machine, moved.t, moved.q, moved.qd, anew=self._tick > 0 and moved.anew)
+        self._hearings[moved.machine].older = moved.age
+        self._note(moved.machine, moved.t, moved.doubt, None, taken=taken)
+
+    def _note(
+        self, name: str, t: float, reason: str, sample: JointSample | PoseSample | None, *, taken: bool
+    ) -> None:
+        """Note that a robot, a person or a machine was heard, and why that may not be relied on."""
+        hearing = self._hearings[name]
+        hearing.driven = self.controllers
+        if taken and (not hearing.heard or t > hearing.heard[-1][0]):
+            jump = f"its samples jump at {t:.3f} s" if self._references[name].jumped else ""
+            if name in self._leapt:
+                if jump:
+                    self._leapt[name] = t + HOLD, jump
+                until, said = self._leapt[name]
+                jump = said if t <= until else ""
+            hearing.heard.append((t, reason or jump))
+            hearing.torques.append(None if sample is None else torques_of(sample))
+            error = sample.qd_error if isinstance(sample, JointSample) else None
+            hearing.speed_errors.append(None if error is None else np.array(error))
+            hearing.leaves_at = self._references[name].leaves_at if name in self._stands else 0.0
+
+    def _following(self, name: str) -> Following:
+        """What captured motion of a person goes through.
+
+        Raises:
+            UnknownName: There is no such person.
+        """
+        if name not in self._followings:
+            human = self.model.human(name)
+            at = next(h.at for h in self.model.workstation.humans if h.name == name)
+            timeout = self._hearings[name].timeout
+            self._followings[name] = Following(human.description, pose_matrix(at), timeout)
+        return self._followings[name]
+
+    def _target(self, sample: JointSample | PoseSample) -> Mechanism:
+        """Robot or human that a sample drives.
+
+        Raises:
+            UnknownName, InputError: There is none; it has another number of joints, or takes no poses.
+        """
+        if isinstance(sample, PoseSample):
+            return moved_by_poses(self.model, sample)
+        mechanism = self.model.mechanism(sample.target)
+        n = len(mechanism.joints)
+        if any(len(values) != n for values in (sample.q, sample.qd, sample.tau) if values is not None):
+            heard = f"{len(sample.q)} joint values" + (
+                "" if sample.qd is None else f", {len(sample.qd)} speeds"
+            )
+            heard += "" if sample.tau is None else f", {len(sample.tau)} torques"
+            raise InputError.at(sample.source, sample.target, heard, f"{sample.target} has {n} joints")
+        return mechanism
+
+    def _take_pose(self, mechanism: Mechanism, sample: PoseSample) -> tuple[bool, str]:
+        """Resolve a Cartesian target into joint positions: whether it was taken, why it is not reached."""
+        frame = self.model.frame(sample.target)
+        reference = self._references[mechanism.name]
+        q, miss = solve_pose(
+            self._mj,
+            self._wanted,
+            mechanism,
+            frame,
+            rotation_from_wxyz(sample.wxyz),
+            np.array(sample.position),
+            start=reference.newest,
+        )
+        missed = f"{sample.target} cannot reach the pose that was heard: the nearest that was found is {miss}"
+        return reference.take(sample.t, q, None), "" if miss.larger <= POSE_TOLERANCE else missed
+
+    def _foresee(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
+        """See `seerob.twin.state.Foresee`: of what a file drives, and of what stands."""
+        hearing, mechanism = self._hearings[name], self.model.mechanisms[name]
+        if not hearing.driven:
+            if not (self.controllers and hearing.given):
+                return None
+            return np.tile(mechanism.home, (len(t), 1)), np.zeros((len(t), len(mechanism.home))), ""
+        if name not in self._ahead:
+            return None
+        q, qd, _ = self._references[name].course(t)
+        return q, qd, hearing.doubt_ahead(self.state.t, float(t[-1]) if len(t) else self.state.t)
+
+    # -- time -------------------------------------------------------------------------------
+
+    def _next(self) -> float:
+        """When the tick that comes next ends [s]."""
+        whole = (self._tick + 1) * self._period
+        ends = self.end < math.inf and self._tick + 1 == last_tick(self.end, self._period)
+        return self.end if ends and abs(self.end - whole) > kernel.SLACK else whole
+
+    def _stretch(self, length: float) -> None:
+        """Cut a tick that is not as long as others [s] into equal steps, no longer than those of others."""
+        steps, before = max(1, math.ceil(length / self._dt - 1e-6)), self._dt
+        self._dt = self._mj.opt.timestep = length / steps
+        if self._centred:
+            # Velocities of mj_step belong half a step earlier than its positions: of another step now.
+            self._data.qvel += 0.5 * (1 - self._dt / before) * (self._data.qvel - self._before)
+        self._divide(steps)
+
+    def start(self) -> State:
+        """The twin at t = 0, placed on the first samples without being pulled there."""
+        self._place(0.0)
+        self._note_errors()
+        return self.state
+
+    def tick(self) -> State:
+        """Advance by one tick and return the twin then.
+
+        Raises:
+            SimulationDiverged: A position that is not finite.
+        """
+        start, t = self._now, self._next()
+        if abs(t - start - self._period) > kernel.SLACK:
+            self._stretch(t - start)
+        for reference in self._references.values():
+            reference.forget(start)
+        for hearing in self._hearings.values():
+            hearing.forget(start)
+        self.signals.forget(start)
+        self._aim(start, t)
+        self._broken.clear()
+        qpos, qvel = self._data.qpos, self._data.qvel
+        q_way, v_way = self._way
+        q_way[0], v_way[0] = self._shown.qpos, self._shown.qvel
+        for step in range(self._steps if self.physics else 0):
+            if self.controllers:
+                self._pull(step, start + step * self._dt)
+            self._before[:] = qvel
+            mujoco.mj_step(self._mj, self._data)
+            if self.controllers and not kernel.tame(qvel, WILD):
+                self._put_back(step + 1, start + (step + 1) * self._dt)
+            q_way[step + 1], v_way[step + 1] = qpos, qvel
+            if self._centred:
+                v_way[step + 1] += 0.5 * (qvel - self._before)
+        self._tick += 1
+        self._now = t
+        if self.physics:
+            self._land(self._steps, t)
+        else:
+            self._follow(t)
+        self._check_finite()
+        self._show(t)
+        self.state.path = self._path(start, t)
+        self._note_errors()
+        return self.state
+
+    @property
+    def _centred(self) -> bool:
+        """Whether the velocities of mj_step belong half a step earlier than its positions (see _pull)."""
+        return self.controllers and self.physics and not self._data.ncon
+
+    def _path(self, start: float, t: float) -> Path:
+        """How everybody came from the last tick to this one."""
+        broken = tuple(sorted(self._broken))
+        q, v = self._way
+        if self.physics:
+            instants: Array = np.asarray(start + self._dt * np.arange(self._steps + 1), float)
+            instants[-1] = t
+            q[-1], v[-1] = self._shown.qpos, self._shown.qvel
+            return Path(instants, q, v, broken)
+        inside = {
+            instant
+            for mechanism in self._mechanisms
+            for instant in self._references[mechanism.name].instants
+            if start + kernel.SLACK < instant < t - kernel.SLACK
+        }
+        instants = np.array([start, *sorted(inside), t], float)
+        many_q, many_v = np.tile(self._shown.qpos, (len(instants), 1)), np.zeros((len(instants), len(v[0])))
+        for mechanism in self._mechanisms:
+            found, speed, _ = self._references[mechanism.name].course(instants)
+            many_q[:, mechanism.q_address] = found @ mechanism.coupling.T + mechanism.offset
+            many_v[:, mechanism.v_address] = speed @ mechanism.coupling.T
+        many_q[0], many_v[0] = q[0], v[0]
+        many_q[-1], many_v[-1] = self._shown.qpos, self._shown.qvel
+        return Path(instants, many_q, many_v, broken)
+
+    def _follow(self, t: float) -> None:
+        """Put the twin on what was heard, with the velocities of that motion."""
+        for mechanism in self._mechanisms:
+            if self._references[mechanism.name].lands(t):
+                self._broken.add(mechanism.name)
+            self._put(mechanism, *self._references[mechanism.name].at(t))
+
+    def _aim(self, start: float, end: float) -> None:
+        """Where every joint is to be at each step of the tick that begins, and at its end [s]."""
+        if not (self.controllers and self.physics):
+            return
+        t = np.array([start + step * self._dt for step in range(self._steps + 1)])
+        t[-1] = end
+        q_all, v_all, a_all = self._course
+        for mechanism in self._mechanisms:
+            q, v, a = self._courses[mechanism.name] = self._references[mechanism.name].course(t)
+            # mj_step moves positions with the velocity at the end of the step, so its velocities
+            # belong half a step earlier than its positions.
+            before = v - 0.5 * self._dt * a
+            if mechanism.name in self._coupled:
+                q = q @ mechanism.coupling.T + mechanism.offset
+                before, a = before @ mechanism.coupling.T, a @ mechanism.coupling.T
+            q_all[:, mechanism.q_address] = q
+            v_all[:, mechanism.v_address] = before
+            a_all[:, mechanism.v_address] = a
+
+    def _pull(self, step: int, t: float) -> None:
+        wanted, mj = self._wanted, self._mj
+        self._land(step, t)
+        q, v, a = (part[step] for part in self._course)
+        wanted.qpos[:], wanted.qvel[:], wanted.qacc[:] = q, v, a
+        mujoco.mj_kinematics(mj, wanted)
+        mujoco.mj_comPos(mj, wanted)
+        mujoco.mj_comVel(mj, wanted)
+        mujoco.mj_passive(mj, wanted)
+        mujoco.mj_rne(mj, wanted, 1, self._feedforward)
+        kernel.command(
+            q, v, a, self._feedforward, wanted.qfrc_passive, mj.dof_armature, mj.dof_damping,
+            self._kp, self._kd, self._dt, self._dof, self._data.ctrl,
+        )  # fmt: skip
+        for pull in self._task_pulls:
+            pull.command(mj, self._data, wanted, self._kp)
+
+    def _land(self, step: int, t: float) -> None:
+        """Put there who jumped there by ``t`` [s], also where that is the instant of the tick itself."""
+        for mechanism in self._mechanisms if self.controllers else ():
+            if self._references[mechanism.name].lands(t):
+                self._broken.add(mechanism.name)
+                self._put(mechanism, *(part[step] for part in self._courses[mechanism.name]))
+
+    def _place(self, t: float) -> None:
+        for mechanism in self._mechanisms:
+            self._put(mechanism, *self._references[mechanism.name].at(t))
+        mujoco.mj_forward(self._mj, self._data)
+        self._show(t)
+
+    def _put(self, mechanism: Mechanism, q: Array, v: Array, a: Array) -> None:
+        late = 0.5 * self._dt * a if self.controllers and self.physics else np.zeros_like(a)
+        self._data.qpos[mechanism.q_address] = mechanism.coupling @ q + mechanism.offset
+        self._data.qvel[mechanism.v_address] = mechanism.coupling @ (v - late)
+        self._before[mechanism.v_address] = mechanism.coupling @ (v - 3 * late)
+
+    def _put_back(self, step: int, t: float) -> None:
+        """Put what the physics has lost back to where it should be; its verdicts wait until it follows."""
+        for mechanism in self._mechanisms:
+            if not kernel.tame(self._data.qvel[mechanism.v_address], WILD):
+                self._put(mechanism, *(part[step] for part in self._courses[mechanism.name]))
+                self._data.qacc_warmstart[mechanism.v_address] = 0.0
+                self._hearings[mechanism.name].lost = t
+                self._broken.add(mechanism.name)
+
+    def _show(self, t: float) -> None:
+        shown, data = self._shown, self._data
+        shown.qpos[:] = data.qpos
+        shown.qvel[:] = data.qvel
+        if self._centred:
+            shown.qvel += 0.5 * (data.qvel - self._before)
+        self.state.refresh(t)
+        if self._grips.follow(self.state):
+            self.state.refresh(t)
+
+    def _note_errors(self) -> None:
+        for name, following in self._followings.items() if self.controllers else ():
+            q = self.state.joint_positions(self.model.mechanisms[name])
+            self._hearings[name].bones = following.errors(self.state.t, q)
+        if not (self.controllers and self.physics and self._tick):
+            return
+        if self.model.workstation.contacts and self.model.workstation.humans:
+            self.state.touches = self._touches()
+        off = np.abs(self._data.qpos - self._course.q[-1])
+        self._force[self._dof] = np.abs(self._data.actuator_force)
+        reached = self._force >= self._almost
+        for mechanism in self._mechanisms:
+            hearing = self._hearings[mechanism.name]
+            hearing.error = float(off[mechanism.q_address].max(initial=0.0))
+            hearing.saturated = bool(reached[mechanism.v_address].any())
+            if mechanism.role == "human" and self.controllers:
+                self._note_captured(mechanism, hearing)
+
+    def _touches(self) -> list[tuple[int, int, float]]:
+        """Every contact now: two of MuJoCo's bodies and the normal force [N]."""
+        mj, data, force = self._mj, self._data, np.zeros(6)
+        found = []
+        for k in range(data.ncon):
+            mujoco.mj_contactForce(mj, data, k, force)
+            one, other = (int(mj.geom_bodyid[geom]) for geom in data.contact[k].geom)
+            if force[0] > 0:
+                found.append((one, other, float(force[0])))
+        return found
+
+    def _note_captured(self, person: Mechanism, hearing: Hearing) -> None:
+        """Where a person was captured, and how well that is what devices saw, where the twin is elsewhere."""
+        hearing.captured = self._course.q[-1][person.q_address].copy()
+        if hearing.error > self.model.workstation.engine.human_tracking_limit:
+            following = self._followings.get(person.name)
+            hearing.residual = following.errors(self.state.t, hearing.captured) if following else {}
+
+    def _check_finite(self) -> None:
+        if np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qvel).all():
+            return
+        for mechanism in self._mechanisms:
+            bad = ~np.isfinite(self._data.qpos[mechanism.q_address])
+            if bad.any():
+                names = [j.name for link in mechanism.description.links for j in link.joints]
+                joint = names[int(bad.argmax())]
+                raise SimulationDiverged(
+                    f"{mechanism.name}/{joint} is not finite after {self._now:.3f} s; "
+                    "lower engine.bandwidth or check masses and samples"
+                )
+        raise SimulationDiverged(f"a velocity is not finite after {self._now:.3f} s")

@@ -1,0 +1,1 @@
+"""Machines that follow variables: conveyors, axes, doors, grippers."""

@@ -1,0 +1,208 @@
+"""Grippers that pick up workpieces and let them go: where each is, and on whom it weighs.
+
+A workpiece is held from the tick on at which both fingers are as near to it as ``touch`` and it reaches
+between them; it then keeps its place in the hand. It is let go when a finger is farther from it than twice
+that, and lies where it was then: nothing falls, and no belt takes it along.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from seerob.core.errors import InputError
+from seerob.core.shapes.geometry import Solid
+from seerob.core.transforms import Array, wxyz_from_rotation
+from seerob.distance.least import Query, Shapes
+from seerob.model.model import Body, Model
+from seerob.model.mounting.machines import BODY, FINGERS
+from seerob.model.mounting.picked_up import AWAY, RESTING
+from seerob.twin.joint_columns import Columns
+from seerob.twin.machines.following import ON_ITS_WAY
+from seerob.twin.state import State
+from seerob.workstation.tables.machines import Fingers
+from seerob.workstation.workstation import Workpiece
+
+LET_GO = 2.0
+"""A finger that is farther than this times ``touch`` does not hold any more."""
+
+
+def own_masses(model: Model) -> Model:
+    """The same workstation with masses of its own, when there is something that is picked up."""
+    loose = any(piece.rest is not None for piece in model.workstation.workpieces)
+    return replace(model, mj=model.mj.__copy__()) if loose else model
+
+
+class Grips:
+    """The workpieces of a twin that are picked up and let go. None is held at first.
+
+    Args:
+        state: The twin, of a model from `own_masses`.
+        physics: The `mujoco.MjModel` that is stepped.
+
+    Raises:
+        InputError: The fingers of a gripper do not face each other.
+    """
+
+    def __init__(self, state: State, physics: Any) -> None:
+        models = (state.model.mj, physics)
+        pieces = [piece for piece in state.model.workstation.workpieces if piece.rest is not None]
+        self._grips = [_Grip(state, models, piece) for piece in pieces]
+        self._weigh(state)
+
+    def follow(self, state: State) -> bool:
+        """Look who holds what now; whether that changed, so that the state is to be renewed."""
+        changed = [grip.follow(state) for grip in self._grips]
+        if any(changed):
+            self._weigh(state)
+        return any(changed)
+
+    def _weigh(self, state: State) -> None:
+        if self._grips:
+            mechanisms = state.model.mechanisms.values()
+            state.columns = {m.name: Columns.of(m, state.model.mj) for m in mechanisms}
+
+
+class _Grip:
+    """A workpiece and its gripper."""
+
+    def __init__(self, state: State, models: tuple[Any, ...], piece: Workpiece) -> None:
+        model = state.model
+        self._models, self._piece, self._hand = models, piece.name, piece.on
+        machine = next(m for m in model.workstation.machines if m.name == piece.on)
+        assert isinstance(machine.motion, Fingers)
+        self._touch = machine.motion.touch
+        own = [b for b in model.bodies if b.owner == piece.name]
+        self._held = [b.index for b in own if b.carrier]
+        self._resting = [b.index for b in own if not b.carrier]
+        self._fingers = [_body(model, f"{piece.on}/{side}") for side in FINGERS]
+        ids = (piece.name, f"{piece.name}/{RESTING}", f"{piece.name}/{AWAY}", f"{piece.on}/{BODY}")
+        self._in_hand, self._lying, self._away, self._palm = (
+            int(mujoco.mj_name2id(model.mj, mujoco.mjtObj.mjOBJ_BODY, name)) for name in ids
+        )
+        mj = model.mj
+        self._mass, self._inertia = float(mj.body_mass[self._in_hand]), mj.body_inertia[self._in_hand].copy()
+        plate = _between(self._fingers[0], np.array(machine.motion.along))
+        solids = tuple(solid for index in self._resting for solid in model.bodies[index].solids)
+        self._gap = Query(Shapes.build([("gap", (plate,)), ("piece", solids)]), (0,), (1,), cap=self._touch)
+        cap = 2 * LET_GO * self._touch
+        self._queries = {
+            places: [Query(model.shapes, (finger.index,), places, cap=cap) for finger in self._fingers]
+            for places in (tuple(self._held), tuple(self._resting))
+        }
+        for index in (*self._held, *self._resting):
+            state.bearers.unknown.pop(index, None)
+        self._holds = True
+        self._unheard = ""
+        self._bring(state, held=False)
+
+    def follow(self, state: State) -> bool:
+        """Whether it was picked up, let go or lost."""
+        if state.bearers.unknown.keys() & set(self._resting):
+            return False
+        if self._silent(state):
+            self._unheard = state.doubt(self._hand) or "not heard"
+            return False
+        unheard, self._unheard = self._unheard, ""
+        if self._holds == self._grips(state):
+            return False
+        if not self._holds:
+            self._pick_up(state)
+        elif unheard:
+            self._let_go(state)
+            reason = (
+                f"{self._piece}: let go while its gripper was not relied on ({unheard}), nobody knows where"
+            )
+            state.bearers.unknown |= dict.fromkeys(self._resting, reason)
+        else:
+            self._let_go(state)
+        return True
+
+    def _silent(self, state: State) -> bool:
+        """Whether the gripper or whoever carries it is not known to be where it is shown."""
+        name = self._hand
+        while name:
+            why = state.hearings[name].doubt(state.t)
+            if why and not why.startswith(ON_ITS_WAY):
+                return True
+            name = state.model.mechanisms[name].on
+        return False
+
+    def _grips(self, state: State) -> bool:
+        """Whether both fingers are at it, or still near it, and it reaches between them."""
+        places = tuple(self._held if self._holds else self._resting)
+        near = LET_GO * self._touch if self._holds else self._touch
+        R, x = state.rotations, state.positions
+        if any(query.minimum(R, x).distance > near for query in self._queries[places]):
+            return False
+        palm = state.data.xmat[self._palm].reshape(3, 3), state.data.xpos[self._palm]
+        both = np.stack([palm[0], R[places[0]]]), np.stack([palm[1], x[places[0]]])
+        return self._holds or self._gap.minimum(*both).distance <= 0
+
+    def _pick_up(self, state: State) -> None:
+        index = self._resting[0]
+        turn, origin = state.data.xmat[self._palm].reshape(3, 3), state.data.xpos[self._palm]
+        rotation = turn.T @ state.rotations[index]
+        self._place(self._in_hand, turn.T @ (state.positions[index] - origin), wxyz_from_rotation(rotation))
+        self._bring(state, held=True)
+
+    def _let_go(self, state: State) -> None:
+        index = self._held[0]
+        self._place(self._lying, state.positions[index], state.quaternions[index])
+        self._bring(state, held=False)
+
+    def _place(self, body: int, position: Array, wxyz: Array) -> None:
+        for mj in self._models:
+            mj.body_pos[body], mj.body_quat[body] = position, wxyz
+
+    def _bring(self, state: State, *, held: bool) -> None:
+        """Into the hand, or out of it."""
+        here, gone = (self._held, self._resting) if held else (self._resting, self._held)
+        bearer = self._in_hand if held else self._lying
+        for mj in self._models:
+            self._load(mj, held)
+        for index in here:
+            state.bearers.put(state.model.mj, index, bearer)
+        for index in gone:
+            state.bearers.put(state.model.mj, index, self._away)
+        state.bearers.drawn[here] = here
+        state.bearers.drawn[gone] = here
+        state.bearers.away = (state.bearers.away - set(here)) | set(gone)
+        self._holds = held
+
+    def _load(self, mj: Any, held: bool) -> None:
+        """Let it weigh on the hand, or not."""
+        body = self._in_hand
+        change = (self._mass if held else 0.0) - float(mj.body_mass[body])
+        mj.body_mass[body] += change
+        mj.body_inertia[body] = self._inertia if held else 0.0
+        while True:
+            mj.body_subtreemass[body] += change
+            if body == 0:
+                break
+            body = int(mj.body_parentid[body])
+
+
+def _body(model: Model, name: str) -> Body:
+    return next(body for body in model.bodies if body.name == name)
+
+
+def _between(finger: Body, along: Array) -> Solid:
+    """The plate in the middle between two fingers, as large as they face each other, in the palm's frame."""
+    up = np.array([0.0, 0.0, 1.0])
+    across = np.cross(up, along / np.linalg.norm(along))
+    spans = []
+    for axis in (across, up):
+        reach = finger.corners @ axis
+        spans.append((float(reach.min()) - finger.radius, float(reach.max()) + finger.radius))
+    # The other finger is turned by half a turn about z.
+    half = min(spans[0][1], -spans[0][0])
+    if half <= 0:
+        what = "its fingers do not face each other"
+        raise InputError.at("workstation", finger.owner, what, "let z run through the middle of a finger")
+    low, high = spans[1]
+    corner = low * up - half * across
+    return Solid(points=np.array([corner, corner + 2 * half * across, corner + (high - low) * up]))

@@ -1,0 +1,119 @@
+"""What machines say: newest values of variables, and why one may not be relied on now."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from seerob.core.errors import Undecided
+from seerob.core.samples import Quality, SignalSample
+from seerob.workstation.variables.dictionary import Value, Variable
+
+DEFAULT_TIMEOUT = 1.0
+"""Of what is heard without a source that states one [s]."""
+SLACK = 1e-9
+"""Instants that differ by less are the same [s]."""
+MAX_KEPT = 4096
+"""Pictures kept per source at most."""
+
+
+class Known(NamedTuple):
+    """What is known of a variable at an instant."""
+
+    value: Value | None
+    """In SI; None when it was never heard. The last one known when there is a doubt."""
+    doubt: str
+    """Why it may not be relied on; empty when it may."""
+
+
+class Signals:
+    """The newest pictures of all sources of variables, a few of which may lie ahead of the tick.
+
+    Args:
+        dictionary: Variables by name.
+        timeouts: Of variables, or of their sources [s], by name.
+        untimed: Why nobody knows how late something is, by variable; it shows, and nothing that moves by it
+            is known.
+    """
+
+    def __init__(
+        self,
+        dictionary: Mapping[str, Variable],
+        timeouts: Mapping[str, float],
+        untimed: Mapping[str, str] | None = None,
+    ) -> None:
+        self.dictionary = dictionary
+        self.untimed = untimed or {}
+        self._timeouts = {
+            name: timeouts.get(name, timeouts.get(variable.source, DEFAULT_TIMEOUT))
+            for name, variable in dictionary.items()
+        }
+        self._heard: dict[str, list[SignalSample]] = {}
+
+    def take(self, sample: SignalSample) -> None:
+        """Hear a picture; one that is older than the newest is dropped."""
+        heard = self._heard.setdefault(sample.source, [])
+        if heard and sample.t < heard[-1].t:
+            return
+        heard.append(sample)
+        del heard[: len(heard) - MAX_KEPT]
+
+    def forget(self, t: float) -> None:
+        """Drop what is older than the last picture at or before ``t`` [s]."""
+        for heard in self._heard.values():
+            while len(heard) > 1 and heard[1].t <= t:
+                del heard[0]
+
+    def at(self, name: str, t: float) -> Known:
+        """What is known of a variable of the dictionary at an instant [s]."""
+        source = self.dictionary[name].source
+        picture = next((s for s in reversed(self._heard.get(source, ())) if s.t <= t + SLACK), None)
+        if picture is None:
+            return Known(None, f"{name}: nothing heard yet")
+        value = picture.values.get(name)
+        age = t - picture.t + picture.ages.get(name, 0.0)
+        timeout = self._timeouts[name]
+        if age > timeout + SLACK:
+            return Known(value, f"{name}: {source} not heard for {age:.2f} s (time-out {timeout:g} s)")
+        return Known(value, doubt_of(picture, name))
+
+    def value(self, name: str, t: float) -> Value:
+        """The value of a variable of the dictionary at an instant [s].
+
+        Raises:
+            Undecided: It is not known, or may not be relied on.
+        """
+        known = self.at(name, t)
+        if known.value is None or known.doubt:
+            raise Undecided(known.doubt or f"{name}: not heard")
+        return known.value
+
+    def meanwhile(self, name: str, begin: float, t: float) -> tuple[Value, ...]:
+        """Every value of a variable that was told after one instant and before another [s], in their order.
+
+        Raises:
+            Undecided: One of them may not be relied on.
+        """
+        source = self.dictionary[name].source
+        found = []
+        for picture in self._heard.get(source, ()):
+            if begin + SLACK < picture.t < t - SLACK:
+                if doubt := doubt_of(picture, name):
+                    raise Undecided(f"{doubt}, at {picture.t:.3f} s")
+                found.append(picture.values[name])
+        return tuple(found)
+
+    def picture(self, t: float) -> tuple[dict[str, Value], dict[str, str]]:
+        """Every variable that was heard, and every doubt, at an instant [s]."""
+        known = {name: self.at(name, t) for name, v in self.dictionary.items() if not v.write}
+        values = {name: k.value for name, k in known.items() if k.value is not None}
+        return values, {name: k.doubt for name, k in known.items() if k.doubt}
+
+
+def doubt_of(picture: SignalSample, name: str) -> str:
+    """Why a variable of a picture may not be relied on; empty when it may."""
+    if name in picture.doubts:
+        return picture.doubts[name]
+    if picture.quality is not Quality.GOOD:
+        return f"{name}: {picture.doubt('its source')}"
+    return "" if name in picture.values else f"{name}: not heard"

@@ -1,0 +1,366 @@
+r"""What everybody does between two ticks: the way they take, and how far and fast any point can get on it.
+
+Whoever judges instants says nothing of what lies between them. Here lies what bounds it: the joints move
+along cubics through the positions and velocities of the physics' own steps (of the samples, where the twin
+is put on these), and with that of every joint a bound on speed, acceleration and its variation of every point
+(`seerob.kernels.spans`). All of it holds at every instant of the span, whatever the shapes.
+
+A figure of which the margin to its limit, m, changes by at most ``fall`` within a span of ends 0 and 1, and
+falls at most ``bend`` below the lesser of both ends, is there nowhere below
+
+.. math:: \max\big(\tfrac12 (m_0 + m_1 - \text{fall}),\; \min(m_0, m_1) - \text{bend}\big).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.transforms import Array
+from seerob.kernels.spans import joint_bounds, joints_at, point_bounds
+from seerob.model.model import Model
+
+Indices = NDArray[np.int64]
+Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]
+"""Of a robot at instants to come [s]: positions and velocities of its joints [rad or m], shape (k, n), and
+why they are not known so; None where nothing is."""
+
+Coupling = Mapping[int, Array]
+
+ROUNDING = 1e-9
+"""Added to every bound on a way or a speed [m, m/s]: the error of rounding is far below."""
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Where all joints are from one tick to the next: cubics from knot to knot."""
+
+    t: Array
+    """Knots, increasing: both ticks and what lies between [s], shape (k,), k >= 2."""
+    q: Array
+    """``qpos`` there, shape (k, nq)."""
+    v: Array
+    """``qvel`` there, shape (k, nv)."""
+    broken: tuple[str, ...] = ()
+    """Robots, people and machines that were put elsewhere meanwhile: nobody knows their way."""
+
+    def at(self, t: float) -> tuple[Array, Array]:
+        """``qpos`` and ``qvel`` at an instant [s] of it."""
+        q, v = np.empty(self.q.shape[1]), np.empty(self.v.shape[1])
+        joints_at(self.t, self.q, self.v, t, q, v)
+        return q, v
+
+    def middle(self, begin: float, end: float) -> float:
+        """Where a span is best cut [s]: at the knot that is nearest to its middle, else there."""
+        inside = self.t[(self.t > begin) & (self.t < end)]
+        half = (begin + end) / 2
+        return float(inside[np.abs(inside - half).argmin()]) if len(inside) else half
+
+
+class Fall(NamedTuple):
+    """How much of its margin a figure can lose within a span, in its own unit; numbers, or one per part."""
+
+    fall: Array | float
+    """From any instant of the span to any other."""
+    bend: Array | float = np.inf
+    """Below the lesser margin of both ends."""
+
+
+UNBOUNDED = Fall(np.inf)
+"""Of a span of which nothing is known."""
+
+
+class Points:
+    """Points of which the motion is bounded: of every body its outermost, and what criteria add.
+
+    Args:
+        model: The compiled workstation.
+
+    Attributes:
+        count: How many there are; the first are those of `Model.bodies`.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self._own: list[tuple[int, Array, float]] = []
+        self._ids: Indices | None = None
+        self._bounds = np.zeros((4, model.mj.nv))
+        self._speed, self._change, self._varies, self._away = self._bounds
+        self._movers = {name: np.asarray(m.v_address) for name, m in model.mechanisms.items()}
+
+    @property
+    def count(self) -> int:
+        """How many points there are."""
+        return len(self.model.bodies) + len(self._own)
+
+    def add(self, body: int, point: Array, radius: float = 0.0) -> int:
+        """Bound another point, and all that is within a distance of it; to be called before the first span.
+
+        Args:
+            body: MuJoCo's.
+            point: In its frame [m], shape (3,).
+            radius: [m].
+
+        Returns:
+            Its row in what a `Span` says of points.
+        """
+        self._own.append((body, np.asarray(point, float).reshape(1, 3), radius))
+        self._ids = None
+        return self.count - 1
+
+    def span(self, path: Path, begin: float, end: float, ids: Indices, mj: Any) -> Span:
+        """What holds from one instant to another.
+
+        Args:
+            path: Of all joints.
+            begin: [s].
+            end: [s].
+            ids: MuJoCo's body of each body at the begin, see `seerob.twin.bearers`.
+            mj: The `mujoco.MjModel` then.
+        """
+        if self._ids is None or not np.array_equal(self._ids, ids):
+            self._chains(mj, ids)
+        joint_bounds(
+            path.t, path.q, path.v, begin, end, mj.qpos0,
+            self._speed, self._change, self._varies, self._away,
+        )  # fmt: skip
+        for name in path.broken:
+            self._speed[self._movers[name]] = np.inf
+        T, n = end - begin, self.count
+        fast, quick, bend = np.empty((3, n))
+        point_bounds(
+            self._speed, self._change, self._varies, self._away, T,
+            self._start, self._joints, self._turns, self._lengths, fast, quick, bend,
+        )  # fmt: skip
+        if path.broken:
+            lost = ~np.isfinite(fast)
+            fast[lost], quick[lost], bend[lost] = np.inf, np.inf, np.inf
+        return Span(begin, end, fast, quick, bend, self._bounds.copy(), path, mj)
+
+    def chain(self, point: int) -> tuple[Indices, NDArray[np.bool_], Array]:
+        """Joints that move a point, from base to tip, whether each turns, the segments behind them [m]."""
+        assert self._ids is not None
+        part = slice(int(self._start[point]), int(self._start[point + 1]))
+        return self._joints[part], self._turns[part], self._lengths[part]
+
+    def column_changes(self, point: int, span: Span, coupling: Coupling) -> Array:
+        r"""How quickly columns of a point's linear Jacobian change at most, per second, shape (n,).
+
+        A column, :math:`z_j \times r_j` of a joint that turns and :math:`z_j` of one that slides, turns with
+        all joints before it, and :math:`r_j` changes with joint j and all after it.
+
+        Args:
+            point: See `add`.
+            span: Within which.
+            coupling: By joint that moves, in ``MjData.qvel``, the share of each commanded one, shape (n,).
+        """
+        dofs, turns, lengths = self.chain(point)
+        speeds = span.qd[dofs]
+        reach = np.cumsum((lengths + np.where(turns, 0.0, span.away[dofs]))[::-1])[::-1]
+        onward = np.cumsum((speeds * np.where(turns, reach, 1.0))[::-1])[::-1]
+        spin = np.where(turns, speeds, 0.0)
+        before = np.cumsum(spin) - spin
+        change = np.where(turns, before * reach + onward, before)
+        found = np.zeros(len(next(iter(coupling.values()), ())))
+        for dof, rate in zip(dofs.tolist(), change.tolist(), strict=True):
+            if dof in coupling:
+                found += rate * np.abs(coupling[dof])
+        return found
+
+    def _chains(self, mj: Any, ids: Indices) -> None:
+        """Resolve which joints move each point, from base to tip, and how long the segments between are."""
+        data = mujoco.MjData(mj)
+        mujoco.mj_kinematics(mj, data)
+        bodies = self.model.bodies
+        every = [(int(ids[b.index]), b.corners, b.radius + b.deviation) for b in bodies]
+        start, joints, turns, lengths = [0], [], [], []
+        for body, points, radius in (*every, *self._own):
+            chain = joints_of(mj, body)
+            ends = points @ data.xmat[body].reshape(3, 3).T + data.xpos[body]
+            anchors = data.xanchor[chain]
+            if chain:
+                far = float(np.linalg.norm(ends - anchors[-1], axis=1).max()) if len(ends) else 0.0
+                lengths += [*np.linalg.norm(np.diff(anchors, axis=0), axis=1).tolist(), far + radius]
+            joints += [int(mj.jnt_dofadr[j]) for j in chain]
+            turns += [bool(mj.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE) for j in chain]
+            start.append(len(joints))
+        self._start, self._joints = np.array(start, np.int64), np.array(joints, np.int64)
+        self._turns, self._lengths = np.array(turns, np.bool_), np.array(lengths, float)
+        self._ids = np.array(ids)
+
+
+def joints_of(mj: Any, body: int) -> list[int]:
+    """Joints that move a body of MuJoCo's, from base to tip."""
+    found: list[int] = []
+    while body > 0:
+        first = int(mj.body_jntadr[body])
+        found = [*range(first, first + int(mj.body_jntnum[body])), *found]
+        body = int(mj.body_parentid[body])
+    return found
+
+
+class Span:
+    """Bounds that hold at every instant from one to another; points as in `Points`."""
+
+    def __init__(
+        self,
+        begin: float,
+        end: float,
+        fast: Array,
+        quick: Array,
+        bend: Array,
+        joints: Array,
+        path: Path,
+        mj: Any,
+    ) -> None:
+        self.begin, self.end = begin, end
+        self.path, self.mj = path, mj
+        """Where all joints are, and the `mujoco.MjModel` that moves them."""
+        self.foresee: Foresee = lambda name, t: None
+        """What robots are known to do after the tick at which the path ends."""
+        self.T = end - begin
+        """Its length [s]."""
+        self.fast = fast
+        """Largest speed [m/s], shape (p,)."""
+        self.quick = quick
+        """Largest acceleration [m/s²], shape (p,)."""
+        self.bend = bend
+        """How far a velocity gets from the straight line between those at both ends [m/s], shape (p,)."""
+        self.slow = np.zeros(len(fast))
+        """Least speed of the fastest point of each body [m/s], shape (n,)."""
+        self.qd, self.qdd, _, self.away = joints
+        """Largest absolute speed and acceleration of every joint, and way from the model's pose, (nv,)."""
+
+    def between_speeds(self, before: Array, after: Array) -> None:
+        """Take into account how fast bodies are at both ends [m/s], shape (n,) each."""
+        n = len(before)
+        most = (before + after + self.quick[:n] * self.T) / 2
+        np.minimum(self.fast[:n], most, out=self.fast[:n])
+        self.slow = np.maximum((before + after - self.quick[:n] * self.T) / 2, 0.0)
+
+    def way(self, rows: Indices) -> float:
+        """Longest way of any of some points within the span [m]."""
+        return float(self.fast[rows].max(initial=0.0)) * self.T + ROUNDING
+
+
+Margin = tuple[Array | float, Array | float]
+"""How far figures are from their limits as the twin has them, and how much of that their tolerances take; in
+their own unit, numbers or one per part."""
+Falls = Callable[[Span, Array | float], Fall]
+"""How far the margins of a criterion can fall within a span, given the least known at its ends."""
+
+
+class Relative:
+    """How quickly points of bodies can change their velocity as seen from other bodies.
+
+    Args:
+        mj: The `mujoco.MjModel`.
+        pairs: From which of its bodies, and of which.
+        points: Of the latter, in its frame [m], shape (k, 3) each.
+    """
+
+    def __init__(self, mj: Any, pairs: Iterable[tuple[int, int]], points: Iterable[Array]) -> None:
+        data = mujoco.MjData(mj)
+        mujoco.mj_kinematics(mj, data)
+        start, joints, turns, lengths = [0], [], [], []
+        for (a, b), own in zip(pairs, points, strict=True):
+            back, forth = joints_of(mj, a), joints_of(mj, b)
+            same = sum(1 for k, j in enumerate(back) if back[: k + 1] == forth[: k + 1])
+            way = [*reversed(back[same:]), *forth[same:]]
+            anchors = data.xanchor[way]
+            if way:
+                ends = own @ data.xmat[b].reshape(3, 3).T + data.xpos[b]
+                far = float(np.linalg.norm(ends - anchors[-1], axis=1).max(initial=0.0))
+                lengths += [*np.linalg.norm(np.diff(anchors, axis=0), axis=1).tolist(), far]
+            joints += [int(mj.jnt_dofadr[j]) for j in way]
+            turns += [bool(mj.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE) for j in way]
+            start.append(len(joints))
+        self._start, self._joints = np.array(start, np.int64), np.array(joints, np.int64)
+        self._turns, self._lengths = np.array(turns, np.bool_), np.array(lengths, float)
+
+    def quick(self, span: Span) -> Array:
+        """Largest acceleration [m/s²], shape (pairs,)."""
+        fast, quick, bend = np.empty((3, len(self._start) - 1))
+        point_bounds(
+            span.qd, span.qdd, span.qdd, span.away, span.T,
+            self._start, self._joints, self._turns, self._lengths, fast, quick, bend,
+        )  # fmt: skip
+        return quick
+
+
+def change_of_motion(
+    model: Model,
+    bodies: Iterable[int],
+    dofs: Indices,
+    points: Points,
+    heaviest: Callable[[int], tuple[float, float]] = lambda _: (1.0, 0.0),
+) -> Callable[[Span], tuple[float, float]]:
+    r"""How much :math:`\sqrt{2E}` of all that has a mass can change within a span, and bend.
+
+    It is a norm of their velocities, so it changes by no more than the norm of how much they change.
+
+    Args:
+        model: The compiled workstation.
+        bodies: MuJoCo's.
+        dofs: Whose rotors count.
+        points: Of which the motion is bounded.
+        heaviest: Of a body, by which factor its mass may be more, and how far its centre off [m].
+
+    Returns:
+        In √J, as `Fall` has it; infinity of who jumps.
+    """
+    mj = model.mj
+    heavy = [b for b in dict.fromkeys(bodies) if mj.body_mass[b] > 0]
+    more = np.array([heaviest(body) for body in heavy]).reshape(-1, 2)
+    masses = more[:, 0] * mj.body_mass[heavy]
+    # The mean square distance from the centre of mass is what its moments of inertia say.
+    radii = np.sqrt(mj.body_inertia[heavy].sum(axis=1) / 2 / mj.body_mass[heavy]) + more[:, 1]
+    rows = rows_of(
+        points.add(body, mj.body_ipos[body], radius) for body, radius in zip(heavy, radii, strict=True)
+    )
+    rotors = mj.dof_armature[dofs]
+
+    def change(span: Span) -> tuple[float, float]:
+        if not (np.isfinite(span.quick[rows]).all() and np.isfinite(span.qdd[dofs]).all()):
+            return np.inf, np.inf
+        turned = rotors @ (span.qdd[dofs] * span.T) ** 2
+        fall = np.sqrt(masses @ (span.quick[rows] * span.T) ** 2 + turned)
+        return float(fall), float(np.sqrt(masses @ span.bend[rows] ** 2 + turned / 4))
+
+    return change
+
+
+def rows_of(points: Iterable[int]) -> Indices:
+    """Points as a `Span` wants them."""
+    return np.array(tuple(points), np.int64)
+
+
+def down_to(least: Array | float, lowest: Array | float) -> Fall:
+    """Of margins that are ``least`` at the lesser end, and known not to be below ``lowest`` in between."""
+    return Fall(np.inf, np.maximum(np.asarray(least) - lowest, 0.0))
+
+
+def approaching(a: Iterable[int], b: Iterable[int]) -> Falls:
+    """Of a distance between two sets of points: it changes by no more than the ways of both."""
+    first, second = rows_of(a), rows_of(b)
+
+    def falls(span: Span, _: Array | float) -> Fall:
+        return Fall(span.way(first) + span.way(second))
+
+    return falls
+
+
+def speeding(points: Iterable[int]) -> Falls:
+    """Of the speed of the fastest of some points."""
+    rows = rows_of(points)
+
+    def falls(span: Span, _: Array | float) -> Fall:
+        faster = float(span.quick[rows].max(initial=0.0)) * span.T
+        return Fall(faster + ROUNDING, float(span.bend[rows].max(initial=0.0)) + ROUNDING)
+
+    return falls

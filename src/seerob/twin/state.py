@@ -1,0 +1,811 @@
+"""The twin at this tick, and what follows from it. Valid until the next tick.
+
+What two criteria share has its one home here and is computed once per tick. Accessors raise
+`Undecided` when the robot or human they speak of was not heard lately, does not follow what was
+heard, or has a mass that nobody gave: a stale or guessed number can never be green.
+
+What says nothing of whether it may be relied on (`data`, `rotations`, `hearings` and so on) is for the
+engine, the picture and the recorder. While a criterion is asked (`asking`) it is closed: reading it raises
+`NotAsked`, so that no author of a criterion can forget to ask.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.errors import NotAsked, Undecided, Unweighed
+from seerob.core.transforms import Array
+from seerob.distance.least import Closest, Closests, Per, Query
+from seerob.distance.surveying import Surveyor
+from seerob.kernels.chain import along
+from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
+from seerob.model.model import Frame, Gap, Mechanism, Model
+from seerob.twin.bearers import Bearers
+from seerob.twin.joint_columns import Columns
+from seerob.twin.signals import Signals
+from seerob.twin.spans import Path
+from seerob.twin.whereabouts.hearing import SLACK, nobody_says
+from seerob.twin.whereabouts.hearing import Hearing as Hearing  # noqa: PLC0414
+from seerob.twin.whereabouts.seen_bones import bones_of, unseen_reason
+from seerob.workstation.variables.dictionary import VARIABLE as VARIABLE  # noqa: PLC0414
+from seerob.workstation.variables.dictionary import Value
+
+Indices = NDArray[np.int64]
+Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]
+"""Of a robot or human and instants ahead [s] (m,): joint positions and velocities there, shape (m, n) each,
+and why they may be others; None where nobody knows what it will do."""
+
+MOST_PLACES = 512
+"""Sets of bodies of which places are kept from tick to tick."""
+
+
+class State:
+    """A view of the engine's `mujoco.MjData`; never keep one beyond its tick."""
+
+    def __init__(
+        self, model: Model, data: Any, hearings: dict[str, Hearing], signals: Signals | None = None
+    ) -> None:
+        self.model = model
+        self.t = 0.0
+        """Run time [s]."""
+        self._data, self._hearings = data, hearings
+        self._signals = signals or Signals(model.dictionary, {})
+        self._closed = False
+        self._at_least = False
+        self.path: Path | None = None
+        """How everybody came here from the last tick, whoever was heard: for bounds; None where there was
+        none."""
+        self.foresee: Foresee = lambda name, t: None
+        """What a motion that is known ahead will do."""
+        self.touches: list[tuple[int, int, float]] | None = None
+        """Of every contact two of MuJoCo's bodies and the normal force [N]; None where none is calculated."""
+        self.asked: set[str] = set()
+        """Robots and humans that answers have depended on since the set was last cleared."""
+        self.bearers = Bearers(model)
+        """Which of MuJoCo's bodies moves each body."""
+        n = len(model.bodies)
+        self._rotations, self._positions = np.zeros((n, 3, 3)), np.zeros((n, 3))
+        self._quaternions = np.zeros((n, 4))
+        self._places: dict[tuple[int, ...], tuple[Array, Array, Array, Array]] = {}
+        self._movers: dict[int, tuple[tuple[str, ...], tuple[int, ...]]] = {}
+        self._period = model.workstation.engine.tick
+        engine = model.workstation.engine
+        self._tracking_limits = {
+            "robot": engine.tracking_limit,
+            "machine": engine.tracking_limit,
+            "human": engine.human_tracking_limit,
+        }
+        self._wanted: Any = None
+        """Where people were captured; made when somebody asks."""
+        self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
+        self._cache: dict[Any, Any] = {}
+        self._relied_on: set[tuple[str, ...]] = set()
+        self._jacobian = np.zeros((6, model.mj.nv))
+        self.columns = {m.name: Columns.of(m, model.mj) for m in model.mechanisms.values()}
+        """Where the joints of each robot and human are among all."""
+        # Views that MuJoCo writes through; to ask the data for them takes longer than to use them.
+        self._xmat, self._xpos, self._xquat = data.xmat, data.xpos, data.xquat
+        self._surveyor = Surveyor(model.shapes)
+        self._cdof, self._com = data.cdof, data.subtree_com
+        self._rows: dict[tuple[int, ...], Indices] = {}
+        self._bones_of: dict[tuple[int, ...], tuple[tuple[str, ...], dict[str, frozenset[str]]]] = {}
+        self._corners = stacked([body.corners for body in model.bodies])
+        self._reach = np.array([body.radius + body.deviation for body in model.bodies])
+
+    def refresh(self, t: float) -> None:
+        """Take the engine's new positions and velocities; called once per tick by the engine."""
+        mj, data = self.model.mj, self._data
+        # mj_step leaves what follows from positions one step behind.
+        mujoco.mj_kinematics(mj, data)
+        mujoco.mj_comPos(mj, data)
+        mujoco.mj_comVel(mj, data)
+        self.t = t
+        placed(
+            self._xmat,
+            self._xpos,
+            self._xquat,
+            self.bearers.ids,
+            self._rotations,
+            self._positions,
+            self._quaternions,
+        )
+        self._cache.clear()
+        self._relied_on.clear()
+        self._surveyor.forget()
+
+    # -- what says nothing of whether it may be relied on: closed while a criterion is asked ---------
+
+    @contextmanager
+    def asking(self) -> Iterator[None]:
+        """While a criterion is asked: what would not raise `Undecided` is closed, and `asked` is noted."""
+        self.asked.clear()
+        self._closed = True
+        try:
+            yield
+        finally:
+            self._closed = False
+
+    def _open(self, what: str, instead: str) -> None:
+        if self._closed:
+            raise NotAsked(
+                f"State.{what} does not say whether it may be relied on, so no criterion may read it; "
+                f"ask State.{instead}, which raises Undecided where it may not"
+            )
+
+    @property
+    def data(self) -> Any:
+        """The `mujoco.MjData`."""
+        self._open("data", "data_of(names), q, qd, pose or another accessor")
+        return self._data
+
+    @property
+    def rotations(self) -> Array:
+        """World from body, in the order of `Model.bodies`, shape (n, 3, 3)."""
+        self._open("rotations", "placed(bodies)")
+        return self._rotations
+
+    @property
+    def positions(self) -> Array:
+        """World position of the bodies' origins [m], shape (n, 3)."""
+        self._open("positions", "placed(bodies)")
+        return self._positions
+
+    @property
+    def quaternions(self) -> Array:
+        """World from body, w first, shape (n, 4)."""
+        self._open("quaternions", "placed(bodies)")
+        return self._quaternions
+
+    @property
+    def hearings(self) -> dict[str, Hearing]:
+        """What is known of where robots and people really are."""
+        self._open("hearings", "hearing(name)")
+        return self._hearings
+
+    @property
+    def signals(self) -> Signals:
+        """What machines say."""
+        self._open("signals", "signal(name)")
+        return self._signals
+
+    def joint_positions(self, mechanism: Mechanism) -> Array:
+        """Joint positions as they are shown [rad or m], shape (n,)."""
+        self._open("joint_positions", "q(mechanism)")
+        return self._q(mechanism)
+
+    def poses(self) -> bytes:
+        """Little-endian float32, seven per body: position [m], quaternion w first."""
+        self._open("poses", "placed(bodies)")
+        return np.hstack([self._positions, self._quaternions])[self.bearers.drawn].astype("<f4").tobytes()
+
+    # -- what may be relied on --------------------------------------------------------------
+
+    def require(self, *names: str) -> None:
+        """Raise `Undecided` unless each robot or human is where the twin shows it."""
+        self.asked.update(names)
+        if names in self._relied_on:
+            return
+        for name in names:
+            key = ("doubt", name)
+            reason = self._cache.get(key)
+            if reason is None:
+                reason = self._cache[key] = self.doubt(name)
+            if reason:
+                raise Undecided(reason)
+        self._relied_on.add(names)
+
+    def doubt(self, name: str) -> str:
+        """Why a twin may not be where the real one is, all of it; empty when it may be relied on.
+
+        After `VARIABLE`, the name of a variable: why it may not be relied on.
+        """
+        if reason := self.interrupted(name):
+            return reason
+        if name.startswith(VARIABLE):
+            return ""
+        hearing = self._hearings[name]
+        if reason := unseen_reason(name, hearing.unseen(self.t)):
+            return reason
+        reason = nobody_says(hearing.unplaced(self.t))
+        return f"{name}: {reason}" if reason else ""
+
+    def interrupted(self, name: str) -> str:
+        """The same without what no device ever saw: why an answer of a moment ago may not hold any more."""
+        if name.startswith(VARIABLE):
+            return self._signals.at(name.removeprefix(VARIABLE), self.t).doubt
+        if reason := self.whole_doubt(name):
+            return reason
+        hearing = self._hearings[name]
+        parts = hearing.doubted(self.t)
+        reason = parts[0][0] if parts else hearing.displaced(self.t)
+        return f"{name}: {reason}" if reason else ""
+
+    def bones_in_doubt(self, name: str) -> tuple[str, ...]:
+        """Bones of a person that may not be where the twin shows them, when the others are.
+
+        What is turned in doubt, and what nobody says the place of.
+
+        Raises:
+            Undecided: Nothing of the person may be relied on.
+        """
+        if reason := self.whole_doubt(name):
+            raise Undecided(reason)
+        return self._bones_in_doubt(name)
+
+    def _bones_in_doubt(self, name: str) -> tuple[str, ...]:
+        turned = self.bones_turned_in_doubt(name)
+        key = ("bones in doubt", name)
+        if key not in self._cache:
+            unplaced = self._hearings[name].unplaced(self.t)
+            self._cache[key] = tuple(dict.fromkeys((*turned, *unplaced))) if unplaced else turned
+        bones: tuple[str, ...] = self._cache[key]
+        return bones
+
+    def bones_turned_in_doubt(self, name: str) -> tuple[str, ...]:
+        """Bones of a person that may not be turned as the twin shows them, when the others are.
+
+        What is in doubt, and what no device sees and its neighbours do not tell: enough for whoever asks
+        for angles between bones, and not where they are.
+
+        Raises:
+            Undecided: Nothing of the person may be relied on.
+        """
+        self.asked.add(name)
+        if reason := self.heard_doubt(name):
+            raise Undecided(reason)
+        key = ("bones turned in doubt", name)
+        if key not in self._cache:
+            hearing = self._hearings[name]
+            doubted = (bone for _, bones in hearing.doubted(self.t) for bone in bones)
+            self._cache[key] = tuple(dict.fromkeys((*doubted, *hearing.unseen(self.t))))
+        bones: tuple[str, ...] = self._cache[key]
+        return bones
+
+    def require_bodies(
+        self, bodies: tuple[int, ...], *, estimates: bool = False, strayed: bool = False
+    ) -> None:
+        """Raise `Undecided` unless these bodies are where the twin shows them: of a person, these bones only.
+
+        Args:
+            bodies: By index.
+            estimates: Whether bones that nobody sees will do where the file accepts them
+                (``unseen_uncertainty``): whoever asks adds
+                `seerob.twin.accuracy.tracking_error.TrackingError`.
+            strayed: Whether people will do of whom the twin is elsewhere than they were captured, as a table
+                or a robot stops it (`stray`): likewise.
+        """
+        key = ("relied on", bodies, estimates, strayed)
+        others, people = self._bones(bodies)
+        self.asked.update(others, people)
+        if key in self._cache:
+            return
+        self.require(*others)
+        if lost := self.bearers.unknown.keys() & set(bodies):
+            raise Undecided(self.bearers.unknown[min(lost)])
+        for name, bones in people.items():
+            if (reason := self.whole_doubt(name)) and not (strayed and reason == self.stray(name)):
+                raise Undecided(reason)
+            if bones.isdisjoint(self._bones_in_doubt(name)):
+                continue
+            if not estimates or self.model.estimates.get(name) is None or self.interrupted(name):
+                raise Undecided(self.doubt(name))
+        self._cache[key] = True
+
+    def whole_doubt(self, name: str) -> str:
+        """The same without what is only said of single bones of a person."""
+        hearing = self._hearings[name]
+        if reason := self.heard_doubt(name):
+            return reason
+        if hearing.lost > self.t - 2 * self._period:
+            return f"{name}: the twin had to be put back to what was heard"
+        limit = self._tracking_limits[self.model.mechanisms[name].role]
+        if hearing.error > limit:
+            why = " (a torque limit is reached)" if hearing.saturated else ""
+            return f"{name}: the twin is off by {hearing.error:.3g} rad or m, more than {limit:g}{why}"
+        return ""
+
+    def heard_doubt(self, name: str) -> str:
+        """The same of what was heard, whether or not the twin follows it."""
+        reason = self._hearings[name].doubt(self.t)
+        if reason:
+            return f"{name}: {reason}"
+        above = self.model.mechanisms[name].on
+        return self.whole_doubt(above) if above else ""
+
+    def stray(self, name: str) -> str:
+        """Why the twin of a person is elsewhere than the person was captured, when it is known by how much.
+
+        Empty when it is not, or when where the person was captured is in doubt itself.
+        """
+        hearing = self._hearings[name]
+        limit = self._tracking_limits[self.model.mechanisms[name].role]
+        if hearing.captured is None or hearing.error <= limit or self.heard_doubt(name):
+            return ""
+        reason = self.whole_doubt(name)
+        return reason if hearing.lost <= self.t - 2 * self._period else ""
+
+    def strays(self, bodies: tuple[int, ...]) -> str:
+        """`stray` of any of the people to whom bodies belong."""
+        _, people = self._bones(bodies)
+        return next(filter(None, map(self.stray, people)), "")
+
+    def captured(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
+        """Where bones of a person were captured, wherever the physics lets the twin be.
+
+        A hand that lies on a table, or that a robot pushes, is stopped there in the twin; what was captured
+        is what the person did.
+
+        Args:
+            name: Of the person.
+            bodies: Its bones, by index.
+
+        Returns:
+            World from bone, shape (n, 3, 3), and the bones' origins in the world [m], (n, 3), in the order of
+            ``bodies``.
+
+        Raises:
+            Undecided: What was heard of the person may not be relied on.
+        """
+        self.asked.add(name)
+        if reason := self.heard_doubt(name):
+            raise Undecided(reason)
+        return self._captured(name, bodies)
+
+    def _captured(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
+        rows, q = self._rows_of(bodies), self._hearings[name].captured
+        if q is None:
+            return self._rotations[rows], self._positions[rows]
+        key = ("captured", name)
+        if key not in self._cache:
+            if self._wanted is None:
+                self._wanted = mujoco.MjData(self.model.mj)
+            self._wanted.qpos[:] = self._data.qpos
+            self._wanted.qpos[self.model.mechanisms[name].q_address] = q
+            mujoco.mj_kinematics(self.model.mj, self._wanted)
+            self._cache[key] = self._wanted.xmat.reshape(-1, 3, 3).copy(), self._wanted.xpos.copy()
+        R, x = self._cache[key]
+        ids = self.bearers.ids[rows]
+        return R[ids], x[ids]
+
+    def contact_forces(self, name: str) -> dict[int, tuple[float, str]]:
+        """Bones of a person that something touches in the twin: the normal force [N], and who presses most.
+
+        By index of the bone. Soft contacts and controllers make them: an estimate.
+
+        Raises:
+            Undecided: What was heard of the person may not be relied on, or no contact is calculated.
+        """
+        self.asked.add(name)
+        if reason := self.heard_doubt(name):
+            raise Undecided(reason)
+        if self.touches is None:
+            raise Undecided(f"{name}: no contacts are calculated (engine.physics, [[contacts]])")
+        if self._hearings[name].lost > self.t - 2 * self._period:
+            raise Undecided(f"{name}: the twin had to be put back to what was heard")
+        own = {body.mj: body.index for body in self.model.bodies if body.owner == name}
+        others = {body.mj: body.name for body in self.model.bodies}
+        pressing: dict[int, dict[str, float]] = {}
+        for one, other, force in self.touches:
+            for mine, its in ((one, other), (other, one)):
+                if mine in own and its not in own:
+                    by = pressing.setdefault(own[mine], {})
+                    who = others.get(its, "the floor")
+                    by[who] = by.get(who, 0.0) + force
+        return {i: (sum(by.values()), max(by, key=lambda who: by[who])) for i, by in pressing.items()}
+
+    def strayed(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
+        """How far bones of the twin of a person are from where they were captured.
+
+        Args:
+            name: Of the person.
+            bodies: Its bones, by index.
+
+        Returns:
+            Between their origins [m], shape (n,), and the angles between them [rad], (n,); 0 where
+            the twin follows within its tracking limit.
+        """
+        if not self.stray(name):
+            return np.zeros(len(bodies)), np.zeros(len(bodies))
+        rows, (R, x) = self._rows_of(bodies), self._captured(name, bodies)
+        trace = np.einsum("nij,nij->n", self._rotations[rows], R)
+        return (
+            np.linalg.norm(self._positions[rows] - x, axis=1),
+            np.arccos(np.clip((trace - 1) / 2, -1.0, 1.0)),
+        )
+
+    def lost_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
+        """Those of some bodies that are bones in doubt of people of whom the others may be relied on."""
+        _, people = self._bones(bodies)
+        told = (name for name in people if not self.whole_doubt(name))
+        lost = {f"{name}/{bone}" for name in told for bone in self.bones_in_doubt(name)}
+        return tuple(i for i in bodies if self.model.bodies[i].name in lost) if lost else ()
+
+    def _bones(self, bodies: tuple[int, ...]) -> tuple[tuple[str, ...], dict[str, frozenset[str]]]:
+        if bodies not in self._bones_of:
+            self._bones_of[bodies] = bones_of(self.model, bodies)
+        return self._bones_of[bodies]
+
+    def signal(self, name: str) -> Value:
+        """The value of a variable of the dictionary now, in SI.
+
+        Raises:
+            Undecided: It was not heard lately, its source calls it bad, or it cannot be.
+        """
+        self.asked.add(VARIABLE + name)
+        return self._signals.value(name, self.t)
+
+    def signals_meanwhile(self, name: str) -> tuple[Value, ...]:
+        """What a variable was between the last tick and this one, where its source tells more often.
+
+        Raises:
+            Undecided: It may not be relied on.
+        """
+        self.asked.add(VARIABLE + name)
+        return () if self.path is None else self._signals.meanwhile(name, float(self.path.t[0]), self.t)
+
+    def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """What several criteria work out from this state: made by whoever asks first at this tick.
+
+        Args:
+            key: A tuple that begins with what it is, and names all that it depends on but the state.
+            make: How to.
+        """
+        if key not in self._cache:
+            before, self.asked = self.asked, set()
+            try:
+                made = make()
+            finally:
+                asked, self.asked = self.asked, before
+                before |= asked
+            self._cache[key] = made, asked
+        made, asked = self._cache[key]
+        self.asked |= asked
+        return made
+
+    def hearing(self, name: str, *, strayed: bool = False) -> Hearing:
+        """What is known of where a robot or human really is, bone by bone of a person.
+
+        Args:
+            name: Of the robot or human.
+            strayed: As in `require_bodies`.
+
+        Raises:
+            Undecided: Nothing of it may be relied on.
+        """
+        self.asked.add(name)
+        if (reason := self.whole_doubt(name)) and not (strayed and reason == self.stray(name)):
+            raise Undecided(reason)
+        return self._hearings[name]
+
+    def placed(
+        self,
+        bodies: tuple[int, ...],
+        *,
+        estimates: bool = False,
+        doubted: bool = False,
+        strayed: bool = False,
+    ) -> tuple[Array, Array]:
+        """Where bodies are: world from body, and the world position of their origins [m].
+
+        Args:
+            bodies: By index.
+            estimates: As in `require_bodies`.
+            doubted: Also bones in doubt of people of whom the others may be relied on, as they are shown: for
+                whoever judges bone by bone (`bones_in_doubt`).
+            strayed: As in `require_bodies`.
+
+        Returns:
+            Of all bodies, shape (n, 3, 3) and (n, 3), so that indices stay what they are; of others they are
+            NaN. Valid until the next tick.
+
+        Raises:
+            Undecided: One of them may be elsewhere.
+        """
+        if doubted:
+            others, people = self._bones(bodies)
+            self.require(*others)
+            for name in people:
+                self.hearing(name, strayed=strayed)
+        else:
+            self.require_bodies(bodies, estimates=estimates, strayed=strayed)
+        if bodies not in self._places:
+            if len(self._places) == MOST_PLACES:
+                self._places.clear()
+                self._cache.clear()
+            n = len(self._positions)
+            R, x, v, w = (np.full((n, *shape), np.nan) for shape in ((3, 3), (3,), (3,), (3,)))
+            self._places[bodies] = R, x, v, w
+        R, x, _, _ = self._places[bodies]
+        key = ("placed", bodies)
+        if key not in self._cache:
+            rows = self._rows_of(bodies)
+            R[rows], x[rows] = self._rotations[rows], self._positions[rows]
+            self._cache[key] = True
+        return R, x
+
+    def _rows_of(self, bodies: tuple[int, ...]) -> Indices:
+        if bodies not in self._rows:
+            self._rows[bodies] = np.array(bodies, np.int64)
+        return self._rows[bodies]
+
+    def data_of(self, *names: str) -> Any:
+        """MuJoCo's data, of which only what these robots, people and machines decide may be used.
+
+        For what has no accessor of its own; `seerob.testing` moves everybody else and compares.
+
+        Raises:
+            Undecided: One of them was not heard.
+        """
+        self.require(*names)
+        return self._data
+
+    # -- joints -----------------------------------------------------------------------------
+
+    def q(self, mechanism: Mechanism) -> Array:
+        """Joint positions of the twin [rad or m], shape (n,)."""
+        self.require(mechanism.name)
+        return self._q(mechanism)
+
+    def _q(self, mechanism: Mechanism) -> Array:
+        return np.asarray(self._data.qpos[self.columns[mechanism.name].own_q])
+
+    def qd(self, mechanism: Mechanism) -> Array:
+        """Joint velocities of the twin [rad/s or m/s], shape (n,)."""
+        self.require(mechanism.name)
+        return np.asarray(self._data.qvel[self.columns[mechanism.name].own_v])
+
+    def speed_error(self, mechanism: Mechanism) -> Array | None:
+        """How far its joint velocities may be off, where they were derived from noisy positions.
+
+        Returns:
+            Three standard deviations [rad/s or m/s], shape (n,); None where nobody says that they were.
+        """
+        self.require(mechanism.name)
+        return self._hearings[mechanism.name].speed_error(self.t)
+
+    def measured_torques(self, mechanism: Mechanism) -> Array:
+        """Joint torques that its source measured, between samples as positions are [N·m or N], shape (n,).
+
+        Raises:
+            Undecided: Not heard, heard without torques, or with torques of another sign or unit.
+        """
+        self.require(mechanism.name)
+        hearing = self._hearings[mechanism.name]
+        if hearing.coarse:
+            raise Undecided(f"{mechanism.name}: {hearing.coarse}")
+        k = sum(1 for instant, _ in hearing.heard if instant <= self.t + SLACK)
+        times = [instant for instant, _ in hearing.heard[max(k - 1, 0) : k + 1]]
+        around = [torques for torques in hearing.torques[max(k - 1, 0) : k + 1] if torques is not None]
+        if not around or len(around) < len(times):
+            raise Undecided(f"{mechanism.name}: its source measures no joint torques")
+        if hearing.torque_doubt:
+            raise Undecided(f"{mechanism.name}: {hearing.torque_doubt}")
+        # Outside its range np.interp holds the last value, as the reference does.
+        return np.array([np.interp(self.t, times, joint) for joint in np.transpose(around)])
+
+    # -- dynamics ---------------------------------------------------------------------------
+
+    def weigh(self, mechanism: Mechanism) -> None:
+        """Raise `Undecided` unless it is known what a robot weighs, with all that it holds now."""
+        self.require(mechanism.name, *mechanism.holders)
+        if lost := self.bearers.unknown.keys() & set(mechanism.carried):
+            raise Undecided(self.bearers.unknown[min(lost)])
+        if mechanism.unknown_masses and not self._at_least:
+            raise Unweighed("; ".join(mechanism.unknown_masses))
+
+    @contextmanager
+    def known_masses_alone(self) -> Iterator[None]:
+        """While only what would be exceeded by less is asked: what nobody weighed weighs nothing meanwhile.
+
+        Of a mass matrix, and of what grows with it, that is a bound from below.
+        """
+        kept, self._cache, self._at_least = self._cache, {}, True
+        try:
+            yield
+        finally:
+            self._cache, self._at_least = kept, False
+
+    def _known(self, mechanisms: tuple[Mechanism, ...], M: Array) -> Array:
+        """A mass matrix without the bodies that nobody weighed, and with what keeps it invertible."""
+        mj, rows = self.model.mj, np.zeros((6, self.model.mj.nv))
+        for body in dict.fromkeys(i for mechanism in mechanisms for i in mechanism.unweighed):
+            mujoco.mj_jacBodyCom(mj, self._data, rows[:3], rows[3:], body)
+            moved = np.hstack([self.columns[mechanism.name].of_rows(rows) for mechanism in mechanisms])
+            turn = self._data.ximat[body].reshape(3, 3)
+            inertia = turn @ np.diag(mj.body_inertia[body]) @ turn.T
+            M = M - mj.body_mass[body] * moved[:3].T @ moved[:3] - moved[3:].T @ inertia @ moved[3:]
+        return np.asarray(M + (1e-9 * np.trace(M) + 1e-15) * np.eye(len(M)))
+
+    def mass_matrix(self, *mechanisms: Mechanism) -> Array:
+        """Joint-space mass matrix M(q) with tools and workpieces [kg·m², kg·m or kg], shape (n, n).
+
+        Of several mechanisms, one on another, that of the joints of all in turn.
+
+        Raises:
+            Undecided: A mass that nobody gave, or what drives it is too coarse for what a mass is asked for.
+        """
+        for mechanism in mechanisms:
+            self.weigh(mechanism)
+            if why := self._hearings[mechanism.name].coarse:
+                raise Undecided(f"{mechanism.name}: {why}")
+        key = ("M", *(mechanism.name for mechanism in mechanisms))
+        if key not in self._cache:
+            if "M" not in self._cache:
+                mujoco.mj_makeM(self.model.mj, self._data)
+                mujoco.mj_fullM(self.model.mj, self._data, self._full_mass_matrix)
+                self._cache["M"] = self._full_mass_matrix
+            if len(mechanisms) == 1:
+                M = self.columns[mechanisms[0].name].of_matrix(self._full_mass_matrix)
+            else:
+                every = np.eye(self.model.mj.nv)
+                C = np.hstack([self.columns[mechanism.name].of_rows(every) for mechanism in mechanisms])
+                M = C.T @ self._full_mass_matrix @ C
+            unknown = any(mechanism.unknown_masses for mechanism in mechanisms)
+            self._cache[key] = self._known(mechanisms, M) if unknown else M
+        return np.asarray(self._cache[key])
+
+    # -- kinematics -------------------------------------------------------------------------
+
+    def pose(self, frame: Frame) -> tuple[Array, Array]:
+        """World rotation (3, 3) and position (3,) [m] of a frame.
+
+        Raises:
+            Undecided: Whoever moves it was not heard; of a person, this bone is in doubt.
+        """
+        names, bodies = self._movers.get(frame.mj) or self._movers_of(frame.mj)
+        self.require(*names)
+        if bodies:
+            self.require_bodies(bodies)
+        return self._pose(frame)
+
+    def _movers_of(self, body: int) -> tuple[tuple[str, ...], tuple[int, ...]]:
+        """Whom the place of a body of MuJoCo depends on: the innermost robot or machine, or a bone."""
+        model = self.model
+        bones = tuple(b.index for b in model.bodies if b.role == "human" and b.mj == body)
+        moving = [m for m in model.mechanisms.values() if body in m.mj_bodies]
+        names = () if bones or not moving else (min(moving, key=lambda m: len(m.mj_bodies)).name,)
+        self._movers[body] = names, bones
+        return names, bones
+
+    def _pose(self, frame: Frame) -> tuple[Array, Array]:
+        key = ("pose", id(frame))
+        if key not in self._cache:
+            # With the frame itself: another one may get the id of one that is forgotten.
+            self._cache[key] = frame, *carried(self._xmat, self._xpos, frame.mj, frame.body_from_frame)
+        _, rotation, position = self._cache[key]
+        return rotation, position
+
+    def jacobian(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> Array:
+        """Jacobian of a point of a frame, linear rows first, world axes, shape (6, n).
+
+        Args:
+            frame: The frame.
+            mechanism: Whose joints the columns are.
+            offset: The point in the frame [m], shape (3,); its origin when not given.
+        """
+        self.require(mechanism.name)
+        # Not its name: a tool's working point is called like the tool.
+        key = ("J", id(frame), mechanism.name, None if offset is None else offset.tobytes())
+        if key not in self._cache:
+            rotation, position = self._pose(frame)
+            if offset is not None:
+                position = position + rotation @ offset
+            every = self._jacobian
+            mujoco.mj_jac(self.model.mj, self._data, every[:3], every[3:], position, frame.mj)
+            self._cache[key] = self.columns[mechanism.name].of_rows(every)
+        return np.asarray(self._cache[key])
+
+    def along(self, bodies: tuple[int, ...], mechanism: Mechanism, points: Array, directions: Array) -> Array:
+        r"""Rows :math:`u^T J_v` of points of several bodies, shape (b, n); see `jacobian`.
+
+        Args:
+            bodies: By index.
+            mechanism: Whose joints the columns are.
+            points: One of each body, in the world [m], shape (b, 3).
+            directions: Likewise, shape (b, 3).
+        """
+        self.require(mechanism.name)
+        moves, roots = self.bearers.moves(self.model.mj, bodies), self.bearers.roots
+        rows = np.array(bodies, np.int64)
+        every = np.empty((len(rows), self.model.mj.nv))
+        along(self._cdof, self._com, roots[rows], moves, points, directions, every)
+        return self.columns[mechanism.name].of_rows(every)
+
+    def body_velocities(self, bodies: tuple[int, ...], *, estimates: bool = False) -> tuple[Array, Array]:
+        """Linear and angular velocities of bodies at their origins [m/s, rad/s].
+
+        Returns:
+            Of all bodies, shape (n, 3) each, so that indices stay what they are; of others they are NaN.
+            Valid until the next tick.
+        """
+        self.placed(bodies, estimates=estimates)
+        key = ("velocities of", bodies)
+        if key not in self._cache:
+            self._cache[key] = True
+            _, _, *buffers = self._places[bodies]
+            for buffer, every in zip(buffers, self._velocities(), strict=True):
+                buffer[self._rows_of(bodies)] = every[self._rows_of(bodies)]
+        _, _, linear, angular = self._places[bodies]
+        return linear, angular
+
+    def _velocities(self) -> tuple[Array, Array]:
+        if "v" not in self._cache:
+            data = self._data
+            linear, angular = np.empty((2, *self._positions.shape))
+            velocities(
+                data.cvel, data.subtree_com, self._positions, self.bearers.ids, self.bearers.roots,
+                linear, angular,
+            )  # fmt: skip
+            self._cache["v"] = linear, angular
+        linear, angular = self._cache["v"]
+        return linear, angular
+
+    def fastest_point(self, index: int) -> tuple[float, Array, Array]:
+        """Bound on the speed of any point of a body, and the point where it is largest.
+
+        Its real surface may lie `Body.deviation` outside its shape; that is in the bound.
+
+        Returns:
+            Speed [m/s], the corner in the world [m] (3,), its velocity [m/s] (3,).
+        """
+        self.require_bodies((index,))
+        speed, point, velocity = self._fastest()
+        return float(speed[index]), point[index], velocity[index]
+
+    def fastest_points(
+        self, bodies: tuple[int, ...], *, estimates: bool = False
+    ) -> tuple[Array, Array, Array]:
+        """The same of several bodies: speeds (b,), corners (b, 3) and their velocities (b, 3).
+
+        Args:
+            bodies: By index.
+            estimates: As in `require_bodies`.
+        """
+        self.require_bodies(bodies, estimates=estimates)
+        rows = self._rows_of(bodies)
+        speed, point, velocity = self._fastest()
+        return speed[rows], point[rows], velocity[rows]
+
+    def largest_speeds(self) -> Array:
+        """The same of every body, whoever was heard, shape (n,): for bounds, never for a verdict."""
+        self._open("largest_speeds", "fastest_points(bodies)")
+        return self._fastest()[0]
+
+    def _fastest(self) -> tuple[Array, Array, Array]:
+        if "fastest" not in self._cache:
+            n = len(self._positions)
+            speed, point, velocity = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
+            corners, start = self._corners
+            fastest(
+                self._rotations, self._positions, *self._velocities(), corners, start, self._reach,
+                speed, point, velocity,
+            )  # fmt: skip
+            self._cache["fastest"] = speed, point, velocity
+        speed, point, velocity = self._cache["fastest"]
+        return speed, point, velocity
+
+    # -- distances --------------------------------------------------------------------------
+
+    def closest(self, gap: Gap, *, estimates: bool = False, strayed: bool = False) -> Closest:
+        """Where two sets are nearest; ``estimates`` and ``strayed`` as in `require_bodies`."""
+        self.require_bodies((*gap.a, *gap.b), estimates=estimates, strayed=strayed)
+        return self._distances(gap.query, Per.SETS).at(0)
+
+    def closest_per_body(self, gap: Gap, *, estimates: bool = False, strayed: bool = False) -> Closests:
+        """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``."""
+        self.require_bodies((*gap.a, *gap.b), estimates=estimates, strayed=strayed)
+        return self._distances(gap.query, Per.BODY)
+
+    def distances(self, query: Query, per: Per, *, estimates: bool = False) -> Closests:
+        """What a query says now; ``estimates`` as in `require_bodies`."""
+        self.require_bodies((*query.a, *query.b), estimates=estimates)
+        return self._distances(query, per)
+
+    def _distances(self, query: Query, per: Per) -> Closests:
+        return self._surveyor.ask(query, per, self._rotations, self._positions)

@@ -1,0 +1,272 @@
+"""The twin at many instants at once, and what follows from it: `seerob.twin.state.State` in arrays.
+
+The accessors are those of `State` with a dimension of instants in front, and their figures are the same
+to rounding. Who was not heard at an instant is in `States.doubts`: whoever asks depends on it, and
+`States.asked` says on whom.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from seerob.core.errors import Undecided
+from seerob.core.transforms import Array
+from seerob.distance.least import Closests, Per, Query, Survey
+from seerob.kernels.chain import held_many, jacobians
+from seerob.kernels.speed import fastest_many, stacked, velocities_many
+from seerob.model.model import Frame, Gap, Mechanism, Model
+from seerob.twin.bearers import untold
+from seerob.twin.joint_columns import Columns, moving_dofs
+from seerob.twin.spans import Path
+
+Reasons = NDArray[np.object_]
+"""Of each instant why something is not known, empty where it is; shape (N,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Where everybody is at many instants."""
+
+    t: Array
+    """[s], shape (N,)."""
+    q: Array
+    """MuJoCo's positions, shape (N, nq)."""
+    v: Array
+    """MuJoCo's velocities, shape (N, nv)."""
+    doubts: Mapping[str, Reasons]
+    """Why a robot or human may not be there, by name."""
+    foreseen: bool = False
+    """Whether one instant leads to the next: a motion, and not a collection of places."""
+    ways: tuple[Path, ...] | None = None
+    """From each instant to the next, N - 1 of them; None where the instants are no motion."""
+
+    speed_errors: Mapping[str, Array] = field(default_factory=dict)
+    """By name, see `seerob.twin.state.State.speed_error`, shape (N, n)."""
+
+    def part(self, begin: int, end: int) -> Motion:
+        """Some instants that follow one another."""
+        doubts = {name: found[begin:end] for name, found in self.doubts.items()}
+        ways = None if self.ways is None else self.ways[begin : end - 1]
+        part = self.t[begin:end], self.q[begin:end], self.v[begin:end]
+        errors = {name: found[begin:end] for name, found in self.speed_errors.items()}
+        return Motion(*part, doubts, self.foreseen, ways, errors)
+
+
+class Questions:
+    """Distances that are asked of many instants, so that from the second time on they are asked together.
+
+    Shared by threads.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._shapes = model.shapes
+        self._lock = threading.Lock()
+        self._survey: Survey | None = None
+
+    def ask(
+        self, question: tuple[Query, Per], rotations: Array, positions: Array
+    ) -> dict[tuple[Query, Per], Closests]:
+        """Answers to this question and to all that were ever asked."""
+        with self._lock:
+            known = () if self._survey is None else self._survey.questions
+            if self._survey is None or question not in known:
+                self._survey = Survey(self._shapes, [*known, question])
+            survey = self._survey
+        return dict(zip(survey.questions, survey.batch(rotations, positions), strict=True))
+
+
+class Bench:
+    """What is the same for all instants, and where one thread places the twin."""
+
+    def __init__(self, model: Model, questions: Questions) -> None:
+        self.model, self.questions = model, questions
+        mj = self.mj = model.mj
+        self.data = mujoco.MjData(mj)
+        self.ids = np.array([body.mj for body in model.bodies], np.int64)
+        self.roots = mj.body_rootid[self.ids].astype(np.int64)
+        self.corners = stacked([body.corners for body in model.bodies])
+        self.reach = np.array([body.radius + body.deviation for body in model.bodies])
+        self.columns = {m.name: Columns.of(m, mj) for m in model.mechanisms.values()}
+        # A mass that nobody gave may be none at all, and is never asked for.
+        self.weighed = tuple(
+            m for m in model.mechanisms.values() if m.role == "robot" and not m.unknown_masses
+        )
+
+    def place(self, motion: Motion) -> States:
+        """The twin at instants."""
+        mj, data, n = self.mj, self.data, len(motion.t)
+        moved = {
+            name: np.empty((n, *getattr(data, name).shape))
+            for name in ("xmat", "xpos", "cvel", "cdof", "subtree_com", "xanchor", "xaxis")
+        }
+        # Views that MuJoCo writes through.
+        views = [(found, getattr(data, name)) for name, found in moved.items()]
+        qpos, qvel = data.qpos, data.qvel
+        M = np.zeros((mj.nv, mj.nv))
+        masses = {m.name: np.empty((n, len(m.own), len(m.own))) for m in self.weighed}
+        for k in range(n):
+            qpos[:], qvel[:] = motion.q[k], motion.v[k]
+            mujoco.mj_kinematics(mj, data)
+            mujoco.mj_comPos(mj, data)
+            mujoco.mj_comVel(mj, data)
+            for found, view in views:
+                found[k] = view
+            if masses:
+                mujoco.mj_makeM(mj, data)
+                mujoco.mj_fullM(mj, data, M)
+                for name, blocks in masses.items():
+                    blocks[k] = self.columns[name].of_matrix(M)
+        return States(self, motion, moved, masses)
+
+
+class States:
+    """The twin at N instants."""
+
+    def __init__(
+        self, bench: Bench, motion: Motion, moved: dict[str, Array], masses: dict[str, Array]
+    ) -> None:
+        self.model, self._motion, self.doubts = bench.model, motion, motion.doubts
+        self.asked: set[str] = set()
+        """Robots and humans that answers have depended on since the set was last cleared."""
+        self._bench, self._moved, self._masses = bench, moved, masses
+        n = len(motion.t)
+        self._rotations = np.ascontiguousarray(moved["xmat"][:, bench.ids]).reshape(n, -1, 3, 3)
+        """World from body, in the order of `Model.bodies`, shape (N, n, 3, 3)."""
+        self._positions = np.ascontiguousarray(moved["xpos"][:, bench.ids])
+        """World position of the bodies' origins [m], shape (N, n, 3)."""
+        self._cache: dict[Any, Any] = {}
+        self._answers: dict[tuple[Query, Per], Closests] = {}
+
+    def __len__(self) -> int:
+        return len(self._motion.t)
+
+    def require(self, *names: str) -> None:
+        """Say that what follows depends on robots or humans."""
+        self.asked.update(names)
+
+    def placed(self, bodies: Sequence[int]) -> tuple[Array, Array]:
+        """World from body, and the origins in the world [m], of these bodies; of others NaN.
+
+        Returns:
+            Shapes (N, n, 3, 3) and (N, n, 3), in the order of `Model.bodies`.
+        """
+        self.require(*filter(None, (self.model.bodies[i].carrier for i in bodies)))
+        self._settled(bodies)
+        rotations, positions = np.full_like(self._rotations, np.nan), np.full_like(self._positions, np.nan)
+        rows = list(bodies)
+        rotations[:, rows], positions[:, rows] = self._rotations[:, rows], self._positions[:, rows]
+        return rotations, positions
+
+    def qd(self, mechanism: Mechanism) -> Array:
+        """Joint velocities [rad/s or m/s], shape (N, n)."""
+        self.require(mechanism.name)
+        return self._motion.v[:, self._bench.columns[mechanism.name].own_v]
+
+    def mass_matrix(self, mechanism: Mechanism) -> Array:
+        """Joint-space mass matrices [kg·m², kg·m or kg], shape (N, n, n).
+
+        Raises:
+            Undecided: A mass that nobody gave.
+        """
+        self._weigh(mechanism)
+        return self._masses[mechanism.name]
+
+    def held(self, mechanism: Mechanism) -> Array:
+        """Torques that hold its joints against gravity [N·m or N], shape (N, n).
+
+        Raises:
+            Undecided: A mass that nobody gave.
+        """
+        self._weigh(mechanism)
+        columns, moved = self._bench.columns[mechanism.name], self._moved
+        found = np.empty((len(self), len(columns.joints)))
+        held_many(
+            moved["subtree_com"], moved["xanchor"], moved["xaxis"], columns.bodies, columns.joints,
+            columns.turns, columns.masses, self._bench.mj.opt.gravity, found,
+        )  # fmt: skip
+        return found if columns.coupling is None else np.asarray(found @ columns.coupling)
+
+    def _weigh(self, mechanism: Mechanism) -> None:
+        self.require(mechanism.name)
+        self._settled(mechanism.carried)
+        if mechanism.unknown_masses:
+            raise Undecided("; ".join(mechanism.unknown_masses))
+
+    def largest_speeds(self) -> Array:
+        """Bounds on the speeds of all bodies' points [m/s], shape (N, n): for bounds, never for a verdict."""
+        return np.asarray(self._fastest()[0])
+
+    def jacobian(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> Array:
+        """Jacobians of a point of a frame, linear rows first, world axes, shape (N, 6, n)."""
+        self.require(mechanism.name)
+        key = id(frame), mechanism.name, None if offset is None else offset.tobytes()
+        if key not in self._cache:
+            bench, moved = self._bench, self._moved
+            at = frame.body_from_frame[:3, 3]
+            if offset is not None:
+                at = at + frame.body_from_frame[:3, :3] @ offset
+            points = moved["xpos"][:, frame.mj] + moved["xmat"][:, frame.mj].reshape(-1, 3, 3) @ at
+            columns = bench.columns[mechanism.name]
+            dofs = np.arange(bench.mj.nv)[columns.all_v]
+            found = np.empty((len(self), 6, len(dofs)))
+            root, moves = int(bench.mj.body_rootid[frame.mj]), moving_dofs(bench.mj, frame.mj)
+            jacobians(moved["cdof"], moved["subtree_com"], root, dofs, moves, points, found)
+            # With the frame itself: another one may get the id of one that is forgotten.
+            self._cache[key] = frame, found if columns.coupling is None else found @ columns.coupling
+        return np.asarray(self._cache[key][1])
+
+    def fastest_points(self, bodies: Sequence[int]) -> tuple[Array, Array, Array]:
+        """Bounds on the speeds of any points of bodies, corners and their velocities; see `State`.
+
+        Returns:
+            Shapes (N, b), (N, b, 3) and (N, b, 3).
+        """
+        self.require(*filter(None, (self.model.bodies[i].carrier for i in bodies)))
+        self._settled(bodies)
+        speed, point, velocity = (found[:, list(bodies)] for found in self._fastest())
+        return speed, point, velocity
+
+    def _fastest(self) -> tuple[Array, Array, Array]:
+        if "fastest" not in self._cache:
+            bench, moved, shape = self._bench, self._moved, self._positions.shape
+            twists = np.empty((2, *shape))
+            velocities_many(
+                moved["cvel"], moved["subtree_com"], self._positions, bench.ids, bench.roots, twists
+            )
+            speed, point, velocity = np.zeros(shape[:2]), np.zeros(shape), np.zeros(shape)
+            fastest_many(
+                self._rotations, self._positions, twists[0], twists[1], *bench.corners, bench.reach,
+                speed, point, velocity,
+            )  # fmt: skip
+            self._cache["fastest"] = speed, point, velocity
+        speed, point, velocity = self._cache["fastest"]
+        return speed, point, velocity
+
+    def closest(self, gap: Gap) -> Closests:
+        """Where two sets are nearest, shape (N,)."""
+        return self._distances(gap, Per.SETS).of(slice(None), 0)
+
+    def closest_per_body(self, gap: Gap) -> Closests:
+        """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``, shape (N, b)."""
+        return self._distances(gap, Per.BODY)
+
+    def _settled(self, bodies: Sequence[int]) -> None:
+        """Refuse what a gripper picks up."""
+        for body in (self.model.bodies[i] for i in bodies):
+            if body.holder:
+                raise Undecided(untold(body))
+
+    def _distances(self, gap: Gap, per: Per) -> Closests:
+        self.require(*gap.carriers)
+        self._settled((*gap.a, *gap.b))
+        question = gap.query, per
+        if question not in self._answers:
+            self._answers |= self._bench.questions.ask(question, self._rotations, self._positions)
+        return self._answers[question]

@@ -1,0 +1,224 @@
+"""What is known of where a robot, a machine or a person really is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from seerob.core.transforms import Array
+from seerob.description.capture.estimated import estimated
+from seerob.description.capture.following import Followed, PartDoubt
+from seerob.description.humans.skeleton import BONES
+from seerob.kernels.pull import SLACK as SLACK  # noqa: PLC0414
+
+Told = TypeVar("Told")
+STANDS = 1e-2
+"""Speed below which a motion that ends has stopped [rad/s or m/s]: noise of encoders makes standing robots
+as fast, and within the time-out nothing gets farther than some millimetres."""
+
+
+REPEATED = 2e-6
+"""What is said again with a doubt follows by less [s] (`device_clock.AFTER`): it is of the same
+instant, also where that lies ahead."""
+
+
+class Places(NamedTuple):
+    """What devices leave open of where the bones of a person are, however well they see them turned."""
+
+    unplaced: frozenset[str]
+    """Bones of which nobody says where they are."""
+    displaced: frozenset[str]
+    """Those of them of which somebody said it before, or all when nobody says where anything is."""
+    slack: Mapping[str, float]
+    """Bone → how much farther a point of it may be, as it is held or seen elsewhere, too [m]."""
+
+
+NOWHERE = Places(frozenset(BONES), frozenset(BONES), {})
+"""Of whoever's posture is told, and of no bone the place."""
+
+
+@dataclass
+class Hearing:
+    """What is known of where a robot or human really is."""
+
+    given: bool
+    """It stands where the workstation file puts it; no source drives it."""
+    driven: bool
+    """A source drives it."""
+    timeout: float = 0.2
+    """[s]"""
+    heard: list[tuple[float, str]] = field(default_factory=list)
+    """Instant [s] of the newest samples and why one may not be relied on (empty: it may), oldest first;
+    some may lie ahead of the tick."""
+    torques: list[Array | None] = field(default_factory=list)
+    """Measured joint torques of the same samples [N·m or N], each (n,); None where there were none."""
+    speed_errors: list[Array | None] = field(default_factory=list)
+    """How far the speeds of the same samples may be off, derived from noisy positions [rad/s or m/s], each
+    (n,); None where nobody says so."""
+    torque_doubt: str = ""
+    """Why those torques may not be relied on; empty when they may."""
+    error: float = 0.0
+    """Largest joint error between twin and reference [rad or m]."""
+    bones: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
+    """Of a person that devices see: bone → how far the twin's is from the device's, position [m] and angle
+    [rad]; None where none was seen."""
+    parts: list[tuple[float, tuple[PartDoubt, ...]]] = field(default_factory=list)
+    """The same of single bones of a person, when the rest may be relied on."""
+    observed: list[tuple[float, frozenset[str]]] = field(default_factory=list)
+    """Of a person that devices see: instant [s] and bones that some device sees then, oldest first."""
+    bare: list[tuple[float, frozenset[str]]] = field(default_factory=list)
+    """Likewise those of limbs of which nothing shows where they point."""
+    aims: list[tuple[float, Mapping[str, float]]] = field(default_factory=list)
+    """Of a person that devices see: instant [s], and hands, feet and heads of which only the joint is seen,
+    with a bound on how far they may be turned from the twin's [rad]; oldest first."""
+    untold: list[tuple[float, frozenset[tuple[str, int]]]] = field(default_factory=list)
+    """Of a person that devices see: instant [s] and angles of the posture that nothing tells, each with its
+    side; oldest first."""
+    places: list[tuple[float, Places]] = field(default_factory=list)
+    """Of a person that devices see: instant [s], and of which bones nobody says where they are; oldest
+    first."""
+    captured: Array | None = None
+    """Of a person whom the physics moves: the joint positions that the twin is pulled to now [rad or m]."""
+    residual: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
+    """As `bones`, of those joint positions instead of the twin's, where the twin does not follow."""
+    lost: float = -np.inf
+    """When the physics last lost it, so that it was put back [s]."""
+    saturated: bool = False
+    """A joint's torque limit was reached: the twin cannot do what was heard."""
+    older: float = 0.0
+    """How much older than its instant what was heard last may be [s]."""
+    leaves_at: float = 0.0
+    """Of who stands where he was last said to be: largest speed of a joint then [rad/s or m/s]."""
+    grace: float = 0.0
+    """How long after its newest sample it may be late all the same [s]."""
+    coarse: str = ""
+    """Why what is heard is too coarse for energies and forces; empty when it is not."""
+
+    def follow(self, found: Followed) -> None:
+        """Take what devices told of a person at one instant."""
+        self.heard.append((found.t, found.reason))
+        self.parts.append((found.t, found.parts))
+        self.observed.append((found.t, found.observed))
+        self.bare.append((found.t, found.bare))
+        self.aims.append((found.t, found.unaimed))
+        self.untold.append((found.t, found.untold))
+        self.places.append((found.t, Places(found.unplaced, found.displaced, found.slack)))
+        self.torques.append(None)
+        self.speed_errors.append(None)
+
+    def forget(self, t: float) -> None:
+        """Drop what is older than the last sample at or before ``t`` [s]."""
+        while len(self.heard) > 1 and self.heard[1][0] <= t:
+            del self.heard[0]
+            del self.torques[:1]
+            del self.speed_errors[:1]
+        for told in (self.parts, self.observed, self.bare, self.aims, self.untold, self.places):
+            while len(told) > 1 and told[1][0] <= t:
+                del told[0]
+
+    def doubt(self, t: float) -> str:
+        """Why what was heard does not tell where it is at ``t`` [s]; empty when it does.
+
+        A sample ahead of the tick does not make up for silence before it: all that happened between two
+        samples that are further apart than the time-out is a guess.
+        """
+        if not self.driven:
+            return "" if self.given else "no source drives it and the file gives no position (q)"
+        k = sum(1 for instant, _ in self.heard if instant <= t + SLACK)
+        if k == 0:
+            return "nothing heard yet"
+        last = self.heard[k - 1][0]
+        age = t - last + self.older
+        if age > self.timeout + SLACK:
+            why = self.heard[k - 1][1]
+            return f"not heard for {age:.2f} s (time-out {self.timeout:.3g} s)" + (why and f": {why}")
+        silence = self.heard[k][0] - last if k < len(self.heard) else 0.0
+        if silence > self.timeout + SLACK and t - last > SLACK:
+            return f"not heard for {silence:.2f} s from {last:.3f} s on (time-out {self.timeout:.3g} s)"
+        if k == len(self.heard) and t - last > self.grace + SLACK and self.leaves_at > STANDS:
+            speed = f"{self.leaves_at:.3g} rad/s or m/s"
+            return f"what drives it ends in motion, with {speed} at {last:.3f} s: nobody says that it stopped"
+        until = k + 1
+        while until < len(self.heard) and self.heard[until][0] - self.heard[until - 1][0] < REPEATED:
+            until += 1
+        return next((reason for _, reason in self.heard[k - 1 : until] if reason), "")
+
+    def speed_error(self, t: float) -> Array | None:
+        """How far joint velocities may be off at ``t`` [s], shape (n,): the worse of two samples."""
+        k = sum(1 for instant, _ in self.heard if instant <= t + SLACK)
+        around = [error for error in self.speed_errors[max(k - 1, 0) : k + 1] if error is not None]
+        return np.max(around, axis=0) if around else None
+
+    def doubt_ahead(self, t: float, until: float) -> str:
+        """Why what was heard does not tell what it does from ``t`` to ``until`` [s]; empty when it does."""
+        for (a, _), (b, reason) in pairwise(self.heard):
+            if t + SLACK < b and a < until - SLACK:
+                if reason:
+                    return reason
+                if b - a > self.timeout + SLACK:
+                    return f"nothing is heard from {a:.3f} s to {b:.3f} s"
+        last = self.heard[-1][0] if self.heard else -np.inf
+        if last < until - SLACK and self.leaves_at > STANDS:
+            return f"its motion ends at {last:.3f} s, and what it does after is not known"
+        return ""
+
+    def doubted(self, t: float) -> tuple[PartDoubt, ...]:
+        """Bones that may not be relied on at ``t`` [s], with the reasons."""
+        return tuple(part for told in _around(self.parts, t) for part in told)
+
+    def unaimed(self, t: float) -> dict[str, float]:
+        """Hands, feet and heads at ``t`` [s] of which only the joint is seen, each with a bound [rad].
+
+        It bounds the angle between how the twin's is turned and how the person's may be.
+        """
+        found: dict[str, float] = {}
+        for told in _around(self.aims, t):
+            found |= {bone: max(angle, found.get(bone, 0.0)) for bone, angle in told.items()}
+        return found
+
+    def unplaced(self, t: float) -> tuple[str, ...]:
+        """Bones of which it is known how they are turned at ``t`` [s], and nobody says where they are."""
+        found = frozenset[str]().union(*(places.unplaced for places in _around(self.places, t)))
+        return tuple(bone for bone in BONES if bone in found) if found else ()
+
+    def displaced(self, t: float) -> str:
+        """Why nobody may rely any more on where bones are that were placed before; empty when all may."""
+        found = frozenset[str]().union(*(places.displaced for places in _around(self.places, t)))
+        return nobody_says(tuple(bone for bone in BONES if bone in found)) if found else ""
+
+    def slack(self, t: float) -> dict[str, float]:
+        """Bones of which a point may be farther than what is seen shows at ``t`` [s], and by how much [m]."""
+        found: dict[str, float] = {}
+        for places in _around(self.places, t):
+            found |= {bone: max(size, found.get(bone, 0.0)) for bone, size in places.slack.items()}
+        return found
+
+    def untold_angles(self, t: float) -> frozenset[tuple[str, int]]:
+        """Angles of the posture at ``t`` [s] that nothing tells, each with its side."""
+        return frozenset().union(*_around(self.untold, t))
+
+    def unseen(self, t: float) -> tuple[str, ...]:
+        """Bones that no device sees at ``t`` [s] and that the bones beside them do not tell.
+
+        Empty for a person whom no device sees, whom joints or keyframes move.
+        """
+        around = _around(self.observed, t)
+        bare = frozenset().union(*_around(self.bare, t))
+        return estimated(frozenset.intersection(*around), bare) if around else ()
+
+
+def nobody_says(bones: Sequence[str]) -> str:
+    """Why nothing rests on where bones are of which only the directions are known; empty for none."""
+    shown = ", ".join(bones[:6]) + (f" and {len(bones) - 6} more" if len(bones) > 6 else "")
+    which = "the person is" if len(bones) == len(BONES) else f"{shown} {'is' if len(bones) == 1 else 'are'}"
+    return f"no device says where {which}, only how bones are turned" if bones else ""
+
+
+def _around(told: list[tuple[float, Told]], t: float) -> list[Told]:
+    """What was told last by ``t`` [s] and what next: between two samples either may hold."""
+    k = sum(1 for instant, _ in told if instant <= t + SLACK)
+    return [what for _, what in told[max(k - 1, 0) : k + 1]]

@@ -1,1 +1,0 @@
-"""Volumes in voxels and as polygons: swept, reachable, extruded."""

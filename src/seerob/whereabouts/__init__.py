@@ -1,1 +1,0 @@
-"""What is known of where anybody is, and what is said of those that are not, or only partly, seen."""

@@ -1,0 +1,1 @@
+"""The file that the engineer writes: typed, frozen, every mistake at once."""

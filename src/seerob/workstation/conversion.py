@@ -1,0 +1,198 @@
+"""From a table of a file to a typed struct, collecting every mistake on the way."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Mapping
+from typing import Any, TypeVar, get_args, get_origin
+
+import msgspec
+from msgspec import Struct
+
+from seerob.core import units
+from seerob.core.errors import Problem, suggestion
+from seerob.workstation.expectations import expected, is_struct, members, unit_of
+
+T = TypeVar("T", bound=Struct)
+
+LARGEST = 1e9
+"""Numbers beyond this are mistakes: no quantity of a workstation needs them in SI."""
+
+
+def convert(
+    table: Mapping[str, Any],
+    wanted: type[T],
+    *,
+    file: str,
+    key: str,
+    problems: list[Problem],
+    hidden: Collection[str] = (),
+    beside: Collection[str] = (),
+) -> T | None:
+    """A struct of a table; mistakes are appended to ``problems`` and make it None.
+
+    Args:
+        table: As TOML has it.
+        wanted: A `msgspec.Struct` type; fields whose metadata carry a unit accept keys with a suffix.
+        file: For messages.
+        key: Place of the table in the file, for messages.
+        problems: Receives every mistake.
+        hidden: Fields that the table may not set.
+        beside: Keys that somebody else reads, to be named as right ones.
+    """
+    fields = {f.encode_name: f for f in msgspec.structs.fields(wanted) if f.encode_name not in hidden}
+    before = len(problems)
+    values: dict[str, Any] = {}
+    for name, value in table.items():
+        place = _join(key, name)
+        field, factor = _field(name, fields)
+        if field is None:
+            remedy = _wrong_unit(name, fields) or suggestion(name, [*fields, *beside])
+            problems.append(Problem(file, place, "unknown key", remedy))
+        elif field in values:
+            problems.append(Problem(file, place, f"{field!r} is given twice, in two units", "keep one"))
+        else:
+            if factor is not None:
+                value = _scaled(value, factor)  # noqa: PLW2901
+            values[field] = _value(value, fields[field].type, place, file, problems)
+    for name, info in fields.items():
+        if info.required and name not in values:
+            problems.append(Problem(file, _join(key, name), "missing", _give(info.type)))
+    if len(problems) > before:
+        return None
+    try:
+        return wanted(**values)
+    except (TypeError, ValueError) as error:
+        problems.append(Problem(file, key, str(error)))
+        return None
+
+
+def tables(value: Any, place: str, file: str, problems: list[Problem]) -> list[Mapping[str, Any]]:
+    """The entries of a list of tables; what is not one is a mistake."""
+    if isinstance(value, dict):
+        problems.append(Problem(file, place, "is one table, not a list of tables", f"write [[{place}]]"))
+    elif not isinstance(value, list) or not all(isinstance(entry, dict) for entry in value):
+        problems.append(Problem(file, place, f"{short(value)} is not a list of tables", f"write [[{place}]]"))
+    else:
+        return value
+    return []
+
+
+def short(value: Any) -> str:
+    """A value for a message."""
+    text = (
+        "nothing"
+        if value is None
+        else "true"
+        if value is True
+        else "false"
+        if value is False
+        else repr(value)
+    )
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _join(key: str, name: str) -> str:
+    return f"{key}.{name}" if key else name
+
+
+def _give(wanted: Any) -> str:
+    unit = unit_of(wanted)
+    if unit:
+        return f"give it [{unit}]"
+    try:
+        msgspec.convert(object(), wanted)
+    except msgspec.ValidationError as error:
+        return expected(wanted, str(error)).replace("expected", "give", 1)
+    return ""
+
+
+def _field(name: str, fields: Mapping[str, Any]) -> tuple[str | None, float | None]:
+    """Field and factor that a key means: itself, or a field with a unit suffix."""
+    if name in fields:
+        return name, None
+    for stem, unit, factor in units.splits(name):
+        if stem in fields and unit_of(fields[stem].type) == unit:
+            return stem, factor
+    return None, None
+
+
+def _wrong_unit(name: str, fields: Mapping[str, Any]) -> str:
+    """What to say of ``mass_mm``: the field exists, but not in that unit."""
+    for stem, _, _ in units.splits(name):
+        if stem in fields:
+            unit = unit_of(fields[stem].type)
+            if unit is None:
+                return f"{stem!r} is no quantity with a unit that could be converted"
+            suffixes = [f"{stem}_{suffix}" for suffix, (si, _) in units.SUFFIXES.items() if si == unit]
+            return f"{stem!r} is in {unit}: write " + " or ".join([stem, *suffixes])
+    return ""
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    """Numbers times a factor, at any depth; what is not a number is left for `_value` to refuse."""
+    if isinstance(value, bool) or not isinstance(value, int | float | list | dict):
+        return value
+    if isinstance(value, list):
+        return [_scaled(item, factor) for item in value]
+    if isinstance(value, dict):
+        return {name: _scaled(item, factor) for name, item in value.items()}
+    return value * factor if abs(value) < LARGEST * LARGEST else math.inf
+
+
+def _value(value: Any, wanted: Any, place: str, file: str, problems: list[Problem]) -> Any:
+    for option in members(wanted):
+        arguments = get_args(option)
+        if is_struct(option) and isinstance(value, dict):
+            return convert(value, option, file=file, key=place, problems=problems)
+        if get_origin(option) is tuple and is_struct(arguments[0]) and isinstance(value, list):
+            entries = tables(value, place, file, problems)
+            return tuple(
+                convert(entry, arguments[0], file=file, key=f"{place}[{i}]", problems=problems)
+                for i, entry in enumerate(entries)
+            )
+        if get_origin(option) is dict and isinstance(value, dict) and is_struct(arguments[1]):
+            return {
+                n: _value(entry, arguments[1], f"{place}.{n}", file, problems) for n, entry in value.items()
+            }
+    unusable = _unusable(value, place)
+    if unusable is not None:
+        problems.append(
+            Problem(
+                file,
+                unusable[0],
+                f"{short(unusable[1])} is wrong",
+                f"expected a finite number, not beyond {LARGEST:g}",
+            )
+        )
+        return None
+    try:
+        return msgspec.convert(value, wanted)
+    except msgspec.ValidationError as error:
+        complaint, _, path = str(error).partition(" - at `")
+        path = path.rstrip("`").removeprefix("$")
+        what = f"{short(_inner(value, path))} is wrong"
+        problems.append(Problem(file, place + path, what, expected(wanted, complaint)))
+        return None
+
+
+def _inner(value: Any, path: str) -> Any:
+    """The value that ``[2][0]`` means inside another; the whole when the path cannot be followed."""
+    for index in re.findall(r"\[(\d+)\]", path):
+        if not isinstance(value, list) or int(index) >= len(value):
+            break
+        value = value[int(index)]
+    return value
+
+
+def _unusable(value: Any, place: str) -> tuple[str, Any] | None:
+    """Place and value of the first number, at any depth, that is not finite or absurdly large."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return None if abs(value) <= LARGEST else (place, value)
+    items: list[tuple[str, Any]] = []
+    if isinstance(value, list):
+        items = [(f"{place}[{i}]", item) for i, item in enumerate(value)]
+    elif isinstance(value, dict):
+        items = [(f"{place}.{name}", item) for name, item in value.items()]
+    return next((found for where, item in items if (found := _unusable(item, where))), None)

@@ -1,0 +1,1 @@
+"""Is it plausible? What a workstation file says, against ranges that are data."""

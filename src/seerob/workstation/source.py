@@ -1,0 +1,185 @@
+"""What a source is: options in, samples out. Sources know no physics.
+
+A *recorded* source (a trajectory file, a recording) knows its future; the run loop pumps it in
+run time, live and as fast as possible alike. The pump stays one sample ahead, so that references
+are interpolated between two samples and nothing lags.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import ClassVar
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from seerob.core.quantities import Seconds
+from seerob.core.samples import JointSample, PoseSample, Quality, Sample
+from seerob.core.snapshot import Finding
+from seerob.description.description import Description
+from seerob.workstation.variables.dictionary import Variable
+
+Row4 = tuple[float, float, float, float]
+Matrix4 = tuple[Row4, Row4, Row4, Row4]
+"""Homogeneous matrix, row by row."""
+
+
+class Target(Struct, frozen=True, kw_only=True):
+    """What a source needs to know of the robot or human it drives."""
+
+    name: str = ""
+    """Empty for a source of variables, which drives nothing."""
+    joints: tuple[str, ...] = ()
+    """Joint names in order."""
+    units: tuple[str, ...] = ()
+    """``rad`` or ``m`` per joint."""
+    lower: tuple[float, ...] = ()
+    """Position limits [rad or m]; -inf where there is none."""
+    upper: tuple[float, ...] = ()
+    velocity: tuple[float | None, ...] = ()
+    """Speed limits [rad/s or m/s]; None where nobody stated one."""
+    acceleration: tuple[float, ...] = ()
+    """Acceleration limits [rad/s² or m/s²], one for each joint or for all; empty where nobody stated any."""
+    jerk: tuple[float, ...] = ()
+    """Jerk limits [rad/s³ or m/s³], likewise."""
+    description: Description | None = None
+    """Its links and joints, for sources that need lengths (where a person's feet are)."""
+    world_from_base: Matrix4 | None = None
+    """Where its root link stands."""
+    frames: tuple[str, ...] = ()
+    """Full names of what its joints move and a `PoseSample` may drive; empty when nobody says."""
+    variables: tuple[Variable, ...] = ()
+    """Of the workstation's dictionary, those that this source reads."""
+    folder: str = ""
+    """Folder of the workstation file, where relative paths start."""
+
+
+class Opened(Struct, frozen=True, kw_only=True):
+    """A source that has read what it can read at start."""
+
+    samples: Iterable[Sample]
+    """In time order, ``t`` from 0; iterating again starts again."""
+    duration: float
+    """From the first to the last sample [s]."""
+    findings: tuple[Finding, ...] = ()
+    """The mapping that was used, limits that were passed, losses in the file."""
+
+
+class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of every source: one file, one class, one ``kind``. The fields are its table in the file."""
+
+    name: str = ""
+    """Made from the kind and the target when not given."""
+    shares: ClassVar[bool] = False
+    """Whether several sources of its sort may drive the same target."""
+    captured: ClassVar[str] = ""
+    """How it captured a person's motion, ``live`` from a device or from a ``file``; empty when it did not."""
+    live: ClassVar[bool] = False
+    """Whether nobody knows its future: a controller, a machine, a tracker."""
+    reads_variables: ClassVar[bool] = False
+    """Whether it reads variables of the workstation's dictionary."""
+
+    timeout: Seconds = 0.2
+    """Age at which what it said no longer counts [s]: dependent verdicts turn UNDECIDED."""
+    loop: bool = False
+    """Start again at the end. Where the ends are the same place, it stands still for ``loop_pause``;
+    where they differ, the way back takes as long and is UNDECIDED: nobody drove it."""
+    loop_pause: Seconds = 1.0
+    """[s]"""
+
+    def target(self) -> str:
+        """Name of the robot or human it drives; empty for signals."""
+        return ""
+
+    def coarse(self, folder: Path) -> str:
+        """Why what it says is too coarse for energies and forces; empty when it is not.
+
+        Args:
+            folder: Folder of the workstation file; relative paths start there.
+        """
+        return ""
+
+    def open(self, folder: Path, target: Target | None) -> Opened:
+        """Read or connect, and check against the target's limits.
+
+        Args:
+            folder: Folder of the workstation file; relative paths start there.
+            target: What it drives; None when `target` is empty.
+
+        Raises:
+            InputError: The file is missing or wrong; names file, place, value and remedy.
+        """
+        raise NotImplementedError
+
+
+SAME_PLACE = 1e-3
+"""A loop whose ends differ by no more than this [rad or m] is closed."""
+
+
+HOLD = 0.05
+"""Period at which a loop that is closed says, during its pause, that it stands still [s]."""
+
+
+class Pump:
+    """Feeds the samples of one recorded source to the loop as run time passes."""
+
+    def __init__(self, opened: Opened, *, loop: bool = False, pause: float = 1.0) -> None:
+        self._iterator = _rounds(opened, pause) if loop and opened.duration > 0 else iter(opened.samples)
+        self._reached = -math.inf
+        self._next = next(self._iterator, None)
+
+    @property
+    def finished(self) -> bool:
+        """Whether there is nothing left to come."""
+        return self._next is None
+
+    def until(self, t: float) -> Iterator[Sample]:
+        """Samples up to ``t`` [s] and the first one after it, each once."""
+        while self._next is not None and self._reached <= t:
+            sample, self._next = self._next, next(self._iterator, None)
+            self._reached = sample.t
+            yield sample
+
+
+def _rounds(opened: Opened, pause: float) -> Iterator[Sample]:
+    """The samples again and again, counted through, each round later than the one before."""
+    seq, start = 0, 0.0
+    last: Sample | None = None
+    while True:
+        for k, sample in enumerate(opened.samples):
+            quality = sample.quality
+            if k == 0 and last is not None and _apart(last, sample):
+                # Nobody drove this way back: it may be looked at, not judged.
+                quality = Quality.DEGRADED
+            elif k == 0 and last is not None:
+                for held in _held(last, start, pause):
+                    yield replace(held, seq=seq)
+                    seq += 1
+            last = sample
+            yield replace(sample, seq=seq, t=sample.t + start, quality=quality)
+            seq += 1
+        if last is None:
+            return
+        start += opened.duration + pause
+
+
+def _held(last: Sample, start: float, pause: float) -> Iterator[Sample]:
+    """What a closed loop says before a round that begins at ``start``: it stands where it ended."""
+    if not isinstance(last, JointSample):
+        return
+    still = None if last.qd is None else (0.0,) * len(last.qd)
+    for k in range(1, math.ceil(pause / HOLD)):
+        yield replace(last, t=start - pause + k * HOLD, qd=still)
+
+
+def _apart(last: Sample | None, first: Sample) -> bool:
+    if isinstance(last, JointSample) and isinstance(first, JointSample):
+        return max((abs(a - b) for a, b in zip(last.q, first.q, strict=True)), default=0.0) > SAME_PLACE
+    if isinstance(last, PoseSample) and isinstance(first, PoseSample):
+        # Between unit quaternions of either sign the chord is 2 sin(angle / 4).
+        chord = min(math.dist(last.wxyz, first.wxyz), math.dist(last.wxyz, [-x for x in first.wxyz]))
+        turn = 4 * math.asin(min(1.0, chord / 2))
+        return max(turn, math.dist(last.position, first.position)) > SAME_PLACE
+    return True

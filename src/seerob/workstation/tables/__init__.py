@@ -1,0 +1,1 @@
+"""Tables of the workstation file, one file each."""

@@ -1,0 +1,67 @@
+"""Cartesian targets that the twin may publish to ROS, in the workstation file."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+from msgspec import Meta
+
+from seerob.core.host_name import check_host
+from seerob.core.quantities import PathName, Table, unit
+
+Topic = Annotated[
+    str,
+    Meta(
+        pattern=r"^/?[A-Za-z~][A-Za-z0-9_/]*$",
+        max_length=200,
+        description="a name of ROS such as /target_pose: letters, digits, _ and /",
+    ),
+]
+
+
+class TargetMessage(StrEnum):
+    """How a pose is published."""
+
+    POSE_STAMPED = "geometry_msgs/PoseStamped"
+    POSE = "geometry_msgs/Pose"
+    TRANSFORM_STAMPED = "geometry_msgs/TransformStamped"
+
+
+class TargetWire(StrEnum):
+    """Over which server of ROS it is published."""
+
+    ROSBRIDGE = "rosbridge"
+    ROS_TCP = "ros_tcp"
+    """Unity's ROS-TCP-Endpoint."""
+
+
+class CartesianTarget(Table, frozen=True, kw_only=True):
+    """Where a tool of the twin is to go, published to ROS for a controller that listens to that."""
+
+    at: PathName
+    """Full name of the link or tool that a source moves by poses (``ur10/tool0``), or the robot's."""
+    host: str
+    """Name or address of the computer with the rosbridge server or ROS-TCP endpoint."""
+    wire: TargetWire = TargetWire.ROSBRIDGE
+    """Which of both it is."""
+    port: Annotated[int, Meta(ge=1, le=65535)] | None = None
+    """9090 of rosbridge and 10000 of an endpoint when not given."""
+    tls: bool = False
+    """Of rosbridge: encrypted, and the server's certificate is checked."""
+    topic: Topic
+    """Such as ``/target_pose``; there is no usual one."""
+    message: TargetMessage = TargetMessage.POSE_STAMPED
+    ros: Annotated[int, Meta(ge=1, le=2)] = 2
+    """1 for a rosbridge server of ROS 1; an endpoint says it by itself."""
+    frame_id: str = "base_link"
+    """Frame of ROS that poses are in."""
+    link: PathName | None = None
+    """Full name of the link of the twin that stands where ``frame_id`` is; the world when not given."""
+    every: Annotated[float, unit("s", ge=0.01, le=60)] = 0.1
+    """Least time between two targets [s]; of what comes faster, the newest is published."""
+
+    def __post_init__(self) -> None:
+        check_host("host", self.host)
+        if self.tls and self.wire is TargetWire.ROS_TCP:
+            raise ValueError("an endpoint of ROS-TCP has no encryption: leave out tls, or use rosbridge")

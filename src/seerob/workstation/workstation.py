@@ -1,0 +1,422 @@
+"""The workstation file: what the engineer writes, typed, frozen, checked all at once.
+
+`read` turns ``workstation.toml`` into a `Workstation`; every mistake is reported in one
+`InputError`. Quantities are SI; a key that ends in ``_deg``, ``_mm`` … is converted at the door.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct
+
+from seerob.core.errors import InputError
+from seerob.core.quantities import (
+    Coordinate,
+    Density,
+    Length,
+    Mass,
+    Name,
+    PathName,
+    Percentile,
+    Radian,
+    Radians,
+    Share,
+    Tolerance,
+    unit,
+)
+from seerob.core.quantities import Metres3 as Metres3  # noqa: PLC0414
+from seerob.core.quantities import Pose as Pose  # noqa: PLC0414
+from seerob.workstation.tables.displays import Display
+from seerob.workstation.tables.machines import Belt, Fingers, Motion, Route, Slide, Turn, Vehicle
+from seerob.workstation.tables.sensors import Sensor
+from seerob.workstation.tables.simple_shape import Shape as Shape  # noqa: PLC0414
+from seerob.workstation.tables.targets import CartesianTarget
+from seerob.workstation.tables.task_phase import TaskPhase
+from seerob.workstation.tables.triggers import Trigger
+
+FILE_NAME = "workstation.toml"
+
+
+class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of every table; the linter knows a struct by its base in the same file."""
+
+
+class Engine(_Table, frozen=True, kw_only=True):
+    """How the twin is moved."""
+
+    timestep: Annotated[float, unit("s", ge=0.001, le=0.002)] = 0.002
+    """Physics step [s]: 500 to 1 000 Hz."""
+    tick: Annotated[float, unit("s", gt=0, le=0.01)] = 0.01
+    """Period of results [s]: 100 Hz or more, a whole number of steps."""
+    bandwidth: Annotated[float, unit("Hz", ge=1, le=60)] = 20.0
+    """Natural frequency of the critically damped controllers that pull robots [Hz]."""
+    human_bandwidth: Annotated[float, unit("Hz", ge=1, le=40)] = 10.0
+    """The same for people [Hz]."""
+    gravity: Annotated[tuple[Coordinate, Coordinate, Coordinate], unit("m/s²")] = (0.0, 0.0, -9.81)
+    """[m/s²]"""
+    tracking_limit: Annotated[float, unit("rad", gt=0)] = 0.01
+    """Joint error [rad or m] beyond which the twin does not follow: what depends on it is UNDECIDED."""
+    human_tracking_limit: Annotated[float, unit("rad", gt=0)] = 0.05
+    """The same for people [rad or m]: about what devices that see people are good to."""
+    physics: bool = True
+    """Whether forces move the twin toward the samples. Without, it is put on the motion through them at every
+    tick: for long recordings, several times as fast, and blind to torque limits and contacts."""
+
+    def __post_init__(self) -> None:
+        steps = self.tick / self.timestep
+        if abs(steps - round(steps)) > 1e-9 or round(steps) < 1:
+            raise ValueError(f"tick = {self.tick} s is not a whole number of timesteps of {self.timestep} s")
+
+
+class Robot(_Table, frozen=True, kw_only=True):
+    """A robot arm or any other chain of joints."""
+
+    name: Name
+    model: str
+    """``library:ur10``, ``package:…/ur10_robot.urdf``, or a path to URDF, xacro or MJCF."""
+    on: str | None = None
+    """Machine that carries it, an axis, a turntable or a cart; it stands in the world when not given."""
+    base: Pose = Pose()
+    """Pose of its root link in the world, or in the frame of the machine it is on."""
+    meshes: str | None = None
+    """The maker's description (as ``model``) whose shapes replace the library's envelope."""
+    calibration: str | None = None
+    """File with the kinematics of this very robot, as ``seerob probe`` writes it."""
+    packages: dict[str, str] = {}
+    """Folders of ROS packages that ``package://`` may name."""
+    arguments: dict[str, str] = {}
+    """Values of the arguments of a xacro file."""
+    tool: str | None = None
+    """Link that is its point of interest; its last mounted tool's ``tcp`` when not given."""
+    q: Radians | None = None
+    """Joint positions [rad or m] where it stands when no source drives it."""
+    rotor_inertia: Annotated[tuple[float, ...], unit("kg·m²")] | None = None
+    """Rotor inertia seen at each joint [kg·m²]; unknown when not given."""
+    torque_limits: Annotated[tuple[float, ...], unit("N·m")] | None = None
+    """Largest torque per joint [N·m], instead of the description's."""
+    velocity_limits: Annotated[tuple[float, ...], unit("rad/s")] | None = None
+    """Largest speed per joint [rad/s], instead of the description's."""
+    acceleration_limits: Annotated[tuple[float, ...], unit("rad/s²")] | None = None
+    """Largest acceleration per joint [rad/s²], of a rescaled motion and of moves between waypoints; never
+    assumed."""
+    jerk_limits: Annotated[tuple[float, ...], unit("rad/s³")] | None = None
+    """Largest jerk per joint [rad/s³], likewise."""
+    masses: dict[str, Body] = {}
+    """Mass properties by hand, per link name."""
+    controller_tcp: Pose | None = None
+    """Where its controller has its tool centre point, in the frame of the flange, when that is neither the
+    flange nor the ``tcp`` of a tool: what a source says of it is compared with the twin."""
+    tcp_tolerance: Annotated[float, unit("m", gt=0, le=0.2)] | None = None
+    """How far what a source says of the tool centre point may be from the twin's [m]; 10 mm when not given,
+    for no two arms of a type are alike. Beyond it, what rests on the robot is undecided."""
+    mass_tolerance: Tolerance | None = None
+    """How far the masses of its links may be off, all alike, as a share: 0.05 for ± 5 %."""
+    com_tolerance: Annotated[float, unit("m", ge=0, le=10)] | None = None
+    """How far the centre of mass of every link may be from where it is said to be, in any direction [m]."""
+    published_mass: Mass | None = None
+    """What its maker says that the whole arm weighs, base included, without tools [kg]: the mass table is
+    compared with it."""
+    published_mass_source: Annotated[str, Meta(min_length=1, max_length=200)] | None = None
+    """Where the maker says so: data sheet, edition, page."""
+
+    def __post_init__(self) -> None:
+        if (self.published_mass is None) != (self.published_mass_source is None):
+            raise ValueError("published_mass and published_mass_source belong together: give both or none")
+
+
+class Body(_Table, frozen=True, kw_only=True):
+    """Physical properties given by hand."""
+
+    mass: Mass
+    com: Metres3 | None = None
+    """Centre of mass in the link's frame [m]; from the shape at uniform density when not given."""
+    inertia: Annotated[tuple[float, float, float, float, float, float], unit("kg·m²")] | None = None
+    """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]; from the shape when not given."""
+    source: str = "workstation file"
+
+
+class Thing(_Table, frozen=True, kw_only=True):
+    """What a tool, a workpiece and a part have in common: a shape and where it is."""
+
+    name: PathName
+    mesh: str | None = None
+    """STL, OBJ, PLY, OFF, glTF, COLLADA or 3MF file."""
+    shape: Shape | None = None
+    units: str | None = None
+    """Unit of the mesh file (``mm``, ``m``, ``inch`` …) when the format does not say."""
+    up: Literal["x", "y", "z"] | None = None
+    """Axis that points up in the mesh file, when the format does not say."""
+    at: Pose = Pose()
+    """Pose in the world, or in the frame it is mounted on."""
+    mass: Mass | None = None
+    com: Metres3 | None = None
+    """Centre of mass in its own frame [m]."""
+    inertia: Annotated[tuple[float, float, float, float, float, float], unit("kg·m²")] | None = None
+    """ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg·m²]."""
+    density: Density | None = None
+    """Uniform density [kg/m³] to compute the mass from the shape."""
+    color: tuple[Share, Share, Share] | None = None
+    """Red, green, blue in 0…1."""
+
+    def __post_init__(self) -> None:
+        if (self.mesh is None) == (self.shape is None):
+            raise ValueError("give either mesh or shape")
+        if self.mass is not None and self.density is not None:
+            raise ValueError("mass and density are both given: keep one")
+        if self.inertia is not None and (self.mass is None or self.com is None):
+            raise ValueError("inertia needs mass and com beside it")
+        if self.com is not None and self.mass is None:
+            raise ValueError("com needs mass beside it")
+
+
+class Mounted(Thing, frozen=True, kw_only=True):
+    """A thing that moves with a robot."""
+
+    on: str
+    """Full name of the link that carries it, such as ``ur10/tool0``, or of another tool."""
+    mass_tolerance: Tolerance | None = None
+    """How far its mass may be off, as a share: 0.05 for ± 5 %."""
+    density_tolerance: Tolerance | None = None
+    """How far its ``density`` may be off, as a share, and with it its mass."""
+    com_tolerance: Annotated[float, unit("m", ge=0, le=10)] | None = None
+    """How far its centre of mass may be from where it is, in any direction [m]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.density_tolerance is not None and self.density is None:
+            raise ValueError("density_tolerance is of a density, which is not given: give mass_tolerance")
+
+
+class Tool(Mounted, frozen=True, kw_only=True):
+    """Something mounted on a robot, real or virtual: it changes the twin's masses and torques."""
+
+    tcp: Pose | None = None
+    """Its working point in its own frame; the robot's point of interest from then on."""
+
+
+class Workpiece(Mounted, frozen=True, kw_only=True):
+    """A payload: something a tool carries."""
+
+    rest: Pose | None = None
+    """Where it lies first, in the world: the gripper that ``on`` names picks it up and lets it go.
+    Without it, it is on what carries it all the time."""
+
+
+class Part(Thing, frozen=True, kw_only=True):
+    """Something of the environment that stands still."""
+
+
+class Machine(Thing, frozen=True, kw_only=True):
+    """Something that moves: an axis, a door, a turntable, what a belt carries, a cart, a gripper."""
+
+    on: str | None = None
+    """Machine, link or tool that carries it, such as ``ur10/tool0``; stands in the world when not given."""
+    slide: Slide | None = None
+    turn: Turn | None = None
+    belt: Belt | None = None
+    vehicle: Vehicle | None = None
+    route: Route | None = None
+    grip: Fingers | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if "/" in self.name:
+            raise ValueError(f"name = {self.name!r}: the name of a machine has no /")
+        if sum(m is not None for m in self._motions()) != 1:
+            raise ValueError("give exactly one of slide, turn, belt, vehicle, route, grip")
+
+    def _motions(self) -> tuple[Motion | None, ...]:
+        return self.slide, self.turn, self.belt, self.vehicle, self.route, self.grip
+
+    @property
+    def motion(self) -> Motion:
+        """How it moves."""
+        return next(motion for motion in self._motions() if motion is not None)
+
+
+class SweptArea(_Table, frozen=True, kw_only=True):
+    """An area made when the workstation is read, from what something sweeps or can reach."""
+
+    of: str
+    """What sweeps: a robot with everything on it, a tool, a link; wildcards allowed."""
+    voxel: Length = 0.05
+    """Edge of a voxel [m]."""
+    reach: bool = False
+    """All that the joint limits allow, instead of the motion of the sources."""
+    start: Annotated[float, unit("s", ge=0)] = 0.0
+    """Begin of the part of the motion to take [s]."""
+    end: Annotated[float, unit("s", ge=0)] | None = None
+    """End of it [s]; that of the motion when not given."""
+    margin: Annotated[float, unit("m", ge=0, le=10)] = 0.0
+    """Dilated by this [m]."""
+    separation: str | None = None
+    """Name of a criterion of kind ``separation``: dilated, at every instant, by its S_p too. Who is outside
+    is farther from every swept part than its protective separation distance was when it was there."""
+
+    def __post_init__(self) -> None:
+        if self.end is not None and self.end < self.start:
+            raise ValueError(f"end = {self.end:g} s is before start = {self.start:g} s: begin before the end")
+        if self.reach and (self.start or self.end is not None or self.separation is not None):
+            raise ValueError(
+                "reach takes no part of a motion and no S_p: leave out start, end and separation"
+            )
+
+
+class Area(Thing, frozen=True, kw_only=True):
+    """A safety area: a shape that is watched, not touched."""
+
+    swept: SweptArea | None = None
+    """Instead of a mesh or a shape: what something sweeps."""
+    on: str | None = None
+    """Full name of the link, tool or bone that carries it; stands still when not given."""
+
+    def __post_init__(self) -> None:
+        if self.swept is None:
+            super().__post_init__()
+        elif self.mesh is not None or self.shape is not None:
+            raise ValueError("give exactly one of mesh, shape, swept")
+        elif self.on is not None or self.at != Pose():
+            raise ValueError("what is swept lies in the world: leave out on and at")
+        if self.mass is not None or self.density is not None:
+            raise ValueError("an area has no mass")
+
+
+class Human(_Table, frozen=True, kw_only=True):
+    """A person."""
+
+    name: Name
+    stature: Annotated[float, unit("m", ge=1.2, le=2.3)] | Percentile
+    """[m], or a percentile of a published population: ``"germany P50"``."""
+    mass: Annotated[float, unit("kg", ge=30, le=250)]
+    """[kg]"""
+    sex: Literal["male", "female"]
+    hand: Literal["right", "left"] = "right"
+    """Dominant hand."""
+    lengths: Literal["drillis", "deleva"] | dict[str, Length] = "drillis"
+    """Data set that segment lengths are taken from; or lengths by hand [m], ``{ forearm = 0.26, … }``, the
+    others then from ``drillis`` so that the chain ends at the stature."""
+    masses: Literal["deleva", "zatsiorsky"] | dict[str, Mass] = "deleva"
+    """Data set of segment masses; or masses by hand [kg], ``{ thigh = 9.5, … }``, the others then from
+    ``deleva`` so that all weigh the body mass."""
+    follow: Literal["posture", "task"] = "posture"
+    """What the controllers that pull the twin hold: each joint at its value, or each bone at its place."""
+    unseen_uncertainty: Annotated[float, unit("m", gt=0, le=2)] | None = None
+    """How far bones that no device sees may be from their estimate [m]; without it they stay undecided."""
+    at: Pose = Pose()
+    """Where the person stands: the point on the floor between the feet."""
+    posture: str = "standing"
+    """Named posture when no source moves the person."""
+    joints: dict[str, Radian] = {}
+    """Joint angles on top of the posture [rad]; ``joints_deg`` for degrees."""
+
+
+class Contact(_Table, frozen=True, kw_only=True):
+    """Two sets that may touch in the physics. Nothing else does."""
+
+    between: tuple[str, str]
+
+
+class Confirmed(_Table, frozen=True, kw_only=True):
+    """A value that looks like a mistake and is meant: it does not keep verdicts undecided any more."""
+
+    key: Annotated[str, Meta(max_length=300)]
+    """Where it stands in the file, with the number of its entry from 0: ``robots[0].base.position``."""
+    value: float | list[Any]
+    """The value that is meant, as the file has it; another one later is not confirmed."""
+    why: Annotated[str, Meta(min_length=1, max_length=1000)]
+    """Why it is right; it stands in the report."""
+
+
+class Workstation(_Table, frozen=True, kw_only=True):
+    """A workstation file."""
+
+    title: str = "Untitled workstation"
+    edition: Literal["ISO 10218-2:2025", "ISO/TS 15066:2016"] = "ISO/TS 15066:2016"
+    """Edition of the norm that limits are taken from."""
+    description: str = ""
+    variables: str | None = None
+    """Dictionary of the variables of controllers and machines, a TOML file beside this one."""
+    zones: str | None = None
+    """Zones of a robot controller as more ``[[areas]]``, a TOML or JSON file beside this one."""
+    allow_writing: bool = False
+    """Whether ``[[triggers]]`` and ``[[targets]]`` may write; the command line must allow it too."""
+    engine: Engine = Engine()
+    robots: tuple[Robot, ...] = ()
+    tools: tuple[Tool, ...] = ()
+    workpieces: tuple[Workpiece, ...] = ()
+    parts: tuple[Part, ...] = ()
+    machines: tuple[Machine, ...] = ()
+    areas: tuple[Area, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    humans: tuple[Human, ...] = ()
+    phases: tuple[TaskPhase, ...] = ()
+    displays: tuple[Display, ...] = ()
+    triggers: tuple[Trigger, ...] = ()
+    targets: tuple[CartesianTarget, ...] = ()
+    contacts: tuple[Contact, ...] = ()
+    confirmed: tuple[Confirmed, ...] = ()
+    sources: tuple[Any, ...] = ()
+    """`Source`s, each of the type that its ``kind`` names."""
+    safety: tuple[Any, ...] = ()
+    """`Criterion`s."""
+    ergonomics: tuple[Any, ...] = ()
+    """Rules, which are `Criterion`s too."""
+    sinks: tuple[Any, ...] = ()
+    """`Sink`s."""
+
+    folder: str = ""
+    """Folder of the file; not written in it."""
+    files: dict[str, bytes] = {}
+    """The file itself, and after `compile` every file it names; not written in it."""
+
+
+TABLES: dict[str, type[Struct]] = {
+    "robots": Robot,
+    "tools": Tool,
+    "workpieces": Workpiece,
+    "parts": Part,
+    "machines": Machine,
+    "areas": Area,
+    "sensors": Sensor,
+    "humans": Human,
+    "phases": TaskPhase,
+    "displays": Display,
+    "triggers": Trigger,
+    "targets": CartesianTarget,
+    "contacts": Contact,
+    "confirmed": Confirmed,
+}
+"""Lists of tables and the type of their entries."""
+
+PLUGINS = ("sources", "safety", "ergonomics", "sinks")
+"""Tables whose type is told by their ``kind``."""
+
+
+def locate(path: Path | str) -> Path:
+    """The workstation file of a path that is one, or a folder that contains one.
+
+    Raises:
+        InputError: There is none.
+    """
+    path = Path(path)
+    try:
+        file = path / FILE_NAME if path.is_dir() else path
+        found = file.is_file()
+    except (OSError, ValueError) as error:
+        raise InputError.at(path, "", f"no such file: {error}", "give a folder or a file") from error
+    if not found:
+        remedy = f"give a folder with a {FILE_NAME}, or make one with `seerob new`"
+        raise InputError.at(file, "", "no such file", remedy)
+    return file
+
+
+def content_hash(files: dict[str, bytes]) -> str:
+    """SHA-256 over the names and contents of files, independent of their order."""
+    digest = hashlib.sha256()
+    for name in sorted(files):
+        digest.update(f"{name}\0{len(files[name])}\0".encode())
+        digest.update(files[name])
+    return digest.hexdigest()

@@ -98,7 +98,7 @@ def test_pulling_bones_is_pulling_with_the_mass_matrix():
     delta = 1e-5 * random.standard_normal(len(q0))
     engine.take([JointSample(source="s", target="operator", seq=0, t=0.0, q=tuple(q0 + delta))])
     engine.start()
-    engine._aim(0.0)
+    engine._aim(0.0, station.workstation.engine.tick)
     engine._data.qpos[mechanism.q_address] = q0
     engine._pull(0, 0.0)
     found = engine._task_pulls[0]._torques[v]

@@ -266,10 +266,10 @@ export interface Result {
   reason: string;
   /** Where the true value lies, given the tolerances of the inputs. */
   interval: [number, number] | null;
-  /** The same per link or body area; the worst one gives the verdict. */
+  /** One result per link or body area; the worst one gives the verdict. */
   parts: Result[];
   markers: Marker[];
-  /** The same by places of a person's body, where a criterion has them. */
+  /** One row per place of a person's body, where a criterion judges such places. */
   rows: Row[];
   /** None on parts, which share their parent's, and on the wire, where it is sent once. */
   basis: Basis | null;
@@ -299,8 +299,8 @@ export interface Snapshot {
    */
   bones: Record<string, Record<string, [number | null, number | null]>>;
   /**
-   * Of what live sources drive whose devices send their time: how much later than the fastest sample the
-   * newest one arrived, and how late it may be to count [s].
+   * Per robot and human whose live device sends its time: how much later than the fastest sample the newest
+   * one arrived, and how late it may be to count [s].
    */
   late: Record<string, [number, number]>;
   results: Result[];

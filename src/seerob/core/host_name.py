@@ -29,7 +29,7 @@ def check_host(key: str, host: str) -> None:
 
 
 def check_url(key: str, url: str) -> None:
-    """The same of the computer in a URL, and its port.
+    """Check the name or address of the computer in a URL, and its port, without asking anybody for it.
 
     Raises:
         ValueError: It cannot be one.

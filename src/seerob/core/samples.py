@@ -49,7 +49,7 @@ class SampleBase(Struct, frozen=True, kw_only=True, tag=True):
     t: float
     """Instant the sample speaks of [s], on the run's clock."""
     t_device: float | None = None
-    """The same instant on the device's own clock [s], if it has one."""
+    """Instant the sample speaks of [s], on the device's own clock; None when it has none."""
     quality: Quality = Quality.GOOD
     reason: str = ""
     """Why it may not be relied on, as whoever heard it found; empty when nobody found anything."""

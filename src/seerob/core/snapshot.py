@@ -224,10 +224,10 @@ class Result(Struct, frozen=True, kw_only=True):
     interval: tuple[float, float] | None = None
     """Where the true value lies, given the tolerances of the inputs."""
     parts: tuple[Result, ...] = ()
-    """The same per link or body area; the worst one gives the verdict."""
+    """One result per link or body area; the worst one gives the verdict."""
     markers: tuple[Marker, ...] = ()
     rows: tuple[Row, ...] = ()
-    """The same by places of a person's body, where a criterion has them."""
+    """One row per place of a person's body, where a criterion judges such places."""
     basis: Basis | None = None
     """None on parts, which share their parent's, and on the wire, where it is sent once."""
     t: float | None = None
@@ -254,8 +254,8 @@ class Snapshot(Struct, frozen=True, kw_only=True, tag="snapshot"):
     """Of people that devices see: bone → how far the twin's bone is from the device's, position [m] and
     angle [rad]; null where the device has none."""
     late: dict[str, tuple[float, float]] = {}
-    """Of what live sources drive whose devices send their time: how much later than the fastest sample the
-    newest one arrived, and how late it may be to count [s]."""
+    """Per robot and human whose live device sends its time: how much later than the fastest sample the newest
+    one arrived, and how late it may be to count [s]."""
     results: tuple[Result, ...] = ()
     looks: dict[str, tuple[float, float, float] | None] = {}
     """Nodes whose look follows a variable: red, green, blue in 0…1; null where one is not drawn."""

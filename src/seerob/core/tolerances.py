@@ -44,7 +44,7 @@ class Spread:
     low: Array
     high: Array
     by_input: Array | Callable[[], Array]
-    """See `widths`, or how to work them out."""
+    """What each input makes of the width by itself, shape (inputs, ...), or a function that works it out."""
 
     @cached_property
     def widths(self) -> Array:

@@ -38,7 +38,7 @@ UNBOUNDED = -2
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def unit_slabs(A: Array, low: Array, high: Array) -> tuple[bool, Array, Array, Array]:
-    """The same polytope with unit normals, without the columns that are zero.
+    """Scale the normals of a polytope to length one, and drop the columns that are zero.
 
     Args:
         A: Normals as columns, shape (3, n).

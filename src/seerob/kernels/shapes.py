@@ -29,7 +29,8 @@ class Shapes:
     solids: tuple[tuple[int, ...], ...]
     """Columns of the arrays below that each body carries."""
     which: Indices
-    """See `seerob.kernels.pairs`."""
+    """One row per solid: its body, its kind and where its data lie in the arrays below;
+    `seerob.kernels.pairs` lists the columns."""
     local: Array
     ball: Array
     corners: Array

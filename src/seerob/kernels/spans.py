@@ -114,7 +114,7 @@ def point_bounds(
     quick: Array,
     bend: Array,
 ) -> None:
-    """The same of points at the ends of chains; writes into the last three arguments.
+    """Bound the motion of points at the ends of chains within a span; writes into the last three arguments.
 
     Args:
         speed: From `joint_bounds`, as the next three, shape (nv,).

@@ -24,11 +24,11 @@ class Tree:
     """What distance queries need of one mesh, in its own frame."""
 
     nodes: NDArray[np.float64]
-    """See `seerob.kernels.tree.build_tree`, shape (k, 20)."""
+    """Nodes of the bounding boxes as `seerob.kernels.tree.build_tree` lays them out, shape (k, 20)."""
     links: NDArray[np.int32]
     triangles: NDArray[np.float64]
     boxes: NDArray[np.float32]
-    """See `seerob.kernels.wide.widen`, shape (w, 120)."""
+    """Boxes of the wide tree as `seerob.kernels.wide.widen` lays them out, shape (w, 120)."""
     kids: NDArray[np.int32]
     probes: NDArray[np.float64]
     """A vertex of each connected piece [m], shape (p, 3)."""

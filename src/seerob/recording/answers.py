@@ -26,7 +26,7 @@ class Answers:
     value: Array
     """In the criterion's unit, shape (N,); NaN where there is none."""
     limit: Array
-    """Likewise."""
+    """Limit in the criterion's unit, shape (N,); NaN where there is none."""
     verdict: Codes
     """Shape (N,)."""
     interval: tuple[Array, Array] | None = None
@@ -41,29 +41,29 @@ class Answers:
         return cls(value, limits, judge_many(value, limit, at_most=at_most))
 
     def between(self, low: Array, high: Array, *, at_most: bool) -> Answers:
-        """The same of values between two; the rule is `seerob.criteria.criterion.judge_interval`."""
+        """Judge values that lie between two ends (`seerob.criteria.criterion.judge_interval`)."""
         ends = [judge_many(end, self.limit, at_most=at_most) for end in (low, high)]
         either = np.where(ends[0] == ends[1], ends[0], UNDECIDED).astype(np.uint8)
         verdict = np.where(np.isnan(self.limit), self.verdict, either)
         return replace(self, verdict=verdict, interval=(low, high))
 
     def finite(self) -> Answers:
-        """The same without values that are infinite; the verdicts stay, and without one nothing is judged."""
+        """Replace infinite values by NaN. A verdict stays; an instant without one has nothing to judge."""
         none = np.isinf(self.value)
         value = np.where(none, np.nan, self.value)
         return replace(self, value=value).without_verdict(none & (self.verdict == NO_VERDICT))
 
     def exceeded(self, where: Flags) -> Answers:
-        """The same, exceeded at some instants."""
+        """Return these answers with EXCEEDED at the instants where ``where``, shape (N,), is true."""
         return replace(self, verdict=np.where(where, EXCEEDED, self.verdict).astype(np.uint8))
 
     def without_verdict(self, where: Flags) -> Answers:
-        """The same with nothing to judge at some instants."""
+        """Return these answers with nothing to judge at the instants where ``where``, shape (N,), is true."""
         verdict = np.where(where, NO_VERDICT, self.verdict).astype(np.uint8)
         return replace(self, verdict=verdict, nothing=where if self.nothing is None else self.nothing | where)
 
     def open(self) -> Answers:
-        """The same where limits may be worse than they say: what is within them is undecided."""
+        """Turn WITHIN into UNDECIDED everywhere, because limits may be worse than they say."""
         verdict = np.where(self.verdict == WITHIN, UNDECIDED, self.verdict)
         return replace(self, verdict=verdict.astype(np.uint8))
 

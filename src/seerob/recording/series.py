@@ -310,7 +310,7 @@ class Series:
 
     @property
     def parts(self) -> Mapping[str, Series]:
-        """The same per link or body area."""
+        """One series per link or body area, by its name."""
         return MappingProxyType(self._parts)
 
     @property

@@ -54,13 +54,14 @@ class Engine(_Table, frozen=True, kw_only=True):
     bandwidth: Annotated[float, unit("Hz", ge=1, le=60)] = 20.0
     """Natural frequency of the critically damped controllers that pull robots [Hz]."""
     human_bandwidth: Annotated[float, unit("Hz", ge=1, le=40)] = 10.0
-    """The same for people [Hz]."""
+    """Natural frequency of the critically damped controllers that pull people [Hz]."""
     gravity: Annotated[tuple[Coordinate, Coordinate, Coordinate], unit("m/s²")] = (0.0, 0.0, -9.81)
     """[m/s²]"""
     tracking_limit: Annotated[float, unit("rad", gt=0)] = 0.01
     """Joint error [rad or m] beyond which the twin does not follow: what depends on it is UNDECIDED."""
     human_tracking_limit: Annotated[float, unit("rad", gt=0)] = 0.05
-    """The same for people [rad or m]: about what devices that see people are good to."""
+    """Joint error [rad or m] beyond which the twin does not follow a person: what depends on it is UNDECIDED.
+    The default is about what devices that see people are good to."""
     physics: bool = True
     """Whether forces move the twin toward the samples. Without, it is put on the motion through them at every
     tick: for long recordings, several times as fast, and blind to torque limits and contacts."""

@@ -29,7 +29,7 @@ class Mesh:
     """Red, green, blue, alpha in 0…1."""
 
     def moved(self, a_from_b: Array) -> Mesh:
-        """The same mesh expressed in ``a``, given the transform (4, 4) from its own frame ``b``."""
+        """Return this mesh expressed in frame ``a``, given the transform (4, 4) from its own frame ``b``."""
         vertices = self.vertices @ a_from_b[:3, :3].T + a_from_b[:3, 3]
         return Mesh(vertices, self.faces, self.color)
 

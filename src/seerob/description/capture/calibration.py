@@ -150,7 +150,7 @@ def calibrate(
 
 
 def _mean(points: Array) -> Array:
-    """Of what was seen (n, 3); NaN when nothing was."""
+    """Average the points that were seen, of those given (n, 3); NaN when none was."""
     seen = points[np.isfinite(points).all(axis=1)]
     return np.asarray(seen.mean(axis=0)) if len(seen) else np.full(3, np.nan)
 

@@ -18,7 +18,8 @@ from seerob.kernels import posture_fit as kernel
 REST = 0.2
 """Pull of the posture of rest: a joint 5 rad away from it counts as much as a point 2 cm away."""
 TURN_REST = 0.7
-"""The same of joints about a bone's own axis: a straight arm or leg hardly shows how it is turned."""
+"""Pull of the posture of rest on joints about a bone's own axis, in the measure of `REST`: a straight arm or
+leg hardly shows how it is turned."""
 KEEP = 6.0
 """Pull of the posture a `KEEP_TIME` before, in the same measure: it smooths what is hardly seen, such as
 how a forearm is turned, and hardly delays what is."""

@@ -37,7 +37,7 @@ SPEED = {"rad": 10.0, "m": 5.0}
 FAR = 0.25
 """A bone that is farther from where it is seen [m] is not followed."""
 TURNED = np.radians(45.0)
-"""The same for how it is turned [rad]."""
+"""A bone that is turned farther from how it is seen [rad] is not followed."""
 MOST_KEPT = 4096
 """Samples per device at most; many times what lies between two ticks."""
 MOST_DEVICES = 32
@@ -52,7 +52,8 @@ MANY = 0.3
 HELD_SPEED = 2.0
 """What is held may have moved so fast meanwhile [m/s]: a reaching hand, K of ISO 13855:2010, 6.2 (2+)."""
 SWUNG_SPEED = 5.0
-"""The same of legs [m/s]: the foot of somebody who walks swings at up to 4 to 5 m/s (M)."""
+"""Legs that are not seen may have moved so fast meanwhile [m/s]: the foot of somebody who walks swings at up
+to 4 to 5 m/s (M)."""
 LEGS = ("thigh", "shank", "foot", "toes")
 ELSEWHERE = 0.1
 """Whoever was not seen for a while and is farther from before [rad or m] is put there, not pulled."""
@@ -124,7 +125,7 @@ class _Device:
     placed: dict[str, float] = field(default_factory=dict)
     """Bone → when a place of it was last seen."""
     anchored: dict[str, float] = field(default_factory=dict)
-    """Likewise a place that says where the person stands."""
+    """Bone → when a place of it was last seen that says where the person stands."""
     turned: dict[Turn, float] = field(default_factory=dict)
     """Bone and axis → when it was last seen how it is turned about it."""
     smoother: Smoother = field(default_factory=Smoother)

@@ -141,7 +141,7 @@ def bind(
 
 
 def with_mounts(observer: Observer, mounts: Mapping[int, tuple[Array, Array]]) -> Observer:
-    """The same with what a calibration found.
+    """Return the observer with the mountings that a calibration found.
 
     Args:
         observer: As the device states it.
@@ -157,7 +157,7 @@ def with_mounts(observer: Observer, mounts: Mapping[int, tuple[Array, Array]]) -
 
 
 def with_places(observer: Observer, places: Mapping[str, Array]) -> Observer:
-    """The same with things elsewhere on their bones: by the device's name, in the bone's frame [m], (3,)."""
+    """Move rows on their bones: name of the row → place in the bone's frame [m], (3,)."""
     rows = tuple(
         replace(row, at=places[row.name], fitted=False) if row.name in places else row
         for row in observer.rows
@@ -166,7 +166,7 @@ def with_places(observer: Observer, places: Mapping[str, Array]) -> Observer:
 
 
 def without_unplaced(observer: Observer) -> tuple[Observer, tuple[str, ...]]:
-    """The same without positions of which nobody knows where on the bone they are, and their names."""
+    """Drop positions whose place on the bone nobody knows; returns their rows' names, too."""
     rows = tuple(replace(row, position=0.0, fitted=False) if row.fitted else row for row in observer.rows)
     names = tuple(row.name for row in observer.rows if row.fitted)
     return replace(observer, rows=tuple(row for row in rows if row.position or row.orientation)), names

@@ -107,7 +107,7 @@ def _named(reader: Reader, root: Element, tag: str) -> dict[str, Element]:
 
 
 def _refuse_repeated(reader: Reader, links: dict[str, Element], joints: dict[str, Element]) -> None:
-    """Of what a link or a joint has one of, two say two things: neither is taken for the other."""
+    """Report every element that may be there once and is there twice: neither of the two is chosen."""
     every = [(f"joint[{name}]", joint, ONCE["joint"]) for name, joint in joints.items()]
     for name, link in links.items():
         every.append((f"link[{name}]", link, ONCE["link"]))

@@ -168,7 +168,7 @@ class Shapes:
 
 
 def moved(solid: Solid, a_from_b: Array) -> Solid:
-    """The same solid expressed in ``a``, given the transform (4, 4) from its own frame ``b``."""
+    """Return the solid expressed in frame ``a``, given the transform (4, 4) from its own frame ``b``."""
     if solid.mesh is not None:
         return replace(solid, mesh=solid.mesh.moved(a_from_b))
     assert solid.points is not None

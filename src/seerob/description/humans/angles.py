@@ -80,7 +80,7 @@ class Angles:
     """Ankle above the lower ankle, seen from the hip over the length of the leg, shape (..., 2)."""
 
     def without(self, bones: Collection[str]) -> Angles:
-        """The same with every angle not assessed that needs one of these bones."""
+        """Return these angles, with NaN for every angle that needs one of the bones: it is not assessed."""
         changed: dict[str, Array] = {}
         for name, needed in NEEDS.items():
             values = np.array(getattr(self, name), float)
@@ -92,7 +92,7 @@ class Angles:
         return replace(self, **changed) if changed else self
 
     def untold(self, angles: Collection[tuple[str, int]]) -> Angles:
-        """The same with these angles not assessed, each by its name and side (0 right, 1 left)."""
+        """Set the angles named, by name and side (0 right, 1 left), to NaN: they are not assessed."""
         changed = {name: np.array(getattr(self, name), float) for name, _ in angles}
         for name, side in angles:
             changed[name][(..., side) if name in SIDED else ...] = np.nan

@@ -30,7 +30,8 @@ FACTOR = 2.0
 CLOSED = 1e-6
 """A chain of which every length is given may miss the stature by this [m]."""
 LARGER = 5.0
-"""The same for masses: a piece of a segment is small."""
+"""A mass that differs from the tables by a larger factor is a mistake; it is more than `FACTOR`, because a
+piece of a segment is small."""
 
 
 def with_lengths(

@@ -40,7 +40,7 @@ DAMPING = {
 """Passive damping of the joints [N·m·s/rad]: a choice, of the order of what flesh has. It keeps a limb whose
 torque limit is reached from spinning, and the controllers make up for it in what is heard."""
 GRAVITY = 9.81
-"""As in Anderson et al. 2007 [m/s²]."""
+"""Gravitational acceleration [m/s²] by which strengths of Anderson et al. 2007 are multiplied."""
 
 
 def build(

@@ -182,7 +182,7 @@ def lowest_sole(description: Description, q: ArrayLike) -> Array:
 
 
 def on_floor(description: Description, q: ArrayLike) -> Array:
-    """The same joint values with the pelvis at the height at which the lowest sole is on the floor.
+    """Move the pelvis up or down until the lowest sole is on the floor; every other joint value stays.
 
     Args:
         description: The person.

@@ -217,7 +217,7 @@ MIRROR_SIGN = np.array(
 
 
 def mirrored(q: ArrayLike) -> Array:
-    """The same posture in a mirror: left and right change places (sagittal plane of the root).
+    """Mirror a posture in the sagittal plane of the root: left and right change places.
 
     Args:
         q: Joint values [rad, m], shape (..., 53).

@@ -19,7 +19,7 @@ MOST_BODIES = 300
 
 
 def sided(mesh: Mesh) -> tuple[Mesh, str]:
-    """The same surface with its sides such that closed bodies have an inside.
+    """Turn the triangles of a surface so that closed bodies have an inside.
 
     Args:
         mesh: Tidied.

@@ -65,7 +65,7 @@ class Quantity(NamedTuple):
     key: str
     """Where it stands in the file: ``safety[2].stop.reaction``; for what follows from several, what of it."""
     kind: str
-    """The same as `Range.key` has it: ``safety.separation.stop.reaction``."""
+    """What sort of quantity it is, spelled as in `Range.key`: ``safety.separation.stop.reaction``."""
     unit: str
     values: tuple[float, ...]
     about: tuple[str, ...]

@@ -139,7 +139,7 @@ class Vehicle(Table, frozen=True, kw_only=True):
     x: str | None = None
     """Variable of its place [m]; all three or none."""
     y: str | None = None
-    """Likewise."""
+    """Variable of its place along y [m]; all three or none."""
     heading: str | None = None
     """Variable of the angle from x to where it looks, about z."""
 

@@ -92,7 +92,7 @@ class TaskPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
     muscle_arms: bool | None = None
     """Posture of the arms mainly static, or repeated 4 times per minute or more."""
     muscle_body: bool | None = None
-    """The same of neck, trunk and legs."""
+    """Posture of neck, trunk and legs mainly static, or repeated 4 times per minute or more."""
     static: bool | None = None
     """One or more parts of the body held longer than 1 min."""
     repeated: bool | None = None

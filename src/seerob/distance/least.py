@@ -42,7 +42,7 @@ class Reach(IntEnum):
 
 
 class Per(StrEnum):
-    """Of what a least distance is taken."""
+    """What a least distance is taken over: the two sets, each body, or each pair of bodies."""
 
     SETS = "sets"
     """All of a to all of b: one."""
@@ -98,7 +98,7 @@ class Closests:
         )
 
     def shaped(self, shape: tuple[int, ...]) -> Closests:
-        """The same in another shape."""
+        """Return these distances reshaped to ``shape``; points keep their last axis of 3."""
         return Closests(
             self.distance.reshape(shape),
             self.point_a.reshape((*shape, 3)),

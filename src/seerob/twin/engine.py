@@ -42,7 +42,7 @@ from seerob.twin.state import Hearing, State
 from seerob.twin.whereabouts.hearing import NOWHERE
 
 DEFAULT_TIMEOUT = 0.2
-"""Of what is heard without a source that states one [s]."""
+"""Time-out [s] of what is heard without a source that states one."""
 WILD = 300.0
 """Above it the physics has lost a joint [rad/s or m/s]."""
 NEAR = 2e-3
@@ -135,7 +135,8 @@ class Engine:
         """Who stands when nothing more is said, and may not when it was in motion."""
         self._live = {*live, *following}
         self._leapt = dict.fromkeys(following, (-np.inf, ""))
-        """Of what follows variables, until when its last jump counts [s], and what is said of it."""
+        """Mechanisms that follow variables → until when their last jump counts [s], and what is said of it.
+        """
         self._unread = coasting  # what a file says was looked at when it was read
         self._references = {
             m.name: Reference(m.home, largest_speed(m), coast=driven[m.name] if m.name in coasting else 0.0)
@@ -348,7 +349,8 @@ class Engine:
         return reference.take(sample.t, q, None), "" if miss.larger <= POSE_TOLERANCE else missed
 
     def _foresee(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
-        """See `seerob.twin.state.Foresee`: of what a file drives, and of what stands."""
+        """Tell what a robot or human will do (`seerob.twin.state.Foresee`) if a file drives it or it stands.
+        """
         hearing, mechanism = self._hearings[name], self.model.mechanisms[name]
         if not hearing.driven:
             if not (self.controllers and hearing.given):

@@ -20,9 +20,9 @@ class Columns:
     """Where the joints of a mechanism are among all of the workstation, bound once."""
 
     own_q: Indices
-    """Of the commanded joints, in ``MjData.qpos``."""
+    """Columns of the commanded joints in ``MjData.qpos``."""
     own_v: Indices
-    """Likewise in ``MjData.qvel``."""
+    """Columns of the commanded joints in ``MjData.qvel``."""
     all_v: Indices | slice
     coupling: Array | None
     """None where every joint is commanded itself."""

@@ -10,7 +10,7 @@ from seerob.core.samples import Quality, SignalSample
 from seerob.workstation.variables.dictionary import Value, Variable
 
 DEFAULT_TIMEOUT = 1.0
-"""Of what is heard without a source that states one [s]."""
+"""Time-out [s] of what is heard without a source that states one."""
 SLACK = 1e-9
 """Instants that differ by less are the same [s]."""
 MAX_KEPT = 4096

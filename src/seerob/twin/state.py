@@ -216,7 +216,7 @@ class State:
         return f"{name}: {reason}" if reason else ""
 
     def interrupted(self, name: str) -> str:
-        """The same without what no device ever saw: why an answer of a moment ago may not hold any more."""
+        """Why what was known a moment ago may not hold now, but for what no device ever saw; else empty."""
         if name.startswith(VARIABLE):
             return self._signals.at(name.removeprefix(VARIABLE), self.t).doubt
         if reason := self.whole_doubt(name):
@@ -298,7 +298,7 @@ class State:
         self._cache[key] = True
 
     def whole_doubt(self, name: str) -> str:
-        """The same without what is only said of single bones of a person."""
+        """Why nothing of a robot or person may be relied on; doubt about single bones does not count."""
         hearing = self._hearings[name]
         if reason := self.heard_doubt(name):
             return reason
@@ -311,7 +311,7 @@ class State:
         return ""
 
     def heard_doubt(self, name: str) -> str:
-        """The same of what was heard, whether or not the twin follows it."""
+        """Why what was heard may not be relied on, whether or not the twin follows it; empty when it may."""
         reason = self._hearings[name].doubt(self.t)
         if reason:
             return f"{name}: {reason}"
@@ -761,7 +761,7 @@ class State:
     def fastest_points(
         self, bodies: tuple[int, ...], *, estimates: bool = False
     ) -> tuple[Array, Array, Array]:
-        """The same of several bodies: speeds (b,), corners (b, 3) and their velocities (b, 3).
+        """Bounds on the speed of any point of bodies [m/s] (b,), with corners (b, 3) and velocities (b, 3).
 
         Args:
             bodies: By index.
@@ -773,7 +773,7 @@ class State:
         return speed[rows], point[rows], velocity[rows]
 
     def largest_speeds(self) -> Array:
-        """The same of every body, whoever was heard, shape (n,): for bounds, never for a verdict."""
+        """Bound on the speed of any point of each body [m/s], shape (n,): for bounds, never for a verdict."""
         self._open("largest_speeds", "fastest_points(bodies)")
         return self._fastest()[0]
 

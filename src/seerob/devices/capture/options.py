@@ -176,7 +176,7 @@ def calibrated(
     bound: Observer,
     description: Description,
 ) -> tuple[Observer, Calibrated]:
-    """The same observer with the mounting that frames of the calibration show, and what was found."""
+    """Calibrate an observer: returns it with the mounting that the frames show, and what was found."""
     found = calibrate(
         list(frames), bound, description, options.calibration.pose, seen=layout.seen, subject=options.human
     )
@@ -185,7 +185,7 @@ def calibrated(
 
 
 def placed_only(bound: Observer, subject: str, remedy: str) -> tuple[Observer, tuple[Finding, ...]]:
-    """The same without what devices place as they like and nothing has told the place of.
+    """Drop positions that devices place as they like and whose place nothing has told.
 
     Args:
         bound: From `observer` or `calibrated`.

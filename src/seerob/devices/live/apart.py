@@ -35,7 +35,7 @@ COMMAND = (sys.executable, "-P", "-m", "seerob.devices.live.listening_process")
 BEGIN_WITHIN = 10.0
 """How long a run waits until it listens [s]."""
 LONGEST_LINE = 1 << 20
-"""Of what it logs [byte]."""
+"""A line of the listening process's log is read up to this length [byte]."""
 SPARE = 2.0
 """Beyond the time in which listeners end [s]; then it is killed."""
 

@@ -34,8 +34,9 @@ HOLD = 0.5
 """Nothing is relied on for so long after a clock stepped or went back [s]: the twin swings to where the
 device is, as after a slip (`seerob.devices.live.real_time.SETTLE`)."""
 RESTART_HOLD = 2.5
-"""The same after a restart [s]: what starts again to say what it said in the last seconds is told from a
-device that was switched on by going back once more."""
+"""Nothing is relied on for so long after a device started again [s]. A recording that starts again and
+repeats what it said in the last seconds goes back once more within it; a device that was switched on does
+not."""
 AGAIN = 60.0
 """A clock that starts again twice within this time is followed, and not relied on for as long [s]: no
 controller is switched on so often."""

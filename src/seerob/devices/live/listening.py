@@ -117,7 +117,7 @@ class LiveSource(Source, frozen=True, kw_only=True):
         return ()
 
     async def inquire(self, folder: Path, target: Target | None) -> tuple[Finding, ...]:
-        """The same at the start of a run, when it is known what it is asked for; raises as `ask` does."""
+        """Ask as `ask` does, at the start of a run, when the target is known; raises as `ask` does."""
         return await self.ask()
 
     def open(self, folder: Path, target: Target | None) -> Opened:

@@ -27,7 +27,7 @@ BEYOND = 0.1
 
 
 def looked_at(opened: Opened, name: str, target: Target | None) -> Opened:
-    """The same, looked at.
+    """Wrap what a source opened, so that each of its samples is looked at.
 
     Raises:
         InputError: It is not what a source returns.

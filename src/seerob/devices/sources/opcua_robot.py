@@ -101,7 +101,7 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
         return await self.inquire(Path(), None)
 
     async def inquire(self, folder: Path, target: Target | None) -> tuple[Finding, ...]:
-        """The same, and whether they are those of the robot that it drives."""
+        """What the server says of the robot, and whether its axes fit the robot that it drives."""
         async with connect(self.way(), Path()) as client:
             found = self._chosen(await robots(client))
             self._factors(found, target)

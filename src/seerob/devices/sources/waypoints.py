@@ -42,17 +42,17 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
     origin: MotionOrigin = MotionOrigin.PLANNED
     """What the motion is a motion of: the timing is made here, so it is preliminary."""
     joint_speed: Annotated[Above | None, unit("rad/s")] = None
-    """Of the leading joint [rad/s or m/s], where a joint move does not say."""
+    """Speed of the leading joint [rad/s or m/s], where a joint move does not say one."""
     joint_acceleration: Annotated[Above | None, unit("rad/s²")] = None
-    """Likewise [rad/s² or m/s²]."""
+    """Acceleration of the leading joint [rad/s² or m/s²], where a joint move does not say one."""
     joint_jerk: Annotated[Above | None, unit("rad/s³")] = None
-    """Of joint moves [rad/s³ or m/s³]; no program says it, and none is assumed."""
+    """Jerk of joint moves [rad/s³ or m/s³]; no program says it, and none is assumed."""
     tool_speed: Annotated[Above | None, unit("m/s")] = None
-    """Of the tool point, where a linear or circular move does not say [m/s]."""
+    """Speed of the tool point [m/s], where a linear or circular move does not say one."""
     tool_acceleration: Annotated[Above | None, unit("m/s²")] = None
-    """Likewise [m/s²]."""
+    """Acceleration of the tool point [m/s²], where a linear or circular move does not say one."""
     tool_jerk: Annotated[Above | None, unit("m/s³")] = None
-    """Of linear and circular moves [m/s³]."""
+    """Jerk of the tool point in linear and circular moves [m/s³]."""
     tool_turn: Annotated[Above | None, unit("rad/s")] = None
     """Largest turning speed of the tool on linear and circular moves [rad/s]; when not given only the
     joints' speed limits hold, and what it reaches is said."""

@@ -37,7 +37,7 @@ SILENCE = 5.0
 MOST_PATHS = 20
 """Documents that are asked for, one after the other."""
 DEEPEST, MOST_NODES = 12, 5000
-"""Of what `browse` names."""
+"""Levels of a document in which `browse` looks for values, and values that it names at most."""
 
 Url = Annotated[
     str,

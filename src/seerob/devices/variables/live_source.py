@@ -88,7 +88,7 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
         return BEAT
 
     def beside(self, folder: Path) -> Self:
-        """The same source with the files that it names found from the folder of the workstation file."""
+        """Return this source with its files named from the folder of the workstation file."""
         named = {key: getattr(self, key, None) for key in FILES}
         return replace(self, **{key: str(folder / path) for key, path in named.items() if path is not None})
 

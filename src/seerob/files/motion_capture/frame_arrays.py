@@ -69,7 +69,7 @@ class FrameArrays:
         )
 
     def turned(self, world_from_capture: Array) -> FrameArrays:
-        """The same in another world.
+        """Express positions and orientations in the world of the workstation.
 
         Args:
             world_from_capture: Rigid transform, shape (4, 4).

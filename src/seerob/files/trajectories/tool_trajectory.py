@@ -24,7 +24,8 @@ UNIT_TOLERANCE = 1e-3
 MAX_SPEED = 10.0
 """A tool that is faster is a wrong unit: the fastest robots of any size reach about this [m/s]."""
 MAX_TURN = 20.0
-"""The same for turning [rad/s]: three wrist joints of a quick robot in line."""
+"""A tool that turns faster is a wrong unit [rad/s]: three wrist joints of a quick robot in line reach about
+this."""
 SMALLEST_JUMP = 0.2
 """A smaller step is noise of closely spaced rows, not a jump [rad]."""
 LARGEST_STEP = 0.75 * np.pi
@@ -67,7 +68,7 @@ class ToolTrajectory(Timed):
         return f"ToolTrajectory({self.file!r}, {len(self.t)} poses, {self.duration:g} s)"
 
     def seen_from(self, a_from_b: ArrayLike) -> ToolTrajectory:
-        """The same motion in frame ``a``, given a rigid transform (4, 4) from the frame ``b`` it is in."""
+        """Express the motion in frame ``a``, given a rigid transform (4, 4) from the frame ``b`` it is in."""
         matrix = np.asarray(a_from_b, float)
         w, x, y, z = wxyz_from_rotation(matrix[:3, :3])
         # Hamilton product from the left, as a matrix.

@@ -30,7 +30,8 @@ BETWEEN = 2.77
 """Noise of the speed half way between two samples, as a multiple of that at a sample: of the cubic through
 them √(2 (11/8)² + 2 (1/8)²) against √½."""
 AT_END = math.sqrt(13.0)
-"""The same of the first and the last sample, whose difference is one-sided: (−3, 4, −1)/2."""
+"""Noise of the speed at the first and the last sample, as a multiple of that at a sample between: the
+difference is one-sided there, (−3, 4, −1)/2."""
 QUIET = 0.005
 """Noise of derived speeds below it is not followed [rad/s or m/s]: 5 mm/s at a metre, a fiftieth of the
 250 mm/s of a reduced speed."""

@@ -26,7 +26,7 @@ SLOPES = (1.2, 1.4, 1.6, 1.8, 2.0, 2.2)
 FINE = 64
 """Places at which a rounding is looked at."""
 SHARE = 0.99
-"""Of what the limits allow at those places, for what is between them."""
+"""Share of the limits that is used at those places; the rest is for what lies between them."""
 
 
 @dataclass(eq=False)

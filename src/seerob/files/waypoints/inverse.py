@@ -147,7 +147,7 @@ def _apart(arm: Arm, a: Array, b: Array) -> float:
 
 
 def _nearest_turn(arm: Arm, q: Array, near: Array) -> Array | None:
-    """The same posture with joints by whole turns nearer to ``near``; None beyond a limit."""
+    """Turn joints by whole turns until they are nearest to ``near``; None where that is beyond a limit."""
     turned = q.copy()
     for i in np.flatnonzero(~arm.slides):
         k = round((near[i] - q[i]) / (2 * np.pi))

@@ -21,7 +21,7 @@ from seerob.files.waypoints.timing import Limits
 BETWEEN = 4
 """Places that are looked at from knot to knot of a curve."""
 SHARE = 0.99
-"""Of what the limits allow at those places, for what is between them."""
+"""Share of the limits that is used at those places; the rest is for what lies between them."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -91,9 +91,9 @@ class Rounding:
 
     piece: Piece
     enter: float
-    """Speed along the piece before it, per rate."""
+    """Speed along the piece before the rounding, per rate of its parameter."""
     leave: float
-    """Likewise along the piece after it."""
+    """Speed along the piece after the rounding, per rate of its parameter."""
 
 
 def joint_line(a: Array, b: Array) -> Piece | None:

@@ -30,9 +30,9 @@ class Point(Table, frozen=True, kw_only=True):
     via: Metres3 | None = None
     """A point on the way of a circular move [m]."""
     speed: Positive | None = None
-    """Of the leading joint [rad/s], or of the tool point [m/s]."""
+    """Speed of the leading joint [rad/s or m/s], or of the tool point [m/s]."""
     acceleration: Positive | None = None
-    """Likewise [rad/s² or m/s²]."""
+    """Acceleration of the leading joint [rad/s² or m/s²], or of the tool point [m/s²]."""
     duration: Annotated[float, unit("s", gt=0, le=1e5)] | None = None
     """Of the move, instead of speed and acceleration [s]."""
     blend: Annotated[float, unit("m", ge=0, le=10)] = 0.0

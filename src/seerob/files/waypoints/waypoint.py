@@ -56,9 +56,9 @@ class Waypoint:
     via: ToolPose | None = None
     """A pose on the way of `Move.CIRCULAR`; only its position counts."""
     speed: float | None = None
-    """Of the leading joint [rad/s or m/s], or of the tool point [m/s]."""
+    """Speed of the leading joint [rad/s or m/s], or of the tool point [m/s]."""
     acceleration: float | None = None
-    """Likewise [rad/s² or m/s², or m/s²]."""
+    """Acceleration of the leading joint [rad/s² or m/s²], or of the tool point [m/s²]."""
     duration: float | None = None
     """Time of the move instead of speed and acceleration [s]."""
     blend: float = 0.0
@@ -73,7 +73,7 @@ class Waypoint:
         return f"{self.name!r} ({self.place})" if self.name else self.place
 
     def waiting(self, seconds: float) -> Waypoint:
-        """The same with more time to stand there [s]."""
+        """Return this waypoint with ``seconds`` more time to stand there [s]."""
         return replace(self, pause=self.pause + seconds)
 
 

@@ -278,7 +278,7 @@ class _Compiler:
         return f"{on}/{machine_mounting.BODY}" if machine else on
 
     def _above(self, on: str | None, key: str, roles: tuple[str, ...]) -> str:
-        """The same of what carries a chain of joints; empty for the world.
+        """Full name of the body that carries a chain of joints; empty for the world.
 
         Raises:
             InputError: It is carried by what cannot carry it.

@@ -61,7 +61,7 @@ def _following(model: Model) -> Iterator[Quantity]:
 
 
 def implausible_motion(model: Model, q: Mapping[str, Sequence[Array]]) -> tuple[Finding, ...]:
-    """The same of where recorded motions go.
+    """Everything that is implausible of the places to which recorded motions go.
 
     Args:
         model: The compiled workstation.

@@ -24,7 +24,8 @@ SLIP = 0.1
 """How far the centre of mass of what has a shape of its own may lie outside it [m]: makers' files put those
 of wrists up to 0.07 m outside their meshes (UR3, UR5 and UR10 of example-robot-data)."""
 LUMP = 0.02
-"""The same of what has none, and is in the shape of what it is fixed to: by its inertia, `SLIP`."""
+"""How far the centre of mass of what has no shape of its own may lie outside the shape that it is fixed to
+[m]; all of its inertia may be outside by `SLIP`."""
 
 
 @dataclass

@@ -129,7 +129,7 @@ def load_thing(
 
 
 def replace_subject(finding: Finding, subject: str) -> Finding:
-    """The same finding about another subject."""
+    """Return the finding with its level and text, about another subject."""
     return Finding(level=finding.level, subject=subject, text=finding.text)
 
 

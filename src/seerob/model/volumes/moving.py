@@ -37,7 +37,7 @@ class Core:
     rotation: Array
     """body_from_core, shape (3, 3)."""
     position: Array
-    """Likewise [m], shape (3,)."""
+    """Position of the core's frame in the body's frame [m], shape (3,)."""
     low: Array
     """Corner of the box around it [m], shape (3,)."""
     high: Array

@@ -131,7 +131,7 @@ class _Set:
 
     @property
     def excess(self) -> float:
-        """The same of any point of theirs [m]."""
+        """Largest distance of any point of the voxels from that set [m]."""
         return float(self.centre + HALF_DIAGONAL * self.grid.pitch)
 
 

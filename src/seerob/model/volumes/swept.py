@@ -68,7 +68,7 @@ class Swept:
         return self.grid.volume
 
     def mesh(self, *, most: int | None = None) -> Mesh:
-        """See `VoxelGrid.mesh`."""
+        """A closed surface with all voxels inside, of about ``most`` triangles; None sets no bound."""
         return self.grid.mesh(most=most)
 
 
@@ -76,7 +76,7 @@ class Holding(Protocol):
     """What grippers hold as a motion goes on, instant by instant: see `seerob.twin.machines.held`."""
 
     mj: Any
-    """See `Moving.mj`."""
+    """The `mujoco.MjModel` that tells where bodies are on those that carry them."""
 
     def follow(self, qpos: Array) -> None:
         """The next instant: positions of all joints [rad or m], shape (nq,)."""

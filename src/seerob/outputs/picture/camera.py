@@ -44,7 +44,7 @@ class Camera:
         return middle + self.focal * np.stack([x, y], -1) * inverse[:, None], inverse
 
     def scaled(self, factor: int) -> Camera:
-        """The same view with ``factor`` times as many pixels each way."""
+        """Return a camera with this view and ``factor`` times as many pixels each way."""
         return Camera(self.eye, self.axes, self.width * factor, self.height * factor)
 
 

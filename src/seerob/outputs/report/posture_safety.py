@@ -97,7 +97,7 @@ def rows(one: Sides, most: int) -> Iterator[list[Cell]]:
 
 
 def worst_rows(one: Sides, most: int = SHOWN) -> list[list[Cell]]:
-    """The same where each score is highest, and most of each limit is used; without one, at the extreme."""
+    """Rows at the highest score, and where most of a limit is used; without a limit, at the extreme."""
     chosen: dict[float, None] = {}
     for series in (*one.scores, *one.measures):
         n = len(series)

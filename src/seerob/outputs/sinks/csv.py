@@ -95,7 +95,7 @@ class CsvWriter(WholeFolder):
         self._spoke: dict[str, float] = {}
 
     def take(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
-        """See `WholeFolder.take`."""
+        """Add the rows of one tick to the tables."""
         for sample in samples:
             heard = self._row(_sample_cells.cells(sample, self._joints))
             self._table(f"samples {_sample_cells.title(sample)}").add(heard)
@@ -137,7 +137,7 @@ class CsvWriter(WholeFolder):
             self._table(f"results {result.name}").add(self._row(cells))
 
     def finish(self) -> None:
-        """See `WholeFolder.finish`."""
+        """Finish every table."""
         rows = [list(row) for row in bone_rows(self._errors)]
         if rows:
             head = [str(title) for title in HEAD]

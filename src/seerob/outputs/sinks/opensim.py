@@ -73,7 +73,7 @@ class OpenSimWriter(WholeFolder):
         self._waiting: dict[str, list[tuple[float, tuple[float, ...], list[float]]]] = {}
 
     def take(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
-        """See `WholeFolder.take`."""
+        """Add the rows of one tick to the tables."""
         names = {person.name for person in self._people}
         for sample in samples:
             if isinstance(sample, BodySample) and sample.target in names:
@@ -144,7 +144,7 @@ class OpenSimWriter(WholeFolder):
         return self.table(name, suffix, lambda path: GrowingTable(path, separator="\t", missing="NaN"))
 
     def finish(self) -> None:
-        """See `WholeFolder.finish`."""
+        """Finish every table."""
         for person in self._people:
             self._coordinates(person.name)
         for k, (name, table) in enumerate(self.tables.items()):

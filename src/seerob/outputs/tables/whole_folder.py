@@ -122,7 +122,7 @@ class WholeFolder(AtEnd):
             self.abandon()
 
     def abandon(self) -> None:
-        """See `AtEnd.abandon`."""
+        """Discard every table and the hidden folder, so that nothing is left behind."""
         for table in self.tables.values():
             table.discard()
         if self._hidden is not None:

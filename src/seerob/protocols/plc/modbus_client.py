@@ -90,7 +90,7 @@ class Device:
         return found
 
     async def patient_block(self, block: Block) -> Sequence[int | bool]:
-        """The same of a device that may be busy for a moment; raises as `block` does otherwise.
+        """Read a block, and ask again while the device is busy; raises as `block` does otherwise.
 
         Raises:
             TimeoutError: It stays busy.

@@ -244,7 +244,7 @@ async def stated_unit(node: Node) -> str:
 
 
 async def said_unit(node: Node) -> str:
-    """The same, but in the server's own words where the dictionary has no spelling for it."""
+    """Unit of a variable as the dictionary spells it, or else in the server's words; empty without one."""
     from asyncua.ua.uaerrors import UaError
 
     try:

@@ -37,7 +37,7 @@ UNITY: tuple[str, ...] = (
     "Neck",
     "Head",
 )
-"""The same in the order of the Unity3D protocol, table 3."""
+"""The 23 segments in the order of the Unity3D protocol, table 3."""
 
 
 def _joints() -> tuple[tuple[str, str, str], ...]:

@@ -34,7 +34,7 @@ class Heard:
     """Host's monotonic time [s]."""
     frame: Frame
     models: Models
-    """The same object as long as nothing has changed."""
+    """What the numbers of the frame stand for; this object stays the same one until something changes."""
     server: ServerInfo
 
 

@@ -66,7 +66,7 @@ class OpenXrSession:
         self._spaces = {}
 
     def frame(self) -> bool:
-        """See `seerob.protocols.tracking.openxr_devices.Runtime.frame`."""
+        """Wait for the next instant; returns whether the origin was set anew since the last."""
         xr = self._xr
         anew = self._events()
         if not self._running:
@@ -89,7 +89,7 @@ class OpenXrSession:
         return anew
 
     def trackers(self) -> Sequence[tuple[str, str]]:
-        """See `seerob.protocols.tracking.openxr_devices.Runtime.trackers`."""
+        """List the persistent path and role path (empty without a role) of every connected tracker."""
         xr = self._xr
         return [
             (self._text(each.persistent_path), self._text(each.role_path))
@@ -97,7 +97,7 @@ class OpenXrSession:
         ]
 
     def locate(self, path: str) -> Located:
-        """See `seerob.protocols.tracking.openxr_devices.Runtime.locate`."""
+        """Tell where the tracker of a role path or a persistent path is at that instant."""
         space = self._spaces.get(path)
         if space is None:  # connected without a role after the session began: actions are fixed by then
             return Located(tracked=False)

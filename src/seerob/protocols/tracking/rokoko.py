@@ -22,7 +22,7 @@ PORT = 14043
 LARGEST = 1 << 17
 """Of a datagram [byte]; Studio's own are 80 kB at most."""
 UNPACKED = 1 << 20
-"""Of what an LZ4 frame may hold [byte]."""
+"""An LZ4 frame may hold at most so much [byte]."""
 MOST_ACTORS = 32
 
 SEGMENTS = (

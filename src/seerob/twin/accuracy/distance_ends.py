@@ -49,7 +49,8 @@ class DistanceEnds:
         return low - others, high + others
 
     def of_sets(self, state: State, distance: float) -> tuple[float, float]:
-        """The same of all of ``gap.b`` [m]; distance as the twin has it [m]."""
+        """Least and largest distance between ``gap.a`` and ``gap.b`` as wholes [m]; the twin's is
+        ``distance``."""
         if self._off.none(state):
             return distance, distance
         own, others = self._errors(state)

@@ -31,7 +31,7 @@ LET_GO = 2.0
 
 
 def own_masses(model: Model) -> Model:
-    """The same workstation with masses of its own, when there is something that is picked up."""
+    """Copy the MuJoCo model, so that its masses may change, when there is something that is picked up."""
     loose = any(piece.rest is not None for piece in model.workstation.workpieces)
     return replace(model, mj=model.mj.__copy__()) if loose else model
 

@@ -67,11 +67,13 @@ class Hearing:
     """Of a person that devices see: bone → how far the twin's is from the device's, position [m] and angle
     [rad]; None where none was seen."""
     parts: list[tuple[float, tuple[PartDoubt, ...]]] = field(default_factory=list)
-    """The same of single bones of a person, when the rest may be relied on."""
+    """Instant [s] and why single bones of a person may not be relied on when the rest may, as (reason,
+    bones); oldest first."""
     observed: list[tuple[float, frozenset[str]]] = field(default_factory=list)
     """Of a person that devices see: instant [s] and bones that some device sees then, oldest first."""
     bare: list[tuple[float, frozenset[str]]] = field(default_factory=list)
-    """Likewise those of limbs of which nothing shows where they point."""
+    """Of a person that devices see: instant [s] and bones of limbs of which nothing shows where they point,
+    oldest first."""
     aims: list[tuple[float, Mapping[str, float]]] = field(default_factory=list)
     """Of a person that devices see: instant [s], and hands, feet and heads of which only the joint is seen,
     with a bound on how far they may be turned from the twin's [rad]; oldest first."""

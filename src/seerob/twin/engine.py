@@ -349,8 +349,7 @@ class Engine:
         return reference.take(sample.t, q, None), "" if miss.larger <= POSE_TOLERANCE else missed
 
     def _foresee(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
-        """Tell what a robot or human will do (`seerob.twin.state.Foresee`) if a file drives it or it stands.
-        """
+        """Tell what a robot or human will do (`seerob.twin.state.Foresee`): by its file, or it stands."""
         hearing, mechanism = self._hearings[name], self.model.mechanisms[name]
         if not hearing.driven:
             if not (self.controllers and hearing.given):

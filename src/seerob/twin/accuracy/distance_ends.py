@@ -49,8 +49,7 @@ class DistanceEnds:
         return low - others, high + others
 
     def of_sets(self, state: State, distance: float) -> tuple[float, float]:
-        """Least and largest distance between ``gap.a`` and ``gap.b`` as wholes [m]; the twin's is
-        ``distance``."""
+        """Least and largest distance between ``gap.a`` and ``gap.b`` [m]; the twin's is ``distance``."""
         if self._off.none(state):
             return distance, distance
         own, others = self._errors(state)

@@ -170,7 +170,11 @@ GOOD = BIND.format(READS["q"])
             r"ZeroDivisionError: division by zero \(rule\.py",
         ),
         ("    def bind(self, model): return None\n", HEAD, "returns NoneType, not a function of State"),
-        (GOOD + "    def basis(self, model): return 'by heart'\n", HEAD, r"returns str, not a seerob\.snap"),
+        (
+            GOOD + "    def basis(self, model): return 'by heart'\n",
+            HEAD,
+            r"returns str, not a seerob\.api\.Basis",
+        ),
         (GOOD + "    def basis(self, model): return {}['x']\n", HEAD, "basis of .* fails: KeyError: 'x'"),
     ],
 )

@@ -163,90 +163,113 @@ def test_the_message_says_what_is_wrong_and_what_would_be_right():
 
 # -- every formula of the judging packages ---------------------------------------------------------
 
-PACKAGES = ("safety", "stopping", "contact", "norms")
+PACKAGES = ("criteria.safety", "criteria.stopping", "criteria.contact", "description.norms")
 NUMBERS = {"float", "int", "Array", "ArrayLike", "Array | float", "ArrayLike | None", "Sequence[float]"}
 J = np.array([[1.0, 0.5], [0.2, 1.0], [0.1, 0.3]])
 M = np.array([[2.0, 0.3], [0.3, 1.0]])
 TWO = np.array([1.0, 2.0])
 HALF = np.array([0.5])
 CALLS = {
-    "safety.effective_mass.inverse_effective_mass": {"J_v": J, "M": M},
-    "safety.effective_mass.projected_mass": {"inverse": np.eye(3), "u": np.array([1.0, 0, 0])},
-    "safety.effective_mass.principal_masses": {"inverse": np.eye(3)},
-    "safety.joint_torque.shares": {"torques": TWO, "limits": 10 * TWO, "uncertainty": TWO},
-    "safety.kinetic_energy.kinetic_energy": {"M": M, "qd": TWO},
-    "safety.manipulability.singular_values": {"J_v": J},
-    "safety.manipulability.least_value_after": {"J": np.eye(6)},
-    "safety.separation.separation_bound": {"v_r": HALF, "v_h": 1.6, "T_r": 0.1, "T_s": 0.5, "xi": 0.2},
-    "safety.tool_force.wrench_from_torques": {"J": J, "tau": TWO, "damped_below": 0.01},
-    "safety.tool_force.largest_error": {"gain": J, "uncertainty": TWO},
-    "safety.velocity.point_velocity": {"J": J, "qd": TWO},
-    "safety.velocity.speed_noise": {"J": J, "error": TWO},
-    "stopping.onset.accelerated": {"v": HALF, "T_r": 0.1, "a": 2.0, "qd": TWO},
-    "stopping.onset.farthest": {"t": TWO - 1, "speeds": TWO, "T_r": 0.1, "lead": 0.5},
-    "stopping.onset.from_torques": {"M": M, "bias": TWO, "torques": TWO},
-    "stopping.terms.way_of_person": {"v_h": 1.6, "T_r": 0.1, "T_s": 0.5},
-    "stopping.terms.course": {"v_r": HALF, "T_r": 0.1, "T_s": 0.5},
-    "stopping.terms.decelerating": {"v": HALF, "v_h": 1.6, "T_r": 0.1, "a": 2.0, "K": 0.2},
-    "stopping.terms.largest_speed_decelerating": {"d": 4 * HALF, "v_h": 1.6, "T_r": 0.1, "a": 2.0, "K": 0.2},
-    "stopping.terms.largest_speed_in_time": {"d": 4 * HALF, "v_h": 1.6, "T_r": 0.1, "T_s": 0.5, "K": 0.2},
-    "stopping.terms.largest_factor": {"c": HALF, "b": HALF, "a": HALF},
-    "stopping.terms.worst_case": {"S_p": TWO},
-    "contact.clamping.clamps": {"gaps": HALF, "speed": HALF, "period": 0.01, "thickness": HALF[None]},
-    "contact.collision.robot_mass": {"M": 10.0, "m_L": 1.0},
-    "contact.collision.reduced_mass": {"m_H": 10.0, "m_R": 10.0},
-    "contact.collision.mass_of_rows": {"w": J, "M": M},
-    "contact.collision.spring_energy": {"F": 100.0, "k": 25e3},
-    "contact.collision.speed_at_force": {"F": 100.0, "mu": 2.0, "k": 25e3},
-    "contact.collision.speed_at_pressure": {"p": 1e6, "A": 1e-4, "mu": 2.0, "k": 25e3},
-    "contact.collision.speed_at_energy": {"E": 1.0, "mu": 2.0},
-    "contact.collision.energy_limit": {"F": 100.0, "k": 25e3, "printed": 1.0},
-    "contact.collision.permissible_speed": {"v_F": 1.0, "v_P": 1.0, "v_E": 1.0},
-    "contact.measured.peaks": {"t": TWO - 1, "force": TWO},
-    "contact.pushing.permissible_while_pushed": {"v": HALF, "mu": TWO, "k": TWO * 1e4, "F": 10.0},
-    "contact.shape.round_shape": {"radius": 0.01},
-    "norms.iso_13855.speed_at": {"distance": TWO},
+    "criteria.safety.effective_mass.inverse_effective_mass": {"J_v": J, "M": M},
+    "criteria.safety.effective_mass.projected_mass": {"inverse": np.eye(3), "u": np.array([1.0, 0, 0])},
+    "criteria.safety.effective_mass.principal_masses": {"inverse": np.eye(3)},
+    "criteria.safety.joint_torque.shares": {"torques": TWO, "limits": 10 * TWO, "uncertainty": TWO},
+    "criteria.safety.kinetic_energy.kinetic_energy": {"M": M, "qd": TWO},
+    "criteria.safety.manipulability.singular_values": {"J_v": J},
+    "criteria.safety.manipulability.least_value_after": {"J": np.eye(6)},
+    "criteria.safety.separation.separation_bound": {
+        "v_r": HALF,
+        "v_h": 1.6,
+        "T_r": 0.1,
+        "T_s": 0.5,
+        "xi": 0.2,
+    },
+    "criteria.safety.tool_force.wrench_from_torques": {"J": J, "tau": TWO, "damped_below": 0.01},
+    "criteria.safety.tool_force.largest_error": {"gain": J, "uncertainty": TWO},
+    "criteria.safety.velocity.point_velocity": {"J": J, "qd": TWO},
+    "criteria.safety.velocity.speed_noise": {"J": J, "error": TWO},
+    "criteria.stopping.onset.accelerated": {"v": HALF, "T_r": 0.1, "a": 2.0, "qd": TWO},
+    "criteria.stopping.onset.farthest": {"t": TWO - 1, "speeds": TWO, "T_r": 0.1, "lead": 0.5},
+    "criteria.stopping.onset.from_torques": {"M": M, "bias": TWO, "torques": TWO},
+    "criteria.stopping.terms.way_of_person": {"v_h": 1.6, "T_r": 0.1, "T_s": 0.5},
+    "criteria.stopping.terms.course": {"v_r": HALF, "T_r": 0.1, "T_s": 0.5},
+    "criteria.stopping.terms.decelerating": {"v": HALF, "v_h": 1.6, "T_r": 0.1, "a": 2.0, "K": 0.2},
+    "criteria.stopping.terms.largest_speed_decelerating": {
+        "d": 4 * HALF,
+        "v_h": 1.6,
+        "T_r": 0.1,
+        "a": 2.0,
+        "K": 0.2,
+    },
+    "criteria.stopping.terms.largest_speed_in_time": {
+        "d": 4 * HALF,
+        "v_h": 1.6,
+        "T_r": 0.1,
+        "T_s": 0.5,
+        "K": 0.2,
+    },
+    "criteria.stopping.terms.largest_factor": {"c": HALF, "b": HALF, "a": HALF},
+    "criteria.stopping.terms.worst_case": {"S_p": TWO},
+    "criteria.contact.clamping.clamps": {
+        "gaps": HALF,
+        "speed": HALF,
+        "period": 0.01,
+        "thickness": HALF[None],
+    },
+    "criteria.contact.collision.robot_mass": {"M": 10.0, "m_L": 1.0},
+    "criteria.contact.collision.reduced_mass": {"m_H": 10.0, "m_R": 10.0},
+    "criteria.contact.collision.mass_of_rows": {"w": J, "M": M},
+    "criteria.contact.collision.spring_energy": {"F": 100.0, "k": 25e3},
+    "criteria.contact.collision.speed_at_force": {"F": 100.0, "mu": 2.0, "k": 25e3},
+    "criteria.contact.collision.speed_at_pressure": {"p": 1e6, "A": 1e-4, "mu": 2.0, "k": 25e3},
+    "criteria.contact.collision.speed_at_energy": {"E": 1.0, "mu": 2.0},
+    "criteria.contact.collision.energy_limit": {"F": 100.0, "k": 25e3, "printed": 1.0},
+    "criteria.contact.collision.permissible_speed": {"v_F": 1.0, "v_P": 1.0, "v_E": 1.0},
+    "criteria.contact.measured.peaks": {"t": TWO - 1, "force": TWO},
+    "criteria.contact.pushing.permissible_while_pushed": {"v": HALF, "mu": TWO, "k": TWO * 1e4, "F": 10.0},
+    "criteria.contact.shape.round_shape": {"radius": 0.01},
+    "description.norms.iso_13855.speed_at": {"distance": TWO},
 }
 ELSEWHERE = {
-    "contact.clamping.thickest": "of a table of sizes that ships",
-    "contact.shape.patch_area": "of radii that `body_shape` made",
-    "contact.shape.force_at_pressure": "of radii that `body_shape` made",
+    "criteria.contact.clamping.thickest": "of a table of sizes that ships",
+    "criteria.contact.shape.patch_area": "of radii that `body_shape` made",
+    "criteria.contact.shape.force_at_pressure": "of radii that `body_shape` made",
 }
 STRICT = {
-    "stopping.onset.accelerated qd": "is kept, and asked for by nobody else",
-    "stopping.terms.largest_factor b": "is 0, no speed",
-    "stopping.terms.largest_factor a": "is 0, no speed",
-    "contact.clamping.clamps gaps": "clamps",
-    "contact.clamping.clamps speed": "clamps",
-    "contact.clamping.clamps period": "clamps",
-    "contact.clamping.clamps thickness": "clamps",
-    "contact.collision.energy_limit printed": "was not printed: that of force and stiffness",
-    "contact.collision.permissible_speed v_P": "of an unknown area: the upper bound of the others",
-    "norms.iso_13855.speed_at distance": "is the larger speed",
+    "criteria.stopping.onset.accelerated qd": "is kept, and asked for by nobody else",
+    "criteria.stopping.terms.largest_factor b": "is 0, no speed",
+    "criteria.stopping.terms.largest_factor a": "is 0, no speed",
+    "criteria.contact.clamping.clamps gaps": "clamps",
+    "criteria.contact.clamping.clamps speed": "clamps",
+    "criteria.contact.clamping.clamps period": "clamps",
+    "criteria.contact.clamping.clamps thickness": "clamps",
+    "criteria.contact.collision.energy_limit printed": "was not printed: that of force and stiffness",
+    "criteria.contact.collision.permissible_speed v_P": "of an unknown area: the upper bound of the others",
+    "description.norms.iso_13855.speed_at distance": "is the larger speed",
 }
 """What is strictest, or right, where an argument is not a number."""
 BELOW = {
-    "safety.joint_torque.shares": "limits uncertainty",
-    "safety.kinetic_energy.kinetic_energy": "M",
-    "safety.separation.separation_bound": "v_h T_r T_s xi",
-    "safety.tool_force.wrench_from_torques": "damped_below",
-    "safety.tool_force.largest_error": "uncertainty",
-    "safety.velocity.speed_noise": "error",
-    "stopping.onset.accelerated": "T_r a",
-    "stopping.onset.farthest": "T_r lead",
-    "stopping.onset.from_torques": "torques",
-    "stopping.terms.way_of_person": "T_r T_s",
-    "stopping.terms.course": "T_r T_s",
-    "stopping.terms.decelerating": "v_h T_r a",
-    "stopping.terms.largest_speed_decelerating": "v_h T_r a",
-    "stopping.terms.largest_speed_in_time": "v_h T_r T_s",
-    "contact.collision.robot_mass": "M m_L",
-    "contact.collision.reduced_mass": "m_R",
-    "contact.collision.spring_energy": "k",
-    "contact.collision.speed_at_force": "k",
-    "contact.collision.speed_at_pressure": "k",
-    "contact.pushing.permissible_while_pushed": "F",
-    "contact.shape.round_shape": "radius",
+    "criteria.safety.joint_torque.shares": "limits uncertainty",
+    "criteria.safety.kinetic_energy.kinetic_energy": "M",
+    "criteria.safety.separation.separation_bound": "v_h T_r T_s xi",
+    "criteria.safety.tool_force.wrench_from_torques": "damped_below",
+    "criteria.safety.tool_force.largest_error": "uncertainty",
+    "criteria.safety.velocity.speed_noise": "error",
+    "criteria.stopping.onset.accelerated": "T_r a",
+    "criteria.stopping.onset.farthest": "T_r lead",
+    "criteria.stopping.onset.from_torques": "torques",
+    "criteria.stopping.terms.way_of_person": "T_r T_s",
+    "criteria.stopping.terms.course": "T_r T_s",
+    "criteria.stopping.terms.decelerating": "v_h T_r a",
+    "criteria.stopping.terms.largest_speed_decelerating": "v_h T_r a",
+    "criteria.stopping.terms.largest_speed_in_time": "v_h T_r T_s",
+    "criteria.contact.collision.robot_mass": "M m_L",
+    "criteria.contact.collision.reduced_mass": "m_R",
+    "criteria.contact.collision.spring_energy": "k",
+    "criteria.contact.collision.speed_at_force": "k",
+    "criteria.contact.collision.speed_at_pressure": "k",
+    "criteria.contact.pushing.permissible_while_pushed": "F",
+    "criteria.contact.shape.round_shape": "radius",
 }
 """What is refused below 0."""
 
@@ -306,9 +329,11 @@ def test_what_is_not_a_number_is_refused_or_stays_so(name):
 
 def test_the_least_of_several_figures_is_not_a_number_where_one_is_not():
     """Manipulability is the least singular value, and the mass along the easiest way the least of three."""
-    assert np.isnan(called("safety.manipulability.singular_values", {"J_v": spoiled(J, math.nan)})[0]).all()
+    assert np.isnan(
+        called("criteria.safety.manipulability.singular_values", {"J_v": spoiled(J, math.nan)})[0]
+    ).all()
     inverse = {"inverse": spoiled(np.eye(3), math.nan)}
-    assert np.isnan(called("safety.effective_mass.principal_masses", inverse)[0]).all()
+    assert np.isnan(called("criteria.safety.effective_mass.principal_masses", inverse)[0]).all()
 
 
 @pytest.mark.parametrize("name", BELOW)

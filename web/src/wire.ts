@@ -254,7 +254,7 @@ export interface Row {
  */
 export interface Result {
   name: string;
-  /** The figure, in `unit`; None when it could not be had. */
+  /** The figure, in `unit`; None when it could not be had. A score or a count is an `int` and exact. */
   value: number | null;
   unit: string;
   /** Admissible value, in `unit`. */

@@ -211,8 +211,8 @@ class Result(Struct, frozen=True, kw_only=True):
     """
 
     name: str
-    value: float | None = None
-    """The figure, in ``unit``; None when it could not be had."""
+    value: float | int | None = None
+    """The figure, in ``unit``; None when it could not be had. A score or a count is an ``int`` and exact."""
     unit: str = ""
     limit: float | None = None
     """Admissible value, in ``unit``."""

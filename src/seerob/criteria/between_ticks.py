@@ -30,7 +30,8 @@ MOST = 32
 """Instants that are looked at between two ticks, of one criterion: spans of 10 ms are halved to less than
 1 ms everywhere; more would hold up a live run."""
 FEW = 8
-"""The same of one whose bound is a judgement of its own (`Criterion.lowest`)."""
+"""Instants that are looked at between two ticks, of a criterion whose bound is a judgement of its own
+(`Criterion.lowest`)."""
 
 _WITHIN, _EXCEEDED, _UNDECIDED = Verdict.WITHIN, Verdict.EXCEEDED, Verdict.UNDECIDED
 

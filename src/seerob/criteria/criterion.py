@@ -27,7 +27,7 @@ Lowest = Callable[["State", "Span"], float]
 """Below its margin at every instant of a span, negative where that is not known, given the twin at one end of
 the span; may raise `Undecided`."""
 EvaluateMany = Callable[["States"], "Answers"]
-"""The same of many instants; may raise `Undecided`, of all of them."""
+"""Called with many instants; may raise `Undecided`, of all of them."""
 
 
 # To ask an enumeration for a member takes longer than all the rest of a judgement.

@@ -44,7 +44,7 @@ class Bound:
 
     @property
     def between(self) -> str:
-        """See `seerob.core.snapshot.CriterionInfo.between`."""
+        """Say what is known of the time between instants (`seerob.core.snapshot.CriterionInfo.between`)."""
         if self.watch is not None:
             return ""
         return self.criterion.between_samples or self.criterion.instants or UNBOUNDED
@@ -175,7 +175,7 @@ def told(error: Exception) -> str:
 
 
 def undecided(result: Result, reason: str) -> Result:
-    """The same without anything that is within: its verdict, parts, rows and markers are undecided instead.
+    """Take a result back: what is within, in it, its parts, rows and markers, becomes undecided.
 
     The one way in which what a criterion said is taken back, whoever has reason to. What is exceeded stays,
     for what is known suffices; a figure without a verdict informs as before. That there is nothing to judge

@@ -55,7 +55,7 @@ def seen_first(
 
 
 def partly_seen(model: Model, gap: Gap, bind: Callable[[Gap], Evaluate]) -> Evaluate:
-    """The same of a question about a gap.
+    """Judge a gap of which bones may be elsewhere: the worst that is known is enough for exceeded.
 
     Args:
         model: The compiled workstation.

@@ -54,7 +54,7 @@ class MotionRecord(Closing):
         """Largest distance of each twin from what was heard [rad or m]."""
 
     def write(self, snapshot: Snapshot, samples: Iterable[Sample]) -> None:
-        """See `seerob.outputs.sink.Writer`."""
+        """Take one tick: what goes out, and what came in to make it."""
         if self.start <= snapshot.t <= self.end:
             self.joints.append(snapshot.joints)
             self.results.append(snapshot.results)
@@ -69,7 +69,7 @@ class MotionRecord(Closing):
 
 
 def without_swept(station: Workstation) -> Workstation:
-    """The same without areas that are swept, and with those criteria only whose S_p one of them wants."""
+    """Drop swept areas, and all criteria but those whose S_p one of these areas wants."""
     wanted = {area.swept.separation for area in station.areas if area.swept is not None}
     return msgspec.structs.replace(
         station,

@@ -49,7 +49,8 @@ class Column:
     note: str = ""
     """Why it was asked instant by instant; empty when it was not."""
     between: str = ""
-    """See `seerob.core.snapshot.CriterionInfo.between`; empty where the instants are no motion."""
+    """What is known of the time between the instants, as `seerob.core.snapshot.CriterionInfo.between` says
+    it; empty where the instants are no motion."""
 
     @property
     def value(self) -> Array:
@@ -91,7 +92,7 @@ class _Whereabouts(State):
     """Where everybody is, and nothing of what follows from it."""
 
     def refresh(self, t: float) -> None:
-        """See `State.refresh`."""
+        """Take the instant [s] alone: nothing that follows from positions is worked out."""
         self.t = t
 
 
@@ -243,7 +244,7 @@ def _uncleared(
 def _with(
     said: tuple[Answers, Reasons], again: tuple[Answers, Reasons], where: Flags
 ) -> tuple[Answers, Reasons]:
-    """The same with what was said of some instants once the way there was looked at."""
+    """Replace answers at some instants by those that were found once the way there was looked at."""
     (answers, reasons), (then, why) = said, again
     picked = {key: np.where(where, getattr(then, key), getattr(answers, key)) for key in ("value", "limit")}
     verdict = np.where(where, then.verdict, answers.verdict).astype(np.uint8)
@@ -360,7 +361,7 @@ def _misshapen(answers: Answers, n: int) -> str:
 
 
 def _doubted(answers: Answers, criterion: Criterion, reasons: Reasons) -> Answers:
-    """The same where nothing is said of instants that are in doubt."""
+    """Make answers undecided, without a figure, at the instants that are in doubt."""
     doubted = reasons != ""
     if not doubted.any():
         return answers
@@ -407,7 +408,7 @@ def _walked(
     findings: Sequence[Finding],
     only: Flags | None = None,
 ) -> Stretch:
-    """The same instant by instant, as on the road, each criterion at every instant.
+    """Ask every criterion instant by instant, as in a run.
 
     Args:
         model: The compiled workstation.
@@ -454,7 +455,7 @@ def _walked(
 def _foresee(
     model: Model, motion: Motion, state: State, name: str, t: Array
 ) -> tuple[Array, Array, str] | None:
-    """See `seerob.twin.state.Foresee`: the motion itself, at its own instants."""
+    """Tell what a robot or human does ahead (`seerob.twin.state.Foresee`): the motion says it."""
     rows = np.searchsorted(motion.t, t - SLACK)
     beyond, rows = bool(len(rows)) and rows[-1] >= len(motion.t), np.minimum(rows, len(motion.t) - 1)
     columns = state.columns[name]

@@ -122,7 +122,7 @@ def _lateness(model: Model, source: Source) -> Iterator[Finding]:
 
 
 def _compared(model: Model, i: int, source: Source, opened: Opened) -> Opened:
-    """The same, with what is implausible of it, and what it says of itself compared with what it drives."""
+    """Add findings: what is implausible of a motion, and where it contradicts what it drives."""
     name = source.target()
     if isinstance(source, LiveSource) or name not in model.mechanisms:
         return opened

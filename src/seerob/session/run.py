@@ -250,7 +250,8 @@ class Summary:
     slipped: float
     """Real time that was lost in a live run [s]."""
     late: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Of what live sources drive: by how much its samples came too late at worst, and may have come [s]."""
+    """Per robot and human that a live source drives: by how much samples came too late at worst, and how late
+    they may come [s]."""
 
     @property
     def verdict(self) -> Verdict | None:

@@ -89,7 +89,7 @@ def scene_of(
 
 
 def _between(bound: Bound, station: Workstation, *, fed: bool) -> str:
-    """See `CriterionInfo.between`; what lies in a method is of instants as dense as the ticks."""
+    """Say what is known of the time between instants. A method's own reason holds at the ticks' rate only."""
     criterion, tick = bound.criterion, station.engine.tick
     if not station.sources and not fed:
         return STILL

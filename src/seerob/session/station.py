@@ -120,7 +120,7 @@ class Station:
         return {**self.model.files, **source_files(references, folder=self.model.folder)}
 
     def with_criteria(self, *criteria: Criterion) -> Station:
-        """The same compiled workstation with more safety criteria."""
+        """Return the compiled workstation with more safety criteria; nothing is compiled again."""
         other = object.__new__(Station)
         other.workstation = replace(self.workstation, safety=(*self.workstation.safety, *criteria))
         from dataclasses import replace as replaced

@@ -70,16 +70,16 @@ class Announced:
         self._writer, self._file, self._say = writer, file, say
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
-        """See `Writer.write`."""
+        """Take one tick: what goes out, and what came in to make it."""
         self._writer.write(snapshot, samples)
 
     def share(self, log: ResultLog) -> None:
-        """See `KeepsResults.share`."""
+        """Use the log of the run; adding a snapshot that is in it changes nothing."""
         if isinstance(self._writer, KeepsResults):
             self._writer.share(log)
 
     def close(self) -> None:
-        """See `Writer.close`."""
+        """Finish files; nothing half-written stays behind."""
         self._announce()
         self._writer.close()
 

@@ -225,7 +225,7 @@ def extreme(series: Series) -> str:
 
 
 def _otherwise(series: Series) -> str:
-    """Of what is undecided at times only, the rest: ``; undecided 5 % of the time, else max 6 at 6.62 s``."""
+    """Say the rest of a result that is undecided at times: ``; undecided 5 % of the time, else …``."""
     import numpy as np
 
     from seerob.outputs.sentences import percent

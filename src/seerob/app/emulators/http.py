@@ -74,7 +74,7 @@ class HttpEmulator(Emulator):
 
 
 def _unmoved(app: Any) -> Callable[[Any, Any, Any], Awaitable[None]]:
-    """The same, with no word about visitors who leave, or who are there when it is switched off."""
+    """Wrap an app so that visitors who leave, or who are there when it is switched off, go unmentioned."""
     from starlette.requests import ClientDisconnect
 
     async def answer(scope: Any, receive: Any, send: Any) -> None:

@@ -69,7 +69,7 @@ class FloorGap:
         return self._clamped(gap, fall, thickness, wanted)
 
     def ever(self, state: State, span: Span, thickness: Array, wanted: Flags) -> Flags:
-        """The same at any instant of a span of which the twin is at one end."""
+        """Which moving bodies clamp which body parts at any instant of a span, given the twin at one end."""
         fast = span.fast[self._moving]
         gap = self.lowest_and_falling(state)[:, 0] - fast * span.T
         return self._clamped(gap, fast, thickness, wanted)

@@ -84,7 +84,7 @@ class ClosingGaps:
         relative: Relative,
         wanted: Flags,
     ) -> tuple[Flags, Array]:
-        """The same at any instant of a span, given the poses and velocities at one end of it."""
+        """Which moving bodies clamp which body parts at any instant of a span, given one end of it."""
         bodies, first = np.array(self._pairs.moving, np.int64), self._pairs.first
         speed = self._speeds(rotations, positions, twists, span.fast[bodies])
         speed[self._seen] += relative.quick(span) * span.T
@@ -105,7 +105,7 @@ class ClosingGaps:
     def _within(
         self, rotations: Array, positions: Array, speed: Array, ways: Array, wanted: Flags
     ) -> tuple[Flags, Array]:
-        """See `clamped`, with gaps that may be narrower by some ways [m], shape (g,)."""
+        """Find clamped parts as `clamped` does, of gaps narrower by some ways [m], shape (g,)."""
         pairs = self._pairs
         nothing = np.zeros_like(wanted), np.zeros(wanted.shape)
         if self._survey is None or not wanted.any():

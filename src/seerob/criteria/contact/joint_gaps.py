@@ -112,7 +112,7 @@ class _Table:
     turns: bool
     """Whether it goes round without end."""
     rates: Array
-    """See `closing`, shape (2, m - 1, r)."""
+    """How fast places close, per unit of the joint, as it grows and as it falls, shape (2, m - 1, r)."""
 
     def at(self, start: float, end: float, qd: tuple[float, float]) -> Array:
         """How fast the pair clamps each body part [m/s], 0 where it does not, shape (r,).
@@ -217,7 +217,7 @@ def _rates(
     fits: Array,
     least: float,
 ) -> Array:
-    """See `closing`: of the places of each of two bodies against the other, remembered by content."""
+    """How fast two bodies close on each other, as `closing` tells it; remembered by content."""
     cores = [_core(solid) for of in solids for solid in of]
     radii = [[s.radius for s in of] for of in solids]
     of_pair = repr((radii, [core.shape for core in cores], least)).encode()

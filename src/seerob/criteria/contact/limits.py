@@ -135,7 +135,7 @@ class Judged:
     v_r: Array
     """Bounds on the speeds of the surfaces [m/s], shape (b,)."""
     v_h: Array
-    """Likewise of the person [m/s], shape (k,)."""
+    """Bounds on the speeds of the person [m/s], shape (k,)."""
     near: NDArray[np.bool_]
     """What could be hit by what, shape (b, k)."""
     projected: Array

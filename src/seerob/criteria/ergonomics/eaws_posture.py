@@ -80,7 +80,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
     """Angles at which a posture belongs to a line."""
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases = shared_phases(model, self.human, self.phases, EawsPhase.from_task)
         error = self.error()
@@ -171,7 +171,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
         )
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         phases = shared_phases(model, self.human, self.phases, EawsPhase.from_task)
         return Basis(
             formula="points of each posture line at its share of the cycle, trunk rotation and lateral "

@@ -31,7 +31,7 @@ class En10054(ZoneRule, frozen=True, kw_only=True):
         return tuple(Level(up_to=k, name=name) for k, name in enumerate(names))
 
     def zones(self, model: Model) -> ZoneTable:
-        """See `ZoneRule.zones`."""
+        """Read the table of zones; raise `InputError` with every mistake in it."""
         if self.table is None:
             return zones_of(published("en_1005_4"), "en_1005_4.toml")
         return read_zones(model.folder / self.table, self.table)

@@ -31,7 +31,7 @@ class Iso11226(ZoneRule, frozen=True, kw_only=True):
         return tuple(Level(up_to=k, name=name) for k, name in enumerate(names))
 
     def zones(self, model: Model) -> ZoneTable:
-        """See `ZoneRule.zones`."""
+        """Read the table of zones; raise `InputError` with every mistake in it."""
         if self.table is None:
             return zones_of(published("iso_11226"), "iso_11226.toml")
         return read_zones(model.folder / self.table, self.table)

@@ -117,7 +117,7 @@ class Niosh(Criterion, frozen=True, kw_only=True):
         return ()
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`.
+        """Look up every name in the model once and return the function that judges one instant.
 
         Raises:
             InputError: The equation does not apply.
@@ -220,7 +220,7 @@ class Niosh(Criterion, frozen=True, kw_only=True):
         )
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         spell = method.duration(self.work, self.recovery)
         found = [
             Input(

@@ -52,7 +52,7 @@ class OwasPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @classmethod
     def read(cls, task: TaskPhase) -> Mapping[str, Any]:
-        """See `Phase.read`."""
+        """Return the fields of the phase that this rule has words of its own for, by name."""
         return {"legs": next((code for code in method.Legs if code == task.legs), None)}
 
 
@@ -81,7 +81,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         return shared_phases(model, self.human, self.phases, OwasPhase.from_task)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases, unknown, error = self.entered(model), OwasPhase(), self.error()
 
@@ -200,7 +200,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         return [key for key, gain in gains.items() if gain == best] if best > 0 else []
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         return Basis(
             formula="action category of the code of back, arms, legs and load",
             source="Karhu et al. 1977, categories of Louhevaara and Suurnäkki 1992; each as at least three "

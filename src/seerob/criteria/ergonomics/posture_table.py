@@ -20,9 +20,9 @@ class PostureTable(ZoneRule, frozen=True, kw_only=True):
     """The worst angle counts, or the sum of all; of the worse side."""
 
     def zones(self, model: Model) -> ZoneTable:
-        """See `ZoneRule.zones`."""
+        """Read the table of zones; raise `InputError` with every mistake in it."""
         return read_zones(model.folder / self.table, self.table, sheet=self.sheet)
 
     def combination(self) -> Literal["max", "sum"]:
-        """See `ZoneRule.combination`."""
+        """Say how the scores of several angles become one: their maximum or their sum."""
         return self.combine

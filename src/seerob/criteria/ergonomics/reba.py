@@ -53,7 +53,7 @@ class RebaPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @classmethod
     def read(cls, task: TaskPhase) -> Mapping[str, Any]:
-        """See `Phase.read`."""
+        """Return the fields of the phase that this rule has words of its own for, by name."""
         return {
             "shock": None if task.load_use is None else task.load_use == "shock",
             "coupling": None if task.coupling is None else method.Coupling(task.coupling),
@@ -99,13 +99,13 @@ class Reba(ScoredPosture, frozen=True, kw_only=True):
 
     @property
     def static(self) -> float:
-        """See `ScoredPosture.static`."""
+        """A posture that is held for this long counts as static [s]."""
         return 60.0
 
     def components(
         self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: Watch | None = None
     ) -> dict[str, Span]:
-        """See `ScoredPosture.components`."""
+        """Score the components of postures in a phase: shapes (..., 2) of sided, (...) of central ones."""
         assert isinstance(phase, RebaPhase)
         bearing = (
             exactly(1) + one_foot_up(Measured(angles, accuracy), self.thresholds)
@@ -136,7 +136,7 @@ class Reba(ScoredPosture, frozen=True, kw_only=True):
         }
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         return self.based(
             model,
             formula="REBA: tables A, B and C of the components' scores, and the activity; the worse side",

@@ -31,7 +31,7 @@ class RulaPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
     muscle_arms: bool | None = None
     """Posture of the arms mainly static, or repeated 4 times per minute or more."""
     muscle_body: bool | None = None
-    """The same of neck, trunk and legs."""
+    """Posture of neck, trunk and legs mainly static, or repeated 4 times per minute or more."""
     supported_arms: Sides | None = None
     """Arms whose weight is supported, or on which the person leans."""
     back_supported: bool | None = None
@@ -41,7 +41,7 @@ class RulaPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @classmethod
     def read(cls, task: TaskPhase) -> Mapping[str, Any]:
-        """See `Phase.read`."""
+        """Return the fields of the phase that this rule has words of its own for, by name."""
         legs = "posture" if task.legs == "posture" else None
         if task.balanced is not None:
             legs = "balanced" if task.balanced else "unbalanced"
@@ -94,13 +94,13 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
 
     @property
     def static(self) -> float:
-        """See `ScoredPosture.static`."""
+        """A posture that is held for this long counts as static [s]."""
         return method.Profile(self.profile).static
 
     def components(
         self, angles: Angles, phase: Phase, accuracy: Accuracy = 0.0, watch: Watch | None = None
     ) -> dict[str, Span]:
-        """See `ScoredPosture.components`."""
+        """Score the components of postures in a phase: shapes (..., 2) of sided, (...) of central ones."""
         assert isinstance(phase, RulaPhase)
         found = method.posture_components(
             angles,
@@ -128,7 +128,7 @@ class Rula(ScoredPosture, frozen=True, kw_only=True):
         }
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         usual = self.profile == method.Profile.ORIGINAL_1993
         return self.based(
             model,

@@ -46,7 +46,7 @@ class PostureRule(Criterion, frozen=True, kw_only=True):
     accuracy: Annotated[float, Meta(ge=0, lt=np.pi / 2, extra={"unit": "rad"})] | None = None
     """How far each angle of the posture may be off [rad]; the verdict then is of the whole interval."""
     joint_accuracy: JointAccuracy | None = None
-    """The same for single joints, where it differs."""
+    """How far the angles of single joints may be off [rad], where that differs from ``accuracy``."""
     unmeasured: tuple[str, ...] = ()
     """Bones that the source does not measure, such as ``"right_hand"``: what needs them is not assessed."""
 
@@ -116,7 +116,7 @@ class ScoredPosture(PostureRule, frozen=True, kw_only=True):
         return shared_phases(model, self.human, own, self.PHASE.from_task)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases, unknown, error = self.entered(model), self.PHASE(), self.error()
         watch = None if self.detect is None else Watch(self.detect, hold=self.static, count=self.REPEATED)

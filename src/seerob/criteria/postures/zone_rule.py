@@ -62,7 +62,7 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
         return self.COMBINE
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         read = bind_posture(model, self.human, self.unmeasured)
         phases = shared_phases(model, self.human, self.phases, SupportPhase.from_task)
         rows, error = self.zones(model).rows, self.error()
@@ -173,7 +173,7 @@ class ZoneRule(PostureRule, frozen=True, kw_only=True):
         )
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         table = self.zones(model)
         phases = shared_phases(model, self.human, self.phases, SupportPhase.from_task)
         asks = any(row.support is not None for row in table.rows)

@@ -89,7 +89,7 @@ class ContactForce(Criterion, frozen=True, kw_only=True):
         return body_limits.shipped() if own is None else body_limits.read(Path(model.folder, own))
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         person, table = model.human(self.human), self._table(model)
         bodies = {i: model.bodies[i].name for i in person.bodies}
         regions = {i: regions_of(name.removeprefix(f"{self.human}/"), table) for i, name in bodies.items()}
@@ -121,7 +121,7 @@ class ContactForce(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         table, doubts = table_input(self._table(model), "2016")
         area = () if self.area is None else (provenance.given("contact area", self.area, "m²"),)
         force = Input(

@@ -94,7 +94,7 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
         return sensor, next(b.index for b in model.bodies if b.name == name), corners
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         sensor, plane, corners = self._device(model)
         hazard = bodies_of(model, self.hazard)
         carriers = carriers_of(model, (*hazard, plane))
@@ -191,7 +191,10 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
         return ask
 
     def falls(self, model: Model, points: Points) -> Falls | None:
-        """See `Criterion.falls`; none of a device that tilts, or whose height changes where S follows it."""
+        """Bound how much nearer the hazard can come between instants; None for a device that tilts.
+
+        None also where its height changes and S follows that.
+        """
         sensor, plane, corners = self._device(model)
         along = self._way(sensor) is Approach.PARALLEL
         if (corners is not None or along) and not _stays_flat(model, plane, level=along):
@@ -199,7 +202,7 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
         return approaching((plane,), bodies_of(model, self.hazard))
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         sensor, plane, _ = self._device(model)
         hazard = bodies_of(model, self.hazard)
         way = self._way(sensor)

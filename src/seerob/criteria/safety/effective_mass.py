@@ -105,11 +105,11 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         return (self.at,) if self.toward is None else (self.at, self.toward)
 
     def unseen(self, model: Model) -> str:
-        """See `Criterion.unseen`; a direction that is not toward somebody needs no shape."""
+        """Say what no shape shows of the robot; a direction that is not toward somebody needs no shape."""
         return "" if self.toward is None else super().unseen(model)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         frame = model.frame(self.at)
         robot = model.carrier(frame)
         robot.require_masses(self.name)
@@ -209,7 +209,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         return Result(name="M/2 + m_L", value=mass, unit="kg", interval=interval)
 
     def batch(self, model: Model) -> EvaluateMany | None:
-        """See `Criterion.batch`; where no mass has a tolerance and nothing else moves it."""
+        """Judge many instants at once; None where a mass has a tolerance or something else moves it."""
         frame, offset = model.frame(self.at), np.array(self.offset)
         robot = model.carrier(frame)
         if len(MassTolerances(model, robot)) or not robot.alone:
@@ -240,7 +240,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         return None if mass is None else judge(mass, self.limit)
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         robot = model.carrier(model.frame(self.at))
         gap = None if self.toward is None else model.gap(robot.moving, model.select(self.toward))
         which = (

@@ -89,14 +89,14 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
         return body_limits.shipped() if own is None else body_limits.read(Path(model.folder, own))
 
     def _against(self, model: Model) -> ForcePolytope:
-        """The same with the limit of its body region."""
+        """Return this criterion with the limit of its body region as ``limit``."""
         if self.body_region is None:
             return self
         force = pushed_region(self._table(model), self.body_region).force
         return replace(self, limit=force.value, body_region=None, limits=None)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         if self.body_region is not None:
             return self._against(model).bind(model)
         frame = model.frame(self.at)
@@ -123,7 +123,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def batch(self, model: Model) -> EvaluateMany | None:
-        """See `Criterion.batch`; of ``zero_moment`` only, whose corners are found without a hull."""
+        """Judge many instants at once; only ``zero_moment`` can, whose corners are found without a hull."""
         if self.definition != "zero_moment" or self.load == "motion":
             return None
         frame, offset = model.frame(self.at), np.array(self.offset)
@@ -144,7 +144,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def falls(self, model: Model, points: Points) -> Falls | None:
-        r"""See `Criterion.falls`; of ``zero_moment``, without velocity products in the load.
+        r"""Bound the force between instants; only of ``zero_moment``, without velocity products in the load.
 
         What the torques allow in one pose, made smaller by a share, they allow in the other. With columns of
         the Jacobian that differ by :math:`\epsilon_j`, torques of gravity that differ by :math:`\delta_j` and
@@ -290,7 +290,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
         return -upper, upper, text
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         robot = model.carrier(model.frame(self.at))
         limit = provenance.limit(self.limit, "N")
         doubts: tuple[str, ...] = ()

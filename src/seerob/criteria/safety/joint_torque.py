@@ -68,7 +68,7 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
         return (self.robot,)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         robot = model.robot(self.robot)
         limits = self._limits(model, robot)
         uncertainty = self._per_joint(model, robot, "torque_uncertainty")
@@ -176,7 +176,7 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
         return np.array(given, float)
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         robot = model.robot(self.robot)
         source = next((s for s in model.workstation.sources if s.target() == robot.name), None)
         measured = getattr(source, "origin", None) == "controller"

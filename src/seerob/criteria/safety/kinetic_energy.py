@@ -64,7 +64,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         return (self.robot,)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         robot = model.mover(self.robot)
         aboard = _aboard(model, robot)
         for each in (robot, *aboard):
@@ -122,7 +122,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def batch(self, model: Model) -> EvaluateMany | None:
-        """See `Criterion.batch`; where no mass has a tolerance and nothing else moves it."""
+        """Judge many instants at once; None where a mass has a tolerance or something else moves it."""
         robot = model.mover(self.robot)
         if len(MassTolerances(model, robot)) or not robot.alone or _aboard(model, robot):
             return None
@@ -134,7 +134,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def falls(self, model: Model, points: Points) -> Falls | None:
-        r"""See `Criterion.falls`, of the largest energy that tolerances of masses allow.
+        r"""Bound between instants the largest energy that tolerances of masses allow.
 
         :math:`\sqrt{2E}` is a norm of the velocities of all that has a mass, so it changes by no more than
         the norm of how much they change. The largest is one too: of heavier masses, with centres that may
@@ -160,12 +160,12 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
         return falls
 
     def margin(self, result: Result) -> Margin:
-        """See `Criterion.margin`, of the largest energy that tolerances allow."""
+        """Tell how far the largest energy that tolerances allow is from the limit [J]."""
         far, off = super().margin(result)
         return far - off, 0.0
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         robot = model.mover(self.robot)
         aboard = _aboard(model, robot)
         alone = robot.alone and not aboard

@@ -57,16 +57,16 @@ class LightCurtain(Criterion, frozen=True, kw_only=True):
         return (*self.subjects(), *model.mechanisms)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         curtain = self._curtain(model)
         return seen_in_field(self.name, curtain.presence, lambda state: curtain.judge(self.name, state))
 
     def falls(self, model: Model, points: Points) -> Falls:
-        """See `Criterion.falls`."""
+        """Bound how far a body can move into the field between two instants at which this is asked."""
         return self._curtain(model).presence.falls()
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         curtain = self._curtain(model)
         return Basis(
             formula=f"{len(curtain.heights)} beams, {curtain.pitch * 1e3:.1f} mm apart; detected when what "

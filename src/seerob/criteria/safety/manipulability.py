@@ -99,7 +99,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
         return (self.at,)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         frame = model.frame(self.at)
         mechanism = model.carrier(frame)
         offset = np.array(self.offset)
@@ -146,7 +146,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def batch(self, model: Model) -> EvaluateMany:
-        """See `Criterion.batch`."""
+        """Return the function that judges many instants at once, or None where there is none."""
         frame, offset = model.frame(self.at), np.array(self.offset)
         mechanism = model.carrier(frame)
 
@@ -157,7 +157,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def falls(self, model: Model, points: Points) -> Falls:
-        """See `Criterion.falls`: no singular value changes more than the Frobenius norm of the Jacobian."""
+        """Bound how far singular values fall between instants: by the norm of the Jacobian's change."""
         frame = model.frame(self.at)
         mechanism = model.carrier(frame)
         local = frame.body_from_frame[:3, :3] @ np.array(self.offset) + frame.body_from_frame[:3, 3]
@@ -171,7 +171,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
         return falls
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         carrier = model.carrier(model.frame(self.at))
         return Basis(
             formula="smallest singular value of J_v(q); ellipsoid of J_v J_vᵀ",

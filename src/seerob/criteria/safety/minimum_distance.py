@@ -53,7 +53,7 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
         return model.gap(a, b)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         return partly_seen(model, self._gap(model), lambda gap: self._bound(model, gap))
 
     def _bound(self, model: Model, gap: Gap) -> Evaluate:
@@ -95,7 +95,7 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def batch(self, model: Model) -> EvaluateMany:
-        """See `Criterion.batch`."""
+        """Return the function that judges many instants at once, or None where there is none."""
         gap, either = self._gap(model), self.uncertainty
 
         def evaluate(states: States) -> Answers:
@@ -110,12 +110,12 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def falls(self, model: Model, points: Points) -> Falls:
-        """See `Criterion.falls`."""
+        """Bound how much nearer the two sets can come between two instants at which this is asked."""
         gap = self._gap(model)
         return approaching(gap.a, gap.b)
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         gap = model.gap(*(model.select(name) for name in self.between))
         return Basis(
             formula="least distance of the two sets' surfaces; negative when they overlap",

@@ -91,7 +91,7 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
             raise InputError.at(self.map, "", what, "give a map.csv of `seerob permissible`") from error
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         robot = model.robot(self.robot)
         found = read_map(self._data(model), name=self.map, units=robot.units)
         same, legs, permitted = _legs(found)
@@ -126,7 +126,7 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def falls(self, model: Model, points: Points) -> Falls:
-        r"""See `Criterion.falls`: the fastest that it may be, on the slowest stretch that it may be on.
+        r"""Bound the speed between instants: the fastest it may be, on the slowest stretch it may be on.
 
         Within a span of length T in which :math:`|\dot q| \le v`, the robot is nowhere farther than vT/2
         from where it is in the middle, and so are the distances from all stretches.
@@ -169,7 +169,7 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
         return Result(name=self.name, value=share, limit=1.0, verdict=verdict, reason=why, markers=drawn)
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         digest = hashlib.sha256(self._data(model)).hexdigest()
         return Basis(
             formula="|q̇| as a share of the permissible path speed at the nearest place of the path; "

@@ -99,7 +99,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     stiffness_tolerance: Tolerance = 0.0
     """How far the stiffness k of every body region may be off, as a share: 0.1 for ± 10 %."""
     area_tolerance: Tolerance = 0.0
-    """Likewise every contact area."""
+    """How far every contact area may be off, as a share: 0.1 for ± 10 %."""
     postures: tuple[str, ...] = ()
     """Without a person: postures of the library in which people can be there, such as ``standing``; regions
     that a part cannot reach by its height are then left out, and listed. Without it, every region counts."""
@@ -125,7 +125,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
             raise ValueError(f"statures = {list(self.statures)}: the least comes first")
 
     def judged(self, model: Model) -> set[int]:
-        """See `Criterion.judged`; of what carries the robot it knows the speed, and not the contact."""
+        """Return what moves of the robot and the human: of what carries the robot, contact is not judged."""
         return {i for name in self.subjects() for i in model.mechanism(name).moving}
 
     def subjects(self) -> tuple[str, ...]:
@@ -137,13 +137,13 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         return tuple(model.mechanisms)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         contacts = Contacts(self, model)
         bones = () if contacts.people is None else contacts.people.bodies
         return contacts.whoever_is_known(seen_first(bones, contacts.evaluate, contacts.without))
 
     def lowest(self, model: Model, points: Points) -> Lowest | None:
-        """See `Criterion.lowest`; none where the file accepts that there is none."""
+        """Judge the least margin within a span; None where the file accepts that nobody knows it."""
         return None if self.between_samples else Contacts(self, model).lowest(points)
 
     def table(self, model: Model) -> body_limits.BodyLimits:
@@ -195,7 +195,7 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         return given_contacts(model, model.mover(self.robot), self.contact_radius, self.contact_area)
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         robot, limits = model.mover(self.robot), self.table(model)
         people = [] if self.human is None else [human.name for human in model.workstation.humans]
         names = (self.robot, *people)
@@ -372,12 +372,12 @@ class Contacts:
         )  # fmt: skip
 
     def without(self, lost: tuple[int, ...]) -> Evaluate | None:
-        """The same about the other bones of these people; None when there are none."""
+        """Judge contacts with the other bones of these people; None when there are none."""
         rest = Person(self.model, self.robot, *self.humans, horizon=self.spec.horizon, without=lost)
         return (lambda state: self.evaluate(state, rest)) if rest.bodies else None
 
     def whoever_is_known(self, judge: Evaluate) -> Evaluate:
-        """The same of several people: of whom nothing is known leaves nobody's contact within."""
+        """Judge several people: if one is not known, another's contact may be exceeded, never within."""
         if self.people is None or not self.people.several:
             return judge
         horizon = self.spec.horizon

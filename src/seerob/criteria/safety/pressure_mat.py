@@ -43,7 +43,7 @@ class PressureMat(Criterion, frozen=True, kw_only=True):
         return Presence(model, sensor, mat, bodies_of(model, self.of))
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         presence = self._presence(model)
 
         def evaluate(state: State) -> Result:
@@ -54,11 +54,11 @@ class PressureMat(Criterion, frozen=True, kw_only=True):
         return seen_in_field(self.name, presence, evaluate)
 
     def falls(self, model: Model, points: Points) -> Falls:
-        """See `Criterion.falls`."""
+        """Bound how far a body can move onto the mat between two instants at which this is asked."""
         return self._presence(model).falls()
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         return Basis(
             formula="a body is on the mat when it is inside the prism over its polygon",
             source="geometry; figures of the device from its data sheet",

@@ -52,7 +52,7 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
         return *_names(self.area), *_names(self.of)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         watched = self._watched(model)
         depths = Depths(model.shapes, tolerance=self.tolerance, cells=CELLS, fewest=FEWEST)
 
@@ -165,12 +165,12 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
         return tuple(watched)
 
     def falls(self, model: Model, points: Points) -> Falls:
-        """See `Criterion.falls`."""
+        """Bound how much nearer bodies can come to areas between two instants at which this is asked."""
         gaps = [each.gap for each in self._watched(model)]
         return approaching((i for gap in gaps for i in gap.a), (i for gap in gaps for i in gap.b))
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         gaps = [each.gap for each in self._watched(model)]
         carriers = dict.fromkeys(name for gap in gaps for name in gap.carriers)
         return Basis(

@@ -72,16 +72,16 @@ class ScannerField(Criterion, frozen=True, kw_only=True):
         return (*self.subjects(), *model.mechanisms)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         scan = self._scan(model)
         return seen_in_field(self.name, scan.presence, lambda state: scan.judge(self.name, state))
 
     def falls(self, model: Model, points: Points) -> Falls:
-        """See `Criterion.falls`."""
+        """Bound how far a body can move into the field between two instants at which this is asked."""
         return self._scan(model).presence.falls()
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         scan = self._scan(model)
         return Basis(
             formula="first point that each beam meets; in the field where it lies inside the polygon; "

@@ -47,7 +47,7 @@ class SensorAgreement(Criterion, frozen=True, kw_only=True):
         return known[self.field]
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         bodies = bodies_of(model, self.of)
         if not bodies:
             raise InputError.at(self.name, "of", "nothing in it has a shape", "name who may enter the field")
@@ -81,15 +81,15 @@ class SensorAgreement(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def remembers(self, model: Model) -> bool:
-        """See `Criterion.remembers`."""
+        """Say whether the result depends on earlier instants, so that it is asked in the order of time."""
         return True
 
     def falls(self, model: Model, points: Points) -> Falls:
-        """See `Criterion.falls`: a disagreement begins and ends within a span, and lasts as long at most."""
+        """Return the bound between instants: a disagreement lasts as long as the span at most."""
         return lambda span, least: Fall(math.inf, span.T)
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         gap = model.gap((self._field(model),), bodies_of(model, self.of))
         variable = model.dictionary[self.variable]
         source = f"{variable.source}: {variable.address}"

@@ -122,7 +122,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return (*tolerances(self.stop), *(tolerance for tolerance in own if tolerance.half))
 
     def _shifted(self, shifts: Shifts) -> Separation:
-        """The same without tolerances, with its inputs at an end: 1 where S_p is largest; with no sensor."""
+        """Return this criterion without tolerances, its inputs at one end: 1 is where S_p is largest."""
         n = len(tolerances(self.stop))
         sides = dict(zip((t.name for t in self._tolerances()[n:]), shifts[n:], strict=True))
         v_h, C = self.human_speed, self._intrusion()[0]
@@ -140,7 +140,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         )
 
     def at_worst(self, model: Model) -> Separation:
-        """The same without tolerances, with every input where S_p is largest."""
+        """Return this criterion without tolerances, with every input where S_p is largest."""
         own, _, _ = self._by_device(model)
         inputs = len(own._tolerances())
         return own._shifted((1,) * inputs) if inputs else self
@@ -176,7 +176,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return self.intrusion, "" if self.intrusion is not None else "intrusion (C)", "workstation file"
 
     def _by_device(self, model: Model) -> tuple[Separation, tuple[str, ...], tuple[Input, ...]]:
-        """The same without a sensor, with what the sensor adds; what is not known of it; inputs."""
+        """Return this criterion with what its sensor adds, what is not known of the sensor, and inputs."""
         if self.sensor is None:
             return self, (), ()
         device = device_of(model, self.name, self.sensor, self.detection)
@@ -225,14 +225,14 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return float(state.fastest_points(people, estimates=True)[0].max(initial=0.0))
 
     def looks_ahead(self, model: Model) -> Mapping[str, float]:
-        """See `Criterion.looks_ahead`: as long as the robot takes to react."""
+        """Look ahead as long as the robot takes to react [s], by its name."""
         if self.stop.acceleration is not None:
             return {}
         worst = self._by_device(model)[0].at_worst(model).stop.reaction
         return {self._sides(model)[0]: min(worst, LARGEST_WINDOW) + model.workstation.engine.tick}
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         own, _, _ = self._by_device(model)
         if self.stop.model == "simulated":
             model.mover(self._sides(model)[0]).require_masses(self.name)
@@ -355,7 +355,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
 
     def batch(self, model: Model) -> EvaluateMany | None:
-        """See `Criterion.batch`; where the stopping time is given and S_p is that of the present speeds."""
+        """Judge many instants at once, where the stopping time is given and S_p is that of present speeds."""
         own, _, _ = self._by_device(model)
         gap = own._gap(model)
         K = sum(own._terms()[0]) + gap.deviation
@@ -365,11 +365,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return separations(own.stop, gap, own._distance, K, incomplete=incomplete)
 
     def remembers(self, model: Model) -> bool:
-        """See `Criterion.remembers`."""
+        """Say whether the result depends on earlier instants, so that it is asked in the order of time."""
         return self.mode == "fixed"
 
     def falls(self, model: Model, points: Points) -> Falls | None:
-        """See `Criterion.falls`, of each moving part; where S_p follows from speeds or joint tables."""
+        """Bound the margin of each moving part between instants; None where nobody knows how S_p changes."""
         gap, rises = self._gap(model), self.rises(model)
         people, parts, lasts = rows_of(gap.a), rows_of(gap.b), self.lasts(model)
         if rises is None:
@@ -440,7 +440,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return self._distance(by_speed(v), K, seen)
 
     def margin(self, result: Result) -> Margin:
-        """See `Criterion.margin`, of each moving part; then how far each is away."""
+        """Tell how far each moving part is from S_p [m], then how far each is away [m], with tolerances."""
         parts = [part for part in result.parts if part.verdict is not None]
         away = np.array([part.value or 0.0 for part in parts])
         least = np.array([part.limit or 0.0 for part in parts])
@@ -536,7 +536,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return Verdict.UNDECIDED if incomplete and verdict is Verdict.WITHIN else verdict
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         if self.sensor is not None:
             own, _, of_device = self._by_device(model)
             found = own.basis(model)

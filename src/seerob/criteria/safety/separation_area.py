@@ -50,7 +50,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         return names_of(self.of)
 
     def judged(self, model: Model) -> set[int]:
-        """See `Criterion.judged`."""
+        """Return the bodies that must stay outside, and the moving ones of the separation."""
         return super().judged(model) | set(self._criterion(model).moving(model))
 
     def depends(self, model: Model) -> tuple[str, ...]:
@@ -73,7 +73,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         return moving, outside
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         criterion = self._criterion(model)
         moving, outside = self._sides(model)
         required = criterion.required(model)
@@ -167,11 +167,11 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         return ""
 
     def remembers(self, model: Model) -> bool:
-        """See `Criterion.remembers`."""
+        """Say whether the result depends on earlier instants, so that it is asked in the order of time."""
         return bool(self._criterion(model).remembers(model))
 
     def falls(self, model: Model, points: Points) -> Falls | None:
-        """See `Criterion.falls`; where S_p follows from speeds alone."""
+        """Bound the loss of distance between instants; None unless S_p follows from speeds alone."""
         rises, lasts = self._criterion(model).rises(model), self._criterion(model).lasts(model)
         if rises is None:
             return None
@@ -185,7 +185,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         return falls
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         found: Basis = self._criterion(model).basis(model)
         gap = model.gap(*self._sides(model))
         return Basis(

@@ -40,7 +40,7 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
         return (self.of,)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`; refuses voxels that could come to need more memory than there is."""
+        """Look up the bodies and return the function that marks voxels; refuses more than memory allows."""
         bodies = model.select(self.of)
         carriers = _carriers(model, bodies)
         low, high = reach_box(model, bodies)
@@ -81,7 +81,7 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         bodies = [model.bodies[i] for i in model.select(self.of)]
         notes = dict.fromkeys(f"{body.owner}: {body.note}" for body in bodies if body.note)
         not_modelled = ["cables, hoses and clothing that are not in the model"]

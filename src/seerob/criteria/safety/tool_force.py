@@ -126,7 +126,7 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
         return (self.at,)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         frame = model.frame(self.at)
         robot = model.carrier(frame)
         if self.torques == "measured":
@@ -228,7 +228,7 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
         return values
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         robot = model.carrier(model.frame(self.at))
         source = next((s for s in model.workstation.sources if s.target() == robot.name), None)
         measured = getattr(source, "origin", None) == "controller"

@@ -38,7 +38,7 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
         return {**Criterion.variables(self), self.variable: ""}
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         variable = model.dictionary[self.variable]
         number = variable.type is Kind.NUMBER
         if variable.si_unit != self.unit:
@@ -73,7 +73,7 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def falls(self, model: Model, points: Points) -> Falls:
-        """See `Criterion.falls`: a variable stands until it is told anew, and all that is told is judged."""
+        """Return no fall: a variable stands until it is told anew, and all that is told is judged."""
         fall = Fall(0.0 if self.every is None else math.inf)
         return lambda span, least: fall
 
@@ -96,7 +96,7 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
         return text if self.expected in (None, value) else f"{text}, not {_word(self.expected)}"
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         variable = model.dictionary[self.variable]
         source = f"{variable.source}: {variable.address}"
         figure = variable.timeout if math.isfinite(variable.timeout) else None

@@ -83,18 +83,18 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         return (self.at or self.of or "",)
 
     def judged(self, model: Model) -> set[int]:
-        """See `Criterion.judged`; of a point the body that it is of."""
+        """Return the bodies of the set; for a point, the body it is fixed to."""
         if self.of is not None:
             return super().judged(model)
         at = model.frame(self.at or "").mj
         return {body.index for body in model.bodies if body.mj == at}
 
     def unseen(self, model: Model) -> str:
-        """See `Criterion.unseen`; a point needs no shape."""
+        """Say what no shape shows of the robots; a point needs no shape."""
         return super().unseen(model) if self.of else ""
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         return self._bind_point(model) if self.at is not None else self._bind_set(model)
 
     def _bind_point(self, model: Model) -> Evaluate:
@@ -182,7 +182,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         )
 
     def falls(self, model: Model, points: Points) -> Falls:
-        """See `Criterion.falls`."""
+        """Bound how much faster the bodies or the point can be between two instants."""
         if self.at is None:
             return speeding(self._bodies(model))
         frame = model.frame(self.at)
@@ -190,7 +190,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         return speeding([points.add(frame.mj, local)])
 
     def batch(self, model: Model) -> EvaluateMany | None:
-        """See `Criterion.batch`; of a point, where nothing moves that carries its robot."""
+        """Judge many instants at once; None for a point when something that moves carries its robot."""
         if self.at is None:
             bodies = self._bodies(model)
             return lambda states: self._answers(states.fastest_points(bodies)[0].max(axis=1))
@@ -209,7 +209,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         return Answers.against(speed, self.limit, at_most=self.at_most)
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         points: tuple[Input, ...]
         if self.at is not None:
             carriers = [model.carrier(model.frame(self.at)).name]

@@ -49,7 +49,7 @@ class Waypoints(Criterion, frozen=True, kw_only=True):
         return (self.robot,)
 
     def bind(self, model: Model) -> Evaluate:
-        """See `Criterion.bind`."""
+        """Look up every name in the model once and return the function that judges one instant."""
         robot = model.robot(self.robot)
         drawn = _drawn(model, robot)
 
@@ -69,7 +69,7 @@ class Waypoints(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     def basis(self, model: Model) -> Basis:
-        """See `Criterion.basis`."""
+        """State the formula, its source, the inputs with their origin, and what is not modelled."""
         return Basis(
             formula="d = min |p - p_k| over the waypoints k",
             source="[Weistroffer2022] 2.1.3.4",

@@ -22,7 +22,7 @@ class PostureTime:
         self._posture: str | None = None
         self._since = self._t = math.nan
         self.seconds: dict[str, float] = {}
-        """Of what counts, by posture [s]."""
+        """Posture → time for which it was held [s], where it was held long enough to count."""
         self.heard = 0.0
         """All time that was heard [s]."""
         self.silent = 0.0

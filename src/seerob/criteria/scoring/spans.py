@@ -31,7 +31,7 @@ class Span(NamedTuple):
         return Span(self.low + other.low, self.high + other.high)
 
     def at_least(self, least: int) -> Span:
-        """The same, not below a score."""
+        """Raise both ends of the span to at least ``least``."""
         return Span(np.maximum(self.low, least), np.maximum(self.high, least))
 
     @property

@@ -45,7 +45,7 @@ def reach_of(data: mujoco.MjData, model: Model, robot: Mechanism) -> float:
 
 
 def grown(chain: Chain, half: Array) -> Chain:
-    """The same with the largest levers within a span, in the middle of which they are as given.
+    """Replace the levers of a chain, given in the middle of a span, by their largest within it.
 
     Args:
         chain: Of a part.

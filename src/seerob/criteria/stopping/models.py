@@ -180,7 +180,7 @@ class _Brakes:
     doubts: tuple[str, ...] = ()
     not_modelled: tuple[str, ...] = ()
     by_onset: Callable[[Onset], Course] | None = None
-    """The same, where nothing but that counts."""
+    """Course by the onset of braking alone; None where other things count, too."""
     in_span: InSpan | None = None
     timed: bool = False
     costly: bool = False
@@ -262,7 +262,7 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
 
 
 def _while_riders_rest(braking: Braking, model: Model, robot: Mechanism) -> Braking:
-    """The same, undecided while a machine on the robot moves: neither table nor simulation knows its stop."""
+    """Raise `Undecided` while a machine on the robot moves: nobody knows its own way to stop."""
     riders = [model.mechanisms[name] for name in robot.riders]
 
     def at(state: State) -> Callable[[Onset, float], Course]:

@@ -36,9 +36,10 @@ class Ceiling:
 
     criterion: str
     share: float
-    """Of the speed that was asked about: inf without a limit, NaN when it cannot be told."""
+    """Largest permitted share of the speed that was asked about: inf without a limit, NaN when it cannot be
+    told."""
     speed: float = math.nan
-    """The same of the governing surface patch [m/s]; NaN where there is none."""
+    """Largest permitted speed of the governing surface patch [m/s]; NaN where there is none."""
     region: str = ""
     """Body region; empty for criteria that know none."""
     surface: str = ""

@@ -30,7 +30,7 @@ class JointLimits:
     jerk: Array
     """[rad/s³ or m/s³]"""
     inputs: tuple[Input, ...]
-    """The same with where each is from."""
+    """These limits as inputs, each with where it is from."""
 
 
 def joint_limits(

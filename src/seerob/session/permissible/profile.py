@@ -40,9 +40,9 @@ class Parabolas:
     t: Array
     """From 0, shape (n,) [s]."""
     s: Array
-    """At those instants, shape (n,)."""
+    """Way at those instants, shape (n,)."""
     speed: Array
-    """Likewise; 0 at both ends."""
+    """Speed at those instants, shape (n,); 0 at both ends."""
     acceleration: Array
     """On each interval, shape (n - 1,)."""
     area: Array

@@ -135,11 +135,11 @@ class Posed(State):
         self.refresh(t)
 
     def whole_doubt(self, name: str) -> str:
-        """See `State.whole_doubt`; of the others what the run knew of them then, of any bone."""
+        """Why nothing of a robot or person may be relied on; others as the run knew them then, bones too."""
         return self.doubts.get(name, "")
 
     def signal(self, name: str) -> Value:
-        """See `State.signal`; what the run heard then, of variables that switch criteria."""
+        """Value of a variable that switches criteria, in SI, as the run heard it; may raise `Undecided`."""
         said = self._said[name]
         if isinstance(said, Undecided):
             raise said

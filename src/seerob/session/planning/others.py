@@ -91,7 +91,7 @@ class Witness(Closing):
         return bool(self.places) if self._instant is not None else bool(self._unknown)
 
     def write(self, snapshot: Snapshot, samples: Iterable[Sample]) -> None:
-        """See `seerob.outputs.sink.Writer`."""
+        """Take one tick: what goes out, and what came in to make it."""
         if self.done or (self._instant is not None and snapshot.t < self._instant - 1e-9):
             self.last = snapshot.t
             return

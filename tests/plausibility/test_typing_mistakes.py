@@ -142,6 +142,19 @@ MISTAKES: dict[str, tuple[dict[str, str], str, set[str]]] = {
     "a metre above the floor": ({"at": "at = { position = [1.75, 0, 1.0] }"}, "humans[0].feet", {"speed"}),
     "below the floor": ({"at": "at = { position = [1.75, 0, -0.3] }"}, "humans[0].feet", {"speed"}),
     "robot inside the table": ({"base": "position = [0.8, 0, 0.4]"}, "robots[0].inside.table", set()),
+    "robot on the floor in the table that stands there": (
+        {"base": "position = [0.8, 0, 0]"},
+        "robots[0].inside.table",
+        set(),
+    ),
+    "two robots in one place": (
+        {
+            "more": '[[robots]]\nname = "b"\nmodel = "library:ur5"\nbase = { position = [0, 0, 0.75] }\n'
+            "q = [0, 0, 0, 0, 0, 0]\n"
+        },
+        "robots[0].inside.b",
+        set(),
+    ),
     "inch mesh in mm": ({"tool": INCH + "density = 7850"}, "tools[0].mass", set()),
     "inch mesh in mm, weighed": ({"tool": INCH + "mass = 3"}, "tools[0].bulk_density", set()),
     "tool in mm": ({"tool": "shape = { box = [80, 100, 120] }\nmass = 1.2"}, "tools[0].extent", set()),
@@ -305,6 +318,23 @@ def test_where_a_recorded_motion_begins_is_looked_at(
     assert doubted(station) == []
     held = [f for _, o in station.sources for f in o.findings if f.holds]
     assert {f.text.partition(" = ")[0] for f in held} == ({key} if key else set())
+
+
+def test_a_robot_that_a_file_moves_in_a_table_that_stands_on_its_floor_is_found(tmp_path: Path) -> None:
+    (tmp_path / "m.csv").write_text(
+        "t [s],J1 [deg],J2 [deg],J3 [deg],J4 [deg],J5 [deg],J6 [deg]\n"
+        "0,180,-90,-90,-90,90,0\n1,180,-80,-90,-90,90,0\n"
+    )
+    more = '[[sources]]\nkind = "csv"\nrobot = "ur5"\nfile = "m.csv"\n'
+    station = station_of(tmp_path, cell(base="position = [0.8, 0, 0]", more=more))
+    held = [f for _, o in station.sources for f in o.findings if f.holds]
+    assert [f.text.partition(" = ")[0] for f in held] == ["robots[0].inside.table"]
+
+
+def test_two_things_that_stand_on_one_floor_in_one_place_are_found(tmp_path: Path) -> None:
+    more = '[[parts]]\nname = "b"\nshape = { box = [0.6, 0.6, 0.6] }\nat = { position = [0.8, 0, 0.3] }\n'
+    (found,) = doubted(station_of(tmp_path, cell(more=more)))
+    assert found.text.startswith("parts[1].inside.table = ")
 
 
 def test_another_value_is_not_confirmed(tmp_path: Path) -> None:

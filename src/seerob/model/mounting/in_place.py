@@ -73,7 +73,7 @@ def implausible_motion(model: Model, q: Mapping[str, Sequence[Array]]) -> tuple[
         _Home(model, {name: at[min(k, len(at) - 1)] for name, at in q.items()}) for k in range(_most(q))
     ]
     people = q.keys() & {human.name for human in model.workstation.humans}
-    every = [*_feet(model, places[0], people), *_overlaps(model, places[0], people)]
+    every = [*_feet(model, places[0], people), *_overlaps(model, places[0], q.keys())]
     if people:
         every += _nobody(model, places)
     return tuple(findings(every, model.workstation.confirmed))
@@ -217,7 +217,7 @@ class _Home:
 
     def depth(self, outer: Body, inner: Body) -> float:
         """How deep one reaches into the other [m]."""
-        if self.distance((outer.index,), (inner.index,), 0.1) >= 0:
+        if self.distance((outer.index,), (inner.index,), 0.1) > 0:
             return 0.0
         pairs = [(outer.index, inner.index), (inner.index, outer.index)]
         asked = Depths(self.shapes).ask(self.rotations, self.positions, pairs)
@@ -234,6 +234,22 @@ def _standing(model: Model) -> list[Body]:
     moved = {i for m in model.mechanisms.values() for i in m.moving}
     fixed = [b for b in _seen(model.bodies) if not b.mover or (b.role == "robot" and b.index not in moved)]
     return [b for b in fixed if not b.holder]
+
+
+def _rooted(model: Model, place: _Home, name: str) -> list[Body]:
+    """Of a robot that stands on nothing that moves: its base, and the links that turn with its first joint.
+
+    A base alone may be as flat as a plate. Where nobody says how the joint is turned, the base alone.
+    """
+    mj, found = model.mj, [b for b in _standing(model) if b.owner == name]
+    if not found or name not in place.still:
+        return found
+    for body in _of(model, model.mechanisms[name]):
+        dof = mj.body_dofadr[mj.body_weldid[body.mj]]
+        if body.owner == name and dof >= 0 and mj.dof_parentid[dof] < 0:
+            turns = mj.jnt_type[mj.dof_jntid[dof]] == mujoco.mjtJoint.mjJNT_HINGE
+            found += [body] if turns and body not in found else []
+    return found
 
 
 def _of(model: Model, mechanism: Mechanism) -> list[Body]:
@@ -263,23 +279,22 @@ def _feet(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity
 
 
 def _overlaps(model: Model, place: _Home, who: Collection[str]) -> Iterator[Quantity]:
-    """How deep people and bases of robots reach into what stands."""
-    standing = _standing(model)
+    """How deep people and roots of robots reach into what stands."""
     owners: dict[str, list[Body]] = {}
-    for body in standing:
+    for body in _standing(model):
         owners.setdefault(body.owner, []).append(body)
+    roots = {r.name: _rooted(model, place, r.name) for r in model.workstation.robots if r.name in owners}
+    owners |= roots
     for group in ("humans", "robots"):
         for i, table in enumerate(getattr(model.workstation, group)):
             if table.name not in who:
                 continue
-            own = (
-                _of(model, model.mechanisms[table.name]) if group == "humans" else owners.get(table.name, [])
-            )
+            own = _of(model, model.mechanisms[table.name]) if group == "humans" else roots.get(table.name, [])
             for owner, bodies in owners.items():
                 if owner == table.name or not own:
                     continue
                 a, b = [body.index for body in own], [body.index for body in bodies]
-                if place.distance(a, b, 0.1) >= 0:
+                if place.distance(a, b, 0.1) > 0:
                     continue
                 deep, inner, outer = max(
                     ((place.depth(y, x), x.name, y.name) for x in own for y in bodies),
@@ -298,7 +313,7 @@ def _parts(model: Model, place: _Home) -> Iterator[Quantity]:
     for i, (part, own) in enumerate(zip(model.workstation.parts, every, strict=True)):
         for other, bodies in zip(model.workstation.parts[:i], every, strict=False):
             a, b = [body.index for body in own], [body.index for body in bodies]
-            if not own or not bodies or place.distance(a, b, 0.1) >= 0:
+            if not own or not bodies or place.distance(a, b, 0.1) > 0:
                 continue
             deep = max(place.depth(y, x) for x in own for y in bodies)
             about = (part.name, other.name)

@@ -210,7 +210,7 @@ export interface Aspect {
   value?: number | null;
   unit?: string;
   limit?: number | null;
-  /** Of the method, that the value falls into, with its thresholds: `20° to 45°`. */
+  /** Band of the method into which the value falls, with its thresholds: `20° to 45°`. */
   band?: string;
 }
 
@@ -397,7 +397,7 @@ export interface MechanismInfo {
   joints: JointInfo[];
   /** Why what its source says is too coarse for energies and forces; empty when it is not. */
   coarse: string;
-  /** Of a robot or machine: what each link and each thing on it weighs. */
+  /** What each link of a robot or machine and each thing on it weighs. */
   masses: LinkMass[];
 }
 

@@ -24,4 +24,4 @@ class ReportSection:
     picture: bytes | None = None
     """PNG."""
     caption: str = ""
-    """Of the picture."""
+    """Caption of the picture."""

@@ -109,7 +109,7 @@ class BodyPoint(Struct, frozen=True, kw_only=True):
     at: Vec3 = (0.0, 0.0, 0.0)
     """Where it is fixed, in the bone's frame [m]; the bone's proximal joint when not given."""
     position: Vec3 | None = None
-    """Of that point in the world [m]; None when it is not known."""
+    """Position of that point in the world [m]; None when it is not known."""
     wxyz: Vec4 | None = None
     """World from bone, unit quaternion; None when it is not known."""
     position_weight: float = 1.0

@@ -168,7 +168,7 @@ class Aspect(Struct, frozen=True, kw_only=True, omit_defaults=True):
     unit: str = ""
     limit: float | None = None
     band: str = ""
-    """Of the method, that the value falls into, with its thresholds: ``20° to 45°``."""
+    """Band of the method into which the value falls, with its thresholds: ``20° to 45°``."""
 
 
 class Row(Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -356,7 +356,7 @@ class MechanismInfo(Struct, frozen=True, kw_only=True):
     coarse: str = ""
     """Why what its source says is too coarse for energies and forces; empty when it is not."""
     masses: tuple[LinkMass, ...] = ()
-    """Of a robot or machine: what each link and each thing on it weighs."""
+    """What each link of a robot or machine and each thing on it weighs."""
 
 
 class Scene(Struct, frozen=True, kw_only=True, tag="scene"):

@@ -34,7 +34,8 @@ class Tolerance(NamedTuple):
 
 
 Shifts = tuple[int, ...]
-"""Of each input: −1 where it makes the figure least, 0 as given, 1 where it makes it largest."""
+"""One number per input: −1 where the input makes the figure least, 0 as given, 1 where it makes it largest.
+"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,7 +79,7 @@ class End(NamedTuple):
     margin: Margin | None
     """None unless it is within."""
     speeds: Array
-    """Of every body [m/s]."""
+    """Speed of every body [m/s]."""
     idle: bool = False
     """Nothing was there to judge."""
 

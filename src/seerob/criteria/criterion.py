@@ -128,7 +128,7 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         raise NotImplementedError
 
     def looks_ahead(self, model: Model) -> Mapping[str, float]:
-        """Of robots, how far ahead it asks what their recorded motions do [s], `State.foresee`."""
+        """Name of a robot → how far ahead it asks what its recorded motion does [s], `State.foresee`."""
         return {}
 
     def variables(self) -> dict[str, str]:

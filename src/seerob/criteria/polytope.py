@@ -38,7 +38,8 @@ class Polytope:
     corners: Array
     """Distinct corners, shape (k, 3) [N]; of an unbounded set those of its section across ``free``."""
     triangles: kernel.Indices
-    """Of its surface, outside counter-clockwise, shape (m, 3); none when it is flat and made by a hull."""
+    """Triangles of the surface, counter-clockwise from outside, shape (m, 3); none when it is flat and made
+    by a hull."""
     free: Array
     """Orthonormal directions in which it has no end, as columns, shape (3, d)."""
     inscribed: float

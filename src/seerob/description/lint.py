@@ -30,7 +30,7 @@ EXTENTS = (1e-4, 20.0)
 LIKELY = (0.01, 10.0)
 """Within these a unit is worth proposing [m]."""
 MAX_MASS = 1e4
-"""Of one thing [kg]."""
+"""Largest mass of one thing [kg]."""
 NOTHING = 1e-9
 """Up to this a mass is none [kg]."""
 DENSITIES = (10.0, 25_000.0)

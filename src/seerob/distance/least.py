@@ -349,7 +349,7 @@ class Members(NamedTuple):
     rows: Indices
     """Solids, meshes first, and 1 where the first belongs to the second set, shape (k, 3)."""
     bodies: Indices
-    """Of the first and of the second set, shape (k, 2)."""
+    """Bodies of the first and of the second set, shape (k, 2)."""
     start: Indices
     """Where each group begins, shape (g + 1,)."""
 

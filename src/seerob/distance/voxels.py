@@ -58,7 +58,7 @@ class VoxelGrid:
 
     @property
     def volume(self) -> float:
-        """Of the marked voxels [m³]."""
+        """Volume of the marked voxels [m³]."""
         return self.count * self.pitch**3
 
     def cover(self, low: Array, high: Array) -> None:
@@ -134,7 +134,7 @@ class VoxelGrid:
         return cells, (low - layers).astype(float)
 
     def centres(self) -> Array:
-        """Of the marked voxels [m], shape (n, 3)."""
+        """Centres of the marked voxels [m], shape (n, 3)."""
         return (np.argwhere(self.cells) + (self.first + 0.5)) * self.pitch
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:

@@ -25,7 +25,7 @@ class Shapes:
     """The solids of all bodies of a model with their trees; immutable, shared by queries and threads."""
 
     names: tuple[str, ...]
-    """Of the bodies, in the order of all pose arrays."""
+    """Names of the bodies, in the order of all pose arrays."""
     solids: tuple[tuple[int, ...], ...]
     """Columns of the arrays below that each body carries."""
     which: Indices

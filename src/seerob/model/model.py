@@ -89,7 +89,7 @@ class Mechanism:
     joints: tuple[Joint, ...]
     """The n joints that are commanded."""
     q_address: Indices
-    """Of all joints, mimics included, in ``MjData.qpos``, shape (m,)."""
+    """Columns of all joints, mimics included, in ``MjData.qpos``, shape (m,)."""
     v_address: Indices
     """In ``MjData.qvel``, shape (m,)."""
     coupling: Array

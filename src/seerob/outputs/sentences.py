@@ -124,7 +124,7 @@ def summary(log: ResultLog) -> list[str]:
 
 
 def covered(series: Series) -> str:
-    """Of which share of the run a verdict speaks: ``decided 40 % of the run, did not apply in 60 %``.
+    """Say for which share of the run a verdict holds: ``decided 40 % of the run, did not apply in 60 %``.
 
     Empty when that is all of it, or when there is no verdict.
     """

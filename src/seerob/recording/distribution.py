@@ -38,7 +38,7 @@ class Distribution(NamedTuple):
     coverage: float
     """Share of the evaluated ticks that have a value, 0…1."""
     mean: float
-    """Of the values that there are."""
+    """Mean of the values that there are."""
     percentiles: tuple[tuple[int, At], ...]
     """50 and 95: the smallest value that so many per cent of the ticks with a value do not exceed."""
     minimum: At

@@ -47,7 +47,7 @@ class Worst(NamedTuple):
     t: float
     """Instant the result speaks of [s]."""
     seq: int
-    """Of the snapshot that it is in."""
+    """Number of the snapshot that it is in."""
     value: float | None
     limit: float | None
     verdict: Verdict | None
@@ -315,7 +315,7 @@ class Series:
 
     @property
     def verdict(self) -> Verdict | None:
-        """Of the whole run so far; see above."""
+        """Verdict of the whole run so far; see above."""
         if not self.known:
             return Verdict.UNDECIDED
         found = worst_verdict(v for v, code in CODES.items() if code in self._said)

@@ -59,7 +59,7 @@ class Column:
 
     @property
     def verdict(self) -> Verdict | None:
-        """Of the whole: EXCEEDED before UNDECIDED before WITHIN before none."""
+        """Verdict of all instants: EXCEEDED before UNDECIDED before WITHIN before none."""
         there = set(np.unique(self.answers.verdict).tolist())
         order = (Verdict.EXCEEDED, Verdict.UNDECIDED, Verdict.WITHIN)
         found = next((verdict for verdict in order if CODES[verdict] in there), None)

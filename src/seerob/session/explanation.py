@@ -245,7 +245,7 @@ class JointExplained:
     name: str
     unit: str
     mean: float
-    """Of measured less needed, with the file's model [N·m or N]."""
+    """Mean of measured less needed, with the file's model [N·m or N]."""
     rms: float
     largest: float
     """By size."""
@@ -280,7 +280,7 @@ class Explanation:
     carried: float
     """Mass that the file has there [kg]."""
     mass: float
-    """Of all that the joints move, as the file has it [kg]."""
+    """Mass of all that the joints move, as the file has it [kg]."""
     condition: float
 
     @property

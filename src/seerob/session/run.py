@@ -80,7 +80,7 @@ def bind(model: Model) -> tuple[Bound, ...]:
 
 
 def looks_ahead(model: Model) -> Mapping[str, float]:
-    """Of robots, how far ahead the criteria of a workstation ask what their recorded motions do [s]."""
+    """Name of a robot → how far ahead criteria ask what its recorded motion does [s]."""
     found: dict[str, float] = {}
     for criterion in model.workstation.safety:
         for name, span in criterion.looks_ahead(model).items():

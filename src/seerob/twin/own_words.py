@@ -188,7 +188,7 @@ class SaidTool:
         return best
 
     def speeds(self, posture: Posture, qd: Array) -> Array:
-        """Of each point where the TCP may be [m/s], shape (tips, N).
+        """Speed of each point where the TCP may be [m/s], shape (tips, N).
 
         Args:
             posture: The arm at N joint positions.

@@ -27,8 +27,8 @@ from seerob.model.model import Model
 
 Indices = NDArray[np.int64]
 Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]
-"""Of a robot at instants to come [s]: positions and velocities of its joints [rad or m], shape (k, n), and
-why they are not known so; None where nothing is."""
+"""Asks what a robot does at instants to come [s]: positions and velocities of its joints [rad or m], shape
+(k, n), and why they are not known so; None where nothing is."""
 
 Coupling = Mapping[int, Array]
 
@@ -72,7 +72,7 @@ class Fall(NamedTuple):
 
 
 UNBOUNDED = Fall(np.inf)
-"""Of a span of which nothing is known."""
+"""The fall within a span of which nothing is known."""
 
 
 class Points:
@@ -346,7 +346,7 @@ def down_to(least: Array | float, lowest: Array | float) -> Fall:
 
 
 def approaching(a: Iterable[int], b: Iterable[int]) -> Falls:
-    """Of a distance between two sets of points: it changes by no more than the ways of both."""
+    """Bound the change of a distance between two sets of points by the ways of both."""
     first, second = rows_of(a), rows_of(b)
 
     def falls(span: Span, _: Array | float) -> Fall:
@@ -356,7 +356,7 @@ def approaching(a: Iterable[int], b: Iterable[int]) -> Falls:
 
 
 def speeding(points: Iterable[int]) -> Falls:
-    """Of the speed of the fastest of some points."""
+    """Bound the change of the speed of the fastest of some points."""
     rows = rows_of(points)
 
     def falls(span: Span, _: Array | float) -> Fall:

@@ -38,8 +38,8 @@ from seerob.workstation.variables.dictionary import Value
 
 Indices = NDArray[np.int64]
 Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]
-"""Of a robot or human and instants ahead [s] (m,): joint positions and velocities there, shape (m, n) each,
-and why they may be others; None where nobody knows what it will do."""
+"""Asks what a robot or human does at instants ahead [s] (m,): joint positions and velocities there, shape (m,
+n) each, and why they may be others; None where nobody knows."""
 
 MOST_PLACES = 512
 """Sets of bodies of which places are kept from tick to tick."""

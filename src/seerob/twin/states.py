@@ -27,7 +27,7 @@ from seerob.twin.joint_columns import Columns, moving_dofs
 from seerob.twin.spans import Path
 
 Reasons = NDArray[np.object_]
-"""Of each instant why something is not known, empty where it is; shape (N,)."""
+"""Why something is not known at each instant, empty where it is; shape (N,)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -130,7 +130,7 @@ class PinchPairs:
         return found
 
     def per_body(self, clamped: Flags) -> Flags:
-        """Of gaps (..., g, r), which moving bodies clamp: shape (..., b, r)."""
+        """Which moving bodies clamp, shape (..., b, r), given which gaps do, shape (..., g, r)."""
         found = np.zeros((*clamped.shape[:-2], len(self.moving), clamped.shape[-1]), bool)
         if not clamped.any():
             return found

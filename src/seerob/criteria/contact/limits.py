@@ -32,7 +32,7 @@ class RegionArrays:
     regions: tuple[BodyRegion, ...]
     force: Array
     pressure: Array
-    """Of every specific area of every region in turn, shape (a,)."""
+    """Pressure limit of every specific area of every region in turn, shape (a,)."""
     owner: NDArray[np.int64]
     """Row of the region of each of them, shape (a,)."""
     multiplier: Array

@@ -77,7 +77,7 @@ class Measurement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     contact: Literal["free", "clamped"]
     """Whether a body part there could give way, or not."""
     speed: _Positive
-    """Of the part at the contact [m/s]."""
+    """Speed of the part at the contact [m/s]."""
     curve: _Name | None = None
     """CSV file of force over time, beside the workstation file."""
     force_N: _Positive | None = None
@@ -95,7 +95,7 @@ class Measurement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     pad: str = ""
     """Its damping element."""
     date: dt.date | None = None
-    """Of the measurement."""
+    """Date of the measurement."""
     calibrated: dt.date | None = None
     """Last calibration of the device."""
     place: Annotated[str, Meta(max_length=500)] = ""
@@ -112,9 +112,9 @@ class Measured:
 
     said: Measurement
     rows: tuple[int, ...]
-    """Of the moving bodies."""
+    """Rows of the moving bodies."""
     column: int
-    """Of the body region."""
+    """Column of the body region."""
     transient: float | None
     """F_T [N]; None when not measured."""
     static: float | None

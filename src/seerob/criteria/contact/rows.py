@@ -43,7 +43,7 @@ class Bound(Protocol):
     unknown: list[str]
     """Why a moving body's contact area is not known, per body."""
     names: list[str]
-    """Of the moving bodies."""
+    """Names of the moving bodies."""
 
 
 class ContactRows:

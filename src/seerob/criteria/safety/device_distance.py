@@ -60,7 +60,7 @@ class DeviceDistance(Criterion, frozen=True, kw_only=True):
     approach: Literal["orthogonal", "parallel"] | None = None
     """Across the field, or along it over the floor; by the kind of device when not given."""
     edition: Literal["2010", "2024"] = "2024"
-    """Of ISO 13855."""
+    """Edition of ISO 13855."""
     reach_over: Annotated[float, _m] | None = None
     """C_RO (D_DO) for reaching over the field, from the norm's table [m]; 0 where it is excluded."""
     reach_under: Annotated[float, _m] | None = None

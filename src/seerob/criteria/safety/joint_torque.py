@@ -60,8 +60,8 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
     """How far each torque may be off [N·m or N]; gives the interval. Without it nothing that the model needs
     is within: friction and rotors are not in it."""
     largest_residual: PerJoint | None = None
-    """Of each joint: where measured torques are farther from what the model needs, the model does not explain
-    them, and what is within is undecided [N·m or N]."""
+    """Largest difference between a measured torque and what the model needs that the model still explains,
+    per joint [N·m or N]; beyond it, what is within is undecided."""
 
     def subjects(self) -> tuple[str, ...]:
         """The robot."""

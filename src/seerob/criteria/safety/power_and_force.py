@@ -87,8 +87,8 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
     """Mass of the robot: M/2 + m_L, the effective mass along the motion, or the larger of both. A machine,
     and what it carries while it moves, has its whole mass instead of M/2 + m_L."""
     drive_force: Annotated[float, Meta(ge=0, extra={"unit": "N"})] | None = None
-    """Of a machine, or of what carries the robot: largest force with which its drive keeps pushing whoever it
-    touches, at any place that can touch [N]; 0 of what rolls freely. Undecided without it."""
+    """Largest force with which the drive of a machine, or of what carries the robot, keeps pushing whoever it
+    touches, at any place that can touch [N]; 0 of what rolls freely."""
     contact_radius: dict[str, _Positive] = field(default_factory=dict)
     """Radius of the sharpest edge of parts by name [m], instead of what their meshes tell; the robot's name
     means its links up to the flange, not what is mounted there."""

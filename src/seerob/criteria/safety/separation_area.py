@@ -54,7 +54,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         return super().judged(model) | set(self._criterion(model).moving(model))
 
     def depends(self, model: Model) -> tuple[str, ...]:
-        """Them, and the robot that the separation is of."""
+        """Names of what must stay outside, and of the robot that the separation is of."""
         return (*self.subjects(), *self._criterion(model).depends(model))
 
     def _criterion(self, model: Model) -> Any:

@@ -44,7 +44,7 @@ class Wrench(NamedTuple):
     """Share of a unit force that the torques do not show, along each axis in order of visibility,
     0 (fully seen) … 1 (not at all), shape (..., 3 or 6)."""
     axes: Array
-    """Those axes as columns, best seen first, shape (..., 3 or 6, 3 or 6)."""
+    """The axes as columns, best seen first, shape (..., 3 or 6, 3 or 6)."""
 
 
 LARGEST = 1e3

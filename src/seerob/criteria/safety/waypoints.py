@@ -20,7 +20,7 @@ from seerob.twin.state import State
 from seerob.workstation.source import Target
 
 DRAWN_RADIUS = 0.012
-"""Of the balls that are drawn [m]."""
+"""Radius of the balls that are drawn [m]."""
 DRAWN = 300
 """Points of the line that is drawn."""
 DRAWN_LABELS = 60

@@ -23,7 +23,7 @@ class Points(NamedTuple):
 
     @property
     def total(self) -> float:
-        """Of section 1, far reach apart."""
+        """Points of section 1, far reach apart."""
         most = float(published("eaws_posture")["asymmetry_sum_most"])
         return sum(self.lines.values()) + min(self.rotation + self.bending, most)
 

@@ -16,7 +16,8 @@ from seerob.criteria.scoring.thresholds import Angle, Thresholds
 from seerob.description.humans.angles import Angles
 
 Accuracy = float | Mapping[str, float]
-"""Of each angle [rad]: one figure for all, or one per name of `Angles`; a name that is not there is exact."""
+"""How far angles may be off [rad]: one figure for all, or one per name of `Angles`; a name that is not there
+is exact."""
 
 
 class JointAccuracy(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

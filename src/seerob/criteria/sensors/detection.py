@@ -23,13 +23,13 @@ class Detection(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How the person is detected, for C by ISO 13855."""
 
     edition: Literal["2010", "2024"] = "2024"
-    """Of ISO 13855."""
+    """Edition of ISO 13855."""
     approach: Literal["orthogonal", "parallel"] = "parallel"
     """Across the field, or along it over the floor."""
     capability: Annotated[float, Meta(gt=0, extra={"unit": "m"})] | None = None
     """Smallest object that is always seen [m]; when none was demonstrated, the largest C holds."""
     height: Annotated[float, _m] | None = None
-    """Of a field along the floor [m]."""
+    """Height of a field along the floor [m]."""
     reach_over: Annotated[float, _m] | None = None
     """C_RO (D_DO) for reaching over a field across the approach, from the norm's table [m]; 0 where other
     measures exclude it. C is the larger of it and what the field gives."""

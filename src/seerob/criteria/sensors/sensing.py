@@ -235,7 +235,7 @@ class Presence:
         return approaching(self.gap.a, self.gap.b)
 
     def inputs(self) -> tuple[Input, ...]:
-        """Of the basis: motion, shapes, and the figures of the device with their source."""
+        """Inputs of the basis: motion, shapes, and the figures of the device with their source."""
         sensor, given = self.sensor, []
         for name, value, unit in (
             ("detection capability", sensor.capability, "m"),
@@ -256,7 +256,7 @@ class Presence:
 
 
 def seen_in_field(name: str, presence: Presence, judge: Evaluate) -> Evaluate:
-    """Of people of whom a part is seen: who is in the field with that part is in it.
+    """Judge people of whom a part is seen: who is in the field with that part is in it.
 
     What the device makes of it stays open, since a bone that nobody sees may shade another.
 

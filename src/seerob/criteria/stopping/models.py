@@ -42,9 +42,9 @@ from seerob.twin.state import State
 MOST_OFF = 3
 """So many masses may be off in a simulated stop: every corner of their tolerances is one more."""
 SHARE = 0.8
-"""Of the torque limits, unless the file says otherwise."""
+"""Share of the torque limits that is used, unless the file says otherwise."""
 SHARES = {"bound": BOUND, "constant_deceleration": CONSTANT}
-"""Of v_r T_s, by how a stop is modelled whose time is known."""
+"""Share of v_r T_s that is travelled, by how a stop is modelled whose time is known."""
 STEADY = 1e-3
 """Speeds of joints that differ by less during the reaction time are the same [rad/s or m/s]."""
 MOVING = 1e-6
@@ -73,7 +73,7 @@ class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """``bound``: full speed during the whole stop, Eq. 2; ``constant_deceleration``: half of that;
     ``table``: the maker's stopping tables; ``simulated``: the dynamics with all brakes on."""
     deceleration: Annotated[float, Meta(gt=0, extra={"unit": "m/s²"})] | None = None
-    """Of the fastest point [m/s²], instead of ``stopping``, with ``constant_deceleration``."""
+    """Deceleration of the fastest point [m/s²], instead of ``stopping``, with ``constant_deceleration``."""
     table: str | StoppingTable | None = None
     """Name of a table that comes with seerob (`table.shipped`), or the table itself."""
     table_for: str | None = None
@@ -150,7 +150,7 @@ class StopModel:
     reactions: Reactions
     """What it does before it brakes."""
     formula: str
-    """Of S_s."""
+    """Formula of S_s."""
     inputs: tuple[Input, ...]
     doubts: tuple[str, ...] = ()
     """Why ways may be longer than it says."""

@@ -53,7 +53,7 @@ class Stopped:
     positions: Array
     """[m], shape (K, n, 3)."""
     speeds: Array
-    """Of each body's fastest point [m/s], shape (K, n)."""
+    """Speed of each body's fastest point [m/s], shape (K, n)."""
 
     @property
     def T_s(self) -> float:

@@ -45,7 +45,7 @@ class Fit:
 
     @property
     def median(self) -> float:
-        """Of all distances [m]; NaN when there are none."""
+        """Median of all distances [m]; NaN when there are none."""
         return float(np.median(list(self.away.values()))) if self.away else np.nan
 
 

@@ -41,7 +41,7 @@ class MarkerStature:
     stature: float
     """[m]"""
     lowest: float
-    """Of the parts of the recording [m]."""
+    """Lowest stature of the parts of the recording [m]."""
     highest: float
     residual: float
     """Median distance of the markers from where the best body has them [m]."""

@@ -44,7 +44,7 @@ as they like."""
 
 
 class Percentile(StrEnum):
-    """Of a length over the frames."""
+    """Percentile of a length over the frames."""
 
     P5 = "P5"
     P50 = "P50"

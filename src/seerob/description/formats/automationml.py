@@ -87,7 +87,7 @@ class Plant:
 
     file: Path
     version: str
-    """Of CAEX."""
+    """Version of CAEX."""
     roots: tuple[Element, ...]
     """Instance hierarchies."""
     links: tuple[tuple[str, str], ...]

@@ -32,13 +32,13 @@ FLOOR = 1.2
 FINE, COARSE = 0.04, 0.07
 """Detection capability up to which hands and arms (2S), and up to which bodies (M), are detected [m]."""
 HIGHEST = 1.0
-"""Of a field along the floor [m] (2S)."""
+"""Largest height of a field along the floor [m] (2S)."""
 CRAWLING = 0.2
 """Height of a field along the floor above which somebody may crawl under it [m] (2S, weak)."""
 
 
 class Edition(StrEnum):
-    """Of ISO 13855."""
+    """Edition of ISO 13855."""
 
     E2010 = "2010"
     E2024 = "2024"

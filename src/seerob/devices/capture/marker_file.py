@@ -24,7 +24,7 @@ class MarkerFile(CaptureFile, frozen=True, kw_only=True):
     up: Up | None = None
     """Axis of the file that points up; what the file says, or told by heads being above feet."""
     unit: Length | None = None
-    """Of the coordinates; what the file says when not given."""
+    """Unit of the coordinates; what the file says when not given."""
 
     def reading(self) -> MarkerReading:
         """How the file is to be read."""

@@ -35,7 +35,7 @@ _PAIRS = {(SEGMENTS.index(p) + 1, SEGMENTS.index(c) + 1): k for k, (_, p, c) in 
 
 
 class Unit(StrEnum):
-    """Of the positions in the stream."""
+    """Unit of the positions in the stream."""
 
     GUESS = "guess"
     """From the length of the trunk."""

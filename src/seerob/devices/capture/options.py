@@ -67,7 +67,7 @@ class Calibration(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 CutOff = Annotated[
     float, Meta(ge=LOWEST, le=HIGHEST, extra={"unit": "Hz"}, extra_json_schema={"x-unit": "Hz"})
 ]
-"""Of the low-pass filter through which the twin sees a device."""
+"""Cut-off frequency of the low-pass filter through which the twin sees a device [Hz]."""
 
 
 class Options(Protocol):

@@ -18,7 +18,7 @@ class BodyCsv(MarkerFile, frozen=True, kw_only=True):
     seen: Seen = Seen.JOINTS
     """What the points are: ``joints``, ``segments``, ``markers`` or ``trackers``."""
     time_unit: TimeUnit | None = None
-    """Of the time, when its header does not say it."""
+    """Unit of the time, when the file's header does not say it."""
 
     def read(self, path: Path) -> Captured:
         """The points of the person.

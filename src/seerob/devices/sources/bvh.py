@@ -34,7 +34,7 @@ HEAD, FEET = ("head", "neck"), ("foot", "ankle", "toe")
 
 
 class Unit(StrEnum):
-    """Of the lengths in a file."""
+    """Unit of the lengths in a file."""
 
     GUESS = "guess"
     """From the size of the skeleton."""
@@ -43,7 +43,7 @@ class Unit(StrEnum):
     MM = "mm"
     INCH = "in"
     CMU = "cmu"
-    """Of the CMU motion capture database and what was made of it: 1/0.45 inch."""
+    """Unit of the CMU motion capture database and what was made of it: 1/0.45 inch."""
 
 
 METRES = {Unit.M: 1.0, Unit.CM: 0.01, Unit.MM: 0.001, Unit.INCH: 0.0254, Unit.CMU: 0.0254 / 0.45}
@@ -199,7 +199,8 @@ class Bvh(CaptureFile, frozen=True, kw_only=True):
     """A person moved by a BVH file."""
 
     unit: Unit = Unit.GUESS
-    """Of its lengths: ``m``, ``cm``, ``mm``, ``in``, ``cmu`` (1/0.45 inch), or guessed from the skeleton."""
+    """Unit of the lengths: ``m``, ``cm``, ``mm``, ``in``, ``cmu`` (1/0.45 inch), or guessed from the
+    skeleton."""
     up: Up = Up.GUESS
     """Its axis that points up: ``y``, ``z``, or guessed from the person."""
 

@@ -22,11 +22,11 @@ class KinectRecording(CaptureFile, frozen=True, kw_only=True):
     """A recording of a depth camera that tracks bodies (JSON, ROS bag, text)."""
 
     topic: str = ""
-    """Of a bag with several topics of skeletons."""
+    """Topic that is read, of a bag with several topics of skeletons."""
     unit: LengthUnit | None = None
-    """Of the positions in a text, when its headers do not say it."""
+    """Unit of the positions in a text, when its headers do not say it."""
     time_unit: TimeUnit | None = None
-    """Of the time in a text, when its header does not say it."""
+    """Unit of the time in a text, when its header does not say it."""
 
     def read(self, path: Path) -> Captured:
         """The person, upright: as ``at`` says, or as the person stands.

@@ -66,7 +66,8 @@ class Mvn(CaptureStream, frozen=True, kw_only=True):
     frequency: Annotated[float, Meta(ge=1, le=240, extra={"unit": "Hz"})] = 60.0
     """Rate of the stream in MVN's settings [Hz]."""
     unit: Unit = Unit.GUESS
-    """Of positions: ``m``, ``cm``, or guessed from the length of the trunk: Xsens' documents differ."""
+    """Unit of positions: ``m``, ``cm``, or guessed from the length of the trunk, because Xsens' documents
+    differ."""
     up: Up = Up.Z
     """Axis that points up in quaternion datagrams (02): ``z``, or ``y`` when MVN is set so."""
 

@@ -156,7 +156,8 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
     frequency: Annotated[float, Meta(ge=1, le=500, extra={"unit": "Hz"})] = 125.0
     """Samples per second [Hz]; e-Series and later can do 500."""
     primary_port: Annotated[int, Meta(ge=0, le=65535)] = ur_primary.PORT
-    """Of the primary interface, which is read once for the kinematics of this very robot; 0 leaves it out."""
+    """Port of the primary interface, which is read once for the kinematics of this very robot; 0 leaves it
+    out."""
     origin: MotionOrigin = MotionOrigin.CONTROLLER
     """``vendor_emulator`` when it is URSim."""
 

@@ -60,7 +60,8 @@ class Vive(CaptureStream, frozen=True, kw_only=True):
     """``udp``: the sender sends to this machine; ``websocket``: this machine connects to it; ``openvr``:
     SteamVR runs here."""
     host: str = ""
-    """Of the computer with SteamVR; with ``udp`` only its datagrams count, anyone's when not given."""
+    """Name or address of the computer with SteamVR; with ``udp`` only its datagrams count, anyone's when not
+    given."""
     port: Annotated[int, Meta(ge=1, le=65535)] = PORT
     bind: str = "127.0.0.1"
     """Own address on which datagrams are listened for; when not given, only this machine is heard."""

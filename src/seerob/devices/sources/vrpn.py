@@ -53,7 +53,7 @@ class Vrpn(CaptureStream, frozen=True, kw_only=True):
     up: Up | None = None
     """Axis of the server's world that points up; z is assumed when not given."""
     unit: LengthUnit = LengthUnit.M
-    """Of positions; VRPN's convention is metres."""
+    """Unit of positions; VRPN's convention is metres."""
     frequency: Annotated[float, Meta(ge=1, le=1000, extra={"unit": "Hz"})] = 100.0
     """Rate of the server [Hz]."""
 

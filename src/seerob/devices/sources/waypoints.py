@@ -35,7 +35,7 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
     file: str = ""
     """Path, from the folder of the workstation file; its ending says what it is. Without it ``points``."""
     tolerance: Annotated[Annotated[float, Meta(gt=0, le=1)] | None, unit("rad")] = None
-    """Of a log (RoboDK, KUKA): how far in any joint the moves between waypoints may be from what was logged
+    """How far in any joint the moves between waypoints of a log (RoboDK, KUKA) may be from what was logged
     [rad or m]; needed with a log."""
     points: tuple[Point, ...] = ()
     """Waypoints by hand instead of a file; their keys are below."""
@@ -68,7 +68,7 @@ class Waypoints(TrajectoryFile, frozen=True, kw_only=True):
     base: str | None = None
     """Link that poses are given in; a controller's own file means the link ``base`` where there is one."""
     period: Annotated[float, unit("s", ge=0.001, le=0.1)] = 0.008
-    """Of the samples [s]."""
+    """Period of the samples [s]."""
 
     def __post_init__(self) -> None:
         if bool(self.file) == bool(self.points):

@@ -57,7 +57,7 @@ class Spot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     path: Annotated[
         str, Meta(max_length=500, pattern=r"^[^\s#]*$", description="a path without blanks and #")
     ] = ""
-    """Of another document, relative to ``url``; not with a WebSocket."""
+    """Path of another document, relative to ``url``; not with a WebSocket."""
     time: Annotated[str, Meta(max_length=500)] | None = None
     """JSON pointer to when it was so: seconds or milliseconds since 1970, or an ISO 8601 text."""
 

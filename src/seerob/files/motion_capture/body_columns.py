@@ -28,7 +28,7 @@ class Column(NamedTuple):
     """What one column holds."""
 
     name: str
-    """Of the point, as the file has it; empty in a table with a row per point."""
+    """Name of the point, as the file has it; empty in a table with a row per point."""
     what: str
     """``position``, ``orientation``, ``confidence``, ``time``, ``person`` or ``point``."""
     axis: int = 0

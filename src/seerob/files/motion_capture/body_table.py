@@ -41,11 +41,11 @@ class BodyTable:
     t: Array
     """[s], shape (n,)."""
     persons: tuple[str, ...]
-    """Of each row, as the file has it; empty texts when it has none."""
+    """Person of each row, as the file has it; empty texts when it has none."""
     values: Array
     """Shape (n, k, 8): x, y, z, quaternion w, x, y, z, confidence; NaN where the file has nothing."""
     unit: str
-    """Of the positions; empty when no header says it."""
+    """Unit of the positions; empty when no header says it."""
     has: frozenset[str]
     """Which of ``position``, ``orientation``, ``confidence`` there are."""
 

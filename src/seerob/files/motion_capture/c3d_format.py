@@ -45,7 +45,7 @@ class C3d:
     """What a C3D file holds, in its own units and axes."""
 
     labels: tuple[str, ...]
-    """Of the points."""
+    """Labels of the points."""
     points: Array
     """Shape (n, k, 3), NaN where a point was not seen."""
     rate: float

@@ -32,7 +32,7 @@ class MarkerReading:
     up: Up | None = None
     """Axis of the file that points up."""
     unit: str = ""
-    """Of the coordinates."""
+    """Unit of the coordinates."""
     convention: str = ""
     """Whose set of markers it is."""
 

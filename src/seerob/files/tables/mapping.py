@@ -92,7 +92,7 @@ class Mapping(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     unit_row: int | None = None
     """Row below the names that holds their units."""
     delimiter: str | None = None
-    """Of a text file: ``","``, ``";"``, a tab, ``"|"``; ``" "`` is any run of blanks."""
+    """Delimiter of a text file: ``","``, ``";"``, a tab, ``"|"``; ``" "`` is any run of blanks."""
     decimal_comma: bool | None = None
     """Whether ``1,5`` is one and a half."""
     robot_column: Column | None = None

@@ -45,7 +45,7 @@ class PathMap:
     permissible: Array
     """Path speed [rad/s or m/s], NaN where undecided, shape (n,)."""
     tool: Array
-    """Of the tool point [m], world, shape (n, 3)."""
+    """Positions of the tool point [m], world, shape (n, 3)."""
     tool_permissible: Array
     """[m/s], NaN where undecided, shape (n,)."""
     tool_given: Array

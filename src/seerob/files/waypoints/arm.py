@@ -20,7 +20,7 @@ class Posture:
     rotation: Array
     """Base from tool, shape (..., 3, 3)."""
     position: Array
-    """Of the tool point in the base [m], shape (..., 3)."""
+    """Position of the tool point in the base [m], shape (..., 3)."""
     anchors: Array
     """A point on each joint's axis [m], shape (..., n, 3)."""
     axes: Array

@@ -28,7 +28,7 @@ class Wish:
     """What the program does not say itself; None where nobody said it."""
 
     joint_speed: float | None = None
-    """Of the leading joint [rad/s or m/s]."""
+    """Speed of the leading joint [rad/s or m/s]."""
     joint_acceleration: float | None = None
     joint_jerk: float | None = None
     tool_speed: float | None = None
@@ -38,11 +38,11 @@ class Wish:
     tool_turn: float | None = None
     """Largest turning speed of the tool on its own ways [rad/s]; not limited when not given."""
     period: float = 0.008
-    """Of the samples [s]."""
+    """Period of the samples [s]."""
     start: tuple[float, ...] | None = None
     """Where the robot stands before the first waypoint [rad or m]."""
     branch: Branch | None = None
-    """Of poses that a joint move goes to; the one nearest to where the robot is when not given."""
+    """Branch of poses that a joint move goes to; the one nearest to where the robot is when not given."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,7 +55,7 @@ class Piece:
 
     @property
     def length(self) -> float:
-        """Of the way."""
+        """Length of the way."""
         return self.end - self.start
 
     @property

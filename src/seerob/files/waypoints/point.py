@@ -34,7 +34,7 @@ class Point(Table, frozen=True, kw_only=True):
     acceleration: Positive | None = None
     """Acceleration of the leading joint [rad/s² or m/s²], or of the tool point [m/s²]."""
     duration: Annotated[float, unit("s", gt=0, le=1e5)] | None = None
-    """Of the move, instead of speed and acceleration [s]."""
+    """Duration of the move [s], instead of speed and acceleration."""
     blend: Annotated[float, unit("m", ge=0, le=10)] = 0.0
     """Radius in which the path is rounded off [m]."""
     pause: Annotated[float, unit("s", ge=0, le=1e5)] = 0.0

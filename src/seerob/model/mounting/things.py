@@ -48,7 +48,7 @@ class LoadedThing:
 
     pieces: tuple[Piece, ...]
     inertial: Inertial | None
-    """Of all pieces together, in the thing's frame; None when nobody gave a mass or a density."""
+    """Inertial of all pieces together, in the thing's frame; None when nobody gave a mass or a density."""
     findings: tuple[Finding, ...]
     files: dict[str, bytes]
 

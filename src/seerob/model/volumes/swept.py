@@ -64,7 +64,7 @@ class Swept:
 
     @property
     def volume(self) -> float:
-        """Of the voxels; not less than that of the swept set [m³]."""
+        """Volume of the voxels; not less than that of the swept set [m³]."""
         return self.grid.volume
 
     def mesh(self, *, most: int | None = None) -> Mesh:

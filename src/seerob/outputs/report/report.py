@@ -40,7 +40,7 @@ class Report:
     date: str
     """When the report was written."""
     findings: tuple[Finding, ...]
-    """Of the model and of the run."""
+    """Findings of the model and of the run."""
     setup: Setup
     """Engine and sources."""
     command: str

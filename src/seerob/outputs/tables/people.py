@@ -18,7 +18,7 @@ class Person:
     name: str
     bones: tuple[str, ...]
     slots: tuple[int, ...]
-    """Of the bones in `Snapshot.poses`."""
+    """Places of the bones in `Snapshot.poses`."""
     joints: tuple[tuple[str, str], ...]
     """Name and unit."""
 
@@ -44,7 +44,7 @@ class Person:
         return [f"{bone} {what}" for bone in self.bones for what in ("position [m]", "angle [rad]")]
 
     def poses(self, snapshot: Snapshot) -> Array:
-        """Of the bones in the world: x, y, z [m], w, x, y, z; shape (bones, 7), as exact as the snapshot."""
+        """Poses of the bones in the world, x, y, z [m], w, x, y, z, as the snapshot has them: (bones, 7)."""
         every = np.frombuffer(snapshot.poses, "<f4").reshape(-1, 7)
         return np.asarray(every[list(self.slots)])
 

@@ -77,7 +77,7 @@ class Transform:
     parent: str
     child: str
     position: tuple[float, float, float]
-    """Of the child, in the parent [m]."""
+    """Position of the child, in the parent [m]."""
     wxyz: tuple[float, float, float, float]
     """Parent from child."""
 

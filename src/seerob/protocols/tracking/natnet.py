@@ -54,9 +54,9 @@ class ServerInfo(NamedTuple):
 
     application: str
     version: tuple[int, int, int, int]
-    """Of the application."""
+    """Version of the application."""
     natnet: tuple[int, int, int, int]
-    """Of the protocol; frames are of this version."""
+    """Version of the protocol, which frames are of."""
     data_port: int | None = None
     group: str | None = None
     """Multicast group; None when unicast, or when the version does not say."""

@@ -39,7 +39,7 @@ class Wish:
 
     by: By = By.ALL
     tolerance: float = 5e-4
-    """Of the path, in any joint [rad or m]."""
+    """Tolerance of the path, in any joint [rad or m]."""
     spacing: float = SPACING
     """Largest way between two stations of the map in joint space [rad or m]."""
     margin: float = 0.02
@@ -47,7 +47,7 @@ class Wish:
     not_faster: bool = False
     """Nowhere faster than the given motion."""
     period: float = 0.008
-    """Of the rescaled trajectory [s]."""
+    """Period of the rescaled trajectory [s]."""
     rounds: int = 3
     """How often the map is made anew when somebody else moves: rescaled, the robot meets them elsewhere; and
     how often it gets more stations where the plan uses more than is permitted between two of them."""
@@ -80,7 +80,7 @@ class PermissibleSpeed:
 
     @property
     def verdict(self) -> Verdict | None:
-        """Of the rescaled motion, or why there is none.
+        """Verdict of the rescaled motion, or why there is none.
 
         That of every criterion in the run of it; with `By.EITHER` the two methods count together, as they
         were asked at `Verified.period`, instead of each by itself.

@@ -18,7 +18,7 @@ Given = Sequence[float] | float | None
 
 @dataclass(frozen=True, eq=False)
 class JointLimits:
-    """Of one robot, all positive and finite, shape (n,) each."""
+    """Limits of the joints of one robot, all positive and finite, shape (n,) each."""
 
     joints: tuple[str, ...]
     units: tuple[str, ...]

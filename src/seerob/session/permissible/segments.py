@@ -35,14 +35,14 @@ class PathSegment:
     """When the given motion begins it [s]."""
     end: float
     way: float
-    """Of the tool point, as a chain through the stations [m]."""
+    """Way of the tool point, as a chain through the stations [m]."""
     tool: tuple[Array, Array]
     """Where the tool point is at its start and end [m], world."""
     permissible: float
     """Path speed at the place where the tool point may be slowest [rad/s or m/s]; NaN where it cannot be
     told. Where any criterion governs in the segment, places that only a joint limits are left out."""
     tool_speed: float
-    """Of the tool point there [m/s]; NaN where it cannot be told."""
+    """Speed of the tool point there [m/s]; NaN where it cannot be told."""
     given: float
     """Largest speed of the tool point in the given motion in the segment [m/s]."""
     share: float

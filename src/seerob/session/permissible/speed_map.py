@@ -42,7 +42,7 @@ class Stations:
     given: Array
     """Path speed of the given motion, shape (k,)."""
     ceilings: tuple[tuple[Ceiling, ...], ...]
-    """Of every criterion and body region at every station."""
+    """Ceilings of every criterion and body region at every station."""
     by: By
     q: Array
     """Joint positions, shape (k, d) [rad or m]."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from made_cell import TWO_R, UR10, heard, made, person, two_r
-from seerob.core.snapshot import Verdict
+from seerob.core.snapshot import Finding, Verdict
 from seerob.criteria.between_ticks import Told
 from seerob.criteria.contact.regions import REGIONS
 from seerob.criteria.safety.power_and_force import Contacts
@@ -32,6 +32,8 @@ CURTAIN = (
     "at = {{ position = [{x}, {y}, -0.3] }}\n"
     "light_curtain = {{ ends = [[-0.005, 0, 0], [0.005, 0, 0]], height = 0.6, pitch = 0.002 }}\n"
 )
+PLC = '[[sources]]\nkind = "signals_csv"\nname = "plc"\nfile = "s.csv"\ntime = "t"\ntime_unit = "s"\n'
+DOOR = '[[variables]]\nname = "door"\nsource = "plc"\naddress = "x"\ntype = "bool"\n'
 SOURCE = '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "motion.csv"\n'
 
 
@@ -48,13 +50,18 @@ def swing(speed):
     return lambda t: ((speed * t, 0.0), (speed, 0.0))
 
 
-def passing(folder, criterion, thing, *, physics="true", tick=0.01, at=0.195, rate=125, speed=1.45):
+def passing(
+    folder, criterion, thing, *, physics="true", tick=0.01, at=0.195, rate=125, speed=1.45, told=None
+):
     """A tool that passes a thing at 3 m/s at an instant between two ticks."""
     angle = speed * at
     placed = thing.format(x=2.08 * np.cos(angle), y=2.08 * np.sin(angle))
     engine = f"engine = {{ gravity = [0, 0, 0], physics = {physics}, tick = {tick} }}\n"
     times = np.arange(0, 0.4 + 1e-9, 1 / rate).tolist()
     files = {"arm.urdf": two_r(), "motion.csv": rows(swing(speed), times)}
+    if told is not None:
+        engine, criterion = f'variables = "v.toml"\n{engine}', f'{criterion}active = "door"\n{PLC}'
+        files |= {"v.toml": DOOR, "s.csv": "t,x\n" + "".join(f"{t},{x}\n" for t, x in told)}
     return made(folder, engine + TWO_R + STICK + placed + SOURCE + criterion, files)
 
 
@@ -79,6 +86,46 @@ def test_what_is_passed_between_two_ticks_is_exceeded(tmp_path, what, physics):
     summary = station.run()
     assert summary.results["c"].verdict is Verdict.EXCEEDED
     assert summary.verdict is Verdict.EXCEEDED
+
+
+@pytest.mark.parametrize(
+    ("told", "verdict"),
+    [
+        ([(0, 0), (0.191, 1), (0.3, 1)], Verdict.EXCEEDED),
+        ([(0, 0), (0.1949, 1), (0.3, 1)], Verdict.EXCEEDED),
+        ([(0, 1), (0.1985, 0), (0.3, 0)], Verdict.EXCEEDED),
+        ([(0, 1), (0.1, 0), (0.192, 1), (0.198, 0), (0.3, 0)], Verdict.EXCEEDED),
+        ([(0, 0), (0.1985, 1), (0.3, 1)], Verdict.WITHIN),
+        ([(0, 1), (0.1915, 0), (0.3, 0)], Verdict.WITHIN),
+    ],
+)
+@pytest.mark.parametrize("every", ["", "every = 1.0\n"])
+def test_what_is_passed_just_when_a_criterion_begins_or_ceases_to_apply_is_judged(
+    tmp_path, told, verdict, every
+):
+    for what in ("post", "area") if not every else ("post",):
+        thing, criterion = THROUGH[what]
+        station = passing(tmp_path / what, criterion + every, thing, physics="false", told=told)
+        assert station.run().results["c"].verdict is verdict, what
+
+
+def test_what_remembers_is_undecided_where_it_begins_to_apply_between_two_ticks(tmp_path):
+    text = person("op", 9, 0, 0) + '[[safety]]\nkind = "separation"\nname = "c"\nmode = "fixed"\n'
+    text += 'between = ["arm", "op"]\nstop = { reaction = 0.1, stopping = 0.2, acceleration = 0 }\n'
+    text += "intrusion = 0\nhuman_uncertainty = 0\nrobot_uncertainty = 0\n"
+    told = [(0, 0), (0.195, 1), (0.3, 1)]
+    found = passing(tmp_path, text, POST, physics="false", told=told).run().results["c"]
+    assert found.verdict is Verdict.UNDECIDED
+    assert "door switched between two ticks" in found.worst().reason
+
+
+def test_what_a_finding_holds_is_exceeded_between_two_ticks_all_the_same(tmp_path):
+    station = passing(tmp_path, THROUGH["post"][1], POST)
+    judge = Judge(station.bound, [Finding(level="warning", subject="c", text="another log", holds=("c",))])
+    feed = pump(station.sources, station.workstation.engine.tick)
+    found = [out.results[0].verdict for out, _ in ticks(engine_of(station.model), judge, feed)]
+    assert found.count(Verdict.EXCEEDED) == 1
+    assert Verdict.WITHIN not in found
 
 
 UNBOUNDED = '[[safety]]\nkind = "effective_mass"\nname = "c"\nat = "arm"\nalong = "motion"\nlimit = 60\n'
@@ -369,11 +416,25 @@ def shaking(size):
     return motion
 
 
-def touching(folder, motion, more="", things="", kind="power_and_force"):
+def touching(folder, motion, more="", things="", kind="power_and_force", told=None):
     text = f"engine = {{ physics = false, gravity = [0, 0, 0] }}\n{TWO_R}{person('op', 2.4, 0.5, 0)}{things}"
     text += f'{SOURCE}[[safety]]\nkind = "{kind}"\nname = "c"\n{more}'
     files = {"arm.urdf": two_r(), "motion.csv": rows(motion, np.arange(0, 0.1001, 0.002).tolist())}
+    if told is not None:
+        text = f'variables = "v.toml"\n{text}active = "door"\n{PLC}'
+        files |= {"v.toml": DOOR, "s.csv": "t,x\n" + "".join(f"{t},{x}\n" for t, x in told)}
     return made(folder, text, files).run().results["c"]
+
+
+@pytest.mark.parametrize(("since", "exceeds"), [(0.0752, True), (0.0801, False)])
+def test_what_is_too_near_just_when_a_criterion_begins_to_apply_is_exceeded(tmp_path, since, exceeds):
+    """Of an S_p that looks ahead only the margins at both ends of a way bound what lies between."""
+    separation = 'between = ["arm", "op"]\nstop = { reaction = 0.01, stopping = 0.1 }\nhuman_speed = 1.6\n'
+    separation += "intrusion = 0\nhuman_uncertainty = 0\nrobot_uncertainty = 0\n"
+    told = [(0, 0), (since, 1), (0.1, 1)]
+    found = touching(tmp_path, shaking(0.01), separation, kind="separation", told=told)
+    assert (found.verdict is Verdict.EXCEEDED) is exceeds
+    assert (found.worst().t == pytest.approx(0.0775, abs=2e-3)) is exceeds
 
 
 def contact(only="", **more):

@@ -12,6 +12,7 @@ import heapq
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import mujoco
@@ -82,6 +83,8 @@ class End(NamedTuple):
     """Speed of every body [m/s]."""
     idle: bool = False
     """Nothing was there to judge."""
+    muted: bool = False
+    """It did not apply."""
 
 
 class Asking(NamedTuple):
@@ -89,8 +92,8 @@ class Asking(NamedTuple):
 
     now: Callable[[int], Result]
     """Asks a criterion now, before its period is over."""
-    at: Callable[[int, Evaluate, State], Result]
-    """What another one of it says of a state, by the same rules."""
+    at: Callable[[int, Evaluate, State, bool], Result]
+    """What another one of it says of a state, by the same rules; as if it applied, when that is wanted."""
     take_back: Callable[[Result, str], Result]
     """Makes what is within undecided, with a reason."""
 
@@ -162,20 +165,64 @@ class BetweenTicks:
     def _one(self, i: int, watch: Watch, result: Result, state: State, speeds: Array) -> Result:
         """What a criterion says of a tick, with what happened since the last one."""
         before = self._before[i]
+        switches = self._switches(watch, before, state)
         if result.t is not None and result.t != state.t and before is not None:
-            self._before[i] = self._falling(watch, before, state, speeds)
+            self._before[i] = None if switches else self._falling(watch, before, state, speeds)
             if self._before[i] is not None:
                 return result
             result = self._asking.now(i)
         now = _end(watch.criterion, result, state.t, speeds)
         if self._way is not None and before is not None:
-            told = self._judge(i, watch, (before, now), state)
+            told = (
+                self._switched(i, watch, (before, now), switches, state)
+                if switches
+                else self._judge(i, watch, (before, now), state)
+            )
+            idle = now.idle and watch.lowest is not None
             if told.exceeded is not None:
                 result = told.exceeded
-            elif told.open and (now.verdict is _WITHIN or (now.idle and watch.lowest is not None)):
-                result = self._asking.take_back(result, told.open)
+            elif told.open and (now.verdict is _WITHIN or idle or now.muted):
+                result = replace(self._asking.take_back(result, told.open), muted=False)
         self._before[i] = now
         return result
+
+    @staticmethod
+    def _switches(watch: Watch, before: End | None, state: State) -> tuple[float, ...]:
+        """When a criterion began or ceased to apply since the last tick [s]."""
+        active = watch.criterion.active
+        if active is None or before is None:
+            return ()
+        return state.signals.switches(active, before.t, state.t)
+
+    def _switched(
+        self, i: int, watch: Watch, ends: tuple[End, End], switches: tuple[float, ...], state: State
+    ) -> Told:
+        """The way between two ticks, of which a criterion applied in parts: each of these by itself."""
+        active, path = watch.criterion.active, self._way
+        assert active is not None
+        assert path is not None
+        before, now = ends
+        opened = Told()
+        for begin, end in pairwise((before.t, *switches, now.t)):
+            known = state.signals.at(active, begin)
+            if end <= begin or (known.value is False and not known.doubt):
+                continue
+            if watch.remembers:
+                return Told(open=f"{active} switched between two ticks, and what is asked remembers")
+            a, b = before, now
+            if begin != before.t:
+                result, a, _ = self._look(i, watch, path, begin, state)
+                if a.verdict is _EXCEEDED:
+                    return Told(exceeded=_between(result, begin))
+            if end != now.t or now.muted:
+                _, b, _ = self._look(i, watch, path, end, state, applies=True)
+                # It does not apply there any more: what it would say is known, and is no verdict.
+                b = b._replace(verdict=None)
+            told = self._judge(i, watch, (a, b), state, cut=True)
+            if told.exceeded is not None:
+                return told
+            opened = opened if opened.open else told
+        return opened
 
     def _falling(self, watch: Watch, before: End, state: State, speeds: Array) -> End | None:
         """What is left at this tick of a margin that was not asked for; None when that is not enough."""
@@ -189,14 +236,17 @@ class BetweenTicks:
         if any(state.hearings[person].bones for person in watch.people):
             return None  # how far devices are off now is not known from then
         if before.margin is None:
-            return End(state.t, before.verdict, None, speeds)
+            return before._replace(t=state.t, speeds=speeds)
         fall = self._fall(watch, path, (before, before._replace(t=state.t, speeds=speeds)), state)
         margin, off = before.margin
         left = margin - fall.fall
         return End(state.t, _WITHIN, (left, off), speeds) if np.all(left - off >= 0) else None
 
-    def _judge(self, i: int, watch: Watch, ends: tuple[End, End], state: State) -> Told:
-        """The way between two instants at which a criterion was asked."""
+    def _judge(self, i: int, watch: Watch, ends: tuple[End, End], state: State, *, cut: bool = False) -> Told:
+        """The way between two instants at which a criterion was asked.
+
+        At one of them it began or ceased to apply when it is ``cut``.
+        """
         before, now = ends
         idle = watch.lowest is not None and (before.idle or now.idle)
         if _EXCEEDED in (before.verdict, now.verdict) or not (before.margin or now.margin or idle):
@@ -205,7 +255,7 @@ class BetweenTicks:
         low = self._low(watch, self._way, ends, state)
         if low >= 0:
             return Told()
-        if not np.isfinite(low) and not (before.margin and now.margin) and watch.lowest is None:
+        if not (np.isfinite(low) or (before.margin and now.margin) or watch.lowest or cut):
             # Nothing was known at one end, which is said there, and from the other nothing follows.
             return Told()
         if not np.isfinite(low) and self._way.broken:
@@ -276,8 +326,7 @@ class BetweenTicks:
             t = path.middle(a.t, b.t)
             result, middle, shadow = self._look(i, watch, path, t, state)
             if middle.verdict is _EXCEEDED:
-                reason = f"between two ticks, at {t:.4f} s: {result.reason}".removesuffix(": ")
-                return Told(exceeded=replace(result, t=t, reason=reason))
+                return Told(exceeded=_between(result, t))
             for pair in ((a, middle), (middle, b)):
                 if pair[0].margin or pair[1].margin or (watch.lowest and (pair[0].idle or pair[1].idle)):
                     low = self._low(watch, path, pair, shadow)
@@ -292,7 +341,9 @@ class BetweenTicks:
         _, _, a, b = spans[0]
         return Told(open=f"not known to be within from {a.t:.4f} s to {b.t:.4f} s, between two ticks")
 
-    def _look(self, i: int, watch: Watch, path: Path, t: float, state: State) -> tuple[Result, End, State]:
+    def _look(
+        self, i: int, watch: Watch, path: Path, t: float, state: State, *, applies: bool = False
+    ) -> tuple[Result, End, State]:
         """A criterion at an instant between two ticks; what is in doubt at the tick is in doubt there."""
         self.looks += 1
         if i not in self._again:
@@ -305,10 +356,16 @@ class BetweenTicks:
         shadow.columns, shadow.foresee = state.columns, state.foresee
         shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)
         shadow.refresh(t)
-        result = self._asking.at(i, self._again[i], shadow)
+        result = self._asking.at(i, self._again[i], shadow, applies)
         return result, _end(watch.criterion, result, t, shadow.largest_speeds()), shadow
 
 
 def _end(criterion: Criterion, result: Result, t: float, speeds: Array) -> End:
     margin = criterion.margin(result) if result.verdict is _WITHIN else None
-    return End(t, result.verdict, margin, speeds, result.nothing)
+    return End(t, result.verdict, margin, speeds, result.nothing, result.muted)
+
+
+def _between(result: Result, t: float) -> Result:
+    """What was met at an instant between two ticks."""
+    reason = f"between two ticks, at {t:.4f} s: {result.reason}".removesuffix(": ")
+    return replace(result, t=t, reason=reason)

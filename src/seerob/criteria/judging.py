@@ -314,8 +314,8 @@ class Judge:
             self._kept.pop(i, None)
             return self._one(i, self._bound[i], state)
 
-        def look(i: int, evaluate: Evaluate, shadow: State) -> Result:
-            return self._now(i, evaluate, shadow)[0]
+        def look(i: int, evaluate: Evaluate, shadow: State, applies: bool) -> Result:
+            return self._now(i, evaluate, shadow, applies=applies)[0]
 
         # What is held is taken back last: what is exceeded between two ticks is looked for all the same.
         found = self._between(state, results, Asking(ask, look, undecided))
@@ -355,13 +355,13 @@ class Judge:
                 _log.debug("%s: %s", criterion.name, error)
         return _unknown(criterion, reason)
 
-    def _now(self, i: int, evaluate: Evaluate, state: State) -> tuple[Result, bool]:
-        """What a criterion says of a state, and whether it did not apply there."""
+    def _now(self, i: int, evaluate: Evaluate, state: State, *, applies: bool = False) -> tuple[Result, bool]:
+        """What a criterion says of a state, and whether it did not apply there; as if it ``applies``."""
         bound = self._bound[i]
         muted: Result | None = None
         try:
             with state.asking():
-                muted = self._muted(bound.criterion, state)
+                muted = None if applies else self._muted(bound.criterion, state)
                 result = muted or self._asked(i, evaluate, state)
         except Unweighed as reason:
             result = self._at_least(i, evaluate, state, str(reason))

@@ -103,6 +103,24 @@ class Signals:
                 found.append(picture.values[name])
         return tuple(found)
 
+    def switches(self, name: str, begin: float, t: float) -> tuple[float, ...]:
+        """When a variable was told to be another one than before, or to be in doubt or no more so.
+
+        After one instant and until another [s], in their order.
+        """
+        instants = dict.fromkeys(
+            picture.t
+            for picture in self._heard.get(self.dictionary[name].source, ())
+            if begin + SLACK < picture.t <= t + SLACK
+        )
+        found, last = [], self.at(name, begin)
+        for instant in instants:
+            now = self.at(name, instant)
+            if (now.value, bool(now.doubt)) != (last.value, bool(last.doubt)):
+                found.append(min(instant, t))
+            last = now
+        return tuple(found)
+
     def picture(self, t: float) -> tuple[dict[str, Value], dict[str, str]]:
         """Every variable that was heard, and every doubt, at an instant [s]."""
         known = {name: self.at(name, t) for name, v in self.dictionary.items() if not v.write}

@@ -51,7 +51,7 @@ class Per(StrEnum):
     PAIR = "pair"
     """Each body of a to each body of b, a-major."""
     WHETHER = "whether"
-    """Of the same pairs, only whether they are nearer than the cap: far cheaper than how near."""
+    """Whether each pair of bodies is nearer than the cap: far cheaper than how near."""
 
 
 @dataclass(frozen=True, eq=False)

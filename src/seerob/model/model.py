@@ -109,7 +109,7 @@ class Mechanism:
     carried: tuple[int, ...]
     """Bodies of tools and workpieces mounted on it."""
     moving: tuple[int, ...]
-    """Of both, those that its joints move."""
+    """Bodies, its own and carried ones, that its joints move."""
     mj_bodies: Indices
     """Every `mujoco` body that its joints move, tools and workpieces included."""
     masses: tuple[LinkMass, ...]
@@ -130,9 +130,9 @@ class Mechanism:
     riders: tuple[str, ...] = ()
     """Machines that are mounted on it: their bodies are among its own, their joints are not."""
     holders: tuple[str, ...] = ()
-    """Those of them that pick things up: what it weighs depends on them."""
+    """Machines among ``riders`` that pick things up: its mass depends on them."""
     unseen: tuple[str, ...] = ()
-    """Full names of what has a mass, some of which lies where nothing of it has a shape."""
+    """Full names of links and things with a mass, part of which lies where none of their shapes is."""
 
     @property
     def links(self) -> frozenset[str]:

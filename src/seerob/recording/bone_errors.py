@@ -17,7 +17,7 @@ Errors = Mapping[str, tuple[float | None, float | None]]
 """Bone → position [m] and angle [rad] that is missing, as in `Snapshot.bones`."""
 
 WIDTH = math.log(1.01)
-"""Of a class, as a logarithm."""
+"""Width of a class, as a logarithm."""
 LEAST = 1e-6
 """Everything below is in the first class [m or rad]."""
 CLASSES = round(math.log(1e9) / WIDTH)
@@ -91,7 +91,7 @@ class BoneErrors:
         )
 
     def all(self) -> tuple[BoneError, ...]:
-        """Of all bones together: position, angle, as far as they were seen."""
+        """Errors of all bones together: position and angle, as far as they were seen."""
         return tuple(
             _told("", k, _together(counted))
             for k in range(len(_WHAT))

@@ -44,7 +44,7 @@ class Distribution(NamedTuple):
     minimum: At
     maximum: At
     levels: tuple[Share, ...]
-    """Of each level, the lowest first, then of what was not assessed."""
+    """Share of each level, the lowest first, then of what was not assessed."""
 
 
 def distribution(series: Series, levels: Sequence[Level] = ()) -> Distribution | None:

@@ -34,7 +34,7 @@ class ChunkPlace(NamedTuple):
     start: int
     end: int
     offset: int
-    """Of the compressed data in the file."""
+    """Offset of the compressed data in the file."""
     length: int
     size: int
     """Decompressed [bytes]."""

@@ -271,7 +271,7 @@ class Explanation:
     source: str
     samples: int
     moving: int
-    """Of them, those in which some joint moves."""
+    """Samples in which some joint moves."""
     joints: tuple[JointExplained, ...]
     payload: Figure
     """Mass on the flange beside what the file has there [kg]."""

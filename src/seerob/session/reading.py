@@ -46,7 +46,7 @@ class Readable(NamedTuple):
     """What the file declares, also where it cannot be read."""
     problems: list[Problem]
     between: list[Problem]
-    """Those of them that an entry has with others: a name that is taken or leads nowhere."""
+    """Problems that an entry has with other entries: a name that is taken or leads nowhere."""
 
 
 def read(path: Path | str) -> Workstation:

@@ -91,5 +91,5 @@ class Needed:
         return np.asarray(state.mass_matrix(robot) @ qdd + bias(state, robot))
 
     def forget(self) -> None:
-        """Of an instant that is undecided for another reason: nothing bridges it."""
+        """Forget the instant before: this one is undecided for another reason, and nothing bridges it."""
         self._before = None

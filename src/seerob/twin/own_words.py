@@ -76,7 +76,7 @@ class Fit(NamedTuple):
     """A TCP fixed to a flange that explains where it was said to be."""
 
     offset: Array
-    """Of the TCP in the flange [m], shape (3,)."""
+    """Position of the TCP in the flange [m], shape (3,)."""
     error: float
     """Largest distance that is left [m]."""
 

@@ -341,7 +341,7 @@ def rows_of(points: Iterable[int]) -> Indices:
 
 
 def down_to(least: Array | float, lowest: Array | float) -> Fall:
-    """Of margins that are ``least`` at the lesser end, and known not to be below ``lowest`` in between."""
+    """Return the fall of margins from ``least`` at the lesser end to no less than ``lowest`` in between."""
     return Fall(np.inf, np.maximum(np.asarray(least) - lowest, 0.0))
 
 

@@ -420,7 +420,7 @@ class State:
         )
 
     def lost_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
-        """Those of some bodies that are bones in doubt of people of whom the others may be relied on."""
+        """Bodies that are bones in doubt, of people whose other bones may be relied on."""
         _, people = self._bones(bodies)
         told = (name for name in people if not self.whole_doubt(name))
         lost = {f"{name}/{bone}" for name in told for bone in self.bones_in_doubt(name)}

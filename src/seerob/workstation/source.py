@@ -51,7 +51,7 @@ class Target(Struct, frozen=True, kw_only=True):
     frames: tuple[str, ...] = ()
     """Full names of what its joints move and a `PoseSample` may drive; empty when nobody says."""
     variables: tuple[Variable, ...] = ()
-    """Of the workstation's dictionary, those that this source reads."""
+    """Variables of the workstation's dictionary that this source reads."""
     folder: str = ""
     """Folder of the workstation file, where relative paths start."""
 

@@ -81,7 +81,7 @@ def _told(places: frozenset[Vec3]) -> tuple[int, ...]:
 
 
 def aimed(turns: Collection[Turn]) -> set[str]:
-    """Those of `ENDS` of which it is told where they point; not how they are turned about their own axis.
+    """Bones of `ENDS` that are known to point somewhere; how they are turned about their axis is not asked.
 
     Args:
         turns: Of `turned`.

@@ -92,7 +92,8 @@ class Followed:
     unplaced: frozenset[str] = frozenset()
     """Bones that point as they are seen, or as the bones beside them tell, and nobody says where they are."""
     displaced: frozenset[str] = frozenset()
-    """Those of them of which a place was seen before, or all when nobody says where anything is."""
+    """Bones of ``unplaced`` of which a place was seen before, or all of them when nobody says where anything
+    is."""
     slack: Mapping[str, float] = field(default_factory=dict)
     """Bone → how much farther a point of it may be than the newest of what is seen shows [m]: what is held
     may have moved, and another device may see it elsewhere."""

@@ -75,7 +75,7 @@ class Options(Protocol):
 
     @property
     def human(self) -> str:
-        """Whom it drives."""
+        """Name of the person whom it drives."""
 
     @property
     def at(self) -> Pose:

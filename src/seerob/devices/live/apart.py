@@ -46,7 +46,7 @@ class Order(NamedTuple):
     path: list[str]
     """Where modules are found: what follows may be of any."""
     level: int
-    """Of the log."""
+    """Level of the log."""
     memory: int
     """Descriptor of the mailbox's memory, inherited."""
     again: bool

@@ -23,7 +23,7 @@ class TimeBase(StrEnum):
     """Which instants count."""
 
     HEADER = "header"
-    """Of the messages themselves, as the robot stamped them."""
+    """Time in the messages themselves, as the robot stamped them."""
     RECEIVED = "received"
     """When whoever recorded the bag got them: with the delays of the network."""
 

@@ -24,7 +24,7 @@ from seerob.protocols.tracking.xr_axes import xr_positions, xr_turns
 
 HEADER = ("t [s]", "serial", "role", "tracking", "x [m]", "y [m]", "z [m]", "qw", "qx", "qy", "qz")
 LARGEST = 2 << 30
-"""Of a file [byte]."""
+"""Largest size of a file [byte]."""
 YES, NO = ("1", "true", "yes"), ("0", "false", "no")
 
 

@@ -52,7 +52,7 @@ class Core:
 
     @property
     def corners(self) -> Array:
-        """Of the box, shape (8, 3) [m]."""
+        """Corners of the box, shape (8, 3) [m]."""
         return np.where(np.indices((2, 2, 2)).reshape(3, 8).T, self.high, self.low)
 
 
@@ -116,7 +116,7 @@ class Joints:
 
     @classmethod
     def of(cls, mj: Any) -> Joints:
-        """Those of a compiled model.
+        """Read the joints of a compiled model.
 
         Raises:
             InputError: A joint that is neither revolute nor prismatic.

@@ -49,7 +49,7 @@ class Person:
         return np.asarray(every[list(self.slots)])
 
     def measured(self, snapshot: Snapshot) -> list[float | None]:
-        """Of each bone, 1 where a device sees it at this tick and 0 where it is estimated.
+        """Give 1 for each bone that a device sees at this tick, and 0 for each that is estimated.
 
         None for every bone where devices say nothing of the person: joints or keyframes move it then, or it
         is not heard.
@@ -58,7 +58,7 @@ class Person:
         return [float(bone in seen) if seen else None for bone in self.bones]
 
     def joints_measured(self, snapshot: Snapshot) -> list[float | None]:
-        """Of each joint, 1 where devices see both bones that it connects, else as `measured`.
+        """Give 1 for each joint where devices see both bones that it connects, else what `measured` says.
 
         A joint of the waist, which no bone carries, needs the pelvis alone.
         """

@@ -84,7 +84,7 @@ class Place(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     words: Words | None = None
     """Must be given for values of several registers: makers differ."""
     bit: Annotated[int, Meta(ge=0, le=15)] | None = None
-    """Of a bit in a register, 0 the lowest."""
+    """Number of a bit in a register, 0 the lowest."""
 
     def __post_init__(self) -> None:
         if self.table.bits and (self.type is not Type.BIT or self.bit is not None):

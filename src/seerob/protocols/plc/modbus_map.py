@@ -179,7 +179,7 @@ class RegisterMap(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def names() -> tuple[str, ...]:
-    """Of the maps that ship."""
+    """Names of the maps that ship."""
     files = (resources.files(__package__) / "modbus_maps").iterdir()
     return tuple(sorted(f.name.removesuffix(SUFFIX) for f in files if f.name.endswith(SUFFIX)))
 

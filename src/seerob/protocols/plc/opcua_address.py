@@ -32,7 +32,7 @@ class NodeName(NamedTuple):
     """A node id as it is written: ``nsu=uri;s=DB.speed``, ``ns=2;i=7``."""
 
     uri: str
-    """Of the namespace; empty when it is meant by number."""
+    """URI of the namespace; empty when it is meant by number."""
     number: int
     kind: str
     """``s`` text, ``i`` number, ``g`` GUID, ``b`` bytes in base64."""

@@ -63,7 +63,7 @@ class Metric:
     """Device's, since 1970 [s]."""
     type: int | None = None
     historical: bool = False
-    """Not of now."""
+    """Whether the value is of the past, not of now."""
     value: Value = None
     """None when the device says that it has none, or it is of a type that is not read."""
 

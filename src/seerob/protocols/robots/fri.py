@@ -68,7 +68,7 @@ class SafetyState(IntEnum):
 
 
 class DriveState(IntEnum):
-    """Of the drives."""
+    """State of the drives."""
 
     OFF = 0
     TRANSITIONING = 1
@@ -84,7 +84,7 @@ class OperationMode(IntEnum):
 
 
 class ControlMode(IntEnum):
-    """Of the arm."""
+    """Control mode of the arm."""
 
     POSITION = 0
     CARTESIAN_IMPEDANCE = 1
@@ -126,7 +126,7 @@ class Monitoring:
     """Pose of the robot's tool centre point in its base frame: x, y, z [mm], then a quaternion, w first; FRI
     2.x only. The maker's client library says so (``getMeasuredCartesianPose``, 2.5)."""
     time: float | None = None
-    """Of the controller, since 1970 [s]."""
+    """Time of the controller, since 1970 [s]."""
     io: tuple[tuple[str, float], ...] = ()
     """Values of the inputs and outputs that the robot program shares."""
 

@@ -52,7 +52,7 @@ class ServerChannel:
     id: int
     topic: str
     encoding: str
-    """Of its messages: ``json``, ``cdr``, ``ros1``, ``protobuf``."""
+    """Encoding of its messages: ``json``, ``cdr``, ``ros1``, ``protobuf``."""
     schema: str
     """Name of the schema."""
 

@@ -61,7 +61,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Of a service."""
+    """Answer of a service."""
 
     id: str
     values: Any

@@ -25,9 +25,9 @@ MOST = 4096
 MOST_BONES = 256
 """Rigid bodies of one skeleton; Motive's own have 21, or 51 with fingers."""
 TRACKED = 0x01
-"""Of a rigid body's parameters: it was seen in this frame."""
+"""Bit of a rigid body's parameters: it was seen in this frame."""
 MODELS_CHANGED = 0x02
-"""Of a frame's parameters: the names are to be asked for again."""
+"""Bit of a frame's parameters: the names are to be asked for again."""
 
 Version = tuple[int, int]
 

@@ -183,7 +183,7 @@ def _object(d: Device) -> DeviceObject:
 
 
 def missing(names: Sequence[str]) -> tuple[str, ...]:
-    """Of `LEAST`, where nothing is worn.
+    """Places of `LEAST` where nothing is worn.
 
     Args:
         names: Plain roles that there are.

@@ -55,7 +55,7 @@ class Bound:
     at: float
     """When [s]."""
     start: float
-    """Of the stretch [s]."""
+    """Start of the stretch [s]."""
     end: float
     asked: int
     """Instants that were looked at."""

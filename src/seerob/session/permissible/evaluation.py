@@ -65,7 +65,7 @@ class PermissibleSpeed:
     before: ResultLog
     """Every criterion during the given motion."""
     first: Snapshot
-    """Of the given motion, for pictures."""
+    """First snapshot of the given motion, for pictures."""
     rescaled: Rescaled | None
     """None where the map does not permit any motion along the path."""
     refused: str

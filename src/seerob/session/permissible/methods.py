@@ -24,7 +24,7 @@ class By(StrEnum):
     """Which methods count."""
 
     ALL = "all"
-    """Those that the workstation has; of both the lesser speed."""
+    """Every method that the workstation has; the lesser of both speeds counts."""
     SSM = "ssm"
     """Speed and separation monitoring alone."""
     PFL = "pfl"

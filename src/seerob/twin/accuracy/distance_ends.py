@@ -19,7 +19,7 @@ from seerob.twin.state import State
 
 
 class DistanceEnds:
-    """Of the bodies of the second set of a gap, bound once.
+    """Ends of distances of the bodies of a gap's second set, bound once.
 
     Args:
         model: The compiled workstation.

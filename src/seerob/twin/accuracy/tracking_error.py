@@ -60,7 +60,7 @@ class TrackingError:
         )
 
     def at(self, state: State) -> Array:
-        """Of each body [m], shape (b,)."""
+        """Tracking error of each body [m], shape (b,)."""
         found = np.zeros(self._n)
         if self.none(state):
             return found

@@ -75,7 +75,7 @@ class Reference:
 
     @property
     def instants(self) -> tuple[float, ...]:
-        """Of the samples that are kept, and of its rest after the newest [s], increasing.
+        """Instants of the samples that are kept, and of its rest after the newest [s], increasing.
 
         Between two of them the motion is one cubic.
         """

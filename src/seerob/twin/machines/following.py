@@ -58,7 +58,7 @@ class Place(NamedTuple):
 
 
 Follow = Callable[[float, Mapping[str, Value]], Place]
-"""Of an instant [s] and values by variable, where the machine is."""
+"""Tells where a machine is, given an instant [s] and values by variable."""
 
 
 class Machines:

@@ -32,13 +32,14 @@ class Places(NamedTuple):
     unplaced: frozenset[str]
     """Bones of which nobody says where they are."""
     displaced: frozenset[str]
-    """Those of them of which somebody said it before, or all when nobody says where anything is."""
+    """Bones of ``unplaced`` of which somebody said before where they are, or all of them when nobody says
+    where anything is."""
     slack: Mapping[str, float]
     """Bone → how much farther a point of it may be, as it is held or seen elsewhere, too [m]."""
 
 
 NOWHERE = Places(frozenset(BONES), frozenset(BONES), {})
-"""Of whoever's posture is told, and of no bone the place."""
+"""What is left open of a person whose posture is told, and the place of no bone."""
 
 
 @dataclass
@@ -64,22 +65,21 @@ class Hearing:
     error: float = 0.0
     """Largest joint error between twin and reference [rad or m]."""
     bones: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
-    """Of a person that devices see: bone → how far the twin's is from the device's, position [m] and angle
+    """Bone of a person that devices see → how far the twin's is from the device's, position [m] and angle
     [rad]; None where none was seen."""
     parts: list[tuple[float, tuple[PartDoubt, ...]]] = field(default_factory=list)
     """Instant [s] and why single bones of a person may not be relied on when the rest may, as (reason,
     bones); oldest first."""
     observed: list[tuple[float, frozenset[str]]] = field(default_factory=list)
-    """Of a person that devices see: instant [s] and bones that some device sees then, oldest first."""
+    """Instant [s] and the bones of a person that some device sees then, oldest first."""
     bare: list[tuple[float, frozenset[str]]] = field(default_factory=list)
-    """Of a person that devices see: instant [s] and bones of limbs of which nothing shows where they point,
-    oldest first."""
+    """Instant [s] and the bones of a person's limbs that devices see without anything that shows where they
+    point, oldest first."""
     aims: list[tuple[float, Mapping[str, float]]] = field(default_factory=list)
     """Of a person that devices see: instant [s], and hands, feet and heads of which only the joint is seen,
     with a bound on how far they may be turned from the twin's [rad]; oldest first."""
     untold: list[tuple[float, frozenset[tuple[str, int]]]] = field(default_factory=list)
-    """Of a person that devices see: instant [s] and angles of the posture that nothing tells, each with its
-    side; oldest first."""
+    """Instant [s] and angles of a person's posture that nothing tells, each with its side, oldest first."""
     places: list[tuple[float, Places]] = field(default_factory=list)
     """Of a person that devices see: instant [s], and of which bones nobody says where they are; oldest
     first."""

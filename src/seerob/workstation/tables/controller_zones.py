@@ -34,7 +34,7 @@ class Zone(Table, frozen=True, kw_only=True):
     height: Annotated[tuple[Coordinate, Coordinate], unit("m")] | None = None
     """Lower and upper end along z of what stands over ``polygon`` [m]."""
     low: Metres3 | None = None
-    """Of a box, the corner with the smallest coordinates [m]."""
+    """Corner of a box with the smallest coordinates [m]."""
     high: Metres3 | None = None
     """The opposite corner [m]."""
 

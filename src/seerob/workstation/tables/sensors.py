@@ -10,7 +10,7 @@ from seerob.core.quantities import Corners, Length, Metres3, Name, Pose, Seconds
 from seerob.core.shapes.floor_polygon import check_polygon
 
 MOST_RAYS = 20_000
-"""Of one scanner, or beams of one curtain."""
+"""Most rays of one scanner, or beams of one curtain."""
 MOST_FIELDS = 32
 
 Capability = Annotated[float, unit("m", gt=0, le=0.5)]

@@ -8,7 +8,7 @@ from seerob.core.quantities import Coordinate, Corners, Length, Table, unit
 from seerob.core.shapes.floor_polygon import check_polygon
 
 MAX_SIZE = 1000.0
-"""Of a simple shape [m]."""
+"""Largest size of a simple shape [m]."""
 
 
 class Shape(Table, frozen=True, kw_only=True):

@@ -48,7 +48,7 @@ class CartesianTarget(Table, frozen=True, kw_only=True):
     port: Annotated[int, Meta(ge=1, le=65535)] | None = None
     """9090 of rosbridge and 10000 of an endpoint when not given."""
     tls: bool = False
-    """Of rosbridge: encrypted, and the server's certificate is checked."""
+    """The connection to rosbridge is encrypted, and the server's certificate is checked."""
     topic: Topic
     """Such as ``/target_pose``; there is no usual one."""
     message: TargetMessage = TargetMessage.POSE_STAMPED

@@ -28,7 +28,7 @@ MOST_VARIABLES = 10_000
 WHOLE = re.compile(r"0|-?[1-9][0-9]{0,18}")
 """As a number is written: another spelling would never be heard."""
 LONGEST_TEXT = 1000
-"""Of a value that is a text."""
+"""Longest text that a value may be."""
 
 Value = float | bool | str
 """In SI, as a signal carries it."""
@@ -73,9 +73,9 @@ class Variable(Table, frozen=True, kw_only=True):
     """The device's raw number times ``scale`` plus ``offset`` is in ``unit``."""
     offset: float = 0.0
     inverted: bool = False
-    """Of a bool: true there is false here."""
+    """A bool that is true there is false here."""
     choices: dict[str, str] = field(default_factory=dict)
-    """Of a choice: number → word."""
+    """Number → word, for a variable that is a choice."""
     range: tuple[float, float] | None = None
     """Least and largest believable number, in ``unit``; what is outside is bad."""
     timeout: Seconds = 0.5

@@ -12,6 +12,7 @@ import pytest
 from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.core.snapshot import CriterionInfo, Result, Snapshot, Verdict
 from seerob.criteria.judging import UNBOUNDED
+from seerob.outputs.sentences import summary
 from seerob.recording.recording import Recording
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import STILL
@@ -35,6 +36,14 @@ def told(rows, between="", limit=2.0):
         )
         log.add(Snapshot(seq=k, t=t, poses=b"", results=() if verdict == "absent" else (said,)))
     return log
+
+
+def test_no_headline_says_throughout_of_a_criterion_that_was_muted_for_a_while():
+    always, *_ = summary(told([(0, W), (4, W)]))[1:]
+    assert always == "One criterion stayed within the limit throughout."
+    partly, *_ = summary(told([(0, "muted"), (3, "muted"), (4, W)]))[1:]
+    assert "not throughout the run" in partly
+    assert "v (25 % of the run)" in partly
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,9 @@
 """Words of a report that are short keep what they are about."""
 
+from types import SimpleNamespace
+
+from seerob.core.snapshot import Finding
+from seerob.outputs.report.page import _unasked
 from seerob.outputs.sentences import listed, shortened
 
 
@@ -18,3 +22,11 @@ def test_a_sentence_lists_so_many_names_and_counts_the_others():
     many = listed([f"n{k}" for k in range(200)])
     assert many.startswith("n0, n1, ")
     assert many.endswith("n13 and 186 more")
+
+
+def test_the_opening_names_whom_no_criterion_asks_about():
+    asked = Finding(level="warning", subject="first", text="envelope made by seerob")
+    other = Finding(level="warning", subject="second", text="not evaluated: criteria ask about first")
+    (said,) = _unasked(SimpleNamespace(scene=SimpleNamespace(findings=(asked, other))))
+    assert "nothing of second" in said
+    assert _unasked(SimpleNamespace(scene=SimpleNamespace(findings=(asked,)))) == []

@@ -112,9 +112,14 @@ def summary(log: ResultLog) -> list[str]:
             f"{counted(len(names), 'criterion', 'criteria').capitalize()} could not be decided for at least "
             f"a part of the run: {listed(names)}. Undecided is not a pass; what is missing is said below."
         )
-    if names := by[Verdict.WITHIN]:
+    partly = [name for name in by[Verdict.WITHIN] if covered(log[name])]
+    if n := len(by[Verdict.WITHIN]) - len(partly):
+        said.append(f"{counted(n, 'criterion', 'criteria').capitalize()} stayed within the limit throughout.")
+    if partly:
+        shares = listed([f"{name} ({percent(log[name].times().decided)} of the run)" for name in partly])
         said.append(
-            f"{counted(len(names), 'criterion', 'criteria').capitalize()} stayed within the limit throughout."
+            f"{counted(len(partly), 'criterion', 'criteria').capitalize()} stayed within the limit, but not "
+            f"throughout the run: asked and decided in a part of it only, {shares}."
         )
     if names := by[None]:
         said.append(

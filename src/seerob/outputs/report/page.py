@@ -13,7 +13,7 @@ from seerob.outputs.report.page_style import STYLE
 from seerob.outputs.report.posture_safety import told
 from seerob.outputs.report.report import Report, badge, input_row
 from seerob.outputs.report.time_shares import spread_over_time
-from seerob.outputs.sentences import about, bound, extremum, percent, reached, summary
+from seerob.outputs.sentences import about, bound, extremum, listed, percent, reached, summary
 from seerob.recording.series import Series
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
@@ -67,7 +67,7 @@ def _opening(report: Report) -> Html:
             tag(
                 "div",
                 tag("p", badge(verdict), " ", tag("strong", head)),
-                [tag("p", sentence) for sentence in summary(report.log)],
+                [tag("p", sentence) for sentence in (*summary(report.log), *_unasked(report))],
                 class_=f"verdict {'none' if verdict is None else verdict.value}",
             ),
             tag(
@@ -79,6 +79,12 @@ def _opening(report: Report) -> Html:
             ),
         ]
     )
+
+
+def _unasked(report: Report) -> list[str]:
+    """Whom and what no criterion asks about: the verdict does not speak of them."""
+    names = [f.subject for f in report.scene.findings if f.text.startswith("not evaluated: ")]
+    return [f"The verdict says nothing of {listed(names)}: no criterion asks about that."] if names else []
 
 
 def _verdicts(report: Report) -> Html:

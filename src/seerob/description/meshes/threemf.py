@@ -1,4 +1,8 @@
-"""3MF core: objects, components and build items, with their colours and the unit of the model."""
+"""3MF core: objects, components and build items, with their colours and the unit of the model.
+
+Read here and not by trimesh 5.2.0, which accepted a model with a document type and an entity; it is refused
+here. The price: a sphere of 81 920 triangles takes 1197 ms here and 406 ms there.
+"""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ LEFT_OUT = {
 
 
 def test_every_kind_of_source_is_played_or_says_its_samples_by_the_road_of_one_that_is():
-    """Live ones are looked at where they are heard: `tests/live/test_spoiled_streams.py`."""
+    """Live ones are looked at where they are heard: `tests/live/test_lying_streams.py`."""
     roads = {load("sources", kind, Source).__mro__[1] for kind in CELLS} - {Source}
     for kind in set(kinds("sources")) - set(CELLS) - set(LEFT_OUT):
         found = load("sources", kind, Source)

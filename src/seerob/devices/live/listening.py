@@ -14,6 +14,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import os
 import time
 from collections.abc import AsyncGenerator, Callable, Coroutine, Iterable, Sequence
@@ -286,6 +287,8 @@ class Listener:
         return "the other end closed the connection"
 
     def _take(self, sample: Sample) -> None:
+        if not math.isfinite(sample.t):
+            raise SeerobError(f"it yields a sample without the time of its arrival (t is {sample.t})")
         if isinstance(sample, SignalSample):
             self._news(sample, sample.t, self.drives)
             return

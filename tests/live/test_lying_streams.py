@@ -1,0 +1,176 @@
+"""What a live source may yield and nobody may rest on: robots, people and variables, as three kinds hear them.
+
+A sample goes the way it goes in a run, without the wire: `Listener`, mailbox, run time, engine, judge.
+"""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import pytest
+from msgspec.structs import replace
+
+from made_cell import FLOATING, TWO_R, made, person, two_r
+from motion_io import made_pictures
+from seerob.core.errors import SeerobError
+from seerob.core.samples import JointSample, Mailbox, SignalSample
+from seerob.devices.capture.options import person as described
+from seerob.devices.capture.stream_source import _Hearing
+from seerob.devices.live import real_time
+from seerob.devices.live.listening import Listener, delay_of
+from seerob.devices.live.real_time import Clock, hear
+from seerob.devices.sources.kinect import LAYOUT, frame
+from seerob.session.opening import source_target
+from seerob.session.run import Judge, bind, engine_of, ticks
+from seerob.testing import LIES, Lie
+
+BEGIN, LIES_AT, END = 1000.0, 0.6, 1.4
+"""Host's monotonic time of the first sample; from when it lies and until when it speaks [s]."""
+OFFSET = -900.0
+"""Device time less the host's [s]."""
+SETTLED = 0.3
+"""By when a stream that contradicts itself shows it, beside the time-out [s]."""
+LIMIT = "limit = 5\nbetween_samples = 'accepted: x'\n"
+VARIABLE = '[[variables]]\nname = "level"\nsource = "plc"\naddress = "x"\ntype = "number"\nunit = "1"\n'
+
+
+def joints(source, target):
+    """As `rtde` yields them."""
+    for k in range(round(END * 125)):
+        t = k / 125
+        q, qd = (0.3 * math.sin(2 * t), 0.2), (0.6 * math.cos(2 * t), 0.0)
+        at = BEGIN + t
+        yield JointSample(source="", seq=0, target="arm", t=at, t_device=at + OFFSET, q=q, qd=qd)
+
+
+def bodies(source, target):
+    """As `kinect` yields them: the depth camera's pictures, bound to the person's bones."""
+    hearing = _Hearing(source, described(target, "op", ""))
+    for k, picture in enumerate(made_pictures.pictures(round(END * made_pictures.RATE))):
+        said = frame(picture.t, picture.bodies[0], "0")
+        if (sample := hearing.take(LAYOUT, said, BEGIN + k / made_pictures.RATE)) is not None:
+            yield replace(sample, t_device=BEGIN + k / made_pictures.RATE + OFFSET)
+
+
+def values(source, target):
+    """As `opcua` yields them."""
+    for k in range(round(END / 0.05)):
+        yield SignalSample(source="plc", seq=0, t=BEGIN + k * 0.05, values={"level": 5.0 + k % 2})
+
+
+KINDS = {
+    "rtde": (
+        joints,
+        FLOATING + TWO_R + '[[safety]]\nkind = "velocity"\nat = "arm/tip"\n' + LIMIT
+        + '[[sources]]\nkind = "rtde"\nrobot = "arm"\nhost = "127.0.0.1"\nfrequency = 125\n',
+        {"arm.urdf": two_r()},
+    ),
+    "kinect": (
+        bodies,
+        "[engine]\nphysics = false\n" + person("op") + '[[safety]]\nkind = "velocity"\nof = "op"\n' + LIMIT
+        + '[[sources]]\nkind = "kinect"\nhuman = "op"\nat = { position = [0, 0, 1], rpy_deg = [0, 0, 0] }\n',
+        {},
+    ),
+    "opcua": (
+        values,
+        'variables = "v.toml"\n' + FLOATING + TWO_R
+        + '[[safety]]\nkind = "variable"\nvariable = "level"\nunit = "1"\nlimit = 99\n'
+        '[[sources]]\nkind = "opcua"\nname = "plc"\nurl = "opc.tcp://127.0.0.1:1"\ntimeout = 0.3\n',
+        {"arm.urdf": two_r(), "v.toml": VARIABLE},
+    ),
+}  # fmt: skip
+
+
+def at_speed(sample, since, speed):
+    """With the device's stamp of a clock that goes so fast from an instant of the host on."""
+    return sample.t_device and replace(sample, t_device=since + OFFSET + speed * (sample.t - since))
+
+
+def of_another(sample):
+    """The same of a robot, person or variable that is not there."""
+    if isinstance(sample, SignalSample):
+        return replace(sample, values={"another": 5.0})
+    return replace(sample, target="nobody")
+
+
+LIVE_LIES = (
+    *LIES,
+    Lie("comes a second late", lambda s, t: replace(s, t=s.t + 1.0)),
+    Lie("has a clock of twice the speed", lambda s, t: at_speed(s, t, 2.0)),
+    Lie("has a clock of a fifth of the speed", lambda s, t: at_speed(s, t, 0.2)),
+    Lie("stamps no time", lambda s, t: s.t_device and replace(s, t_device=math.nan)),
+    Lie("stands at its last stamp", lambda s, t: s.t_device and replace(s, t_device=t + OFFSET)),
+    Lie("speaks of somebody else", lambda s, t: of_another(s)),
+)
+
+
+class Stream:
+    """One live source of a run, what it yields, and from an instant on something else."""
+
+    def __init__(self, station, said, patch, lie):
+        self.now = BEGIN
+        patch.setattr(real_time, "time", SimpleNamespace(monotonic=lambda: self.now, sleep=self._sleep))
+        (self.source,) = station.workstation.sources
+        self.box, self.station = Mailbox(), station
+        self.ears = Listener(self.source, source_target(station.model, self.source), self.box.post)
+        self.delay = delay_of([self.source])
+        self._lie = lie
+        self._waiting = list(said)
+
+    def _sleep(self, seconds):
+        self.now += seconds
+
+    def first(self):
+        self.now += 0.05
+        return self.take()
+
+    def take(self):
+        while self._waiting and self._waiting[0].t <= self.now:
+            sample = self._waiting.pop(0)
+            try:
+                if self._lie is not None and sample.t >= BEGIN + LIES_AT:
+                    sample = self._lie.said(sample, BEGIN + LIES_AT)
+                if sample is not None:
+                    self.ears._take(sample)
+            except Exception:  # as `Listener._session` ends, and is begun anew
+                self.ears._clock.reconnect()
+        return self.box.take()
+
+    def verdicts(self):
+        """By instant of the run [s]."""
+        clock = Clock()
+        model = self.station.model
+        feed = hear(iter(lambda: (), None), self, clock)
+        told = []
+        try:
+            for out, _ in ticks(engine_of(model), Judge(bind(model)), feed):
+                told += [(clock.start + out.t - BEGIN - self.delay, r.verdict, r.reason) for r in out.results]
+                if self.now > BEGIN + END:
+                    break
+                clock.wait(out.t + model.workstation.engine.tick)
+        except SeerobError as error:  # what ends a run is no verdict
+            assert str(error)
+        return told
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def honest(request, tmp_path_factory):
+    """A workstation with one live source, and what that yields."""
+    yields, text, files = KINDS[request.param]
+    station = made(tmp_path_factory.mktemp(request.param), text, files)
+    (source,) = station.workstation.sources
+    return station, list(yields(source, source_target(station.model, source)))
+
+
+def test_a_stream_that_does_not_lie_is_within(honest, monkeypatch):
+    told = Stream(*honest, monkeypatch, None).verdicts()
+    assert {verdict for t, verdict, _ in told if t > 0.5} == {"within"}, told[-1]
+
+
+@pytest.mark.parametrize("lie", LIVE_LIES, ids=lambda lie: lie.what)
+def test_nothing_rests_on_a_stream_that_lies(honest, monkeypatch, lie):
+    stream = Stream(*honest, monkeypatch, lie)
+    since = LIES_AT + stream.source.timeout + SETTLED
+    assert since < END - 0.1
+    assert not [t for t, verdict, _ in stream.verdicts() if t > since and verdict == "within"]

@@ -35,7 +35,7 @@ import seerob as sr
 from seerob.app import cli
 from seerob.app.emulators.rtde import RtdeServer
 from seerob.core.samples import SignalSample, key
-from seerob.devices.live import apart, ears, listening_process
+from seerob.devices.live import listening_process, receivers, source_process
 from seerob.devices.live.listening import Listener, LiveSource, name_of
 from seerob.session.opening import source_target
 
@@ -83,7 +83,7 @@ class Post:
     @contextlib.contextmanager
     def watching(self):
         """Note what is taken while the road is driven on, and afterwards what the listeners noted."""
-        take = ears.Listening.take
+        take = receivers.Receivers.take
 
         def taking(listening):
             now, found = time.monotonic(), take(listening)
@@ -91,12 +91,12 @@ class Post:
             self.heard.update(sample.source for sample in found)
             return found
 
-        ears.Listening.take = taking
-        apart.COMMAND = (sys.executable, __file__, "--listen", str(self._notes))
+        receivers.Receivers.take = taking
+        source_process.COMMAND = (sys.executable, __file__, "--listen", str(self._notes))
         try:
             yield self
         finally:
-            ears.Listening.take = take
+            receivers.Receivers.take = take
         for notes in self._notes.iterdir():
             for name, signals, seq, instant, device, posted in json.loads(notes.read_bytes()):
                 self.posted[name, seq] = posted
@@ -295,7 +295,7 @@ def main() -> None:
         _ = station.sources
         with Post(Path(folder, "alone")).watching() as alone:
             pairs = [(source, source_target(station.model, source)) for source in sources]
-            with ears.Listening(pairs) as listening:
+            with receivers.Receivers(pairs) as listening:
                 listening.first(5.0)
                 begun = time.monotonic()
                 time.sleep(seconds)

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from seerob.core.samples import JointSample, SignalSample
-from seerob.devices.live.ears import Listening
 from seerob.devices.live.listening import LiveSource
+from seerob.devices.live.receivers import Receivers
 
 _log = logging.getLogger("told")
 
@@ -104,7 +104,7 @@ def _only_here(process):
 
 def run():
     """A run that waits to be killed; prints who listens for it."""
-    with Listening([(Told(), None)]) as listening:
+    with Receivers([(Told(), None)]) as listening:
         while not (pid := [s.values["process"] for s in listening.take() if isinstance(s, SignalSample)]):
             time.sleep(0.01)
         print(int(pid[0]), flush=True)

@@ -22,7 +22,7 @@ from seerob.session.reading import read
 from seerob.session.run import Judge
 from seerob.session.station import Station
 from seerob.twin.engine import Engine
-from seerob.twin.whereabouts.hearing import Hearing
+from seerob.twin.validity.hearing import Hearing
 
 TIMEOUT = 0.2
 POST = {"name": "post", "at": {"position": [1.6, 0.0, 1.0]}, "shape": {"box": [0.1, 1.0, 1.6]}}

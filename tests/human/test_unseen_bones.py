@@ -21,7 +21,7 @@ from seerob.session.run import Judge
 from seerob.session.station import Station
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.engine import Engine
-from seerob.twin.whereabouts.hearing import Hearing
+from seerob.twin.validity.hearing import Hearing
 
 RIGHT = ("right_clavicle", "right_upper_arm", "right_forearm", "right_hand")
 UPPER = ("pelvis", "lumbar", "thorax", "neck", "head", *RIGHT)

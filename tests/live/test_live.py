@@ -16,7 +16,6 @@ import pytest
 from live_story import wait_for as until
 from seerob.core.errors import SeerobError
 from seerob.core.samples import JointSample, SignalSample
-from seerob.devices.live.ears import PROMPT, Listening
 from seerob.devices.live.listening import (
     FIRST_PAUSE,
     LONGEST_PAUSE,
@@ -27,6 +26,7 @@ from seerob.devices.live.listening import (
     say_once,
 )
 from seerob.devices.live.real_time import Clock, hear
+from seerob.devices.live.receivers import PROMPT, Receivers
 from seerob.workstation.source import Source
 
 
@@ -162,7 +162,7 @@ def test_the_newest_wins_and_nothing_queues():
         await asyncio.sleep(60)
 
     said = threading.Event()
-    with Listening([(Made(script=script), None)]) as listening:
+    with Receivers([(Made(script=script), None)]) as listening:
         assert said.wait(60)
         (sample,) = listening.take()
         assert (sample.t, sample.seq) == (999.0, 999)
@@ -177,7 +177,7 @@ def test_run_time_begins_at_the_first_sample_and_the_tick_that_speaks_of_it_come
 
     source = Made(script=script)
     clock, period = Clock(), 0.01
-    with Listening([(source, None)]) as listening:
+    with Receivers([(source, None)]) as listening:
         feed = hear(iter(lambda: (), None), listening, clock)
         for k in range(20):
             samples = next(feed)
@@ -201,7 +201,7 @@ def test_a_run_begins_with_what_is_heard_then_and_not_with_what_was_heard_before
         yield joint(t=2.0)
         await asyncio.sleep(60)
 
-    with Listening([(Made(script=script), None)]) as listening:
+    with Receivers([(Made(script=script), None)]) as listening:
         assert posted.wait(60)
         take = listening.take
 
@@ -221,14 +221,14 @@ def test_a_run_begins_without_a_source_that_is_not_there():
         await asyncio.sleep(60)
 
     said = threading.Event()
-    with Listening([(Made(script=script), None)]) as listening:
+    with Receivers([(Made(script=script), None)]) as listening:
         assert said.wait(60)
         assert listening.first(patience=0.05) == ()
 
 
 def test_a_live_run_waits_for_no_thread_for_long_and_leaves_that_as_it_was():
     before = sys.getswitchinterval()
-    with Listening([]):
+    with Receivers([]):
         assert sys.getswitchinterval() <= PROMPT < before
     assert sys.getswitchinterval() == before
 

@@ -24,7 +24,7 @@ def signal(t):
 
 
 class Said:
-    """Stands where `Listening` does, with what a test says."""
+    """Stands where `Receivers` does, with what a test says."""
 
     delay = 0.02
 

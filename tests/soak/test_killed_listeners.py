@@ -12,7 +12,7 @@ import pytest
 
 from live_story import open_files, wait_for
 from seerob.core.samples import JointSample, SignalSample
-from seerob.devices.live.ears import Listening
+from seerob.devices.live.receivers import Receivers
 from soak.test_live_sources import KILLS, SPARE, load
 from told_sources import Told
 
@@ -35,15 +35,15 @@ class Lines(logging.Filter):
 
 def kill_and_hear(monkeypatch, kills):
     """What was in use after a fifth of the kills, and at the end."""
-    monkeypatch.setattr("seerob.devices.live.apart.FIRST_PAUSE", 0.002)
-    monkeypatch.setattr("seerob.devices.live.apart.LONGEST_PAUSE", 0.02)
+    monkeypatch.setattr("seerob.devices.live.source_process.FIRST_PAUSE", 0.002)
+    monkeypatch.setattr("seerob.devices.live.source_process.LONGEST_PAUSE", 0.02)
     lines, before = Lines(), load()
-    logs = [logging.getLogger(f"seerob.devices.live.{name}") for name in ("apart", "listening")]
+    logs = [logging.getLogger(f"seerob.devices.live.{name}") for name in ("source_process", "listening")]
     for log in logs:
         log.addFilter(lines)
     settled = None
     try:
-        with Listening([(Told(), None)]) as listening:
+        with Receivers([(Told(), None)]) as listening:
             for k in range(kills):
                 found = {}
                 wait_for(

@@ -21,7 +21,7 @@ from seerob.core.samples import Quality, SignalSample
 from seerob.devices import sources
 from seerob.devices.live.listening import Listener, LiveSource
 from seerob.devices.sources.opcua_robot import OpcuaRobot
-from seerob.twin.whereabouts.hearing import Hearing
+from seerob.twin.validity.hearing import Hearing
 from soak.device_kinds import FOREIGN, KINDS, OWN
 from soak.elsewhere import Elsewhere
 

@@ -144,7 +144,7 @@ class BetweenTicks:
         found = list(results)
         if not any(self._watches):
             return tuple(found)
-        speeds, ids, path = state.largest_speeds(), state.bearers.ids, state.path
+        speeds, ids, path = state.largest_speeds(), state.attachments.ids, state.path
         if path is None or self._ids is None or self._speeds is None:
             path, self._before = None, [None] * len(found)
         self._way, self._asking, self._whole = path, asking, None
@@ -227,7 +227,7 @@ class BetweenTicks:
     def _falling(self, watch: Watch, before: End, state: State, speeds: Array) -> End | None:
         """What is left at this tick of a margin that was not asked for; None when that is not enough."""
         path = self._way
-        if path is None or self._ids is None or not np.array_equal(self._ids, state.bearers.ids):
+        if path is None or self._ids is None or not np.array_equal(self._ids, state.attachments.ids):
             return None  # what was picked up has the speed of the hand at once
         if watch.lowest is not None:
             now = before._replace(t=state.t, speeds=speeds)
@@ -293,7 +293,7 @@ class BetweenTicks:
             state: The twin at one of them.
         """
         if watch.lowest is not None:
-            if self._ids is None or not np.array_equal(self._ids, state.bearers.ids):
+            if self._ids is None or not np.array_equal(self._ids, state.attachments.ids):
                 return -np.inf
             try:
                 return float(watch.lowest(state, self._span(watch, path, ends, state)))
@@ -314,7 +314,7 @@ class BetweenTicks:
         assert path is not None
         begin, end = (f"{each.t:.4g} s" for each in ends)
         assert self._ids is not None
-        if watch.remembers or not np.array_equal(self._ids, state.bearers.ids):
+        if watch.remembers or not np.array_equal(self._ids, state.attachments.ids):
             what = "it remembers" if watch.remembers else "something was picked up or let go"
             return Told(open=f"not known to be within from {begin} to {end}: {what}")
         spans = [(low, ends[0].t, *ends)]
@@ -351,7 +351,7 @@ class BetweenTicks:
         if self._shadow is None:
             data = mujoco.MjData(state.model.mj)
             self._shadow = State(state.model, data, state.hearings, state.signals)
-            self._shadow.bearers = state.bearers
+            self._shadow.attachments = state.attachments
         shadow = self._shadow
         shadow.columns, shadow.foresee = state.columns, state.foresee
         shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)

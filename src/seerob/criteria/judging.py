@@ -21,7 +21,7 @@ from seerob.criteria.between_ticks import Asking, BetweenTicks, Watch
 from seerob.criteria.criterion import Criterion, Evaluate
 from seerob.model.model import Model
 from seerob.twin.state import State
-from seerob.twin.whereabouts.hearing import SLACK
+from seerob.twin.validity.hearing import SLACK
 
 _log = logging.getLogger(__name__)
 # To ask an enumeration for a member takes longer than all the rest of a judgement.

@@ -30,7 +30,7 @@ from seerob.session.run import Bound, Feed, engine_of, settled
 from seerob.twin.spans import Path
 from seerob.twin.state import Hearing, State
 from seerob.twin.states import Bench, Motion, Questions, Reasons, States
-from seerob.twin.whereabouts.hearing import SLACK, STANDS
+from seerob.twin.validity.hearing import SLACK, STANDS
 
 STRETCH = 256
 """Instants that are placed together: enough for the arrays to pay, few enough for the processor's cache."""

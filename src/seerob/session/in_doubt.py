@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from seerob.twin.state import State
-from seerob.twin.whereabouts.hearing import nobody_says
+from seerob.twin.validity.hearing import nobody_says
 
 
 def in_doubt(state: State) -> dict[str, str]:
@@ -24,4 +24,4 @@ def in_doubt(state: State) -> dict[str, str]:
             found |= {f"{name}/{bone}": why for why, bones in hearing.doubted(state.t) for bone in bones}
             held = (body.name for body in state.model.bodies if body.mover == name and body.owner != name)
             found |= dict.fromkeys(held, reason)
-    return found | {state.model.bodies[i].name: why for i, why in state.bearers.unknown.items()}
+    return found | {state.model.bodies[i].name: why for i, why in state.attachments.unknown.items()}

@@ -16,9 +16,9 @@ from seerob.core.errors import InputError
 from seerob.core.snapshot import Finding, Scene
 from seerob.criteria.contact.measured import curves
 from seerob.criteria.criterion import Criterion
-from seerob.devices.live.ears import Listening
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.live.real_time import Clock, hear, require_recorded
+from seerob.devices.live.receivers import Receivers
 from seerob.model.model import Model
 from seerob.model.mounting.compilation import Progress, compile_workstation
 from seerob.model.mounting.in_place import implausible
@@ -211,7 +211,7 @@ class Station:
         with ExitStack() as until_the_end:
             if clock and heard:
                 targets = [(source, source_target(self.model, source)) for source in heard]
-                listening = until_the_end.enter_context(Listening(targets))
+                listening = until_the_end.enter_context(Receivers(targets))
                 road.warm_up(self.model)  # while they begin
                 feed = hear(feed, listening, clock)
             bound = self.bound  # refused, if so, before anything is open

@@ -39,7 +39,7 @@ from seerob.twin.moving_base import moved_by_poses
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Path
 from seerob.twin.state import Hearing, State
-from seerob.twin.whereabouts.hearing import NOWHERE
+from seerob.twin.validity.hearing import NOWHERE
 
 DEFAULT_TIMEOUT = 0.2
 """Time-out [s] of what is heard without a source that states one."""

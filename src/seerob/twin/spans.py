@@ -120,7 +120,7 @@ class Points:
             path: Of all joints.
             begin: [s].
             end: [s].
-            ids: MuJoCo's body of each body at the begin, see `seerob.twin.bearers`.
+            ids: MuJoCo's body of each body at the begin, see `seerob.twin.attachments`.
             mj: The `mujoco.MjModel` then.
         """
         if self._ids is None or not np.array_equal(self._ids, ids):

@@ -26,13 +26,13 @@ from seerob.distance.surveying import Surveyor
 from seerob.kernels.chain import along
 from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
 from seerob.model.model import Frame, Gap, Mechanism, Model
-from seerob.twin.bearers import Bearers
+from seerob.twin.attachments import Attachments
 from seerob.twin.joint_columns import Columns
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Path
-from seerob.twin.whereabouts.hearing import SLACK, nobody_says
-from seerob.twin.whereabouts.hearing import Hearing as Hearing  # noqa: PLC0414
-from seerob.twin.whereabouts.seen_bones import bones_of, unseen_reason
+from seerob.twin.validity.hearing import SLACK, nobody_says
+from seerob.twin.validity.hearing import Hearing as Hearing  # noqa: PLC0414
+from seerob.twin.validity.seen_bones import bones_of, unseen_reason
 from seerob.workstation.variables.dictionary import VARIABLE as VARIABLE  # noqa: PLC0414
 from seerob.workstation.variables.dictionary import Value
 
@@ -67,7 +67,7 @@ class State:
         """Of every contact two of MuJoCo's bodies and the normal force [N]; None where none is calculated."""
         self.asked: set[str] = set()
         """Robots and humans that answers have depended on since the set was last cleared."""
-        self.bearers = Bearers(model)
+        self.attachments = Attachments(model)
         """Which of MuJoCo's bodies moves each body."""
         n = len(model.bodies)
         self._rotations, self._positions = np.zeros((n, 3, 3)), np.zeros((n, 3))
@@ -110,7 +110,7 @@ class State:
             self._xmat,
             self._xpos,
             self._xquat,
-            self.bearers.ids,
+            self.attachments.ids,
             self._rotations,
             self._positions,
             self._quaternions,
@@ -182,7 +182,7 @@ class State:
     def poses(self) -> bytes:
         """Little-endian float32, seven per body: position [m], quaternion w first."""
         self._open("poses", "placed(bodies)")
-        return np.hstack([self._positions, self._quaternions])[self.bearers.drawn].astype("<f4").tobytes()
+        return np.hstack([self._positions, self._quaternions])[self.attachments.drawn].astype("<f4").tobytes()
 
     # -- what may be relied on --------------------------------------------------------------
 
@@ -286,8 +286,8 @@ class State:
         if key in self._cache:
             return
         self.require(*others)
-        if lost := self.bearers.unknown.keys() & set(bodies):
-            raise Undecided(self.bearers.unknown[min(lost)])
+        if lost := self.attachments.unknown.keys() & set(bodies):
+            raise Undecided(self.attachments.unknown[min(lost)])
         for name, bones in people.items():
             if (reason := self.whole_doubt(name)) and not (strayed and reason == self.stray(name)):
                 raise Undecided(reason)
@@ -370,7 +370,7 @@ class State:
             mujoco.mj_kinematics(self.model.mj, self._wanted)
             self._cache[key] = self._wanted.xmat.reshape(-1, 3, 3).copy(), self._wanted.xpos.copy()
         R, x = self._cache[key]
-        ids = self.bearers.ids[rows]
+        ids = self.attachments.ids[rows]
         return R[ids], x[ids]
 
     def contact_forces(self, name: str) -> dict[int, tuple[float, str]]:
@@ -594,8 +594,8 @@ class State:
     def weigh(self, mechanism: Mechanism) -> None:
         """Raise `Undecided` unless it is known what a robot weighs, with all that it holds now."""
         self.require(mechanism.name, *mechanism.holders)
-        if lost := self.bearers.unknown.keys() & set(mechanism.carried):
-            raise Undecided(self.bearers.unknown[min(lost)])
+        if lost := self.attachments.unknown.keys() & set(mechanism.carried):
+            raise Undecided(self.attachments.unknown[min(lost)])
         if mechanism.unknown_masses and not self._at_least:
             raise Unweighed("; ".join(mechanism.unknown_masses))
 
@@ -711,7 +711,7 @@ class State:
             directions: Likewise, shape (b, 3).
         """
         self.require(mechanism.name)
-        moves, roots = self.bearers.moves(self.model.mj, bodies), self.bearers.roots
+        moves, roots = self.attachments.moves(self.model.mj, bodies), self.attachments.roots
         rows = np.array(bodies, np.int64)
         every = np.empty((len(rows), self.model.mj.nv))
         along(self._cdof, self._com, roots[rows], moves, points, directions, every)
@@ -739,7 +739,7 @@ class State:
             data = self._data
             linear, angular = np.empty((2, *self._positions.shape))
             velocities(
-                data.cvel, data.subtree_com, self._positions, self.bearers.ids, self.bearers.roots,
+                data.cvel, data.subtree_com, self._positions, self.attachments.ids, self.attachments.roots,
                 linear, angular,
             )  # fmt: skip
             self._cache["v"] = linear, angular

@@ -22,7 +22,7 @@ from seerob.distance.least import Closests, Per, Query, Survey
 from seerob.kernels.chain import held_many, jacobians
 from seerob.kernels.speed import fastest_many, stacked, velocities_many
 from seerob.model.model import Frame, Gap, Mechanism, Model
-from seerob.twin.bearers import untold
+from seerob.twin.attachments import untold
 from seerob.twin.joint_columns import Columns, moving_dofs
 from seerob.twin.spans import Path
 

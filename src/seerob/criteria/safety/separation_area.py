@@ -207,7 +207,7 @@ def _shells(
     shells = []
     R, x = state.placed(moving)
     for i, distance in zip(moving, S_p.tolist(), strict=True):
-        if i in state.bearers.away:
+        if i in state.attachments.away:
             continue
         body = model.bodies[i]
         corners = body.corners @ R[i].T + x[i]

@@ -24,7 +24,7 @@ from seerob.criteria.stopping.onset import LARGEST_WINDOW, Chain, Levers, Onset,
 from seerob.criteria.stopping.terms import Course, travel
 from seerob.model.model import Gap, Mechanism, Model
 from seerob.twin.spans import ROUNDING, Indices, Points, Span, rows_of
-from seerob.twin.whereabouts.hearing import SLACK
+from seerob.twin.validity.hearing import SLACK
 
 InSpan = Callable[[Points], Callable[[Span], Course | None]]
 """From the points of which the motion is bounded to the longest course that begins within a span; None where

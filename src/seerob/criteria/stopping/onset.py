@@ -34,9 +34,9 @@ from seerob.core.errors import Undecided
 from seerob.core.transforms import Array
 from seerob.kernels.speed import fastest, placed, stacked, velocities
 from seerob.model.model import Body, Gap, Mechanism, Model
-from seerob.twin.bearers import Bearers
+from seerob.twin.attachments import Attachments
 from seerob.twin.state import State
-from seerob.twin.whereabouts.hearing import SLACK
+from seerob.twin.validity.hearing import SLACK
 
 LARGEST_WINDOW = 2.0
 """A motion is looked at so far ahead at most [s]."""
@@ -193,7 +193,7 @@ class Foreseen:
         mujoco.mj_kinematics(mj, data)
         mujoco.mj_comPos(mj, data)
         mujoco.mj_comVel(mj, data)
-        return speeds_of(data, state.bearers, self._gap.b, self._corners, self._reach)
+        return speeds_of(data, state.attachments, self._gap.b, self._corners, self._reach)
 
 
 def farthest(t: Array, speeds: Array, T_r: float, lead: float) -> Array:
@@ -216,7 +216,7 @@ def farthest(t: Array, speeds: Array, T_r: float, lead: float) -> Array:
 
 def speeds_of(
     data: mujoco.MjData,
-    bearers: Bearers,
+    attachments: Attachments,
     bodies: Sequence[int],
     corners: tuple[Array, NDArray[np.int64]],
     reach: Array,
@@ -225,14 +225,14 @@ def speeds_of(
 
     Args:
         data: Where everybody is, with MuJoCo's velocities.
-        bearers: Who moves whom.
+        attachments: Who moves whom.
         bodies: By index.
         corners: Of the bodies, `seerob.kernels.speed.stacked`.
         reach: How far their surfaces are outside the hull of these [m], shape (n,).
     """
     n = len(bodies)
     rows = np.array(bodies, np.int64)
-    ids, roots = bearers.ids[rows], bearers.roots[rows]
+    ids, roots = attachments.ids[rows], attachments.roots[rows]
     rotations, positions, quaternions = np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, 4))
     placed(data.xmat, data.xpos, data.xquat, ids, rotations, positions, quaternions)
     linear, angular = np.empty((2, n, 3))
@@ -301,7 +301,7 @@ def _chain(model: Model, robot: Mechanism, body: Body) -> NDArray[np.int64]:
 def _levers(state: State, robot: Mechanism, chain: NDArray[np.int64], index: int) -> Array:
     """Largest distance of a body from each axis of its chain [m], shape (k,)."""
     body = state.model.bodies[index]
-    if index in state.bearers.away:
+    if index in state.attachments.away:
         return np.zeros(len(chain))
     joints = state.model.mj.dof_jntid[robot.v_address[chain]]
     R, x = state.placed((index,))

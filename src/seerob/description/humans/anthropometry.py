@@ -19,7 +19,7 @@ from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.humans import zatsiorsky
-from seerob.description.humans.by_hand import with_lengths, with_masses
+from seerob.description.humans.overrides import with_lengths, with_masses
 from seerob.description.humans.skeleton import SIDES
 from seerob.description.humans.tables import table
 
@@ -147,7 +147,7 @@ def body(
 ) -> Body:
     """The body of a person of that stature [m], body mass [kg] and sex.
 
-    ``own_lengths`` [m] (`seerob.description.humans.by_hand.LENGTHS`) and ``own_masses`` [kg], by bone,
+    ``own_lengths`` [m] (`seerob.description.humans.overrides.LENGTHS`) and ``own_masses`` [kg], by bone,
     replace the tables'; the other lengths and masses make up for it, so that stature and body mass stay.
 
     Raises:

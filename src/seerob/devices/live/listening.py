@@ -2,7 +2,7 @@
 
 A `LiveSource` says in one asynchronous generator what it hears, `LiveSource.listen`. A `Listener` runs
 that in a thread of its own, begins anew when it ends, puts each sample's time on the host's clock and
-posts it to a mailbox, where only the newest waits. `seerob.devices.live.ears.Listening` is all of them
+posts it to a mailbox, where only the newest waits. `seerob.devices.live.receivers.Receivers` is all of them
 together, from which a run takes once per tick.
 
 The twin runs a fixed delay behind the world, one period of the slowest source and a margin, so that

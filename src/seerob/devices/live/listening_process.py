@@ -1,4 +1,4 @@
-"""The process in which one live source listens, started by `seerob.devices.live.apart`.
+"""The process in which one live source listens, started by `seerob.devices.live.source_process`.
 
 It is told on its standard input what to listen to, and ends when that is closed: with whoever started it.
 """
@@ -17,9 +17,9 @@ from typing import BinaryIO
 
 import msgspec
 
-from seerob.devices.live.apart import Order, Said
 from seerob.devices.live.listening import Listener, LiveSource, stop
 from seerob.devices.live.shared_mailbox import SharedMailbox
+from seerob.devices.live.source_process import Order, Said
 from seerob.devices.live.wake_promptly import wake_promptly
 from seerob.workstation.source import Target
 

@@ -9,8 +9,8 @@ from msgspec.structs import replace
 
 from seerob.core.errors import InputError, Problem
 from seerob.core.samples import Quality, Sample, SignalSample, key
-from seerob.devices.live.ears import Listening
 from seerob.devices.live.listening import LiveSource
+from seerob.devices.live.receivers import Receivers
 from seerob.workstation.workstation import Workstation
 
 AFTER = 1e-6
@@ -70,7 +70,7 @@ def _asleep() -> float:
 
 
 def hear(
-    recorded: Iterable[tuple[Sample, ...]], listening: Listening, clock: Clock
+    recorded: Iterable[tuple[Sample, ...]], listening: Receivers, clock: Clock
 ) -> Iterator[tuple[Sample, ...]]:
     """The newest samples of live sources, beside those of recorded ones.
 

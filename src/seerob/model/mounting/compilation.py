@@ -25,11 +25,11 @@ from seerob.model.model import Body, Frame, Mechanism, Model
 from seerob.model.mounting import machines as machine_mounting
 from seerob.model.mounting.areas import mount_sensor, mount_swept
 from seerob.model.mounting.body_list import listed
-from seerob.model.mounting.by_hand import by_hand, home
 from seerob.model.mounting.chains import assumed, payload, placeholder
 from seerob.model.mounting.contacts import add_contacts
 from seerob.model.mounting.in_place import implausible
 from seerob.model.mounting.mechanisms import Chain, Riders, mechanism
+from seerob.model.mounting.overrides import home, overridden
 from seerob.model.mounting.people import describe
 from seerob.model.mounting.picked_up import picked_up
 from seerob.model.mounting.specification import Mounting
@@ -151,7 +151,7 @@ class _Compiler:
             arguments=robot.arguments,
             name=robot.name,
         )
-        description = by_hand(description, robot, self.file)
+        description = overridden(description, robot, self.file)
         if robot.calibration is not None:
             description = calibrated_by(description, robot.calibration, self.folder)
         q = home(description, robot, self.file)

@@ -9,8 +9,8 @@ from collections import deque
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 
-from seerob.protocols.links.bell import Bell
 from seerob.protocols.links.reception import Received, Reception
+from seerob.protocols.links.wakeup import Wakeup
 
 CHUNK = 1 << 16
 """Read at once [byte]."""
@@ -33,7 +33,7 @@ class Connection:
         self._loop = asyncio.get_running_loop()
         self._waiting: deque[Received] = deque()
         self._bytes = 0
-        self._bell = Bell()
+        self._wakeup = Wakeup()
         self._error: OSError | None = None
         self._ended = self._listens = False
         self._tells = True
@@ -83,7 +83,7 @@ class Connection:
     async def _more(self, patience: float) -> None:
         if self._tells:
             if self._error is None:
-                await self._bell.wait(patience)
+                await self._wakeup.wait(patience)
             return
         async with asyncio.timeout(patience):
             data = await self._loop.sock_recv(self._link, CHUNK)
@@ -93,7 +93,7 @@ class Connection:
         self._waiting.append(received)
         self._bytes += len(received.data)
         self._ended = self._ended or not received.data
-        self._bell.ring()
+        self._wakeup.wake()
 
     def _read(self) -> None:
         try:
@@ -102,7 +102,7 @@ class Connection:
             return
         except OSError as error:
             self._error = error
-            self._bell.ring()
+            self._wakeup.wake()
         if self._ended or self._error is not None or self._bytes > MOST:
             self._deafen()
 

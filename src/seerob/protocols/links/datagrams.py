@@ -11,8 +11,8 @@ from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from typing import Any, NamedTuple
 
-from seerob.protocols.links.bell import Bell
 from seerob.protocols.links.reception import Reception
+from seerob.protocols.links.wakeup import Wakeup
 
 WAITING = 512
 """Datagrams that wait for whoever reads; after that the oldest is dropped."""
@@ -47,7 +47,7 @@ class Datagrams(asyncio.DatagramProtocol):
         self._senders, self._answer = senders, answer
         self._loop = asyncio.get_running_loop()
         self._waiting: deque[Datagram] = deque(maxlen=WAITING)
-        self._bell = Bell()
+        self._wakeup = Wakeup()
         self._error: OSError | None = None
         self._send: Callable[[bytes, Any], object] = lambda data, to: None
         self.port = 0
@@ -92,7 +92,7 @@ class Datagrams(asyncio.DatagramProtocol):
             return
         self.dropped += len(self._waiting) == WAITING
         self._waiting.append(Datagram(arrived, data))
-        self._bell.ring()
+        self._wakeup.wake()
         if self._answer is not None:
             self._loop.call_soon(self._reply, data, sender)
 
@@ -110,7 +110,7 @@ class Datagrams(asyncio.DatagramProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Called by the loop."""
         self._error = exc if isinstance(exc, OSError) else OSError("closed")
-        self._bell.ring()
+        self._wakeup.wake()
 
     async def receive(self, silence: float) -> AsyncGenerator[Datagram, None]:
         """What arrives, oldest first.
@@ -128,7 +128,7 @@ class Datagrams(asyncio.DatagramProtocol):
             if self._error is not None:
                 raise self._error
             try:
-                await self._bell.wait(silence)
+                await self._wakeup.wait(silence)
             except TimeoutError as error:
                 # On a busy machine this thread may have slept, with data waiting: the loop looks twice.
                 await asyncio.sleep(0)

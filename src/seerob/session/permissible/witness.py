@@ -13,12 +13,12 @@ from seerob.core.snapshot import Result
 from seerob.core.transforms import Array
 from seerob.model.model import Mechanism, Model
 from seerob.twin.state import Hearing, State
-from seerob.twin.whereabouts.hearing import Places
+from seerob.twin.validity.hearing import Places
 from seerob.workstation.variables.dictionary import Value
 
 
 class Seen(NamedTuple):
-    """How far bones may be from where the twin has them; see `seerob.twin.whereabouts.hearing.Hearing`."""
+    """How far bones may be from where the twin has them; see `seerob.twin.validity.hearing.Hearing`."""
 
     bones: dict[str, tuple[float | None, float | None]]
     unaimed: Mapping[str, float]

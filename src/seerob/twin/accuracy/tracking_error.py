@@ -11,7 +11,7 @@ from seerob.core.transforms import Array, rotation_from_wxyz
 from seerob.description.humans.skeleton import BONES
 from seerob.model.model import Model
 from seerob.twin.state import State
-from seerob.twin.whereabouts.told_bones import told_between, told_errors
+from seerob.twin.validity.inferred_bones import told_between, told_errors
 
 
 class TrackingError:
@@ -23,7 +23,7 @@ class TrackingError:
     device sees adds what the file accepts (``unseen_uncertainty``), else nothing: how wrong it is nobody
     knows, and `State.require_bodies` leaves it undecided. What is held because it was not seen just now, or
     what another device sees elsewhere, adds `Hearing.slack`. A bone between two that are seen adds how far
-    the lengths of bones let its ends be (`seerob.twin.whereabouts.told_bones`). Where something stops the
+    the lengths of bones let its ends be (`seerob.twin.validity.inferred_bones`). Where something stops the
     twin, the way from there to where the person was captured is added to what devices are off from that.
 
     Args:
@@ -94,7 +94,7 @@ class TrackingError:
     def _told(
         self, state: State, person: str, errors: Mapping[str, tuple[float | None, float | None]]
     ) -> dict[str, float]:
-        """Of bones between two that are seen [m], see `seerob.twin.whereabouts.told_bones`."""
+        """Of bones between two that are seen [m], see `seerob.twin.validity.inferred_bones`."""
         where = self._joints[person]
         seen = {bone for bone, error in errors.items() if error != (None, None) and bone in where}
         if not told_between(seen):

@@ -94,14 +94,14 @@ class _Grip:
             for places in (tuple(self._held), tuple(self._resting))
         }
         for index in (*self._held, *self._resting):
-            state.bearers.unknown.pop(index, None)
+            state.attachments.unknown.pop(index, None)
         self._holds = True
         self._unheard = ""
         self._bring(state, held=False)
 
     def follow(self, state: State) -> bool:
         """Whether it was picked up, let go or lost."""
-        if state.bearers.unknown.keys() & set(self._resting):
+        if state.attachments.unknown.keys() & set(self._resting):
             return False
         if self._silent(state):
             self._unheard = state.doubt(self._hand) or "not heard"
@@ -116,7 +116,7 @@ class _Grip:
             reason = (
                 f"{self._piece}: let go while its gripper was not relied on ({unheard}), nobody knows where"
             )
-            state.bearers.unknown |= dict.fromkeys(self._resting, reason)
+            state.attachments.unknown |= dict.fromkeys(self._resting, reason)
         else:
             self._let_go(state)
         return True
@@ -165,12 +165,12 @@ class _Grip:
         for mj in self._models:
             self._load(mj, held)
         for index in here:
-            state.bearers.put(state.model.mj, index, bearer)
+            state.attachments.put(state.model.mj, index, bearer)
         for index in gone:
-            state.bearers.put(state.model.mj, index, self._away)
-        state.bearers.drawn[here] = here
-        state.bearers.drawn[gone] = here
-        state.bearers.away = (state.bearers.away - set(here)) | set(gone)
+            state.attachments.put(state.model.mj, index, self._away)
+        state.attachments.drawn[here] = here
+        state.attachments.drawn[gone] = here
+        state.attachments.away = (state.attachments.away - set(here)) | set(gone)
         self._holds = held
 
     def _load(self, mj: Any, held: bool) -> None:

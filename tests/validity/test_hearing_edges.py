@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seerob.description.humans.skeleton import BONES
-from seerob.twin.whereabouts.hearing import SLACK, Hearing
+from seerob.twin.validity.hearing import SLACK, Hearing
 
 
 def heard(*instants: float, timeout: float = 0.5) -> Hearing:

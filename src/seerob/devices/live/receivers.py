@@ -1,7 +1,7 @@
 """The live sources of one run together, from which it takes once per tick.
 
-Each listens in a process of its own (`seerob.devices.live.apart`). Only those listen here that take what this
-process has.
+Each listens in a process of its own (`seerob.devices.live.source_process`). Only those listen here that take
+what this process has.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from types import TracebackType
 from typing import Self
 
 from seerob.core.samples import Mailbox, Sample, SignalSample, key
-from seerob.devices.live.apart import Apart, told
 from seerob.devices.live.listening import Listener, LiveSource, delay_of, name_of, stop
+from seerob.devices.live.source_process import SourceProcess, told
 from seerob.workstation.source import Target
 
 PATIENCE = 1.0
@@ -24,7 +24,7 @@ PROMPT = 1e-4
 is as long as what is heard here, or shown to somebody, would wait for the twin's computations."""
 
 
-class Listening:
+class Receivers:
     """The live sources of one run: started on entry, stopped on exit.
 
     Args:
@@ -39,13 +39,13 @@ class Listening:
         self._awaited = {name_of(source) for source, _ in sources if source.target()}
         self._box = Mailbox()
         self._here: list[Listener] = []
-        self._apart: list[Apart] = []
+        self._apart: list[SourceProcess] = []
         for source, target in sources:
             pair = told(source, target)
             if pair is None:
                 self._here.append(Listener(source, target, self._box.post))
             else:
-                self._apart.append(Apart(name_of(source), pair))
+                self._apart.append(SourceProcess(name_of(source), pair))
 
     def __enter__(self) -> Self:
         self._interval = sys.getswitchinterval()

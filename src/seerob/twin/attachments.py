@@ -18,7 +18,7 @@ def untold(body: Body) -> str:
     return f"{body.owner}: {body.holder} picks it up and lets it go, and only a run tells where it is"
 
 
-class Bearers:
+class Attachments:
     """Who moves whom, now.
 
     Args:

@@ -19,7 +19,7 @@ ROUNDING = 1e-6
 """Beyond a limit by less than this is the rounding of a printed number [rad or m]."""
 
 
-def by_hand(description: Description, robot: Robot, file: str) -> Description:
+def overridden(description: Description, robot: Robot, file: str) -> Description:
     """The description with the rotor inertias, limits and masses that a robot's table gives.
 
     Args:

@@ -11,7 +11,7 @@ from seerob.core.samples import Quality
 from seerob.devices.live.device_clock import AFTER
 from seerob.session.run import Judge, bind, pump, ticks
 from seerob.twin.engine import Engine
-from seerob.twin.whereabouts.hearing import Hearing
+from seerob.twin.validity.hearing import Hearing
 from seerob.workstation.source import Opened, Source
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'

@@ -79,7 +79,7 @@ def told(source: LiveSource, target: Target | None) -> bytes | None:
         return None
 
 
-class Apart:
+class SourceProcess:
     """One source's process, its end and its beginning anew.
 
     Args:

@@ -52,7 +52,7 @@ class _Wait(asyncio.Future[None]):
             self.get_loop().call_soon(then, self, context=self._context)
 
 
-class Bell:
+class Wakeup:
     """Rung by callbacks of the running loop; one task at a time waits for it.
 
     It remembers nothing: whoever waits looks first whether something is there.
@@ -64,7 +64,7 @@ class Bell:
         self._due = 0.0
         self._timer: asyncio.TimerHandle | None = None
 
-    def ring(self) -> None:
+    def wake(self) -> None:
         """Whoever waits goes on, and has done with what there is when this returns."""
         if self._wait is not None:
             self._wait.end()

@@ -17,10 +17,10 @@ import told_sources
 from live_story import open_files, wait_for
 from seerob.core.plugin import kinds, load
 from seerob.core.samples import JointSample, Quality, SignalSample
-from seerob.devices.live import apart
-from seerob.devices.live.apart import told
-from seerob.devices.live.ears import Listening
+from seerob.devices.live import source_process
 from seerob.devices.live.listening import LiveSource
+from seerob.devices.live.receivers import Receivers
+from seerob.devices.live.source_process import told
 from seerob.devices.sources.headset import Headset
 from seerob.workstation.source import Source
 from told_sources import AtOnce, Delayed, Large, Missing, Mistaken, Stubborn, Told
@@ -48,7 +48,7 @@ def is_there(pid):
 
 def test_it_is_heard_from_another_process_whose_end_is_waited_for():
     before = open_files()
-    with Listening([(Told(name="controller"), None)]) as listening:
+    with Receivers([(Told(name="controller"), None)]) as listening:
         pid = process_of(listening)
         first, later = taken(listening)[-1], taken(listening)[-1]
     assert pid != os.getpid()
@@ -61,7 +61,7 @@ def test_it_is_heard_from_another_process_whose_end_is_waited_for():
 
 def test_each_has_a_process_of_its_own_and_what_drives_something_is_waited_for():
     sources = [(Told(name="a", robot="left"), None), (Told(name="b", robot="right"), None)]
-    with Listening(sources) as listening:
+    with Receivers(sources) as listening:
         heard = listening.first(patience=60.0)
         assert {s.target for s in heard if isinstance(s, JointSample)} == {"left", "right"}
         processes = {}
@@ -70,7 +70,7 @@ def test_each_has_a_process_of_its_own_and_what_drives_something_is_waited_for()
 
 
 def test_the_newest_wins_and_nothing_queues():
-    with Listening([(AtOnce(), None)]) as listening:
+    with Receivers([(AtOnce(), None)]) as listening:
         found = []
         wait_for(lambda: found.extend(listening.take()) or (found and found[-1].seq == 999))
         assert len(found) < 1000 or len(found) == len({s.seq for s in found})
@@ -81,7 +81,7 @@ def test_the_newest_wins_and_nothing_queues():
 def test_what_it_logs_is_logged_here_with_its_place_and_what_a_library_prints_is_not_taken_for_it(caplog):
     with (
         caplog.at_level(logging.INFO),
-        Listening([(Told(name="a"), None), (Mistaken(name="b", robot="other"), None)]) as listening,
+        Receivers([(Told(name="a"), None), (Mistaken(name="b", robot="other"), None)]) as listening,
     ):
         wait_for(lambda: taken(listening)[-1].seq > 3)
         wait_for(lambda: any(r.getMessage().startswith("b: not heard") for r in caplog.records))
@@ -94,7 +94,7 @@ def test_what_it_logs_is_logged_here_with_its_place_and_what_a_library_prints_is
 
 
 def test_a_process_that_is_killed_is_started_again_with_one_line_each(caplog):
-    with caplog.at_level(logging.WARNING), Listening([(Told(name="arm"), None)]) as listening:
+    with caplog.at_level(logging.WARNING), Receivers([(Told(name="arm"), None)]) as listening:
         for k in range(3):
             pid = process_of(listening)
             # Its signals come first, and what drives a robot is heard by its joints: who is killed in between
@@ -110,7 +110,7 @@ def test_a_process_that_is_killed_is_started_again_with_one_line_each(caplog):
 
 def test_a_delay_that_came_while_nobody_listened_stays_one(tmp_path):
     """Whoever listens next knows the clock of the device: samples that are 0.8 s old are not of now."""
-    with Listening([(Delayed(name="arm", been=str(tmp_path / "been"), timeout=0.5), None)]) as listening:
+    with Receivers([(Delayed(name="arm", been=str(tmp_path / "been"), timeout=0.5), None)]) as listening:
         pid = process_of(listening)
         assert {s.quality for s in taken(listening)} == {Quality.GOOD}
         os.kill(pid, signal.SIGKILL)
@@ -140,14 +140,14 @@ def test_it_ends_with_the_run_however_that_ends(how):
 
 
 def test_an_interrupt_of_the_terminal_is_not_for_it():
-    with Listening([(Told(), None)]) as listening:
+    with Receivers([(Told(), None)]) as listening:
         assert os.getpgid(process_of(listening)) != os.getpgid(0)
 
 
 def test_one_that_does_not_end_is_not_waited_for_long(monkeypatch):
-    monkeypatch.setattr(apart, "SPARE", 0.5)
+    monkeypatch.setattr(source_process, "SPARE", 0.5)
     begun = 0.0
-    with Listening([(Stubborn(), None)]) as listening:
+    with Receivers([(Stubborn(), None)]) as listening:
         taken(listening)
         (process,) = [p._process for p in listening._apart]
         begun = time.monotonic()
@@ -158,7 +158,7 @@ def test_one_that_does_not_end_is_not_waited_for_long(monkeypatch):
 def test_one_that_is_stopped_while_it_begins_ends():
     before = open_files()
     for pause in (0.0, 0.02, 0.1):
-        listening = Listening([(Told(), None)])
+        listening = Receivers([(Told(), None)])
         (process,) = listening._apart
         process.start()
         time.sleep(pause)
@@ -172,8 +172,8 @@ def test_an_interrupt_while_it_begins_leaves_nothing_behind(monkeypatch):
     def interrupted(process):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(apart.Apart, "wait", interrupted)
-    listening = Listening([(Told(), None), (Told(robot="other"), None)])
+    monkeypatch.setattr(source_process.SourceProcess, "wait", interrupted)
+    listening = Receivers([(Told(), None), (Told(robot="other"), None)])
     with pytest.raises(KeyboardInterrupt), listening:
         listening.first()
     assert not any(process._thread.is_alive() for process in listening._apart)
@@ -186,7 +186,7 @@ def test_what_only_this_process_has_listens_here():
     assert told(Told(), None)
     for source in (Local(), Headset(human="operator")):
         assert told(source, None) is None
-    with Listening([(Local(), None)]) as listening:
+    with Receivers([(Local(), None)]) as listening:
         assert process_of(listening) == os.getpid()
 
 
@@ -194,20 +194,20 @@ def test_modules_of_the_folder_it_is_started_in_are_not_taken(tmp_path, monkeypa
     for name in ("msgspec", "pickle", "seerob", "sitecustomize"):
         (tmp_path / f"{name}.py").write_text("import os\nopen('taken', 'w')\nos._exit(7)\n")
     monkeypatch.chdir(tmp_path)
-    with Listening([(Told(), None)]) as listening:
+    with Receivers([(Told(), None)]) as listening:
         taken(listening)
     assert not (tmp_path / "taken").exists()
 
 
 def test_a_source_that_is_not_known_there_is_told_with_its_place(caplog):
-    with caplog.at_level(logging.WARNING), Listening([(Missing(name="odd"), None)]):
+    with caplog.at_level(logging.WARNING), Receivers([(Missing(name="odd"), None)]):
         wait_for(lambda: "odd: the process that listened has ended (exit code 1)" in caplog.text)
     assert "No module named 'of_a_notebook'" in caplog.text
     assert "a source cannot be listened to in a process of its own" in caplog.text
 
 
 def test_a_sample_that_has_no_room_is_a_loss(caplog):
-    with caplog.at_level(logging.WARNING), Listening([(Large(name="odd"), None)]) as listening:
+    with caplog.at_level(logging.WARNING), Receivers([(Large(name="odd"), None)]) as listening:
         wait_for(lambda: "odd: not heard: a sample of 200" in caplog.text)
         assert listening.take() == ()
 

@@ -1,7 +1,7 @@
 """Wavefront OBJ with the colours of its material libraries; it knows neither unit nor axes.
 
 Read here and not by trimesh 5.2.0 for its messages: a face that names a missing vertex and a coordinate that
-is no number are told with vertex and count, where trimesh raises NumPy's IndexError and ValueError. The price:
+is no number are told with vertex and count, where trimesh raises NumPy's IndexError and ValueError. Price:
 a sphere of 81 920 triangles takes 440 ms here and 168 ms there.
 """
 

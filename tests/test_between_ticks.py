@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, UR10, heard, made, person, two_r
+from made_cell import TWO_R, UR10, heard, made, person, two_r
 from seerob.core.snapshot import Finding, Verdict
 from seerob.criteria.between_ticks import Told
 from seerob.criteria.contact.regions import REGIONS
@@ -436,25 +435,6 @@ def test_what_is_too_near_just_when_a_criterion_begins_to_apply_is_exceeded(tmp_
     found = touching(tmp_path, shaking(0.01), separation, kind="separation", told=told)
     assert (found.verdict is Verdict.EXCEEDED) is exceeds
     assert (found.worst().t == pytest.approx(0.0775, abs=2e-3)) is exceeds
-
-
-@pytest.mark.parametrize(("mode", "keeps"), [("fixed", True), ("dynamic", False)])
-def test_a_fixed_separation_remembers_how_far_it_may_have_risen_between_two_ticks(tmp_path, mode, keeps):
-    text = FLOATING + TWO_R + person("op", 9, 0, 0) + '[[safety]]\nkind = "separation"\nname = "c"\n'
-    text += f'mode = "{mode}"\nbetween = ["arm", "op"]\nhuman_speed = 1.6\nintrusion = 0\n'
-    text += "stop = { reaction = 0.1, stopping = 0.2, acceleration = 0 }\n"
-    text += "human_uncertainty = 0\nrobot_uncertainty = 0\n"
-    watch = made(tmp_path, text, {"arm.urdf": two_r()}).bound[0].watch
-    still = np.zeros(watch.points.count)
-
-    def lost(begin, fast):
-        span = SimpleNamespace(begin=begin, T=0.01, fast=still + fast, slow=still, way=lambda rows: 0.0)
-        return float(np.max(np.minimum(*watch.falls(span, 1.0))))
-
-    rest, moved = lost(0.0, 0.0), lost(0.01, 1.0)
-    assert moved > rest + 0.1
-    assert (lost(0.02, 0.0) > rest + 0.1) is keeps
-    assert lost(0.0, 0.0) == rest  # another run
 
 
 def contact(only="", **more):

@@ -372,17 +372,6 @@ class Separation(Criterion, frozen=True, kw_only=True):
         """Bound the margin of each moving part between instants; None where nobody knows how S_p changes."""
         gap, rises = self._gap(model), self.rises(model)
         people, parts, lasts = rows_of(gap.a), rows_of(gap.b), self.lasts(model)
-        begin, largest = -np.inf, np.zeros(len(parts))
-
-        def remembered(span: Span, more: Array) -> Array:
-            """With ``mode = "fixed"`` the largest since a run began: ticks do not know what was between."""
-            nonlocal begin, largest
-            if self.mode != "fixed":
-                return more
-            largest = more if span.begin < begin else np.maximum(largest, more)
-            begin = span.begin
-            return largest
-
         if rises is None:
             most = self._most(model, points)
             n = len(parts)
@@ -391,7 +380,6 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 S_p = None if most is None else most(span)
                 if S_p is None:
                     return UNBOUNDED
-                S_p = remembered(span, S_p)
                 nearer, each = span.way(people) + span.fast[parts] * span.T, np.asarray(least)
                 lost = np.maximum(each[:n] - (each[n:] - nearer - S_p), nearer)
                 return Fall(np.inf, np.concatenate([lost, nearer]))
@@ -400,9 +388,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
         def falls(span: Span, _: Array | float) -> Fall:
             nearer = span.way(people) + span.fast[parts] * span.T
-            lost = np.concatenate([nearer + remembered(span, rises(span)), nearer])
-            # What S_p has ahead, or had, counts at once: the margin at the end says nothing of the way there.
-            return Fall(np.inf, lost) if lasts or self.mode == "fixed" else Fall(lost)
+            lost = np.concatenate([nearer + rises(span), nearer])
+            # What S_p has ahead may leave it at once: the margin at the end says nothing of the way there.
+            return Fall(np.inf, lost) if lasts else Fall(lost)
 
         return falls
 

@@ -1,0 +1,241 @@
+"""Contradictions at both sides of each threshold: two samples, or one motion, in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from seerob.core.samples import BodyPoint, BodySample, JointSample, PoseSample
+from seerob.devices.live.contradictions import Contradictions
+from seerob.workstation.source import Target
+
+BEGIN = 100.0
+"""Of the device's clock [s]."""
+SLIDER = Target(name="arm", joints=("a", "b"), units=("rad", "m"), velocity=(3.2, 1.0))
+UNLIMITED = Target(name="arm", joints=("a", "b"), units=("rad", "m"), velocity=(20.0, None))
+PERSON = ("a", "b", "c", "d")
+
+
+def said(t, q, qd=None, device=True):
+    at = BEGIN + t
+    return JointSample(source="", seq=0, target="arm", t=at, t_device=at if device else None, q=q, qd=qd)
+
+
+def last(samples, target=None):
+    looking = Contradictions(target)
+    return [looking.find(sample) for sample in samples][-1]
+
+
+def pose(t, position=(0.0, 0.0, 0.0), wxyz=(1.0, 0.0, 0.0, 0.0)):
+    return PoseSample(source="", seq=0, target="cart", t=t, t_device=t, position=position, wxyz=wxyz)
+
+
+def body(t, places):
+    points = tuple(
+        BodyPoint(name=name, bone="hip", position=None if x is None else (x, 0.0, 0.0))
+        for name, x in places.items()
+    )
+    return BodySample(source="", seq=0, target="op", t=t, t_device=t, points=points)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(
+    ("target", "joint", "dt", "reach"),
+    [
+        (None, 0, 0.01, 30 * 0.01 + 0.005),  # 30 rad/s where nobody stated a limit, and noise of 5 mrad
+        (UNLIMITED, 0, 0.01, 30 * 0.01 + 0.005),  # nor more where twice the limit is more
+        (SLIDER, 0, 0.01, 6.4 * 0.01 + 0.005),  # twice the limit
+        (UNLIMITED, 1, 0.01, 10 * 0.01 + 0.001),  # 10 m/s, 1 mm
+        (SLIDER, 1, 0.01, 2.0 * 0.01 + 0.001),
+        (SLIDER, 2, 0.01, 30 * 0.01 + 0.005),  # of a joint that the robot does not have
+        (None, 0, 0.49, 30 * 0.49 + 0.005),  # before half a second of silence
+    ],
+)
+def test_a_joint_goes_so_far_and_no_farther(target, joint, dt, reach, way):
+    def found(far):
+        q = [0.1, 0.1, 0.1]
+        q[joint] -= way * far
+        return last([said(0.0, (0.1, 0.1, 0.1)), said(dt, tuple(q))], target)
+
+    assert not found(0.999 * reach)
+    assert found(1.001 * reach).startswith(f"joint {joint + 1} went")
+
+
+def test_exactly_so_far_is_no_farther():
+    """Of times that a float holds exactly."""
+    reach, far = 30 * 0.25 + 0.005, 10 * 0.25 + 0.001
+    assert not last([said(0.0, (0.0,)), said(0.25, (reach,))])
+    assert not last([pose(0.0), pose(0.25, (far, 0, 0))])
+    assert not last([body(0.0, {"a": 0.0}), body(0.25, {"a": 10 * 0.25 + 0.2})])
+
+
+@pytest.mark.parametrize(
+    ("dt", "reach"),
+    [
+        (0.01, 30 * 0.06 + 0.005),  # it may have been 50 ms longer
+        (-0.01, 30 * 0.04 + 0.005),
+        (0.049, 30 * 0.099 + 0.005),
+        (0.052, 30 * 0.052 + 0.005),  # what is farther apart did not come so close together
+    ],
+)
+def test_where_no_device_sends_a_time_samples_may_come_closer_together(dt, reach):
+    found = lambda far: last([said(0.0, (0.0,), None, False), said(dt, (far,), None, False)])  # noqa: E731
+    assert not found(0.998 * reach)
+    assert found(1.002 * reach)
+
+
+def test_at_the_edge_of_what_may_come_closer_together():
+    first, then = (JointSample(source="", seq=0, target="arm", t=t, q=(35 * t,)) for t in (0.0, 0.05))
+    assert last([first, then])
+
+
+@pytest.mark.parametrize("dt", [0.0, 0.5, 0.51, -0.01])
+def test_what_was_before_a_silence_says_nothing_of_now(dt):
+    assert not last([said(0.0, (0.0,), (0.0,)), said(dt, (20.0,), (9.0,))])
+    # Nor do positions and velocities over it, or those of before.
+    looking = Contradictions(None)
+    for k in range(5):
+        assert not looking.find(said(0.01 * k, (0.0,), (0.0,)))
+    assert not looking.find(said(0.04 + dt, (0.0,), (0.1,)))
+    assert not looking.find(said(0.04 + dt + 0.02, (0.002,), (0.1,)))
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(("unit", "noise"), [("rad", 0.005), ("m", 0.001)])
+@pytest.mark.parametrize(
+    ("before", "now", "dt", "share"),
+    [
+        (0.0, 0.0, 0.1, 0.2 + 0.03 / 0.1),  # positions alone: a fifth of their way, and 30 ms of it
+        (0.0, 0.0, 0.4, 0.2 + 0.03 / 0.4),
+    ],
+)
+def test_positions_that_go_while_velocities_are_zero(before, now, dt, share, unit, noise, way):
+    target = Target(name="arm", joints=("a",), units=(unit,), velocity=(None,))
+    limit = noise / (1 - share)
+
+    def found(far):
+        return last([said(0.0, (0.5,), (before,)), said(dt, (0.5 + way * far,), (now,))], target)
+
+    assert not found(0.995 * limit)
+    assert "is zero while the joint moves" in found(1.005 * limit)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(
+    ("before", "now", "dt"),
+    [(0.0, 2.0, 0.1), (2.0, 0.0, 0.1), (2.0, 2.0, 0.2), (2.0, -2.0, 0.2), (2.0, 1.0, 0.2)],
+)
+def test_positions_that_stay_behind_their_velocities(before, now, dt, way):
+    """Noise, a fifth of the way and 30 ms of the larger velocity."""
+    said_way, length = 0.5 * dt * (before + now), 0.5 * dt * (abs(before) + abs(now))
+    limit = 0.005 + 0.2 * length + 0.03 * max(abs(before), abs(now))
+
+    def found(off):
+        q = way * (said_way - off)
+        return last([said(0.0, (0.0,), (way * before,)), said(dt, (q,), (way * now,))])
+
+    assert not found(0.995 * limit)
+    assert "the velocity of joint 1" in found(1.005 * limit)
+
+
+def test_of_joints_that_the_robot_does_not_have_angles_are_compared():
+    motion = [said(0.0, (0.0, 0.0), (0.0, 0.0)), said(0.1, (0.0, 0.0), (0.0, 1.5))]
+    assert "the velocity of joint 2" in last(motion, Target(name="arm", joints=("a",), units=("rad",)))
+
+
+@pytest.mark.parametrize("qd", [(), (0.1,), None])
+def test_velocities_that_are_not_those_of_all_joints_are_not_compared(qd):
+    looking = Contradictions(None)
+    for k in range(100):
+        assert not looking.find(said(0.01 * k, (0.0, 0.0), qd))
+    for k in range(100, 103):  # and what comes after begins anew
+        assert not looking.find(said(0.01 * k, (0.0, 0.0), (0.1, 0.1)))
+
+
+def test_joints_that_become_more_begin_anew():
+    looking = Contradictions(None)
+    for k in range(10):
+        n = 1 + k // 5
+        assert not looking.find(said(0.01 * k, (0.0,) * n, (0.05,) * n))
+
+
+def standing(speed, period, until=3.0):
+    """Samples at which positions that stand while velocities run are found."""
+    looking = Contradictions(None)
+    motion = [said(k * period, (0.0,), (speed,)) for k in range(round(until / period))]
+    return [k for k, sample in enumerate(motion) if looking.find(sample)]
+
+
+def test_ways_are_compared_over_half_a_second_and_no_longer():
+    """Over T it is found above 0.005 / (0.8 T - 0.03)."""
+    assert standing(0.0137, 0.125)[0] == 4  # over exactly half a second
+    assert not standing(0.0128, 0.125)
+    assert not standing(0.0130, 0.0542)
+
+
+def test_the_newest_is_compared_with_ten_instants_before():
+    """From 0.494 to 0.5 s after each: of fifty samples that is four of each twenty-five."""
+    found = standing(0.0137, 1 / 512)
+    assert found[0] == 253
+    assert len(found) == pytest.approx((3.0 - 0.494) * 512 * 4 / 26, abs=8)
+
+
+def test_a_way_to_and_fro_counts_both_ways():
+    """A fifth of 0.5 rad, although the joint is where it began."""
+    speed = lambda t: 1.0 if t < 0.25 else -1.0  # noqa: E731
+    for first in (1, -1):
+        motion = [
+            said(t, (first * (min(t, 0.5 - t) + 0.22 * t),), (first * speed(t),))
+            for t in np.arange(0, 0.5, 1 / 128).tolist()
+        ]
+        assert not last(motion)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_what_was_right_for_long_hides_nothing(way):
+    looking = Contradictions(None)
+    for k in range(1000):
+        assert not looking.find(said(0.01 * k, (way * 0.01 * k,), (way * 1.0,)))
+    found = [bool(looking.find(said(10 + 0.01 * k, (way * 9.99,), (way * 1.0,)))) for k in range(12)]
+    assert found.index(True) <= 7
+
+
+@pytest.mark.parametrize(
+    ("position", "angle", "told"),
+    [
+        ((0.1008, 0, 0), 0.0, False),  # 10 m/s and 1 mm
+        ((0, -0.1012, 0), 0.0, True),
+        ((0, 0, 0), 0.304, False),  # 30 rad/s and 5 mrad
+        ((0, 0, 0), 0.306, True),
+        ((0, 0, 0), -0.306, True),
+    ],
+)
+def test_a_tool_goes_and_turns_so_far(position, angle, told):
+    turned = (math.cos(angle / 2), 0.0, math.sin(angle / 2), 0.0)
+    # A quaternion and its opposite are one orientation, and one may be longer than 1 by rounding.
+    for sign in (1.0, -1.0):
+        wxyz = tuple(sign * x for x in turned)
+        assert bool(last([pose(0.0), pose(0.01, position, wxyz)])) is told
+    longer = tuple(x * (1 + 1e-9) for x in turned)
+    assert not last([pose(0.0, wxyz=longer), pose(0.01, wxyz=longer)])
+
+
+@pytest.mark.parametrize(("far", "told"), [(0, False), (1, False), (2, True), (4, True)])
+def test_a_person_is_elsewhere_when_half_the_points_are(far, told):
+    before = dict.fromkeys(PERSON, 0.0)
+    reach = 10 * 0.03 + 0.2
+    for share, doubted in ((0.999, False), (1.001, told)):
+        after = {name: -share * reach if k < far else 0.0 for k, name in enumerate(PERSON)}
+        found = last([body(0.0, before), body(0.03, after)])
+        assert bool(found) is doubted
+        assert not found or found.startswith(f"{far} of 4 points")
+
+
+def test_points_without_a_place_or_a_past_count_for_nothing():
+    assert not last([body(0.0, {"a": 0.0}), body(0.03, {"b": 9.0})])
+    assert not last([body(0.0, {"a": None}), body(0.03, {"a": 9.0})])
+    assert not last([body(0.0, {"a": 0.0}), body(0.03, {"a": None})])
+    assert not last([body(0.0, {"a": 0.0}), body(0.03, {"a": 0.0, "b": 9.0, "c": 9.0})])
+    assert last([body(0.0, {"a": 0.0, "b": None}), body(0.03, {"a": 9.0, "b": 9.0, "c": 0.0})])

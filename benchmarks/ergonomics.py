@@ -22,12 +22,10 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "
 import numpy as np
 
 from seerob.criteria.ergonomics.reba import METHOD as REBA
-from seerob.criteria.ergonomics.reba import Reba, RebaPhase
+from seerob.criteria.ergonomics.reba import Coupling, Reba, RebaPhase
 from seerob.criteria.ergonomics.rula import METHOD as RULA
-from seerob.criteria.ergonomics.rula import Rula, RulaPhase
+from seerob.criteria.ergonomics.rula import LoadUse, Rula, RulaPhase
 from seerob.criteria.scoring.judgement import Method
-from seerob.criteria.scoring.reba import Coupling
-from seerob.criteria.scoring.rula import LoadUse
 from seerob.criteria.scoring.spans import Span
 from seerob.description.humans import manikin
 from seerob.description.humans.angles import Angles, angles

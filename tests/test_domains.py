@@ -16,9 +16,10 @@ from hypothesis import strategies as st
 from seerob.core.domains import number, whole
 from seerob.core.errors import SeerobError
 from seerob.criteria.contact import collision
+from seerob.criteria.ergonomics import eaws_posture, niosh, owas, reba, rula
+from seerob.criteria.ergonomics.eaws_posture import PostureTime
 from seerob.criteria.safety.separation import separation_bound
-from seerob.criteria.scoring import eaws_posture, niosh, owas, reba, repetition, rula
-from seerob.criteria.scoring.posture_time import PostureTime
+from seerob.criteria.scoring import repetition
 from seerob.criteria.stopping import terms
 from seerob.description.norms import iso_13855
 

@@ -8,15 +8,15 @@ from made_postures import PERSON, made_angles
 
 from made_cell import judged, made, state_at
 from seerob.core.snapshot import Snapshot, Verdict
-from seerob.criteria.scoring.eaws_posture import (
+from seerob.criteria.ergonomics.eaws_posture import (
     EawsThresholds,
     Interpolation,
+    PostureTime,
     asymmetry_points,
     line_points,
     lines,
     possible_lines,
 )
-from seerob.criteria.scoring.posture_time import PostureTime
 from seerob.criteria.scoring.published import published
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import JOINTS

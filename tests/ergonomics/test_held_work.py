@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_postures import made_angles
 
+from seerob.criteria.ergonomics.rula import Profile
 from seerob.criteria.scoring.held_work import Hold, Moves, Watch, WorkDetection, activity, muscle_use
-from seerob.criteria.scoring.rula import Profile
 
 RATE = 20.0
 SEEN = 4

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seerob.criteria.scoring.niosh import (
+from seerob.criteria.ergonomics.niosh import (
     Duration,
     End,
     Grip,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_postures import made_angles, posed
 
-from seerob.criteria.scoring.owas import OwasThresholds, arm_codes, back_codes, leg_codes, load_codes, owas
+from seerob.criteria.ergonomics.owas import OwasThresholds, arm_codes, back_codes, leg_codes, load_codes, owas
 
 USUAL = OwasThresholds()
 

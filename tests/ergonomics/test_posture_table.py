@@ -10,8 +10,8 @@ from made_postures import PERSON
 from made_cell import judged, made, state_at
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Origin, RowState, Verdict
-from seerob.criteria.postures.zone_file import read_zones
 from seerob.criteria.scoring.published import published
+from seerob.criteria.scoring.zones import read_zones
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import JOINTS
 from seerob.session.run import bind

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from seerob.criteria.scoring.niosh import (
+from seerob.criteria.ergonomics.niosh import (
     Duration,
     End,
     Grip,

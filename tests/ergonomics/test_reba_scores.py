@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from made_postures import UNSUPPORTED, known, made_angles
 
-from seerob.criteria.scoring.edges import ROUNDING
-from seerob.criteria.scoring.reba import (
+from seerob.criteria.ergonomics.reba import (
     Coupling,
     coupling,
     knees,
@@ -17,7 +16,7 @@ from seerob.criteria.scoring.reba import (
     upper_arm,
     wrist,
 )
-from seerob.criteria.scoring.spans import exactly
+from seerob.criteria.scoring.spans import ROUNDING, exactly
 from seerob.criteria.scoring.thresholds import Thresholds
 
 SIX = ("neck", "trunk", "legs", "upper arm", "lower arm", "wrist")

@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 from made_postures import PERSON, UNSUPPORTED, posed, random_q
 
-from seerob.criteria.postures.zone_file import zones_of
-from seerob.criteria.scoring import eaws_posture, owas, reba, rula
-from seerob.criteria.scoring.edges import ROUNDING, fallen, reached
+from seerob.criteria.ergonomics import eaws_posture, owas, reba, rula
+from seerob.criteria.scoring.measured import ArmPolicy
 from seerob.criteria.scoring.published import published
-from seerob.criteria.scoring.shoulder import ArmPolicy
-from seerob.criteria.scoring.spans import exactly
+from seerob.criteria.scoring.spans import ROUNDING, exactly, fallen, reached
 from seerob.criteria.scoring.thresholds import Thresholds
-from seerob.criteria.scoring.zones import ZoneRow, ZoneWatch
+from seerob.criteria.scoring.zones import ZoneRow, ZoneWatch, zones_of
 from seerob.description.humans.angles import angles
 from seerob.description.humans.skeleton import JOINTS, bone_poses, mirrored
 

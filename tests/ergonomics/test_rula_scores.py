@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from made_postures import UNSUPPORTED, known, made_angles
 
-from seerob.criteria.ergonomics.rula import Rula
-from seerob.criteria.scoring.edges import ROUNDING
-from seerob.criteria.scoring.rula import (
+from seerob.criteria.ergonomics.rula import (
     LEAST,
     LoadUse,
     Profile,
+    Rula,
     force,
     lower_arm,
     neck,
@@ -19,8 +18,8 @@ from seerob.criteria.scoring.rula import (
     upper_arm,
     wrist,
 )
-from seerob.criteria.scoring.shoulder import ArmPolicy
-from seerob.criteria.scoring.spans import exactly
+from seerob.criteria.scoring.measured import ArmPolicy
+from seerob.criteria.scoring.spans import ROUNDING, exactly
 from seerob.criteria.scoring.thresholds import Thresholds
 
 SEVEN = list(LEAST)[:7]

@@ -10,9 +10,9 @@ from made_cell import heard, judged, made, results_at, state_at
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Origin, RowState, Verdict
 from seerob.criteria.ergonomics import reba, rula
-from seerob.criteria.postures.ergonomic_posture import posture as angles_of
-from seerob.criteria.scoring.bands import band_of
-from seerob.criteria.scoring.owas import Legs
+from seerob.criteria.ergonomics.owas import Legs
+from seerob.criteria.postures.rule import posture as angles_of
+from seerob.criteria.scoring.score_rows import band_of
 from seerob.description.humans.angles import Angles, angles
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import JOINTS, bone_poses, mirrored

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from made_postures import PERSON, UNSUPPORTED, made_angles, random_q
 
-from seerob.criteria.scoring import reba, rula
-from seerob.criteria.scoring.measured import Measured
-from seerob.criteria.scoring.owas import (
+from seerob.criteria.ergonomics import reba, rula
+from seerob.criteria.ergonomics.owas import (
     OwasThresholds,
     arm_codes,
     back_codes,
@@ -17,7 +16,7 @@ from seerob.criteria.scoring.owas import (
     only,
     owas,
 )
-from seerob.criteria.scoring.shoulder import ArmPolicy, arm_score
+from seerob.criteria.scoring.measured import ArmPolicy, Measured, arm_score
 from seerob.criteria.scoring.spans import Span, beyond, exactly, graded
 from seerob.criteria.scoring.thresholds import Thresholds
 from seerob.description.humans.angles import angles

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from made_postures import UNSUPPORTED, known, made_angles
 
-from seerob.criteria.scoring import reba, rula
-from seerob.criteria.scoring.owas import owas
+from seerob.criteria.ergonomics import reba, rula
+from seerob.criteria.ergonomics.owas import owas
 from seerob.criteria.scoring.published import cells, published
 from seerob.criteria.scoring.spans import exactly
 from seerob.criteria.scoring.thresholds import Thresholds

@@ -7,9 +7,8 @@ import pytest
 from made_postures import PERSON, made_angles, random_q
 
 from seerob.core.errors import InputError
-from seerob.criteria.postures.zone_file import zones_of
 from seerob.criteria.scoring.published import published
-from seerob.criteria.scoring.zones import MEASURES, ZoneRow, ZoneWatch, mistakes, value_of
+from seerob.criteria.scoring.zones import MEASURES, ZoneRow, ZoneWatch, mistakes, value_of, zones_of
 from seerob.description.humans.angles import angles
 from seerob.description.humans.skeleton import JOINTS, bone_poses, mirrored
 

@@ -11,7 +11,7 @@ from test_touching import desk, pressing
 from seerob.core.errors import Undecided
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Verdict
-from seerob.criteria.postures.ergonomic_posture import bind_posture
+from seerob.criteria.postures.rule import bind_posture
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.criteria.safety.separation import Separation, Stop
 from seerob.description.humans.angles import angles

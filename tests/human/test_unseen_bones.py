@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from seerob.core.errors import Undecided
 from seerob.core.snapshot import Verdict
-from seerob.criteria.postures.ergonomic_posture import bind_posture
+from seerob.criteria.postures.rule import bind_posture
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.description.capture.estimated import estimated
 from seerob.description.humans.skeleton import BONES, PARENTS

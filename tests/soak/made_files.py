@@ -13,7 +13,7 @@ import numpy as np
 from motion_io import made_pictures
 from seerob.app.emulators.mvn_person import animated
 from seerob.app.emulators.vive import recorded, worn
-from seerob.criteria.postures.zone_file import read_zones
+from seerob.criteria.scoring.zones import read_zones
 from seerob.description.capture.captured import Seen
 from seerob.description.capture.mapping import read_conventions
 from seerob.description.humans import keyframes

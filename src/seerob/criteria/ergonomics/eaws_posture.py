@@ -1,25 +1,341 @@
-"""Posture screening in the style of the EAWS form: sections 0 and 1, over the time of a cycle."""
+"""Posture screening in the style of the EAWS form: sections 0 and 1, over the time of a cycle.
+
+This is not the EAWS: its figures come from one public code and from memory, sections 2 to 4 are not public.
+First lines and points of a posture, then the screening over time (seconds per posture line and of an
+asymmetric trunk, the points of both), then the rule.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated
+import math
+from collections.abc import Mapping
+from enum import StrEnum
+from functools import cache
+from typing import Annotated, NamedTuple
 
+import numpy as np
 from msgspec import Meta, Struct
 from msgspec.structs import asdict
 
+from seerob.core.domains import number
+from seerob.core.errors import UnknownName
 from seerob.core.snapshot import Basis, Highlight, Input, Origin, Result, Row, RowState, Verdict
 from seerob.criteria.criterion import Evaluate, judge_interval
-from seerob.criteria.postures.ergonomic_posture import bind_posture
-from seerob.criteria.postures.rule import PostureRule
-from seerob.criteria.scoring import eaws_posture as method
+from seerob.criteria.postures.rule import PostureRule, bind_posture
 from seerob.criteria.scoring.basis import chosen, entered, posture_quality
-from seerob.criteria.scoring.eaws_screening import Points, Screening
-from seerob.criteria.scoring.phases import Period, Phase, Seconds, Stance, phase_at, shared_phases
+from seerob.criteria.scoring.measured import Accuracy, Measured
+from seerob.criteria.scoring.phases import Period, Phase, Seconds, phase_at, shared_phases
 from seerob.criteria.scoring.published import published
+from seerob.criteria.scoring.repetition import GAP
 from seerob.criteria.scoring.score_rows import total_row
+from seerob.criteria.scoring.spans import ROUNDING, Span, reached
+from seerob.criteria.scoring.thresholds import Angle
+from seerob.description.humans.angles import Angles
 from seerob.model import provenance
 from seerob.model.model import Model
 from seerob.twin.state import State
+from seerob.workstation.tables.task_phase import Stance
+
+
+class Interpolation(StrEnum):
+    """What lies between two columns of the form."""
+
+    LINEAR = "linear"
+    """Linear between columns, proportional below the first, the last column beyond it."""
+    STEP = "step"
+    """The column that was reached; 0 below the first."""
+
+
+class EawsThresholds(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Angles at which a posture belongs to a line."""
+
+    bent: Angle = math.radians(20)
+    """Trunk bent forward from here on [rad]."""
+    far_bent: Angle = math.radians(60)
+    """Trunk strongly bent forward beyond [rad]."""
+    overhead: Angle = math.radians(40)
+    """Elbow or wrist above the horizontal through the shoulder by more: hands above head [rad]; a choice."""
+    crouching: Angle = math.radians(60)
+    """Both knees bent beyond [rad]: crouching; a choice."""
+    kneeling: Angle = math.radians(60)
+    """Shank from the vertical beyond [rad]: kneeling; a choice."""
+
+
+class Line(NamedTuple):
+    """One line of the form."""
+
+    id: str
+    name: str
+    position: str
+    points: tuple[float, ...]
+    confidence: str
+
+
+@cache
+def lines() -> dict[str, Line]:
+    """The lines by their number."""
+    rows = published("eaws_posture")["lines"]
+    return {row["id"]: Line(**{**row, "points": tuple(map(float, row["points"]))}) for row in rows}
+
+
+POSITIONS: Mapping[Stance, str] = {
+    "sitting": "sitting",
+    "standing": "standing",
+    "one_leg": "standing",
+    "walking": "walking",
+    "both_knees_bent": "kneeling",
+    "one_knee_bent": "kneeling",
+    "kneeling": "kneeling",
+    "lying": "lying",
+    "climbing": "climbing",
+}
+"""How the legs are used → group of lines."""
+
+
+def line_points(line: str, share: float, interpolation: Interpolation = Interpolation.LINEAR) -> float:
+    """Points of a posture that lasts for a share of the time, 0 to 1."""
+    if line not in lines():
+        raise UnknownName("line of the form", line, lines())
+    number("share", share, 0, 1 + _ROUNDING)
+    points = lines()[line].points
+    shares = published("eaws_posture")["shares"][: len(points)]
+    if Interpolation(interpolation) is Interpolation.STEP:
+        reached = int(np.searchsorted(shares, share + _ROUNDING, side="right"))
+        return points[reached - 1] if reached else 0.0
+    return float(np.interp(share, [0.0, *shares], [0.0, *points]))
+
+
+def asymmetry_points(at_least: tuple[float, ...]) -> float:
+    """Points of a trunk that is turned, or bent sideways.
+
+    Args:
+        at_least: Share of the time at or beyond each of the form's three angles.
+    """
+    table = published("eaws_posture")
+    number("share", at_least, 0, 1 + _ROUNDING)
+    best = 0.0
+    for share, points in zip(at_least, table["asymmetry_points"], strict=True):
+        reached = int(np.searchsorted(table["asymmetry_shares"], share + _ROUNDING, side="right"))
+        factor = table["asymmetry_factors"][reached - 1] if reached else 0.0
+        best = max(best, points * factor)
+    return float(min(best, table["asymmetry_most"]))
+
+
+def possible_lines(
+    angles: Angles,
+    *,
+    legs: Stance | None,
+    supported: bool | None,
+    thresholds: EawsThresholds,
+    accuracy: Accuracy = 0.0,
+) -> tuple[str, ...]:
+    """Lines that a posture may belong to; one when it is known.
+
+    Of several that fit, a posture belongs to the one with the most points: bent or arms raised.
+
+    Args:
+        angles: Of one posture.
+        legs: How they are used; ``posture`` tells standing, crouching and kneeling apart.
+        supported: Whether the trunk is well supported; None when nobody said.
+        thresholds: Of the lines.
+        accuracy: Of each angle [rad].
+    """
+    t, m = thresholds, Measured(angles, accuracy)
+    bent = m.graded(
+        "trunk_flexion",
+        lambda x: reached(x, t.bent).astype(np.int64) + reached(x, t.far_bent),
+        within=(0, 2),
+        neutral=-math.inf,
+    )
+    arms = _highest(
+        m.graded(
+            "arm_rise",
+            lambda x: (x >= -ROUNDING).astype(np.int64) + reached(x, t.overhead),
+            within=(0, 2),
+            neutral=-math.inf,
+        )
+    )
+    positions = _positions(m, legs, t)
+    held = [supported] if supported is not None else [True, False]
+    found: dict[str, None] = {}
+    for position in positions:
+        for b in range(int(bent.low), int(bent.high) + 1):
+            for a in range(int(arms.low), int(arms.high) + 1):
+                for support in held:
+                    found[_line(position, b, a, support)] = None
+    return tuple(sorted(found, key=_weight))
+
+
+def _highest(span: Span) -> Span:
+    return Span(span.low.max(axis=-1), span.high.max(axis=-1))
+
+
+def _positions(measured: Measured, legs: Stance | None, t: EawsThresholds) -> tuple[str, ...]:
+    if legs is None:
+        return tuple(dict.fromkeys(POSITIONS.values()))
+    if legs != "posture":
+        return (POSITIONS[legs],)
+    folded = measured.beyond("knee_flexion", t.crouching)
+    flat = measured.beyond("shank_tilt", t.kneeling)
+    low = folded.low.min() == 1 or flat.low.max() == 1
+    high = folded.high.min() == 1 or flat.high.max() == 1
+    return ("kneeling",) if low else ("standing", "kneeling") if high else ("standing",)
+
+
+def _line(position: str, bent: int, arms: int, supported: bool) -> str:
+    if position in ("lying", "climbing"):
+        return {"lying": "15", "climbing": "16"}[position]
+    if position == "sitting":
+        upright = "9" if bent else "7" if supported else "8"
+        return (upright, "10", "11")[arms]
+    if position == "kneeling":
+        upright = "13" if bent else "12"
+        return upright if arms == 0 else "14"
+    upright = "1" if supported or position == "walking" else "2"
+    trunk = (upright, "3b" if supported else "3a", "4b" if supported else "4a")[bent]
+    return max((trunk, (trunk, "5", "6")[arms]), key=_weight)
+
+
+def _weight(line: str) -> float:
+    return line_points(line, 0.66)
+
+
+_ROUNDING = 1e-9
+
+
+class PostureTime:
+    """Seconds by posture; a posture counts, from its begin, once it was held long enough.
+
+    Args:
+        hold: How long a posture is held to count [s].
+    """
+
+    def __init__(self, hold: float) -> None:
+        self._hold = hold
+        self._posture: str | None = None
+        self._since = self._t = math.nan
+        self.seconds: dict[str, float] = {}
+        """Posture → time for which it was held [s], where it was held long enough to count."""
+        self.heard = 0.0
+        """All time that was heard [s]."""
+        self.silent = 0.0
+        """Time in which nothing was heard [s]."""
+
+    def add(self, t: float, posture: str) -> None:
+        """The posture from the instant before up to this one [s]."""
+        number("the instant", t, unit="s")
+        step = t - self._t
+        if math.isnan(step):
+            self._posture, self._since = posture, t
+        elif step > GAP + _ROUNDING:
+            self.silent += step
+            self._posture, self._since = posture, t
+        else:
+            self.heard += step
+            before = 0.0 if self._posture is None else self._credit(self._t)
+            after = 0.0 if self._posture is None else self._credit(t)
+            if self._posture is not None and after > before:
+                self.seconds[self._posture] = self.seconds.get(self._posture, 0.0) + after - before
+            if posture != self._posture:
+                self._posture, self._since = posture, t
+        self._t = t
+
+    def _credit(self, t: float) -> float:
+        held = t - self._since
+        return held if held >= self._hold - _ROUNDING else 0.0
+
+
+_TURNS = ("trunk_twist", "trunk_side_bend")
+
+
+class Points(NamedTuple):
+    """Points so far."""
+
+    lines: dict[str, float]
+    rotation: float
+    bending: float
+
+    @property
+    def total(self) -> float:
+        """Points of section 1, far reach apart."""
+        most = float(published("eaws_posture")["asymmetry_sum_most"])
+        return sum(self.lines.values()) + min(self.rotation + self.bending, most)
+
+
+class _Ledger:
+    """Time by line and by size of the asymmetry, at one end of what is possible."""
+
+    def __init__(self, hold: float) -> None:
+        self.lines = PostureTime(hold)
+        self.turns = {name: [PostureTime(0.0) for _ in range(3)] for name in _TURNS}
+
+
+class Screening:
+    """Points of a posture as time goes on, least and greatest.
+
+    Args:
+        cycle: Length of the cycle [s]; shares are of this, or of all that was heard when that is longer.
+        hold: How long a posture is held to count [s].
+        interpolation: Between the columns of the form.
+    """
+
+    def __init__(self, cycle: float, hold: float, interpolation: Interpolation) -> None:
+        self._cycle, self._hold, self._interpolation = cycle, hold, interpolation
+        self._t = -math.inf
+        self._begin()
+
+    def _begin(self) -> None:
+        self._ends = (_Ledger(self._hold), _Ledger(self._hold))
+
+    def add(self, t: float, possible: tuple[str, ...], angles: Angles, accuracy: Accuracy) -> None:
+        """What a posture may be at an instant [s], lightest line first; an earlier instant begins anew."""
+        if t < self._t:
+            self._begin()
+        if t == self._t:
+            return
+        self._t = t
+        measured = Measured(angles, accuracy)
+        for end, ledger in enumerate(self._ends):
+            ledger.lines.add(t, possible[-end])
+            for name, timers in ledger.turns.items():
+                for edge, timer in zip(published("eaws_posture")["asymmetry_from_deg"], timers, strict=True):
+                    turned = measured.beyond(name, math.radians(edge))
+                    timer.add(t, "turned" if int(turned[end]) else "")
+
+    @property
+    def heard(self) -> float:
+        """Time that was heard [s]."""
+        return self._ends[0].lines.heard
+
+    @property
+    def silent(self) -> float:
+        """Time in which nothing was heard [s]."""
+        return self._ends[0].lines.silent
+
+    @property
+    def coverage(self) -> float:
+        """Share of the time that was heard."""
+        return self.heard / (self.heard + self.silent) if self.heard > 0 else 0.0
+
+    @property
+    def complete(self) -> bool:
+        """Whether a whole cycle was heard."""
+        return self.heard >= self._cycle - 1e-6
+
+    def points(self) -> tuple[Points, Points]:
+        """Least and greatest."""
+        whole = max(self._cycle, self.heard)
+        found = []
+        for ledger in self._ends:
+            seconds = {name: s for name, s in ledger.lines.seconds.items() if name}
+            turns = [
+                asymmetry_points(tuple(timer.seconds.get("turned", 0.0) / whole for timer in timers))
+                for timers in ledger.turns.values()
+            ]
+            points = {name: line_points(name, s / whole, self._interpolation) for name, s in seconds.items()}
+            found.append(Points(points, *turns))
+        return found[0], found[1]
+
 
 WHAT = "EAWS-style posture screening (sections 0-1 only)"
 _BONES = ("lumbar", "thorax")
@@ -72,11 +388,11 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
     """Greatest admissible points; judged only when sections 2 to 4 are entered."""
     minimum_hold: Seconds = 4.0
     """A posture counts when it is held so long [s]; 0 counts all, as frequent dynamic postures need."""
-    interpolation: method.Interpolation = method.Interpolation.LINEAR
+    interpolation: Interpolation = Interpolation.LINEAR
     """What lies between the columns of the form; a choice."""
     phases: tuple[EawsPhase, ...] = ()
     """Phases of the task, each from its `start` on; without any, those of ``[[phases]]``."""
-    thresholds: method.EawsThresholds = method.EawsThresholds()
+    thresholds: EawsThresholds = EawsThresholds()
     """Angles at which a posture belongs to a line."""
 
     def bind(self, model: Model) -> Evaluate:
@@ -89,7 +405,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
         def evaluate(state: State) -> Result:
             angles = read(state)
             phase = phase_at(phases, state.t, EawsPhase())
-            found = method.possible_lines(
+            found = possible_lines(
                 angles,
                 legs=phase.legs,
                 supported=phase.back_supported,
@@ -131,7 +447,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
             reasons.append(_rating(ends[0]))
         if verdict in (Verdict.WITHIN, Verdict.EXCEEDED):
             reasons.append("by figures of one public code and of memory, not verified (1 + M)")
-        best = method.lines()[now[-1]]
+        best = lines()[now[-1]]
         reasons.append(f"now line {' or '.join(now)}" + (f": {best.name}" if len(now) == 1 else ""))
         value = ends[0] if known else None
         return Result(
@@ -158,7 +474,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
     def _row(self, name: str, low: float, high: float) -> Row:
         known = abs(high - low) < 1e-9
         key = name.removeprefix("line ")
-        line = method.lines().get(key)
+        line = lines().get(key)
         most = published_most() if line is None else line.points[-1]
         return Row(
             name=name if line is None else f"{name}: {line.name}",
@@ -191,7 +507,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
                 ),
                 Input(
                     name="between columns",
-                    value=method.Interpolation(self.interpolation).value,
+                    value=Interpolation(self.interpolation).value,
                     origin=Origin.CHOICE,
                     source="option interpolation",
                 ),
@@ -211,7 +527,7 @@ class EawsPosture(PostureRule, frozen=True, kw_only=True):
                     )
                     for name, value in asdict(self.entered).items()
                 ),
-                *chosen(self.thresholds, method.EawsThresholds()),
+                *chosen(self.thresholds, EawsThresholds()),
                 *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
                 *(() if self.limit is None else provenance.limit(self.limit, "")),
             ),
@@ -231,7 +547,7 @@ def published_most() -> float:
 
 
 def _pairs(low: Points, high: Points) -> list[tuple[str, float, float]]:
-    names = sorted({*low.lines, *high.lines}, key=list(method.lines()).index)
+    names = sorted({*low.lines, *high.lines}, key=list(lines()).index)
     found = [(f"line {name}", low.lines.get(name, 0.0), high.lines.get(name, 0.0)) for name in names]
     return [
         *found,

@@ -10,9 +10,9 @@ from typing import Annotated
 from msgspec import Meta
 
 from seerob.core.snapshot import Level
-from seerob.criteria.postures.zone_file import ZoneTable, read_zones, zones_of
 from seerob.criteria.postures.zone_rule import ZoneRule
 from seerob.criteria.scoring.published import published
+from seerob.criteria.scoring.zones import ZoneTable, read_zones, zones_of
 from seerob.model.model import Model
 
 

@@ -1,30 +1,193 @@
-"""OWAS on the twin: the posture code and its action category, every tick; Karhu et al. 1977."""
+"""OWAS: its codes as pure functions, and the rule on the twin: posture code and action category, every tick.
+
+Karhu et al. 1977, action categories of Louhevaara and Suurnäkki 1992.
+The category does not grow with each code, so what is not known is a set of codes, not a span.
+"""
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Mapping
+from enum import StrEnum
 from typing import Any, Literal
 
 import numpy as np
+from msgspec import Struct
+from numpy.typing import ArrayLike, NDArray
 
+from seerob.core.domains import number, whole
 from seerob.core.figures import whatever_is_missing
 from seerob.core.snapshot import Basis, Highlight, Input, Level, Origin, Result, Row, RowState, Verdict
 from seerob.criteria.criterion import Evaluate, judge, judge_interval
-from seerob.criteria.postures.ergonomic_posture import bind_posture
-from seerob.criteria.postures.rule import PostureRule
-from seerob.criteria.scoring import owas as method
+from seerob.criteria.postures.rule import PostureRule, bind_posture
 from seerob.criteria.scoring.basis import ACCURACY_NOTE, chosen, entered, posture_quality
-from seerob.criteria.scoring.edges import ROUNDING
-from seerob.criteria.scoring.measured import Accuracy
+from seerob.criteria.scoring.measured import Accuracy, Measured
 from seerob.criteria.scoring.phases import Kilograms, Phase, TaskPhase, phase_at, shared_phases
-from seerob.criteria.scoring.published import published
+from seerob.criteria.scoring.published import Ints, cells, published
 from seerob.criteria.scoring.score_rows import aspects, total_row
-from seerob.criteria.scoring.spans import Span
+from seerob.criteria.scoring.spans import ROUNDING, Span, either
+from seerob.criteria.scoring.thresholds import Angle
 from seerob.description.humans.angles import Angles
 from seerob.description.humans.skeleton import SIDES
 from seerob.model import provenance
 from seerob.model.model import Model
 from seerob.twin.state import State
+
+CODES = {"back": 4, "arms": 3, "legs": 7, "load": 3}
+"""Components in the order of `owas`, and how many codes each has."""
+Possible = NDArray[np.bool_]
+"""Whether each code is possible, shape (..., number of codes)."""
+
+
+class Legs(StrEnum):
+    """How the legs are used: the seven codes in their order, or an estimate."""
+
+    SITTING = "sitting"
+    STANDING = "standing"
+    ONE_LEG = "one_leg"
+    BOTH_KNEES_BENT = "both_knees_bent"
+    ONE_KNEE_BENT = "one_knee_bent"
+    """On one bent knee."""
+    KNEELING = "kneeling"
+    WALKING = "walking"
+    POSTURE = "posture"
+    """Not a code: estimated for somebody who stands or kneels."""
+
+
+class OwasThresholds(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Angles that OWAS leaves to whoever applies it; all are choices."""
+
+    bent: Angle = math.radians(20)
+    """Back bent forward or backward beyond [rad]."""
+    twisted: Angle = math.radians(20)
+    """Back twisted beyond [rad]."""
+    side_bent: Angle = math.radians(20)
+    """Back bent sideways beyond [rad]."""
+    knee_bent: Angle = math.radians(30)
+    """Knee bent beyond [rad]."""
+    foot_rise: Angle = math.radians(7)
+    """One foot above the other, over the length of the leg, beyond [rad]: on one leg."""
+    kneeling: Angle = math.radians(60)
+    """Shank from the vertical beyond [rad] with its foot down: kneeling."""
+
+
+def owas(back: ArrayLike, arms: ArrayLike, legs: ArrayLike, load: ArrayLike) -> Ints:
+    """Action category, 1 to 4, of a posture code.
+
+    Args:
+        back: 1 to 4, shape (...); all others broadcast with it.
+        arms: 1 to 3.
+        legs: 1 to 7.
+        load: 1 to 3.
+
+    Raises:
+        ValueError: A code that the method does not have.
+    """
+    given = (back, arms, legs, load)
+    codes = [whole(name, code, 1, CODES[name]) for name, code in zip(CODES, given, strict=True)]
+    return np.asarray(cells("owas", "category")[tuple(code - 1 for code in codes)])
+
+
+def category_span(back: Possible, arms: Possible, legs: Possible, load: Possible) -> Span:
+    """Least and greatest category of all codes that are possible, shape (...)."""
+    every = (
+        back[..., :, None, None, None]
+        & arms[..., None, :, None, None]
+        & legs[..., None, None, :, None]
+        & load[..., None, None, None, :]
+    )
+    table = cells("owas", "category")
+    axes = (-4, -3, -2, -1)
+    low = np.where(every, table, table.max()).min(axis=axes)
+    return Span(low, np.where(every, table, table.min()).max(axis=axes))
+
+
+def settled(codes: Mapping[str, Possible], around: Mapping[str, Possible]) -> dict[str, Possible]:
+    """Codes of a posture at a threshold: those of the greatest category, which does not grow with each code.
+
+    Args:
+        codes: Possible codes by component, in the order of `owas`, shape (number of codes) each.
+        around: The same with every angle off by rounding.
+    """
+    sets = {key: own if own.sum() > 1 else around[key] for key, own in codes.items()}
+    every = np.ix_(*(np.flatnonzero(sets[key]) for key in CODES))
+    found = cells("owas", "category")[every]
+    worst = np.unravel_index(found.argmax(), found.shape)
+    picked = {key: int(every[k].ravel()[i]) for (k, key), i in zip(enumerate(CODES), worst, strict=True)}
+    return {key: own if own.sum() > 1 else only(picked[key] + 1, len(own)) for key, own in codes.items()}
+
+
+def only(code: int, of: int) -> Possible:
+    """The set of one code."""
+    return np.asarray(np.arange(1, of + 1) == whole("code", code, 1, of))
+
+
+def load_codes(kg: float | None) -> Possible:
+    """1 below 10 kg, 2 up to 20 kg, 3 beyond; all when nobody said."""
+    if kg is None:
+        return np.ones(3, bool)
+    number("load", kg, 0, unit="kg")
+    return only(1 + (kg >= 10) + (kg > 20), 3)
+
+
+def back_codes(angles: Angles, thresholds: OwasThresholds, accuracy: Accuracy = 0.0) -> Possible:
+    """1 straight, 2 bent, 3 twisted or bent sideways, 4 both."""
+    m = Measured(angles, accuracy)
+    bent = m.beyond("trunk_flexion", thresholds.bent)
+    turned = either(
+        m.beyond("trunk_twist", thresholds.twisted), m.beyond("trunk_side_bend", thresholds.side_bent)
+    )
+    pairs = [_may(bent, b) & _may(turned, t) for t in (False, True) for b in (False, True)]
+    return np.stack(pairs, axis=-1)
+
+
+def arm_codes(angles: Angles, accuracy: Accuracy = 0.0) -> Possible:
+    """1 both below shoulder level, 2 one at or above it, 3 both; elbow or wrist, whichever is higher."""
+    up = Measured(angles, accuracy).graded(
+        "arm_rise", lambda x: (x >= -ROUNDING).astype(np.int64), within=(0, 1), neutral=-math.inf
+    )
+    low, high = up.low.sum(axis=-1), up.high.sum(axis=-1)
+    return np.stack([(low <= n) & (n <= high) for n in range(3)], axis=-1)
+
+
+BOTH = tuple(itertools.product((False, True), repeat=2))
+"""Whether something is so of the right leg and of the left one."""
+
+
+def leg_codes(angles: Angles, thresholds: OwasThresholds, accuracy: Accuracy = 0.0) -> Possible:
+    """Codes 2 to 6 of somebody who stands or kneels; sitting and walking cannot be seen from one posture."""
+    t, m = thresholds, Measured(angles, accuracy)
+    high = m.beyond("foot_rise", t.foot_rise)
+    bent = m.beyond("knee_flexion", t.knee_bent)
+    flat = m.beyond("shank_tilt", t.kneeling)
+    may_raise, may_fold, may_lie = map(_both_may, (high, bent, flat))
+    found = np.zeros((*angles.trunk_flexion.shape, 7), bool)
+    for raised, folded in itertools.product(BOTH, repeat=2):
+        legs = may_raise[raised] & may_fold[folded]
+        for lying in BOTH:
+            found[..., _leg_code(raised, folded, lying) - 1] |= legs & may_lie[lying]
+    return found
+
+
+def _leg_code(raised: tuple[bool, ...], bent: tuple[bool, ...], lying: tuple[bool, ...]) -> int:
+    down = [side for side in range(2) if not raised[side]]
+    if any(lying[side] for side in down):
+        return 6
+    if len(down) == 1:
+        return 5 if bent[down[0]] else 3
+    return 4 if any(bent) else 2
+
+
+def _may(span: Span, value: bool) -> Possible:
+    return np.asarray(span.high == 1 if value else span.low == 0)
+
+
+def _both_may(span: Span) -> dict[tuple[bool, ...], Possible]:
+    """Where the right leg may be so and the left one, by what each is."""
+    right, left = (Span(span.low[..., side], span.high[..., side]) for side in range(2))
+    return {both: _may(right, both[0]) & _may(left, both[1]) for both in BOTH}
+
 
 NEUTRAL = {"back": 1, "arms": 1, "legs": 2, "load": 1}
 """The code of somebody who stands upright with empty hands."""
@@ -47,13 +210,13 @@ class OwasPhase(Phase, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     load: Kilograms | None = None
     """Handled mass, or a force divided by 9.81 m/s² [kg]; 0 for none."""
-    legs: method.Legs | None = None
+    legs: Legs | None = None
     """How the legs are used; ``posture`` estimates it for somebody who stands or kneels."""
 
     @classmethod
     def read(cls, task: TaskPhase) -> Mapping[str, Any]:
         """Return the fields of the phase that this rule has words of its own for, by name."""
-        return {"legs": next((code for code in method.Legs if code == task.legs), None)}
+        return {"legs": next((code for code in Legs if code == task.legs), None)}
 
 
 class Owas(PostureRule, frozen=True, kw_only=True):
@@ -63,7 +226,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
     """Highest admissible action category."""
     phases: tuple[OwasPhase, ...] = ()
     """Phases of the task, each from its `start` on; without any, those of ``[[phases]]``."""
-    thresholds: method.OwasThresholds = method.OwasThresholds()
+    thresholds: OwasThresholds = OwasThresholds()
     """Where a posture counts as bent, twisted and so on."""
 
     @property
@@ -88,35 +251,35 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         def evaluate(state: State) -> Result:
             angles = read(state)
             phase = phase_at(phases, state.t, unknown)
-            measured = method.settled(self.codes(angles, phase), self.codes(angles, phase, ROUNDING))
+            measured = settled(self.codes(angles, phase), self.codes(angles, phase, ROUNDING))
             spread = None if error is None else self.codes(angles, phase, error)
             return self._result(angles, measured, spread)
 
         return evaluate
 
-    def codes(self, angles: Angles, phase: OwasPhase, accuracy: Accuracy = 0.0) -> dict[str, method.Possible]:
+    def codes(self, angles: Angles, phase: OwasPhase, accuracy: Accuracy = 0.0) -> dict[str, Possible]:
         """Possible codes of postures in a phase, each of shape (..., number of codes)."""
         if phase.legs is None:
             legs = np.ones(7, bool)
-        elif phase.legs == method.Legs.POSTURE:
-            legs = method.leg_codes(angles, self.thresholds, accuracy)
+        elif phase.legs == Legs.POSTURE:
+            legs = leg_codes(angles, self.thresholds, accuracy)
         else:
-            legs = method.only(list(method.Legs).index(phase.legs) + 1, 7)
+            legs = only(list(Legs).index(phase.legs) + 1, 7)
         return {
-            "back": method.back_codes(angles, self.thresholds, accuracy),
-            "arms": method.arm_codes(angles, accuracy),
+            "back": back_codes(angles, self.thresholds, accuracy),
+            "arms": arm_codes(angles, accuracy),
             "legs": legs,
-            "load": method.load_codes(phase.load),
+            "load": load_codes(phase.load),
         }
 
     def _result(
         self,
         angles: Angles,
-        measured: Mapping[str, method.Possible],
-        spread: Mapping[str, method.Possible] | None,
+        measured: Mapping[str, Possible],
+        spread: Mapping[str, Possible] | None,
     ) -> Result:
-        span = method.category_span(**measured)
-        reach = span if spread is None else method.category_span(**spread)
+        span = category_span(**measured)
+        reach = span if spread is None else category_span(**spread)
         low, high = int(reach.low), int(reach.high)
         missing = [key for key, possible in measured.items() if possible.sum() > 1]
         verdict = judge_interval((low, high), self.limit)
@@ -165,9 +328,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
             ),
         )
 
-    def _row(
-        self, key: str, angles: Angles, measured: method.Possible, spread: method.Possible | None
-    ) -> Row:
+    def _row(self, key: str, angles: Angles, measured: Possible, spread: Possible | None) -> Row:
         part, t = _part(key, measured, spread), self.thresholds
         edges = {
             "trunk_flexion": (-t.bent, t.bent),
@@ -182,20 +343,20 @@ class Owas(PostureRule, frozen=True, kw_only=True):
             name=key,
             state=RowState.NOT_ASSESSED if part.value is None else RowState.JUDGED,
             value=part.value,
-            scale=(1.0, float(method.CODES[key])),
+            scale=(1.0, float(CODES[key])),
             interval=part.interval,
             reason=part.reason,
             bones=tuple(f"{self.human}/{bone}" for bone in BONES_OF[key]),
             aspects=aspects(angles, ANGLES_OF[key], None, edges),
         )
 
-    def _drivers(self, measured: Mapping[str, method.Possible], span: Span) -> list[str]:
+    def _drivers(self, measured: Mapping[str, Possible], span: Span) -> list[str]:
         """Parts that alone, put back to upright, would lower the category most."""
         gains = {}
         for key, possible in measured.items():
             if possible.sum() == 1:
-                instead = {**measured, key: method.only(NEUTRAL[key], method.CODES[key])}
-                gains[key] = int(span.low - method.category_span(**instead).low)
+                instead = {**measured, key: only(NEUTRAL[key], CODES[key])}
+                gains[key] = int(span.low - category_span(**instead).low)
         best = max(gains.values(), default=0)
         return [key for key, gain in gains.items() if gain == best] if best > 0 else []
 
@@ -208,7 +369,7 @@ class Owas(PostureRule, frozen=True, kw_only=True):
             inputs=(
                 *provenance.motion(model, self.human),
                 *entered(self.entered(model), OwasPhase()),
-                *chosen(self.thresholds, method.OwasThresholds()),
+                *chosen(self.thresholds, OwasThresholds()),
                 *posture_quality(self.accuracy, self.joint_accuracy, self.unmeasured),
                 Input(
                     name="arm at or above shoulder level",
@@ -225,11 +386,11 @@ class Owas(PostureRule, frozen=True, kw_only=True):
         )
 
 
-def _text(possible: method.Possible) -> str:
+def _text(possible: Possible) -> str:
     return " or ".join(str(code) for code in np.flatnonzero(possible) + 1)
 
 
-def _part(key: str, measured: method.Possible, spread: method.Possible | None) -> Result:
+def _part(key: str, measured: Possible, spread: Possible | None) -> Result:
     codes = np.flatnonzero(measured) + 1
     wide = codes if spread is None else np.flatnonzero(spread) + 1
     known = len(codes) == 1

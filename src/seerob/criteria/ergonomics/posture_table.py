@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from seerob.criteria.postures.zone_file import ZoneTable, read_zones
 from seerob.criteria.postures.zone_rule import ZoneRule
+from seerob.criteria.scoring.zones import ZoneTable, read_zones
 from seerob.model.model import Model
 
 

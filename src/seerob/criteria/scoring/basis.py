@@ -10,9 +10,8 @@ import msgspec
 
 from seerob.core.snapshot import Input, Origin
 from seerob.criteria.scoring.held_work import WorkDetection
-from seerob.criteria.scoring.measured import JointAccuracy
+from seerob.criteria.scoring.measured import ArmPolicy, JointAccuracy
 from seerob.criteria.scoring.phases import Phase
-from seerob.criteria.scoring.shoulder import ArmPolicy
 from seerob.criteria.scoring.thresholds import Thresholds
 
 PROJECTION_NOTE = "sideways angles are taken out of the sagittal plane, not projected on the frontal one"

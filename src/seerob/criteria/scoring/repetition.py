@@ -27,7 +27,7 @@ def static(t: ArrayLike, scores: ArrayLike, hold: float, *, gap: float = GAP) ->
     Args:
         t: Instants, increasing, shape (n,) [s]; scores hold until the next one.
         scores: Component scores, shape (n, k) or (n,).
-        hold: How long is static [s]: 60 in RULA and REBA, see `seerob.criteria.scoring.rula.Profile.static`.
+        hold: How long is static [s]: 60 in RULA and REBA, `rula.Profile.static`.
         gap: Interruptions that are shorter do not count [s].
 
     Returns:

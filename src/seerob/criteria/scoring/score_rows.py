@@ -1,14 +1,68 @@
-"""Rows of a result: one per component and side with its angles and bands, and one per total."""
+"""Rows of a result: one per component and side with its angles and bands, and one per total.
+
+A band of a method is what an angle falls into, for whoever reads the score.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 from seerob.core.snapshot import Aspect, Row, RowState, Verdict
-from seerob.criteria.scoring.bands import NEUTRAL, Edges, band_of
-from seerob.criteria.scoring.spans import Span
+from seerob.criteria.scoring.spans import Span, fallen, reached
+from seerob.criteria.scoring.thresholds import Thresholds
 from seerob.description.humans.angles import SIDED, Angles
 from seerob.description.humans.skeleton import SIDES
+
+Edges = Mapping[str, tuple[float, ...]]
+"""Name of an angle → where its bands end [rad], increasing."""
+
+
+def degrees(*edges: float) -> tuple[float, ...]:
+    """Return edges that are given in degrees [rad]."""
+    return tuple(math.radians(edge) for edge in edges)
+
+
+def modifier_edges(thresholds: Thresholds) -> dict[str, tuple[float, ...]]:
+    """Bands of the angles that only add to a score."""
+    t = thresholds
+    both = {
+        "trunk_twist": t.trunk_twist,
+        "trunk_side_bend": t.trunk_side_bend,
+        "neck_twist": t.neck_twist,
+        "neck_side_bend": t.neck_side_bend,
+        "wrist_deviation": t.wrist_deviation,
+        "forearm_rotation": t.forearm_rotation,
+        "shoulder_rotation": t.arm_rotated,
+    }
+    outward = {
+        "shoulder_abduction": t.arm_abducted,
+        "clavicle_elevation": t.shoulder_raised,
+        "forearm_out": t.forearm_out,
+        "wrist_across": t.wrist_across,
+        "foot_rise": t.foot_rise,
+    }
+    return {
+        **{name: (-edge, edge) for name, edge in both.items()},
+        **{name: (edge,) for name, edge in outward.items()},
+    }
+
+
+NEUTRAL = {"elbow_flexion": math.radians(80)}
+"""Name of an angle → the posture away from which its bands get stricter [rad], where that is not 0."""
+
+
+def band_of(angle: float, edges: Sequence[float], neutral: float = 0.0) -> str:
+    """``20° to 45°`` of an angle [rad]; empty for one that is not measured or has no bands."""
+    if not edges or math.isnan(angle):
+        return ""
+    shown = [f"{math.degrees(edge):.4g}°".replace("-", "−") for edge in sorted(edges)]
+    # An edge belongs to the stricter side, which is the one away from the neutral posture.
+    at = sum(bool(reached(angle, edge) if edge >= neutral else not fallen(angle, edge)) for edge in edges)
+    if at == 0:
+        return f"below {shown[0]}"
+    return f"beyond {shown[-1]}" if at == len(shown) else f"{shown[at - 1]} to {shown[at]}"
+
 
 BONES_OF: dict[str, tuple[str, ...]] = {
     "upper arm": ("{side}_upper_arm",),

@@ -2,6 +2,11 @@
 
 The least score and the greatest are carried along side by side. A sum of spans and a table that grows in
 each argument keep them exact, as long as what goes in varies independently.
+
+An angle at a threshold follows one rule for all methods, on the stricter side: what is measured is never
+exactly 45°. What is computed may be, and then the last bit decides, which changes
+with where a person stands and faces. So an angle within rounding of a threshold counts as beyond it, away
+from the neutral posture, whatever side a method's wording gives the edge itself to.
 """
 
 from __future__ import annotations
@@ -11,11 +16,26 @@ from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from seerob.core.transforms import Array
-from seerob.criteria.scoring.edges import reached
 from seerob.criteria.scoring.published import Ints
+
+ROUNDING = 1e-6
+"""Angles that differ by less [rad] are the same: no device is as good, and no rounding of ours as bad."""
+
+
+def reached(angle: Array | float, edge: float) -> NDArray[np.bool_]:
+    """Whether an angle is at an edge or beyond it [rad]; at an edge of 0, which is neutral, only beyond.
+
+    What is not a number is, so that it never scores least.
+    """
+    return np.asarray(~(np.asarray(angle) < (edge - ROUNDING if edge else ROUNDING)))
+
+
+def fallen(angle: Array | float, edge: float) -> NDArray[np.bool_]:
+    """Whether an angle is at an edge or below it [rad]; at an edge of 0 only below."""
+    return reached(-np.asarray(angle), -edge)
 
 
 class Span(NamedTuple):

@@ -381,6 +381,7 @@ class Engine:
         """The twin at t = 0, placed on the first samples without being pulled there."""
         self._place(0.0)
         self._note_errors()
+        self.state.heard()
         return self.state
 
     def tick(self) -> State:
@@ -422,6 +423,7 @@ class Engine:
         self._show(t)
         self.state.path = self._path(start, t)
         self._note_errors()
+        self.state.heard()
         return self.state
 
     @property

@@ -11,7 +11,7 @@ engine, the picture and the recorder. While a criterion is asked (`asking`) it i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -19,20 +19,19 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.errors import NotAsked, Undecided, Unweighed
+from seerob.core.errors import Undecided, Unweighed
 from seerob.core.transforms import Array
 from seerob.distance.least import Closest, Closests, Per, Query
 from seerob.distance.surveying import Surveyor
 from seerob.kernels.chain import along
 from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
 from seerob.model.model import Frame, Gap, Mechanism, Model
-from seerob.twin.attachments import Attachments
 from seerob.twin.joint_columns import Columns
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Path
-from seerob.twin.validity.hearing import SLACK, nobody_says
+from seerob.twin.validity.hearing import SLACK
 from seerob.twin.validity.hearing import Hearing as Hearing  # noqa: PLC0414
-from seerob.twin.validity.seen_bones import bones_of, unseen_reason
+from seerob.twin.validity.validity import Validity
 from seerob.workstation.variables.dictionary import VARIABLE as VARIABLE  # noqa: PLC0414
 from seerob.workstation.variables.dictionary import Value
 
@@ -45,18 +44,14 @@ MOST_PLACES = 512
 """Sets of bodies of which places are kept from tick to tick."""
 
 
-class State:
+class State(Validity):
     """A view of the engine's `mujoco.MjData`; never keep one beyond its tick."""
 
     def __init__(
         self, model: Model, data: Any, hearings: dict[str, Hearing], signals: Signals | None = None
     ) -> None:
-        self.model = model
-        self.t = 0.0
-        """Run time [s]."""
-        self._data, self._hearings = data, hearings
-        self._signals = signals or Signals(model.dictionary, {})
-        self._closed = False
+        super().__init__(model, hearings, signals)
+        self._data = data
         self._at_least = False
         self.path: Path | None = None
         """How everybody came here from the last tick, whoever was heard: for bounds; None where there was
@@ -65,27 +60,14 @@ class State:
         """What a motion that is known ahead will do."""
         self.touches: list[tuple[int, int, float]] | None = None
         """Of every contact two of MuJoCo's bodies and the normal force [N]; None where none is calculated."""
-        self.asked: set[str] = set()
-        """Robots and humans that answers have depended on since the set was last cleared."""
-        self.attachments = Attachments(model)
-        """Which of MuJoCo's bodies moves each body."""
         n = len(model.bodies)
         self._rotations, self._positions = np.zeros((n, 3, 3)), np.zeros((n, 3))
         self._quaternions = np.zeros((n, 4))
         self._places: dict[tuple[int, ...], tuple[Array, Array, Array, Array]] = {}
         self._movers: dict[int, tuple[tuple[str, ...], tuple[int, ...]]] = {}
-        self._period = model.workstation.engine.tick
-        engine = model.workstation.engine
-        self._tracking_limits = {
-            "robot": engine.tracking_limit,
-            "machine": engine.tracking_limit,
-            "human": engine.human_tracking_limit,
-        }
         self._wanted: Any = None
         """Where people were captured; made when somebody asks."""
         self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
-        self._cache: dict[Any, Any] = {}
-        self._relied_on: set[tuple[str, ...]] = set()
         self._jacobian = np.zeros((6, model.mj.nv))
         self.columns = {m.name: Columns.of(m, model.mj) for m in model.mechanisms.values()}
         """Where the joints of each robot and human are among all."""
@@ -94,7 +76,6 @@ class State:
         self._surveyor = Surveyor(model.shapes)
         self._cdof, self._com = data.cdof, data.subtree_com
         self._rows: dict[tuple[int, ...], Indices] = {}
-        self._bones_of: dict[tuple[int, ...], tuple[tuple[str, ...], dict[str, frozenset[str]]]] = {}
         self._corners = stacked([body.corners for body in model.bodies])
         self._reach = np.array([body.radius + body.deviation for body in model.bodies])
 
@@ -116,27 +97,10 @@ class State:
             self._quaternions,
         )
         self._cache.clear()
-        self._relied_on.clear()
+        self.heard()
         self._surveyor.forget()
 
     # -- what says nothing of whether it may be relied on: closed while a criterion is asked ---------
-
-    @contextmanager
-    def asking(self) -> Iterator[None]:
-        """While a criterion is asked: what would not raise `Undecided` is closed, and `asked` is noted."""
-        self.asked.clear()
-        self._closed = True
-        try:
-            yield
-        finally:
-            self._closed = False
-
-    def _open(self, what: str, instead: str) -> None:
-        if self._closed:
-            raise NotAsked(
-                f"State.{what} does not say whether it may be relied on, so no criterion may read it; "
-                f"ask State.{instead}, which raises Undecided where it may not"
-            )
 
     @property
     def data(self) -> Any:
@@ -162,18 +126,6 @@ class State:
         self._open("quaternions", "placed(bodies)")
         return self._quaternions
 
-    @property
-    def hearings(self) -> dict[str, Hearing]:
-        """What is known of where robots and people really are."""
-        self._open("hearings", "hearing(name)")
-        return self._hearings
-
-    @property
-    def signals(self) -> Signals:
-        """What machines say."""
-        self._open("signals", "signal(name)")
-        return self._signals
-
     def joint_positions(self, mechanism: Mechanism) -> Array:
         """Joint positions as they are shown [rad or m], shape (n,)."""
         self._open("joint_positions", "q(mechanism)")
@@ -184,156 +136,7 @@ class State:
         self._open("poses", "placed(bodies)")
         return np.hstack([self._positions, self._quaternions])[self.attachments.drawn].astype("<f4").tobytes()
 
-    # -- what may be relied on --------------------------------------------------------------
-
-    def require(self, *names: str) -> None:
-        """Raise `Undecided` unless each robot or human is where the twin shows it."""
-        self.asked.update(names)
-        if names in self._relied_on:
-            return
-        for name in names:
-            key = ("doubt", name)
-            reason = self._cache.get(key)
-            if reason is None:
-                reason = self._cache[key] = self.doubt(name)
-            if reason:
-                raise Undecided(reason)
-        self._relied_on.add(names)
-
-    def doubt(self, name: str) -> str:
-        """Why a twin may not be where the real one is, all of it; empty when it may be relied on.
-
-        After `VARIABLE`, the name of a variable: why it may not be relied on.
-        """
-        if reason := self.interrupted(name):
-            return reason
-        if name.startswith(VARIABLE):
-            return ""
-        hearing = self._hearings[name]
-        if reason := unseen_reason(name, hearing.unseen(self.t)):
-            return reason
-        reason = nobody_says(hearing.unplaced(self.t))
-        return f"{name}: {reason}" if reason else ""
-
-    def interrupted(self, name: str) -> str:
-        """Why what was known a moment ago may not hold now, but for what no device ever saw; else empty."""
-        if name.startswith(VARIABLE):
-            return self._signals.at(name.removeprefix(VARIABLE), self.t).doubt
-        if reason := self.whole_doubt(name):
-            return reason
-        hearing = self._hearings[name]
-        parts = hearing.doubted(self.t)
-        reason = parts[0][0] if parts else hearing.displaced(self.t)
-        return f"{name}: {reason}" if reason else ""
-
-    def bones_in_doubt(self, name: str) -> tuple[str, ...]:
-        """Bones of a person that may not be where the twin shows them, when the others are.
-
-        What is turned in doubt, and what nobody says the place of.
-
-        Raises:
-            Undecided: Nothing of the person may be relied on.
-        """
-        if reason := self.whole_doubt(name):
-            raise Undecided(reason)
-        return self._bones_in_doubt(name)
-
-    def _bones_in_doubt(self, name: str) -> tuple[str, ...]:
-        turned = self.bones_turned_in_doubt(name)
-        key = ("bones in doubt", name)
-        if key not in self._cache:
-            unplaced = self._hearings[name].unplaced(self.t)
-            self._cache[key] = tuple(dict.fromkeys((*turned, *unplaced))) if unplaced else turned
-        bones: tuple[str, ...] = self._cache[key]
-        return bones
-
-    def bones_turned_in_doubt(self, name: str) -> tuple[str, ...]:
-        """Bones of a person that may not be turned as the twin shows them, when the others are.
-
-        What is in doubt, and what no device sees and its neighbours do not tell: enough for whoever asks
-        for angles between bones, and not where they are.
-
-        Raises:
-            Undecided: Nothing of the person may be relied on.
-        """
-        self.asked.add(name)
-        if reason := self.heard_doubt(name):
-            raise Undecided(reason)
-        key = ("bones turned in doubt", name)
-        if key not in self._cache:
-            hearing = self._hearings[name]
-            doubted = (bone for _, bones in hearing.doubted(self.t) for bone in bones)
-            self._cache[key] = tuple(dict.fromkeys((*doubted, *hearing.unseen(self.t))))
-        bones: tuple[str, ...] = self._cache[key]
-        return bones
-
-    def require_bodies(
-        self, bodies: tuple[int, ...], *, estimates: bool = False, strayed: bool = False
-    ) -> None:
-        """Raise `Undecided` unless these bodies are where the twin shows them: of a person, these bones only.
-
-        Args:
-            bodies: By index.
-            estimates: Whether bones that nobody sees will do where the file accepts them
-                (``unseen_uncertainty``): whoever asks adds
-                `seerob.twin.accuracy.tracking_error.TrackingError`.
-            strayed: Whether people will do of whom the twin is elsewhere than they were captured, as a table
-                or a robot stops it (`stray`): likewise.
-        """
-        key = ("relied on", bodies, estimates, strayed)
-        others, people = self._bones(bodies)
-        self.asked.update(others, people)
-        if key in self._cache:
-            return
-        self.require(*others)
-        if lost := self.attachments.unknown.keys() & set(bodies):
-            raise Undecided(self.attachments.unknown[min(lost)])
-        for name, bones in people.items():
-            if (reason := self.whole_doubt(name)) and not (strayed and reason == self.stray(name)):
-                raise Undecided(reason)
-            if bones.isdisjoint(self._bones_in_doubt(name)):
-                continue
-            if not estimates or self.model.estimates.get(name) is None or self.interrupted(name):
-                raise Undecided(self.doubt(name))
-        self._cache[key] = True
-
-    def whole_doubt(self, name: str) -> str:
-        """Why nothing of a robot or person may be relied on; doubt about single bones does not count."""
-        hearing = self._hearings[name]
-        if reason := self.heard_doubt(name):
-            return reason
-        if hearing.lost > self.t - 2 * self._period:
-            return f"{name}: the twin had to be put back to what was heard"
-        limit = self._tracking_limits[self.model.mechanisms[name].role]
-        if hearing.error > limit:
-            why = " (a torque limit is reached)" if hearing.saturated else ""
-            return f"{name}: the twin is off by {hearing.error:.3g} rad or m, more than {limit:g}{why}"
-        return ""
-
-    def heard_doubt(self, name: str) -> str:
-        """Why what was heard may not be relied on, whether or not the twin follows it; empty when it may."""
-        reason = self._hearings[name].doubt(self.t)
-        if reason:
-            return f"{name}: {reason}"
-        above = self.model.mechanisms[name].on
-        return self.whole_doubt(above) if above else ""
-
-    def stray(self, name: str) -> str:
-        """Why the twin of a person is elsewhere than the person was captured, when it is known by how much.
-
-        Empty when it is not, or when where the person was captured is in doubt itself.
-        """
-        hearing = self._hearings[name]
-        limit = self._tracking_limits[self.model.mechanisms[name].role]
-        if hearing.captured is None or hearing.error <= limit or self.heard_doubt(name):
-            return ""
-        reason = self.whole_doubt(name)
-        return reason if hearing.lost <= self.t - 2 * self._period else ""
-
-    def strays(self, bodies: tuple[int, ...]) -> str:
-        """`stray` of any of the people to whom bodies belong."""
-        _, people = self._bones(bodies)
-        return next(filter(None, map(self.stray, people)), "")
+    # -- people as they were captured -------------------------------------------------------
 
     def captured(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
         """Where bones of a person were captured, wherever the physics lets the twin be.
@@ -419,27 +222,6 @@ class State:
             np.arccos(np.clip((trace - 1) / 2, -1.0, 1.0)),
         )
 
-    def lost_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
-        """Bodies that are bones in doubt, of people whose other bones may be relied on."""
-        _, people = self._bones(bodies)
-        told = (name for name in people if not self.whole_doubt(name))
-        lost = {f"{name}/{bone}" for name in told for bone in self.bones_in_doubt(name)}
-        return tuple(i for i in bodies if self.model.bodies[i].name in lost) if lost else ()
-
-    def _bones(self, bodies: tuple[int, ...]) -> tuple[tuple[str, ...], dict[str, frozenset[str]]]:
-        if bodies not in self._bones_of:
-            self._bones_of[bodies] = bones_of(self.model, bodies)
-        return self._bones_of[bodies]
-
-    def signal(self, name: str) -> Value:
-        """The value of a variable of the dictionary now, in SI.
-
-        Raises:
-            Undecided: It was not heard lately, its source calls it bad, or it cannot be.
-        """
-        self.asked.add(VARIABLE + name)
-        return self._signals.value(name, self.t)
-
     def signals_meanwhile(self, name: str) -> tuple[Value, ...]:
         """What a variable was between the last tick and this one, where its source tells more often.
 
@@ -448,40 +230,6 @@ class State:
         """
         self.asked.add(VARIABLE + name)
         return () if self.path is None else self._signals.meanwhile(name, float(self.path.t[0]), self.t)
-
-    def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
-        """What several criteria work out from this state: made by whoever asks first at this tick.
-
-        Args:
-            key: A tuple that begins with what it is, and names all that it depends on but the state.
-            make: How to.
-        """
-        if key not in self._cache:
-            before, self.asked = self.asked, set()
-            try:
-                made = make()
-            finally:
-                asked, self.asked = self.asked, before
-                before |= asked
-            self._cache[key] = made, asked
-        made, asked = self._cache[key]
-        self.asked |= asked
-        return made
-
-    def hearing(self, name: str, *, strayed: bool = False) -> Hearing:
-        """What is known of where a robot or human really is, bone by bone of a person.
-
-        Args:
-            name: Of the robot or human.
-            strayed: As in `require_bodies`.
-
-        Raises:
-            Undecided: Nothing of it may be relied on.
-        """
-        self.asked.add(name)
-        if (reason := self.whole_doubt(name)) and not (strayed and reason == self.stray(name)):
-            raise Undecided(reason)
-        return self._hearings[name]
 
     def placed(
         self,
@@ -508,9 +256,9 @@ class State:
             Undecided: One of them may be elsewhere.
         """
         if doubted:
-            others, people = self._bones(bodies)
-            self.require(*others)
-            for name in people:
+            owners = self._owners(bodies)
+            self.require(*owners.others)
+            for name in owners.people:
                 self.hearing(name, strayed=strayed)
         else:
             self.require_bodies(bodies, estimates=estimates, strayed=strayed)

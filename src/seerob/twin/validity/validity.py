@@ -1,0 +1,337 @@
+"""Of whom the twin may be relied on at this tick, and who was asked for.
+
+What cannot be relied on raises `Undecided` here, so that no accessor of `seerob.twin.state.State` and no
+author of a criterion can forget it. Each reason is worked out once per tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from seerob.core.errors import NotAsked, Undecided
+from seerob.model.model import Model
+from seerob.twin.attachments import Attachments
+from seerob.twin.signals import Signals
+from seerob.twin.validity.hearing import Hearing, nobody_says
+from seerob.twin.validity.seen_bones import bones_of, unseen_reason
+from seerob.workstation.variables.dictionary import VARIABLE, Value
+
+MOST = 4096
+"""Sets of bodies of which it is kept whom they belong to."""
+
+
+class _Owners(NamedTuple):
+    """Whom bodies belong to."""
+
+    key: int
+    others: tuple[str, ...]
+    """Robots and machines."""
+    people: dict[str, frozenset[str]]
+    """Person → which bones."""
+    everyone: frozenset[str]
+    bodies: frozenset[int]
+
+
+class Validity:
+    """What may be relied on at an instant.
+
+    Args:
+        model: The compiled workstation.
+        hearings: What is known of each robot, person and machine.
+        signals: What machines say.
+    """
+
+    def __init__(self, model: Model, hearings: dict[str, Hearing], signals: Signals | None = None) -> None:
+        self.model = model
+        self.t = 0.0
+        """Run time [s]."""
+        self.asked: set[str] = set()
+        """Robots and humans that answers have depended on since the set was last cleared."""
+        self.attachments = Attachments(model)
+        """Which of MuJoCo's bodies moves each body."""
+        self._hearings = hearings
+        self._signals = signals or Signals(model.dictionary, {})
+        self._closed = False
+        self._cache: dict[Any, Any] = {}
+        engine = model.workstation.engine
+        self._period = engine.tick
+        limits = {"human": engine.human_tracking_limit}
+        self._tracking_limits = {
+            m.name: limits.get(m.role, engine.tracking_limit) for m in model.mechanisms.values()
+        }
+        self._owners_of: dict[tuple[int, ...], _Owners] = {}
+        self._reasons: dict[tuple[str, str], str] = {}
+        """By question and name, why something may not be relied on at this tick."""
+        self._lost: dict[int, tuple[frozenset[str], tuple[int, ...]]] = {}
+        self._relied_on: set[Hashable] = set()
+
+    def heard(self) -> None:
+        """Work every reason out again: what is known of robots, people and machines has changed."""
+        self._reasons.clear()
+        self._lost.clear()
+        self._relied_on.clear()
+
+    # -- what says nothing of whether it may be relied on is closed while a criterion is asked ----
+
+    @contextmanager
+    def asking(self) -> Iterator[None]:
+        """While a criterion is asked: what would not raise `Undecided` is closed, and `asked` is noted."""
+        self.asked.clear()
+        self._closed = True
+        try:
+            yield
+        finally:
+            self._closed = False
+
+    def _open(self, what: str, instead: str) -> None:
+        if self._closed:
+            raise NotAsked(
+                f"State.{what} does not say whether it may be relied on, so no criterion may read it; "
+                f"ask State.{instead}, which raises Undecided where it may not"
+            )
+
+    @property
+    def hearings(self) -> dict[str, Hearing]:
+        """What is known of where robots and people really are."""
+        self._open("hearings", "hearing(name)")
+        return self._hearings
+
+    @property
+    def signals(self) -> Signals:
+        """What machines say."""
+        self._open("signals", "signal(name)")
+        return self._signals
+
+    # -- of robots, people, machines and variables ------------------------------------------
+
+    def require(self, *names: str) -> None:
+        """Raise `Undecided` unless each robot or human is where the twin shows it."""
+        self.asked.update(names)
+        if names in self._relied_on:
+            return
+        for name in names:
+            if reason := self.doubt(name):
+                raise Undecided(reason)
+        self._relied_on.add(names)
+
+    def _once(self, question: str, name: str, find: Callable[[str], str]) -> str:
+        key = question, name
+        reason = self._reasons.get(key)
+        if reason is None:
+            reason = self._reasons[key] = find(name)
+        return reason
+
+    def doubt(self, name: str) -> str:
+        """Why a twin may not be where the real one is, all of it; empty when it may be relied on.
+
+        After `VARIABLE`, the name of a variable: why it may not be relied on.
+        """
+        return self._once("where", name, self._doubt)
+
+    def _doubt(self, name: str) -> str:
+        if reason := self.interrupted(name):
+            return reason
+        if name.startswith(VARIABLE):
+            return ""
+        hearing = self._hearings[name]
+        if reason := unseen_reason(name, hearing.unseen(self.t)):
+            return reason
+        reason = nobody_says(hearing.unplaced(self.t))
+        return f"{name}: {reason}" if reason else ""
+
+    def interrupted(self, name: str) -> str:
+        """Why what was known a moment ago may not hold now, but for what no device ever saw; else empty."""
+        return self._once("interrupted", name, self._interrupted)
+
+    def _interrupted(self, name: str) -> str:
+        if name.startswith(VARIABLE):
+            return self._signals.at(name.removeprefix(VARIABLE), self.t).doubt
+        if reason := self.whole_doubt(name):
+            return reason
+        hearing = self._hearings[name]
+        parts = hearing.doubted(self.t)
+        reason = parts[0][0] if parts else hearing.displaced(self.t)
+        return f"{name}: {reason}" if reason else ""
+
+    def whole_doubt(self, name: str) -> str:
+        """Why nothing of a robot or person may be relied on; doubt about single bones does not count."""
+        return self._once("whole", name, self._whole_doubt)
+
+    def _whole_doubt(self, name: str) -> str:
+        hearing = self._hearings[name]
+        if reason := self.heard_doubt(name):
+            return reason
+        if hearing.lost > self.t - 2 * self._period:
+            return f"{name}: the twin had to be put back to what was heard"
+        limit = self._tracking_limits[name]
+        if hearing.error > limit:
+            why = " (a torque limit is reached)" if hearing.saturated else ""
+            return f"{name}: the twin is off by {hearing.error:.3g} rad or m, more than {limit:g}{why}"
+        return ""
+
+    def heard_doubt(self, name: str) -> str:
+        """Why what was heard may not be relied on, whether or not the twin follows it; empty when it may."""
+        return self._once("heard", name, self._heard_doubt)
+
+    def _heard_doubt(self, name: str) -> str:
+        reason = self._hearings[name].doubt(self.t)
+        if reason:
+            return f"{name}: {reason}"
+        above = self.model.mechanisms[name].on
+        return self.whole_doubt(above) if above else ""
+
+    def hearing(self, name: str, *, strayed: bool = False) -> Hearing:
+        """What is known of where a robot or human really is, bone by bone of a person.
+
+        Args:
+            name: Of the robot or human.
+            strayed: As in `require_bodies`.
+
+        Raises:
+            Undecided: Nothing of it may be relied on.
+        """
+        self.asked.add(name)
+        if (reason := self.whole_doubt(name)) and not (strayed and reason == self.stray(name)):
+            raise Undecided(reason)
+        return self._hearings[name]
+
+    def signal(self, name: str) -> Value:
+        """The value of a variable of the dictionary now, in SI.
+
+        Raises:
+            Undecided: It was not heard lately, its source calls it bad, or it cannot be.
+        """
+        self.asked.add(VARIABLE + name)
+        return self._signals.value(name, self.t)
+
+    # -- of people, bone by bone --------------------------------------------------------------
+
+    def stray(self, name: str) -> str:
+        """Why the twin of a person is elsewhere than the person was captured, when it is known by how much.
+
+        Empty when it is not, or when where the person was captured is in doubt itself.
+        """
+        return self._once("stray", name, self._stray)
+
+    def _stray(self, name: str) -> str:
+        hearing = self._hearings[name]
+        if hearing.captured is None or hearing.error <= self._tracking_limits[name] or self.heard_doubt(name):
+            return ""
+        reason = self.whole_doubt(name)
+        return reason if hearing.lost <= self.t - 2 * self._period else ""
+
+    def strays(self, bodies: tuple[int, ...]) -> str:
+        """`stray` of any of the people to whom bodies belong."""
+        return next(filter(None, map(self.stray, self._owners(bodies).people)), "")
+
+    def bones_in_doubt(self, name: str) -> tuple[str, ...]:
+        """Bones of a person that may not be where the twin shows them, when the others are.
+
+        What is turned in doubt, and what nobody says the place of.
+
+        Raises:
+            Undecided: Nothing of the person may be relied on.
+        """
+        if reason := self.whole_doubt(name):
+            raise Undecided(reason)
+        return self._bones_in_doubt(name)
+
+    def _bones_in_doubt(self, name: str) -> tuple[str, ...]:
+        turned = self.bones_turned_in_doubt(name)
+        unplaced = self._hearings[name].unplaced(self.t)
+        return tuple(dict.fromkeys((*turned, *unplaced))) if unplaced else turned
+
+    def bones_turned_in_doubt(self, name: str) -> tuple[str, ...]:
+        """Bones of a person that may not be turned as the twin shows them, when the others are.
+
+        What is in doubt, and what no device sees and its neighbours do not tell: enough for whoever asks
+        for angles between bones, and not where they are.
+
+        Raises:
+            Undecided: Nothing of the person may be relied on.
+        """
+        self.asked.add(name)
+        if reason := self.heard_doubt(name):
+            raise Undecided(reason)
+        hearing = self._hearings[name]
+        doubted = (bone for _, bones in hearing.doubted(self.t) for bone in bones)
+        return tuple(dict.fromkeys((*doubted, *hearing.unseen(self.t))))
+
+    # -- of bodies ----------------------------------------------------------------------------
+
+    def require_bodies(
+        self, bodies: tuple[int, ...], *, estimates: bool = False, strayed: bool = False
+    ) -> None:
+        """Raise `Undecided` unless these bodies are where the twin shows them: of a person, these bones only.
+
+        Args:
+            bodies: By index.
+            estimates: Whether bones that nobody sees will do where the file accepts them
+                (``unseen_uncertainty``): whoever asks adds
+                `seerob.twin.accuracy.tracking_error.TrackingError`.
+            strayed: Whether people will do of whom the twin is elsewhere than they were captured, as a table
+                or a robot stops it (`stray`): likewise.
+        """
+        owners = self._owners(bodies)
+        self.asked |= owners.everyone
+        key = owners.key, estimates, strayed
+        if key in self._relied_on:
+            return
+        self.require(*owners.others)
+        if lost := self.attachments.unknown.keys() & owners.bodies:
+            raise Undecided(self.attachments.unknown[min(lost)])
+        for name, bones in owners.people.items():
+            if (reason := self.whole_doubt(name)) and not (strayed and reason == self.stray(name)):
+                raise Undecided(reason)
+            if bones.isdisjoint(self._bones_in_doubt(name)):
+                continue
+            if not estimates or self.model.estimates.get(name) is None or self.interrupted(name):
+                raise Undecided(self.doubt(name))
+        self._relied_on.add(key)
+
+    def lost_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
+        """Bodies that are bones in doubt, of people whose other bones may be relied on."""
+        owners = self._owners(bodies)
+        if owners.key not in self._lost:
+            known = frozenset(name for name in owners.people if not self.whole_doubt(name))
+            lost = {f"{name}/{bone}" for name in known for bone in self.bones_in_doubt(name)}
+            which = tuple(i for i in bodies if self.model.bodies[i].name in lost) if lost else ()
+            self._lost[owners.key] = known, which
+        known, which = self._lost[owners.key]
+        self.asked |= known
+        return which
+
+    def _owners(self, bodies: tuple[int, ...]) -> _Owners:
+        found = self._owners_of.get(bodies)
+        if found is None:
+            if len(self._owners_of) == MOST:
+                self._owners_of.clear()
+                self.heard()
+            others, people = bones_of(self.model, bodies)
+            everyone = frozenset((*others, *people))
+            found = _Owners(len(self._owners_of), others, people, everyone, frozenset(bodies))
+            self._owners_of[bodies] = found
+        return found
+
+    # -- what follows from it -------------------------------------------------------------------
+
+    def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """What several criteria work out from this state: made by whoever asks first at this tick.
+
+        Args:
+            key: A tuple that begins with what it is, and names all that it depends on but the state.
+            make: How to.
+        """
+        if key not in self._cache:
+            before, self.asked = self.asked, set()
+            try:
+                made = make()
+            finally:
+                asked, self.asked = self.asked, before
+                before |= asked
+            self._cache[key] = made, asked
+        made, asked = self._cache[key]
+        self.asked |= asked
+        return made

@@ -8,7 +8,9 @@ from collections.abc import Iterator
 from fact_tables import markdown
 
 from seerob.app import cli
+from seerob.app.commands import emulate
 from seerob.app.console.terminal import Exit
+from seerob.core.plugin import kinds
 
 _HEAD = (
     "<!-- Written by scripts/write-docs from the command line. Do not edit. -->\n\n"
@@ -40,7 +42,8 @@ def commands_page() -> str:
     for name, sub in _subcommands(cli.parser()):
         example = (sub.epilog or "").removeprefix("example: ").split("   ")[0]
         parts += [f"\n## {name}\n\n", _sentence(sub.description), f"\n```\n{example}\n```\n", _options(sub)]
-        for kind, inner in _subcommands(sub):
+        for kind in kinds(emulate.PACKAGE) if name == "emulate" else ():
+            inner = emulate.parser_of(kind)
             parts += [f"\n### {name} {kind}\n\n", _sentence(inner.description), _options(inner)]
     return "".join(parts)
 

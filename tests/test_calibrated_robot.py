@@ -7,7 +7,7 @@ import pytest
 
 from made_cell import made
 from seerob.app.cli import main
-from seerob.app.emulators.motions import swing
+from seerob.app.emulation.motions import swing
 from seerob.app.emulators.rtde import RtdeServer
 from seerob.core.errors import InputError
 from seerob.protocols.robots.ur_primary import Kinematics

@@ -13,10 +13,9 @@ import pytest
 
 from seerob.app import cli
 from seerob.app.console.terminal import Exit
-from seerob.app.emulating._motions import read, target_of
-from seerob.app.emulating.rtde import HOME
-from seerob.app.emulators.motions import swing
-from seerob.app.emulators.rtde import RtdeServer
+from seerob.app.emulation.motions import swing
+from seerob.app.emulation.options import read, target_of
+from seerob.app.emulators.rtde import HOME, RtdeServer
 from seerob.core.errors import InputError
 from seerob.recording.recording import Recording
 from seerob.session.station import load
@@ -127,13 +126,11 @@ def test_a_port_that_is_taken_is_an_error(capsys):
 
 
 def test_an_emulator_plays_a_file_within_the_limits_of_its_robot(tmp_path):
-    motion = read(MOTION, target_of("ur10", joints=6, whose="this kind of controller"))
+    motion = read(MOTION, target_of("ur10"))
     q, qd = motion(1.0)
     assert len(q) == len(qd) == 6
     rows = "".join(f"{0.1 * k:.1f},{k}.0,0,0,0,0,0\n" for k in range(20))
     wild = tmp_path / "wild.csv"
     wild.write_text("t [s]," + ",".join(f"J{k} [rad]" for k in range(1, 7)) + "\n" + rows)
     with pytest.raises(InputError, match="beyond"):
-        read(wild, target_of("ur10", joints=6, whose="this kind of controller"))
-    with pytest.raises(InputError, match="7 joints"):
-        target_of("iiwa14", joints=6, whose="this kind of controller")
+        read(wild, target_of("ur10"))

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from kept_run import Chapters
 from seerob import load
-from seerob.app.cli import parser
-from seerob.app.emulating import opcua, rtde
+from seerob.app.emulators.opcua import Opcua
+from seerob.app.emulators.rtde import Rtde
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.recording.recording import Recording
 
@@ -47,8 +47,7 @@ def nothing():
 
 
 def test_the_plc_dies_and_comes_back(tmp_path):
-    asked = {kind: parser().parse_args(["emulate", kind, "--port", "0"]) for kind in ("rtde", "opcua")}
-    robot, plc = rtde.emulated(asked["rtde"]).server, opcua.emulated(asked["opcua"]).server
+    robot, plc = Rtde(port=0).ready().server, Opcua(port=0).ready().server
     with robot, plc:
         station = here(tmp_path / "cell", robot.port, plc.port)
         assert not [f for f in station.scene().findings if "not reached" in f.text]

@@ -1,6 +1,5 @@
 """`seerob plan` and emulated controllers on waypoints, as a user calls them."""
 
-import argparse
 import os
 import signal
 import time
@@ -15,7 +14,7 @@ import seerob
 from seerob.app import cli
 from seerob.app.console.interruption import Stopped
 from seerob.app.console.terminal import Exit
-from seerob.app.emulating import fri, rtde
+from seerob.app.emulators import fri, rtde
 from seerob.core.errors import InputError
 from seerob.description.robots import library
 from seerob.files.waypoints.arm import Arm
@@ -168,28 +167,20 @@ def test_a_posture_may_begin_with_a_minus():
     assert found.margin == 0.1
 
 
-@pytest.mark.parametrize(("kind", "n"), [(rtde, 6), (fri, 7)])
-def test_an_emulated_controller_goes_through_waypoints(tmp_path, kind, n):
-    parser = argparse.ArgumentParser()
-    kind.add(parser)
+@pytest.mark.parametrize(("kind", "options", "n"), [(rtde, rtde.Rtde, 6), (fri, fri.Fri, 7)])
+def test_an_emulated_controller_goes_through_waypoints(tmp_path, kind, options, n):
     goals = np.zeros((3, n)) + kind.HOME
     goals[1, 0] += 0.4
     goals[2, 1] -= 0.3
     rows = "\n".join(f"[[waypoints]]\nq = {row.tolist()}" for row in goals)
     (tmp_path / "w.toml").write_text(rows, encoding="utf-8")
-    options = parser.parse_args(["--waypoints", str(tmp_path / "w.toml")])
-    options.host = "127.0.0.1"
-    server = kind.emulated(options).server
+    server = options(waypoints=str(tmp_path / "w.toml")).ready().server
     q = np.array([server.motion(t)[0] for t in np.arange(0.0, 12.0, 0.02)])
     assert [np.abs(q - goal).max(axis=1).min() < 0.01 for goal in goals] == [True] * 3
     np.testing.assert_allclose(q[-1], goals[-1], atol=1e-9)
 
 
 def test_a_pose_as_the_first_waypoint_starts_where_the_emulator_stands(tmp_path):
-    parser = argparse.ArgumentParser()
-    rtde.add(parser)
     (tmp_path / "w.script").write_text("movej(p[-0.7, -0.2, 0.5, 3.14, 0, 0])", encoding="utf-8")
-    options = parser.parse_args(["--waypoints", str(tmp_path / "w.script")])
-    options.host = "127.0.0.1"
-    q, _ = rtde.emulated(options).server.motion(0.0)
+    q, _ = rtde.Rtde(waypoints=str(tmp_path / "w.script")).ready().server.motion(0.0)
     assert q == pytest.approx(rtde.HOME)

@@ -6,12 +6,11 @@ import argparse
 import re
 import shlex
 import tomllib
-from importlib import import_module
 
 import pytest
 
 from seerob.app.commands import emulate, probe
-from seerob.app.emulating._hint import probes_of
+from seerob.app.emulation.hint import probes_of
 from seerob.core.plugin import kinds, load
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.sources.fri import Fri
@@ -19,7 +18,7 @@ from seerob.devices.sources.kinect import Kinect
 from seerob.devices.sources.rtde import Rtde
 from seerob.workstation.source import Source
 
-KINDS = [kind for kind in kinds(emulate.PACKAGE) if not kind.startswith("_")]
+KINDS = kinds(emulate.PACKAGE)
 
 
 def words(module, line):
@@ -31,8 +30,8 @@ def words(module, line):
 @pytest.mark.parametrize("port", [None, 23456])
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_hears_an_emulated_device_is_understood_and_goes_where_it_is(kind, port):
-    asked = words(emulate, kind if port is None else f"{kind} --port {port}")
-    made = import_module(f"seerob.app.{emulate.PACKAGE}.{kind}").emulated(asked)
+    asked = emulate.options_of(kind, [] if port is None else ["--port", str(port)])
+    made = asked.ready()
     to = getattr(made.server, "to", None)
     host, port = to or (asked.host, asked.port)
     commands = probes_of(kind, host, port, sends=bool(to), commands=made.commands)

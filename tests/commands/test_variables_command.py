@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from argparse import Namespace
 
 import pytest
 from hypothesis import given
@@ -11,7 +10,7 @@ from hypothesis import strategies as st
 
 from seerob.app import cli
 from seerob.app.console.terminal import Exit
-from seerob.app.emulating import siemens_web
+from seerob.app.emulators.siemens_web import SiemensWeb
 from seerob.core.errors import InputError
 from seerob.devices.variables.live_source import Node
 from seerob.devices.variables.skeleton import skeleton
@@ -52,8 +51,7 @@ timeout = 1
 def cell(tmp_path, monkeypatch):
     """A cell with a door, and its PLC."""
     monkeypatch.setenv("PLC_PASSWORD", "seerob")
-    options = Namespace(host="127.0.0.1", port=0, user="seerob", password="seerob")
-    with siemens_web.emulated(options).server as plc:
+    with SiemensWeb(port=0).ready().server as plc:
         (tmp_path / "workstation.toml").write_text(STATION.replace("URL", plc.url), encoding="utf-8")
         (tmp_path / "variables.toml").write_text(VARIABLES, encoding="utf-8")
         yield tmp_path, plc

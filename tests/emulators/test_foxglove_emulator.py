@@ -7,8 +7,8 @@ import json
 import pytest
 from websockets.sync.client import connect
 
+from seerob.app.emulation.ros_robot import EPOCH
 from seerob.app.emulators.foxglove import FoxgloveBridge
-from seerob.app.emulators.ros_robot import EPOCH
 from seerob.devices.sources.foxglove import Foxglove
 from seerob.protocols.ros import foxglove
 from seerob.protocols.ros.ros_serialised import Edition

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from seerob.app.emulators.motions import played, swing
+from seerob.app.emulation.motions import played, swing
 
 
 def speeds_are_derivatives(motion, times):

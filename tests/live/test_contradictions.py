@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from live_story import listening, wait_for
-from seerob.app.emulators.motions import swing
+from seerob.app.emulation.motions import swing
 from seerob.app.emulators.rtde import RtdeServer
 from seerob.core.samples import BodyPoint, BodySample, JointSample, PoseSample, Quality
 from seerob.devices.live.contradictions import SPAN, Contradictions

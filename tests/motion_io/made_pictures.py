@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from seerob.app.emulators import kinect_person
+from seerob.app.emulation import kinect_person
 from seerob.protocols.tracking.kinect import JOINTS, Picture, body_object
 
 RATE = 30.0

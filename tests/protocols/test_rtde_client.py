@@ -17,7 +17,7 @@ from threading import Thread
 import pytest
 
 from live_story import wait_for
-from seerob.app.emulators.motions import swing
+from seerob.app.emulation.motions import swing
 from seerob.app.emulators.rtde import RtdeServer
 from seerob.devices.sources.rtde import FIELDS, NEEDED
 from seerob.protocols import ProtocolError

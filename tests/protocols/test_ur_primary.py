@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.app.emulators.motions import swing
+from seerob.app.emulation.motions import swing
 from seerob.app.emulators.rtde import RtdeServer
 from seerob.protocols import ProtocolError
 from seerob.protocols.robots.ur_primary import (

@@ -11,8 +11,8 @@ import msgspec
 import numpy as np
 
 from free_ports import free_port
-from seerob.app.emulators.background import Emulator
-from seerob.app.emulators.motions import swing
+from seerob.app.emulation.background import Emulator
+from seerob.app.emulation.motions import swing
 from seerob.core.page_messages import Tracking
 from seerob.devices.live.headset_offers import OFFERS, read
 from seerob.devices.live.listening import LiveSource
@@ -40,7 +40,7 @@ def target(name, address, unit="mm/s", **more):
 
 
 def person():
-    from seerob.app.emulators.mvn_person import animated
+    from seerob.app.emulation.mvn_person import animated
 
     return animated("library:reach")
 
@@ -75,8 +75,8 @@ def drfl(patch):
 
 
 def modbus_robot(_):
+    from seerob.app.emulation.modbus_robot import program
     from seerob.app.emulators.modbus import ModbusServer
-    from seerob.app.emulators.modbus_robot import program
     from seerob.devices.sources.modbus_robot import ModbusRobot
     from seerob.protocols.plc.modbus_map import load
 
@@ -239,8 +239,8 @@ def vive(patch):
 
 
 def kinect(_):
+    from seerob.app.emulation.kinect_person import animated
     from seerob.app.emulators.kinect import KinectSender
-    from seerob.app.emulators.kinect_person import animated
     from seerob.devices.sources.kinect import Kinect, Link
 
     server = KinectSender(animated("library:reach"), to=None, port=0, rate=60.0).start()

@@ -85,7 +85,7 @@ def opcua(port: int) -> Start:
 
 
 def opcua_robot(port: int) -> Start:
-    from seerob.app.emulators.motions import swing
+    from seerob.app.emulation.motions import swing
     from seerob.app.emulators.opcua import OpcuaServer
 
     return OpcuaServer(robots={"arm": swing((0.0,) * 6)}, port=port).prepare().start

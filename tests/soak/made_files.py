@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from motion_io import made_pictures
-from seerob.app.emulators.mvn_person import animated
+from seerob.app.emulation.mvn_person import animated
 from seerob.app.emulators.vive import recorded, worn
 from seerob.criteria.scoring.zones import read_zones
 from seerob.description.capture.captured import Seen

@@ -9,9 +9,9 @@ from pymodbus.pdu import DecodePDU
 from pymodbus.pdu.bit_message import ReadCoilsResponse
 from pymodbus.pdu.register_message import ReadHoldingRegistersResponse
 
+from seerob.app.emulation.motions import swing
 from seerob.app.emulators.drfl import DrflSender
 from seerob.app.emulators.fri import FriServer
-from seerob.app.emulators.motions import swing
 from seerob.devices.sources.mqtt import Plain, plain_change
 from seerob.devices.sources.rtde import FIELDS
 from seerob.protocols import ProtocolError

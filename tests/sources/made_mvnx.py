@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from seerob.app.emulators.mvn_person import segments
+from seerob.app.emulation.mvn_person import segments
 from seerob.description.humans import manikin
 from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from live_story import Story, lived, wait_for
 from made_cell import made
 from seerob.app import cli
-from seerob.app.emulating import drfl as emulating
+from seerob.app.emulators.drfl import Drfl as DrflOptions
 from seerob.app.emulators.drfl import DrflSender
 from seerob.core.errors import InputError
 from seerob.core.samples import JointSample, Quality, SignalSample
@@ -217,8 +217,7 @@ def test_another_arm_is_an_error(tmp_path, port):
 
 
 def test_the_emulated_bridge_can_be_probed(port, capsys):
-    options = cli.parser().parse_args(["emulate", "drfl", "--port", str(port)])
-    with emulating.emulated(options).server:
+    with DrflOptions(port=port).ready().server:
         words = ["probe", "drfl", "--port", str(port), "--seconds", "2", "--set", "timeout=2"]
         assert cli.main(words) == 0
     said = capsys.readouterr().out

@@ -19,9 +19,9 @@ from pymodbus.client import ModbusTcpClient
 from live_story import Story, listening, lived, open_files, wait_for
 from made_cell import made
 from seerob.app import cli
-from seerob.app.emulating import modbus as emulating
+from seerob.app.emulation.modbus_robot import program
+from seerob.app.emulators.modbus import Modbus as ModbusOptions
 from seerob.app.emulators.modbus import ModbusServer
-from seerob.app.emulators.modbus_robot import program
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.samples import JointSample, Quality, SignalSample
 from seerob.devices.sources.modbus import Modbus
@@ -323,8 +323,7 @@ def test_old_software_without_torques_is_read_without_them(tmp_path):
 
 
 def test_the_emulated_controller_can_be_probed(capsys):
-    options = cli.parser().parse_args(["emulate", "modbus", "--port", "0"])
-    with emulating.emulated(options).server as server:
+    with ModbusOptions(port=0).ready().server as server:
         words = ["probe", "modbus_robot", "127.0.0.1", "--port", str(server.port), "--seconds", "2"]
         assert cli.main(words) == 0
     said = capsys.readouterr().out

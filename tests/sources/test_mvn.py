@@ -15,11 +15,10 @@ from test_bvh import ROOT
 from test_bvh import made as made_bvh
 
 from free_ports import free_port
-from seerob.app import cli
-from seerob.app.emulating.mvn import emulated
+from seerob.app.commands.emulate import options_of
+from seerob.app.emulation.mvn_datagrams import datagrams
+from seerob.app.emulation.mvn_person import Pose, animated, followed, recorded, segments
 from seerob.app.emulators.mvn import MvnSender
-from seerob.app.emulators.mvn_datagrams import datagrams
-from seerob.app.emulators.mvn_person import Pose, animated, followed, recorded, segments
 from seerob.core.errors import InputError
 from seerob.core.transforms import rotation_from_wxyz, wxyz_from_rotation
 from seerob.description.humans.skeleton import BONES, bone_poses
@@ -304,8 +303,6 @@ def test_the_command_sends_what_it_is_told(tmp_path):
     made(tmp_path / "x.mvnx", Q)
     port = free_port()
     words = [
-        "emulate",
-        "mvn",
         "--file",
         str(tmp_path / "x.mvnx"),
         "--port",
@@ -314,10 +311,10 @@ def test_the_command_sends_what_it_is_told(tmp_path):
         "--rate",
         "60",
     ]
-    server, what, where, *_ = emulated(cli.parser().parse_args(words))
+    server, what, where, *_ = options_of("mvn", words).ready()
     assert (what, where) == (f"a person, {tmp_path / 'x.mvnx'}", f"127.0.0.1:{port}")
     (data, *_) = server.instant(3)
     (frame,) = fed(Frames(unit=Unit.CM), [data])
     np.testing.assert_allclose(frame.positions, POSES[3].positions, atol=1e-5)
-    with pytest.raises(InputError, match="1 to 240 Hz"):
-        emulated(cli.parser().parse_args(["emulate", "mvn", "--rate", "1000"]))
+    with pytest.raises(InputError, match=r"<= 240 \[Hz\]"):
+        options_of("mvn", ["--rate", "1000"])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from free_ports import free_port
-from seerob.app.emulators.mvn_person import animated
+from seerob.app.emulation.mvn_person import animated
 from seerob.app.emulators.rokoko import RokokoSender
 from seerob.core.samples import Quality
 from seerob.core.transforms import rotation_from_axis_angle, wxyz_from_rotation

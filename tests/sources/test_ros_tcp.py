@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import socket
 import struct
 from itertools import pairwise
@@ -15,7 +14,7 @@ from listening import heard
 
 from free_ports import free_port
 from live_story import wait_for
-from seerob.app.emulating import ros_tcp as emulating
+from seerob.app.commands.emulate import options_of
 from seerob.app.emulators.ros_tcp import RosTcpEndpoint, UnityProject
 from seerob.core.errors import InputError
 from seerob.core.samples import PoseSample
@@ -148,10 +147,7 @@ def test_hostile_lengths_are_refused_before_anything_is_kept():
 
 
 def asked(*arguments):
-    parser = argparse.ArgumentParser()
-    emulating.add(parser)
-    options = parser.parse_args(["--robot", "ur10", *arguments])
-    return emulating.emulated(argparse.Namespace(**vars(options), host="127.0.0.1"))
+    return options_of("ros_tcp", ["--robot", "ur10", *arguments]).ready()
 
 
 def test_an_emulated_endpoint_and_an_emulated_unity_project_are_heard():

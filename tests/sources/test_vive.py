@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from free_ports import free_port
-from seerob.app.emulators.mvn_person import animated
+from seerob.app.emulation.mvn_person import animated
 from seerob.app.emulators.vive import FIVE, WORN, ViveSender, recorded, worn
 from seerob.core.errors import InputError
 from seerob.core.samples import Quality

@@ -8,7 +8,7 @@ import threading
 import numpy as np
 import pytest
 
-from seerob.app.emulators.mvn_person import animated
+from seerob.app.emulation.mvn_person import animated
 from seerob.app.emulators.vive import FIVE, WORN
 from seerob.app.emulators.vrpn import VrpnServer
 from seerob.core.samples import Quality

@@ -10,8 +10,8 @@ import pytest
 
 from live_story import listening, open_files, wait_for
 from seerob.app import cli
-from seerob.app.emulating import web as emulating
 from seerob.app.emulators.web import STATE, WebServer
+from seerob.app.emulators.web import Web as WebOptions
 from seerob.core.errors import InputError
 from seerob.devices.sources.web import Web, leaves
 from seerob.workstation.source import Target
@@ -143,8 +143,7 @@ def test_browsing_names_every_value():
 
 
 def test_the_emulated_machine_can_be_probed(capsys):
-    options = cli.parser().parse_args(["emulate", "web", "--port", "0"])
-    with emulating.emulated(options).server as server:
+    with WebOptions(port=0).ready().server as server:
         for url in (server.url + STATE, server.live):
             assert cli.main(["probe", "web", url, "--seconds", "0.3"]) == 0
     said = capsys.readouterr().out

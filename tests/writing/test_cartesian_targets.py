@@ -10,7 +10,7 @@ import pytest
 
 from live_story import wait_for
 from made_cell import made
-from seerob.app.emulators.motions import swing
+from seerob.app.emulation.motions import swing
 from seerob.app.emulators.ros_tcp import RosTcpEndpoint
 from seerob.app.emulators.rosbridge import RosbridgeServer
 from seerob.core.errors import InputError

@@ -5,16 +5,14 @@ from __future__ import annotations
 import argparse
 import logging
 import os
-import re
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
-from typing import Any, NoReturn
 
 from seerob.app.console.interruption import Interrupts
 from seerob.app.console.printable import PrintableLines, printable
-from seerob.app.console.terminal import Exit
+from seerob.app.console.terminal import Exit, Parser
 from seerob.core.errors import SeerobError
 from seerob.core.interrupted import stopped
 
@@ -39,31 +37,6 @@ COMMANDS = (
     "import_aml",
 )
 """One module each in `seerob.app.commands`, with ``HELP``, ``EXAMPLE``, ``add`` and ``run``."""
-_NEGATIVE, _OPTION = re.compile(r"-\.?\d"), re.compile(r"--[a-z][a-z-]*")
-
-
-class Parser(argparse.ArgumentParser):
-    """A parser whose mistakes end with `Exit.ERROR`: argparse's own 2 means undecided here."""
-
-    def error(self, message: str) -> NoReturn:
-        """Print the usage and the mistake, and leave."""
-        self.print_usage(sys.stderr)
-        self.exit(Exit.ERROR, f"{self.prog}: {message}\n")
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Also values that begin with a minus, ``--to -60,70``: argparse takes them for options."""
-        return super().parse_known_args(_joined(sys.argv[1:] if args is None else args), namespace)
-
-
-def _joined(words: Sequence[str]) -> list[str]:
-    """Words of which a negative number is one with the option before it; no option begins with a digit."""
-    found: list[str] = []
-    for word in words:
-        if found and _NEGATIVE.match(word) and _OPTION.fullmatch(found[-1]) and "--" not in found:
-            found[-1] += f"={word}"
-        else:
-            found.append(word)
-    return found
 
 
 def parser() -> argparse.ArgumentParser:

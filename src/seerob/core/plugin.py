@@ -20,9 +20,9 @@ HOMES = {
     "ergonomics": "seerob.criteria.ergonomics",
     "sources": "seerob.devices.sources",
     "sinks": "seerob.outputs.sinks",
-    "emulating": "seerob.app.emulating",
+    "emulators": "seerob.app.emulators",
 }
-"""Table of the workstation file → the package of its kinds; ``emulating`` is of `seerob emulate`."""
+"""Table of the workstation file → the package of its kinds; ``emulators`` are of `seerob emulate`."""
 
 
 class PluginError(SeerobError):
@@ -49,7 +49,7 @@ def load(package: str, kind: str, base: type[T]) -> type[T]:
     """The plug-in class of a kind.
 
     Args:
-        package: ``safety``, ``ergonomics``, ``sources`` or ``sinks``.
+        package: ``safety``, ``ergonomics``, ``sources``, ``sinks`` or ``emulators``.
         kind: Module name in that package, or a dotted module name of your own.
         base: What the class must derive from.
 
@@ -57,14 +57,15 @@ def load(package: str, kind: str, base: type[T]) -> type[T]:
         UnknownName: No such kind.
         PluginError: A module that is not there, that fails, or that has not exactly one such class.
     """
+    what = "emulator" if package == "emulators" else f"kind of [[{package}]]"
     if not all(part.isidentifier() for part in kind.split(".")):
-        raise UnknownName(f"kind of [[{package}]]", kind, kinds(package))
+        raise UnknownName(what, kind, kinds(package))
     if "." in kind:
         name = kind
     elif kind in kinds(package):
         name = f"{home(package)}.{kind}"
     else:
-        raise UnknownName(f"kind of [[{package}]]", kind, kinds(package))
+        raise UnknownName(what, kind, kinds(package))
     try:
         module = importlib.import_module(name)
     except ModuleNotFoundError as error:

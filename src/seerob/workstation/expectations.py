@@ -57,13 +57,13 @@ def choices(wanted: Any) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _described(wanted: Any) -> str | None:
-    """What the metadata of a text's pattern say in words, also inside ``X | Y``."""
+def described(wanted: Any) -> str | None:
+    """What the metadata of a type say in words, also inside ``X | Y``."""
     for meta in getattr(wanted, "__metadata__", ()):
         if isinstance(meta, msgspec.Meta) and meta.description:
             return str(meta.description)
     if get_origin(wanted) in (Union, types.UnionType):
-        return next((found for item in get_args(wanted) if (found := _described(item))), None)
+        return next((found for item in get_args(wanted) if (found := described(item))), None)
     return None
 
 
@@ -78,7 +78,7 @@ def expected(wanted: Any, complaint: str) -> str:
     if allowed and ("enum" in complaint or "Expected `str`" in complaint):
         return "one of: " + ", ".join(allowed)
     if "matching regex" in complaint:
-        return "expected " + (_described(wanted) or complaint[complaint.index("matching") :])
+        return "expected " + (described(wanted) or complaint[complaint.index("matching") :])
     found = re.match(r"Expected `([^`]+)`(.*?)(?:, got .*)?$", complaint)
     if not found:
         return complaint[:1].lower() + complaint[1:]

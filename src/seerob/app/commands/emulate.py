@@ -1,34 +1,123 @@
 """``seerob emulate``: a device without the device, for a try-out and for demonstrations.
 
-What it can be is in `seerob.app.emulating`, one file per kind.
+What it can be is in `seerob.app.emulators`, one file per kind; its options are the fields of a class there.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from importlib import import_module
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 from seerob.app.console.interruption import Stopped
-from seerob.app.console.terminal import Exit, line, seconds
-from seerob.core.errors import InputError
-from seerob.core.host_name import check_host
-from seerob.core.plugin import home, kinds
+from seerob.app.console.terminal import Exit, Parser, line
+from seerob.core.errors import InputError, Problem, suggestion
+from seerob.core.plugin import kinds, load
+
+if TYPE_CHECKING:
+    from seerob.app.emulation.options import EmulatorOptions
 
 HELP = "be a controller or a device without the hardware: a real server that plays a motion"
 EXAMPLE = "seerob emulate rtde --robot ur10 --file motion.csv"
-PACKAGE = "emulating"
+PACKAGE = "emulators"
 
 
 def add(sub: argparse.ArgumentParser) -> None:
-    """Arguments, those of each kind below it."""
-    each = sub.add_subparsers(dest="kind", required=True, metavar="kind")
-    for kind in kinds(PACKAGE):
-        module = import_module(f"{home(PACKAGE)}.{kind}")
-        own = each.add_parser(kind, help=module.HELP, description=module.HELP)
-        module.add(own)
-        own.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine)")
-        own.add_argument("--seconds", type=seconds, help="end after this time")
+    """Arguments; those of a kind are read when it is known."""
+    sub.add_argument("kind", help=f"what it is: {', '.join(kinds(PACKAGE))}")
+    text = "its own, as `seerob emulate KIND --help` and `seerob kinds emulators` list them"
+    sub.add_argument("options", nargs=argparse.REMAINDER, help=text)
+
+
+def parser_of(kind: str) -> Parser:
+    """The parser of a kind's options, made from the fields of its class; its own first.
+
+    Args:
+        kind: A module of `seerob.app.emulators`.
+
+    Raises:
+        UnknownName: There is none of that name.
+    """
+    import msgspec
+
+    from seerob.app.emulation.options import COMMAND, EmulatorOptions
+    from seerob.workstation.expectations import choices, described, members, unit_of
+
+    wanted = load(PACKAGE, kind, EmulatorOptions)
+    title = (wanted.__doc__ or "").strip().split("\n")[0].rstrip(".")
+    made = Parser(
+        prog=f"{COMMAND} {kind}",
+        description=title,
+        allow_abbrev=False,
+        argument_default=argparse.SUPPRESS,
+    )
+    common = EmulatorOptions.__struct_fields__
+    for field in sorted(msgspec.structs.fields(wanted), key=lambda f: f.name in common):
+        unit = unit_of(field.type)
+        text = (described(field.type) or "") + (f" [{unit}]" if unit else "")
+        if bool in members(field.type):
+            made.add_argument(_option(field.name), action="store_true", help=text)
+            continue
+        if field.default not in (msgspec.NODEFAULT, None, ""):
+            shown = f"{field.default:g}" if isinstance(field.default, float) else field.default
+            text += f" (default: {shown})"
+        value = " or ".join(choices(field.type)) or field.name.upper()
+        made.add_argument(_option(field.name), metavar=value, help=text)
+    return made
+
+
+def options_of(kind: str, words: Sequence[str]) -> EmulatorOptions:
+    """The options of a kind that the words of a command line say.
+
+    Args:
+        kind: A module of `seerob.app.emulators`.
+        words: After it: ``--robot ur10 --port 0``.
+
+    Raises:
+        UnknownName: There is no such kind.
+        InputError: With every mistake: an option that it does not have, a value that is none.
+    """
+    import msgspec
+
+    from seerob.app.emulation.options import COMMAND, EmulatorOptions
+    from seerob.workstation.conversion import convert
+
+    parser = parser_of(kind)
+    said, rest = parser.parse_known_args(list(words))
+    wanted = load(PACKAGE, kind, EmulatorOptions)
+    fields = {field.name: field.type for field in msgspec.structs.fields(wanted)}
+    place = f"{COMMAND} {kind}"
+    if rest:
+        word = next((w.partition("=")[0] for w in rest if w.startswith("-")), rest[0])
+        what = "unknown option" if word.startswith("-") else "belongs to no option"
+        raise InputError.at(place, word, what, suggestion(word, map(_option, fields)))
+    table = {name: _value(text, fields[name]) for name, text in vars(said).items()}
+    problems: list[Problem] = []
+    found = convert(table, wanted, file=place, key="", problems=problems)
+    if found is None:
+        raise InputError(p._replace(key=_option(p.key) if p.key else "") for p in problems)
+    return found
+
+
+def _option(name: str) -> str:
+    """A field as the command line has it: ``primary_port`` is ``--primary-port``."""
+    return "--" + name.replace("_", "-")
+
+
+def _value(text: Any, wanted: Any) -> Any:
+    """The number that a word is, where the option takes one; what is none is left for the type to refuse."""
+    from seerob.workstation.expectations import members
+
+    for member in members(wanted):
+        said = get_args(member) if get_origin(member) is Literal else ()
+        if member in (int, float) or any(isinstance(value, int) for value in said):
+            with suppress(ValueError):
+                return int(text)
+            with suppress(ValueError):
+                return float(text)
+    return text
 
 
 def run(options: argparse.Namespace) -> int:
@@ -37,34 +126,28 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         InputError: What it shall play is wrong, or it cannot listen there.
     """
-    from seerob.app.emulating._hint import probes_of
+    from seerob.app.emulation.hint import probes_of
+    from seerob.app.emulation.options import COMMAND
     from seerob.devices.live.listening import because
 
-    for key in ("host", "to", "unity"):
-        if host := getattr(options, key, None):
-            try:
-                check_host(f"--{key}", host)
-            except ValueError as error:
-                raise InputError.at("seerob emulate", f"--{key}", str(error)) from None
-    made = import_module(f"{home(PACKAGE)}.{options.kind}").emulated(options)
+    asked = options_of(options.kind, options.options)
+    made = asked.ready()
     server, where = made.server, made.where
     stopped = Stopped()
     try:
         server.start()
     except OSError as error:
         found = f"cannot listen on {where}: {because(error)}"
-        raise InputError.at(
-            "seerob emulate", "--port", found, "choose another, or 0 for any free one"
-        ) from error
+        raise InputError.at(COMMAND, "--port", found, "choose another, or 0 for any free one") from error
     try:
         line("emulates", made.what, "bold")
         to = getattr(server, "to", None)
-        host, port = to or (getattr(server, "host", options.host), getattr(server, "port", options.port))
+        host, port = to or (getattr(server, "host", asked.host), getattr(server, "port", 0))
         way = ("sends", "to") if to else ("listens", "at")
         line(way[0], f"{options.kind} {way[1]} {host}:{port}  (Ctrl-C ends)")
         for command in probes_of(options.kind, host, port, sends=bool(to), commands=made.commands):
             line("try", command)
-        end = time.monotonic() + (options.seconds if options.seconds is not None else float("inf"))
+        end = time.monotonic() + (asked.seconds if asked.seconds is not None else float("inf"))
         while not stopped() and time.monotonic() < end:
             time.sleep(0.05)
     finally:

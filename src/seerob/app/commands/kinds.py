@@ -1,4 +1,4 @@
-"""``seerob kinds``: every source, criterion, rule and sink, one line each, with its options."""
+"""``seerob kinds``: every source, criterion, rule, sink and emulator, one line each, with its options."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import msgspec
 from seerob.app.console.terminal import OUT, Exit
 from seerob.workstation.workstation import PLUGINS
 
-HELP = "list every source, criterion, rule and sink with its options"
+HELP = "list every source, criterion, rule, sink and emulator with its options"
 EXAMPLE = "seerob kinds safety"
 
 COMMON = {
@@ -18,25 +18,29 @@ COMMON = {
     "safety": ("name", "every"),
     "ergonomics": ("name", "every"),
     "sinks": (),
+    "emulators": ("host", "seconds"),
 }
 
 
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
-    sub.add_argument("group", nargs="?", choices=PLUGINS, help="only these")
+    sub.add_argument("group", nargs="?", choices=(*PLUGINS, "emulators"), help="only these")
 
 
 def run(options: argparse.Namespace) -> int:
     """Print them."""
+    from seerob.app.emulation.options import EmulatorOptions
     from seerob.core import plugin
     from seerob.description.robots import library
     from seerob.session.reading import BASES
 
-    for group in [options.group] if options.group else list(BASES):
+    bases: dict[str, type[msgspec.Struct]] = {**BASES, "emulators": EmulatorOptions}
+    for group in [options.group] if options.group else list(bases):
         common = ", ".join(COMMON[group])
-        OUT.print(f"[[{group}]]" + (f"  (all: {common})" if common else ""), style="bold", markup=False)
+        title = "seerob emulate" if group == "emulators" else f"[[{group}]]"
+        OUT.print(title + (f"  (all: {common})" if common else ""), style="bold", markup=False)
         for kind in plugin.kinds(group):
-            found = plugin.load(group, kind, BASES[group])
+            found = plugin.load(group, kind, bases[group])
             title = (found.__doc__ or "").strip().split("\n")[0]
             OUT.print(f"  {kind:<18} {title}", markup=False)
             fields = [f for f in msgspec.structs.fields(found) if f.name not in COMMON[group]]

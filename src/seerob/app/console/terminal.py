@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import re
+import sys
+from collections.abc import Sequence
 from datetime import datetime
 from enum import IntEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from rich.console import Console as RichConsole
 
@@ -46,6 +49,9 @@ _WIDEST_NAME = 60
 """Characters of a name that results are lined up behind; a longer one moves only its own."""
 
 
+_NEGATIVE, _OPTION = re.compile(r"-\.?\d"), re.compile(r"--[a-z][a-z-]*")
+
+
 class Exit(IntEnum):
     """Exit codes."""
 
@@ -53,6 +59,30 @@ class Exit(IntEnum):
     EXCEEDED = 1
     UNDECIDED = 2
     ERROR = 3
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose mistakes end with `Exit.ERROR`: argparse's own 2 means undecided here."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the usage and the mistake, and leave."""
+        self.print_usage(sys.stderr)
+        self.exit(Exit.ERROR, f"{self.prog}: {message}\n")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Also values that begin with a minus, ``--to -60,70``: argparse takes them for options."""
+        return super().parse_known_args(_joined(sys.argv[1:] if args is None else args), namespace)
+
+
+def _joined(words: Sequence[str]) -> list[str]:
+    """Words of which a negative number is one with the option before it; no option begins with a digit."""
+    found: list[str] = []
+    for word in words:
+        if found and _NEGATIVE.match(word) and _OPTION.fullmatch(found[-1]) and "--" not in found:
+            found[-1] += f"={word}"
+        else:
+            found.append(word)
+    return found
 
 
 def seconds(text: str) -> float:

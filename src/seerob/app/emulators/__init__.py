@@ -1,1 +1,1 @@
-"""Small real servers that speak a controller's protocol: for a demo without hardware, and for tests."""
+"""What ``seerob emulate`` can be: real servers that speak a device's protocol, one file per kind."""

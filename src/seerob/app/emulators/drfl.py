@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated, Literal
 
-from seerob.app.emulators.message_sender import MessageSender, Way
-from seerob.app.emulators.motions import Motion
+from seerob.app.emulation.message_sender import MessageSender, Way
+from seerob.app.emulation.motions import Motion
+from seerob.app.emulation.options import Ready, RobotOptions, To, option, port
 from seerob.protocols.robots.doosan_drfl import JOINTS, Message, RobotMode, RobotState, encode
 
 
@@ -50,3 +52,25 @@ class DrflSender(MessageSender):
                 control=0,
             )
         )
+
+
+# -- options ------------------------------------------------------------------------------------
+
+HOME = (0.0, 0.3, 1.2, 0.0, 1.2, 0.0)
+"""What it swings about when no motion is given [rad]."""
+
+
+class Drfl(RobotOptions, frozen=True, kw_only=True):
+    """The bridge of a Doosan controller (DRFL), which sends to this software."""
+
+    robot: Annotated[str, option("robot of the library, whose limits hold")] = "doosan_m1013"
+    to: To = "127.0.0.1"
+    port: Annotated[int, port("port to send to")] = 20128
+    rate: Annotated[Literal[10, 50, 100, 200, 250, 500, 1000], option("messages per second", "Hz")] = 100
+
+    def ready(self) -> Ready:
+        """The bridge."""
+        target = self.target(joints=JOINTS, whose="a Doosan arm")
+        motion, what = self.motion(target, HOME)
+        sender = DrflSender(motion, to=(self.to, self.port), rate=self.rate)
+        return Ready(sender, f"{target.name}, {what}", f"to {self.to}:{self.port}")

@@ -6,10 +6,11 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from seerob.app.emulators.motions import Motion
-from seerob.app.emulators.ros_robot import LATE, RosRobot
+from seerob.app.emulation.motions import Motion
+from seerob.app.emulation.options import Ready, port
+from seerob.app.emulation.ros_robot import LATE, RosOptions, RosRobot
 from seerob.protocols import ProtocolError
 from seerob.protocols.ros import foxglove
 from seerob.protocols.ros.foxglove import ServerChannel
@@ -95,3 +96,16 @@ class FoxgloveBridge(RosRobot):
                     payload = encode(content, says(k / self.rate), self.edition)
                     await connection.send(foxglove.pack(own, self.epoch + k / self.rate, payload))
                 k += 1
+
+
+# -- options ------------------------------------------------------------------------------------
+
+
+class Foxglove(RosOptions, frozen=True, kw_only=True):
+    """A Foxglove bridge (ROS 1 or 2) with the joint states of a robot."""
+
+    port: Annotated[int, port()] = 8765
+
+    def ready(self) -> Ready:
+        """The bridge."""
+        return self.served(FoxgloveBridge)

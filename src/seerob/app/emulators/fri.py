@@ -10,10 +10,11 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from seerob.app.emulators.background import LoopEmulator
-from seerob.app.emulators.motions import Motion
+from seerob.app.emulation.background import LoopEmulator
+from seerob.app.emulation.motions import Motion
+from seerob.app.emulation.options import Ready, RobotOptions, option, port
 from seerob.protocols import ProtocolError
 from seerob.protocols.robots import fri
 from seerob.protocols.robots.fri import Edition, Monitoring, Quality, SessionState
@@ -148,3 +149,34 @@ class _Answers(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, _: tuple[str | Any, int]) -> None:
         self._server.heard(data)
+
+
+# -- options ------------------------------------------------------------------------------------
+
+HOME = (0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0)
+"""What it swings about when no motion is given [rad]."""
+JOINTS = 7
+
+
+class Fri(RobotOptions, frozen=True, kw_only=True):
+    """A KUKA LBR controller (FRI), which sends to a client."""
+
+    robot: Annotated[str, option("robot of the library, whose limits hold")] = "iiwa14"
+    to: Annotated[str, option("address of the client")] = "127.0.0.1"
+    port: Annotated[int, port("port of the client")] = 30200
+    edition: Annotated[Literal["1", "2.5", "2.7"], option("edition of FRI")] = "2.7"
+    period: Annotated[int, option("between messages", "ms", ge=1, le=100)] = 5
+
+    def ready(self) -> Ready:
+        """The controller."""
+        target = self.target(joints=JOINTS, whose="an LBR")
+        motion, what = self.motion(target, HOME)
+        server = FriServer(
+            motion,
+            to=(self.to, self.port),
+            host=self.host,
+            edition=Edition(self.edition),
+            period=1e-3 * self.period,
+        )
+        where = f"{self.host}, to {self.to}:{self.port}"
+        return Ready(server, f"{target.name}, {what}", where, (f"seerob probe fri {self.host}{{option}}",))

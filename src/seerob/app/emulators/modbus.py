@@ -7,14 +7,18 @@ import logging
 import math
 import struct
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
+from typing import Annotated
 
-from seerob.app.emulators.background import LoopEmulator
-from seerob.protocols.plc.modbus import Place, Table, blocks, encode
+from seerob.app.emulation import plc_cell
+from seerob.app.emulation.background import LoopEmulator
+from seerob.app.emulation.modbus_robot import Program, program
+from seerob.app.emulation.options import Ready, RobotOptions, option, port
+from seerob.protocols.plc.modbus import Place, Table, Type, Words, blocks, encode
+from seerob.protocols.plc.modbus_map import load
 
-Program = Mapping[Place, Callable[[float], float | bool]]
-"""Place → the raw value in it at a time since it was made [s]."""
 IDS = {1: Table.COIL, 5: Table.COIL, 15: Table.COIL, 2: Table.DISCRETE, 4: Table.INPUT}
 """Functions of the protocol and their tables; the others are about holding registers."""
 
@@ -122,3 +126,43 @@ class ModbusServer(LoopEmulator):
                 with suppress(struct.error):  # a device's number that does not fit stays as it was
                     words = encode(place, value(t))
                     registers[place.at - start : place.at - start + len(words)] = words
+
+
+# -- options ------------------------------------------------------------------------------------
+
+HOME = (0.0, 0.3, 1.2, 0.0, 1.2, 0.0)
+"""What it swings about when no motion is given [rad]."""
+BELT = 128
+"""Registers of the belt: speed, bits, position."""
+
+
+class Modbus(RobotOptions, frozen=True, kw_only=True):
+    """A controller that has a robot's joints in Modbus registers, with a belt beside them."""
+
+    robot: Annotated[str, option("robot of the library, whose limits hold")] = "doosan_m1013"
+    map: Annotated[str, option("register map, or a file of one")] = "doosan"
+    port: Annotated[int, port()] = 5020
+
+    def ready(self) -> Ready:
+        """The controller."""
+        found = load(self.map, Path())
+        target = self.target(joints=found.joints, whose=f"the map {self.map}")
+        home = (*HOME, *(0.0,) * found.joints)[: found.joints]
+        motion, what = self.motion(target, home)
+        states: dict[str, str | bool | float] = {"robot_state": "moving", "servo_on": True}
+        known = {s.name for s in found.signals}
+        played = {
+            **program(found, motion, {name: state for name, state in states.items() if name in known}),
+            Place(table=Table.HOLDING, at=BELT, type=Type.I16): plc_cell.speed,
+            Place(table=Table.HOLDING, at=BELT + 1, type=Type.BIT, bit=0): plc_cell.running,
+            Place(table=Table.HOLDING, at=BELT + 1, type=Type.BIT, bit=1): plc_cell.clear,
+            Place(table=Table.HOLDING, at=BELT + 2, type=Type.F32, words=Words.HIGH_FIRST): plc_cell.position,
+        }
+        server = ModbusServer(played, host=self.host, port=self.port, refresh=found.refresh)
+        belt = f"a belt in the holding registers {BELT} (i16, mm/s) to {BELT + 3}"
+        chosen = "" if self.map == "doosan" else f" --set map={self.map}"
+        hear = (
+            f"seerob probe modbus_robot {{host}} --port {{port}}{chosen}",
+            "seerob probe modbus {host} --port {port}",
+        )
+        return Ready(server, f"{target.name}, {what}; {belt}", f"{self.host}:{self.port}", hear)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable, Sequence
+from typing import Annotated
 
-from seerob.app.emulators.background import Emulator
-from seerob.app.emulators.mvn_datagrams import datagrams
-from seerob.app.emulators.mvn_person import Person
+from seerob.app.emulation.background import Emulator
+from seerob.app.emulation.mvn_datagrams import datagrams
+from seerob.app.emulation.mvn_person import Person
+from seerob.app.emulation.options import PersonOptions, Ready, To, option, port
 from seerob.protocols.tracking import mvn
 from seerob.protocols.tracking.mvn import Kind
 
@@ -108,3 +110,27 @@ class MvnSender(Emulator):
                 self.sent += 1
                 late = time.monotonic() - begun - k / self.rate
                 k += 1 + (int(late * self.rate) if late > LATE else 0)
+
+
+# -- options ------------------------------------------------------------------------------------
+
+
+class Mvn(PersonOptions, frozen=True, kw_only=True):
+    """Xsens MVN's network streamer, which sends a moving person."""
+
+    to: To = "127.0.0.1"
+    port: Annotated[int, port("port to send to")] = mvn.PORT
+    rate: Annotated[float, option("samples per second", "Hz", ge=1, le=240)] = 60.0
+    tcp: Annotated[bool, option("connect and send in a stream; else UDP")] = False
+    cm: Annotated[bool, option("positions in centimetres, as the specification says")] = False
+
+    def ready(self) -> Ready:
+        """The streamer."""
+        server = MvnSender(
+            {0: self.person()},
+            to=(self.to, self.port),
+            rate=self.rate,
+            units=100.0 if self.cm else 1.0,
+            tcp=self.tcp,
+        )
+        return Ready(server, f"a person, {self.file}", f"{self.to}:{self.port}")

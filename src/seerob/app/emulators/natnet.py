@@ -6,12 +6,14 @@ import socket
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Annotated, Literal
 
 import numpy as np
 
-from seerob.app.emulators import natnet_datagrams
-from seerob.app.emulators.background import Emulator
-from seerob.app.emulators.mvn_person import Person
+from seerob.app.emulation import natnet_datagrams
+from seerob.app.emulation.background import Emulator
+from seerob.app.emulation.mvn_person import Person
+from seerob.app.emulation.options import PersonOptions, Ready, option, port
 from seerob.core.transforms import turned
 from seerob.files.motion_capture.upright import world_from_file
 from seerob.protocols.tracking import mvn_segments, natnet
@@ -165,3 +167,37 @@ def _as_bodies(positions: np.ndarray, wxyz: np.ndarray, first: int) -> tuple[Bod
         Body(first + k, place, turn[[1, 2, 3, 0]], 0.0002, tracked=True)
         for k, (place, turn) in enumerate(zip(places, turns, strict=True))
     )
+
+
+# -- options ------------------------------------------------------------------------------------
+
+TRACKED = {"waist": "Pelvis", "left_foot": "LeftFoot", "right_foot": "RightFoot"}
+TRACKED |= {"left_hand": "LeftHand", "right_hand": "RightHand"}
+"""Rigid bodies and the segments that they sit on."""
+_GROUP = "group (address) to send to, port 1511; else to who asks"
+
+
+class Natnet(PersonOptions, frozen=True, kw_only=True):
+    """OptiTrack Motive's stream (NatNet), with a moving person."""
+
+    rate: Annotated[float, option("samples per second", "Hz", ge=1, le=1000)] = 120.0
+    port: Annotated[int, port("port for questions; 0 is any free one")] = 1510
+    version: Annotated[
+        Literal["2.6", "2.9", "3.0", "3.1", "4.0", "4.1", "4.2"], option("version of NatNet")
+    ] = "4.1"
+    multicast: Annotated[str, option(_GROUP)] | None = None
+
+    def ready(self) -> Ready:
+        """Motive."""
+        person = self.person()
+        major, minor = map(int, self.version.split("."))
+        server = NatnetServer(
+            {"Anna": person},
+            worn={name: (person, segment) for name, segment in TRACKED.items()},
+            version=(major, minor),
+            host=self.host,
+            port=self.port,
+            group=(self.multicast, natnet.DATA_PORT) if self.multicast else None,
+            rate=self.rate,
+        )
+        return Ready(server, f"a skeleton and five rigid bodies, {self.file}", f"{self.host}:{self.port}")

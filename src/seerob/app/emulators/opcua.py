@@ -13,10 +13,12 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
-from seerob.app.emulators.background import LoopEmulator
-from seerob.app.emulators.motions import Motion
+from seerob.app.emulation import plc_cell
+from seerob.app.emulation.background import LoopEmulator
+from seerob.app.emulation.motions import Motion, swing
+from seerob.app.emulation.options import EmulatorOptions, Ready, port
 from seerob.protocols.plc.opcua_client import SILENT, content
 from seerob.protocols.plc.opcua_robotics import AXIS, DEVICE, DEVICES, ROBOTICS, SAFETY, SYSTEM
 from seerob.protocols.plc.opcua_units import CODES, NAMESPACE, number
@@ -298,3 +300,33 @@ def _free(host: str) -> int:
     with socket.socket() as probe:
         probe.bind((host, 0))
         return int(probe.getsockname()[1])
+
+
+# -- options ------------------------------------------------------------------------------------
+
+HOME = (0.0, -1.2, 1.4, -1.5, -1.5, 0.0)
+"""What the robot swings about [rad]."""
+OUTPUT = "Twin/warning"
+"""A bool that a trigger may write."""
+
+
+class Opcua(EmulatorOptions, frozen=True, kw_only=True):
+    """An OPC UA server: a PLC with a belt, a light curtain and a door, and a robot by OPC 40010."""
+
+    port: Annotated[int, port()] = 4840
+
+    def ready(self) -> Ready:
+        """The server."""
+        variables = {
+            "Belt/running": Emulated(plc_cell.running),
+            "Belt/speed": Emulated(plc_cell.speed, "mm/s"),
+            "Belt/position": Emulated(plc_cell.position, "mm"),
+            "Curtain/clear": Emulated(plc_cell.clear),
+            "Door/open": Emulated(plc_cell.door_open),
+        }
+        server = OpcuaServer(
+            variables, {"Robot": swing(HOME)}, host=self.host, port=self.port, outputs=(OUTPUT,)
+        )
+        what = f"variables {', '.join(variables)}; one robot; {OUTPUT} may be written"
+        hear = ("seerob probe opcua_robot opc.tcp://{at}", "seerob probe opcua opc.tcp://{at}")
+        return Ready(server, what, f"{self.host}:{self.port}", hear)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Annotated, Literal
+
 import numpy as np
 
-from seerob.app.emulators.message_sender import MessageSender, Way
-from seerob.app.emulators.mvn_person import Person
+from seerob.app.emulation.message_sender import MessageSender, Way
+from seerob.app.emulation.mvn_person import Person
+from seerob.app.emulation.options import PersonOptions, Ready, To, option, port
 from seerob.protocols.tracking import mvn_segments
 from seerob.protocols.tracking.rokoko import PORT, SEGMENTS, Actor, Scene, encode
 
@@ -60,3 +63,27 @@ class RokokoSender(MessageSender):
     def message(self, k: int) -> bytes:
         """The datagram number ``k``."""
         return encode(self.scene(k / self.rate), compressed=self.compressed)
+
+
+# -- options ------------------------------------------------------------------------------------
+
+
+class Rokoko(PersonOptions, frozen=True, kw_only=True):
+    """Rokoko Studio's live stream (JSON), which sends a moving person."""
+
+    rate: Annotated[float, option("samples per second", "Hz", ge=1, le=200)] = 100.0
+    to: To = "127.0.0.1"
+    port: Annotated[int, port("port to send to")] = PORT
+    version: Annotated[Literal["2", "3"], option("version of the JSON")] = "3"
+    lz4: Annotated[bool, option("compressed")] = False
+
+    def ready(self) -> Ready:
+        """Studio."""
+        server = RokokoSender(
+            {"Anna": self.person()},
+            to=(self.to, self.port),
+            rate=self.rate,
+            version=self.version,
+            compressed=self.lz4,
+        )
+        return Ready(server, f"a person, {self.file}", f"{self.to}:{self.port}")

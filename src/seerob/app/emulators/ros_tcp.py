@@ -7,10 +7,13 @@ import contextlib
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
-from seerob.app.emulators.motions import Motion
-from seerob.app.emulators.ros_robot import LATE, RosRobot
+from msgspec.structs import replace
+
+from seerob.app.emulation.motions import Motion
+from seerob.app.emulation.options import Ready, option, port
+from seerob.app.emulation.ros_robot import LATE, RosOptions, RosRobot
 from seerob.protocols import ProtocolError
 from seerob.protocols.ros import ros_tcp
 from seerob.protocols.ros.ros_messages import ros1_name, same_type
@@ -137,3 +140,30 @@ class UnityProject(_Playing):
         finally:
             if writer is not None:
                 writer.transport.abort()
+
+
+# -- options ------------------------------------------------------------------------------------
+
+_UNITY = "connect to an endpoint at this address, as a Unity project does; else be the endpoint"
+_ROS = "edition of ROS; as a Unity project what the endpoint says"
+
+
+class RosTcp(RosOptions, frozen=True, kw_only=True):
+    """Unity's ROS-TCP-Endpoint with the joint states of a robot, or a Unity project that publishes them."""
+
+    port: Annotated[int, port("port of the endpoint; 0 is any free one")] = 10000
+    unity: Annotated[str, option(_UNITY)] | None = None
+    ros: Annotated[Literal["1", "2"], option(_ROS)] = "1"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.unity and not self.port:
+            raise ValueError("--port is 0 with --unity: name the endpoint's port")
+
+    def ready(self) -> Ready:
+        """The endpoint, or the project."""
+        if not self.unity:
+            return self.served(RosTcpEndpoint)
+        _, what, _, _ = made = replace(self, host=self.unity).served(UnityProject)
+        hear = ("seerob probe ros_tcp --set side=endpoint --port {port}",)
+        return made._replace(what=f"a Unity project, {what}", commands=hear)

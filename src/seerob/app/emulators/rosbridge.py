@@ -13,10 +13,11 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from seerob.app.emulators.motions import Motion
-from seerob.app.emulators.ros_robot import LATE, RosRobot
+from seerob.app.emulation.motions import Motion
+from seerob.app.emulation.options import Ready, port
+from seerob.app.emulation.ros_robot import LATE, RosOptions, RosRobot
 from seerob.protocols.ros.ros_messages import Joints, Plan, Said, Transform, ros1_name
 from seerob.protocols.ros.ros_serialised import Edition, encode
 from seerob.protocols.ros.rosbridge import MAX_MESSAGE, Compression
@@ -209,3 +210,16 @@ def _status(level: str, text: str) -> str:
 def _end(task: asyncio.Task[None] | None) -> None:
     if task is not None:
         task.cancel()
+
+
+# -- options ------------------------------------------------------------------------------------
+
+
+class Rosbridge(RosOptions, frozen=True, kw_only=True):
+    """A rosbridge server (ROS 1 or 2) with the joint states of a robot."""
+
+    port: Annotated[int, port()] = 9090
+
+    def ready(self) -> Ready:
+        """The server."""
+        return self.served(RosbridgeServer)

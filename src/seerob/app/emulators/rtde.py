@@ -12,9 +12,13 @@ import logging
 import math
 import time
 from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated
 
-from seerob.app.emulators.background import LoopEmulator
-from seerob.app.emulators.motions import Motion
+from seerob.app.emulation.background import LoopEmulator
+from seerob.app.emulation.motions import Motion
+from seerob.app.emulation.options import Ready, RobotOptions, option, port
+from seerob.core.errors import InputError
 from seerob.protocols import ProtocolError
 from seerob.protocols.robots.rtde import (
     NOT_FOUND,
@@ -263,3 +267,41 @@ class _Client:
                 return
             self._say(Data(recipe.number, recipe.pack(self._server.at(k / rate))))
             k += 1
+
+
+# -- options ------------------------------------------------------------------------------------
+
+HOME = (0.0, -1.2, 1.4, -1.5, -1.5, 0.0)
+"""What it swings about when no motion is given [rad]: elbow up, tool down."""
+JOINTS = 6
+
+
+class Rtde(RobotOptions, frozen=True, kw_only=True):
+    """A Universal Robots controller (RTDE)."""
+
+    port: Annotated[int, port()] = 30004
+    calibration: Annotated[str, option("kinematics it says it has: a file of seerob probe")] | None = None
+    primary_port: Annotated[int, port("port where it says them; 0 is any free one")] = 30011
+
+    def ready(self) -> Ready:
+        """The controller."""
+        target = self.target(joints=JOINTS, whose="a Universal Robots arm")
+        motion, what = self.motion(target, HOME)
+        server = RtdeServer(
+            motion,
+            host=self.host,
+            port=self.port,
+            kinematics=None if self.calibration is None else _kinematics(Path(self.calibration)),
+            primary_port=self.primary_port,
+        )
+        return Ready(server, f"{target.name}, {what}", f"{self.host}:{self.port}")
+
+
+def _kinematics(path: Path) -> Kinematics:
+    from seerob.description.robots.calibration import read_calibration
+
+    try:
+        found = read_calibration(path.read_bytes(), str(path))
+    except OSError as error:
+        raise InputError.at(path, "", f"cannot be read: {error.strerror}", "give another file") from error
+    return Kinematics(found.theta, found.a, found.d, found.alpha, found.checksum or (0,) * 6)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from seerob.app.emulators.http import HttpEmulator
+from seerob.app.emulation import plc_cell
+from seerob.app.emulation.http import HttpEmulator
+from seerob.app.emulation.options import EmulatorOptions, Ready, option, port
 from seerob.protocols.plc import s7_web
 
 MOST_SESSIONS = 4
@@ -130,3 +132,41 @@ class SiemensWebServer(HttpEmulator):
 
 def _error(code: int, text: str) -> dict[str, Any]:
     return {"error": {"code": code, "message": text}}
+
+
+# -- options ------------------------------------------------------------------------------------
+
+PASSWORD = "seerob"  # noqa: S105 - everybody may know it
+
+
+class SiemensWeb(EmulatorOptions, frozen=True, kw_only=True):
+    """A Siemens PLC's web server (S7 web API): a belt, a light curtain and a door."""
+
+    port: Annotated[int, port()] = 8081
+    user: Annotated[str, option("who may log in")] = "seerob"
+    password: Annotated[str, option("with which")] = PASSWORD
+
+    def ready(self) -> Ready:
+        """The PLC."""
+        program = {
+            '"Belt".running': plc_cell.running,
+            '"Belt".speed': plc_cell.speed,
+            '"Belt".position': plc_cell.position,
+            '"Curtain".clear': plc_cell.clear,
+            '"Door".open': plc_cell.door_open,
+        }
+        server = SiemensWebServer(
+            program,
+            user=self.user,
+            password=self.password,
+            host=self.host,
+            port=self.port,
+            outputs=('"Twin".too_close',),
+        )
+        what = f"variables {', '.join(program)}; speeds in mm/s, positions in mm"
+        password = self.password if self.password == PASSWORD else "…"
+        hear = (
+            f"PLC_PASSWORD={password} seerob probe siemens_web http://{{at}}"
+            f" --set user={self.user} --set password_env=PLC_PASSWORD"
+        )
+        return Ready(server, what, f"{self.host}:{self.port}", (hear,))

@@ -3,29 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import Annotated
 
 import numpy as np
 
-from seerob.app.emulators.message_sender import MessageSender, Way
-from seerob.app.emulators.mvn_person import Person
+from seerob.app.emulation.message_sender import MessageSender, Way
+from seerob.app.emulation.mvn_person import FIVE, WORN, Person
+from seerob.app.emulation.options import PersonOptions, Ready, option, port
 from seerob.core.transforms import rotation_from_rpy, rotation_from_wxyz, wxyz_from_rotation
 from seerob.protocols.tracking import mvn_segments
 from seerob.protocols.tracking.vive import PORT, Device, Devices, encode
 
-WORN = {
-    "waist": "Pelvis",
-    "chest": "T8",
-    "left_foot": "LeftFoot",
-    "right_foot": "RightFoot",
-    "left_hand": "LeftHand",
-    "right_hand": "RightHand",
-    "left_elbow": "LeftForeArm",
-    "right_elbow": "RightForeArm",
-    "head": "Head",
-}
-"""Roles and the segments that they sit on."""
-FIVE = ("waist", "left_foot", "right_foot", "left_hand", "right_hand")
-"""The least with which a whole body is followed."""
 STRAP = rotation_from_rpy((0.4, -0.7, 1.1))
 """How a tracker happens to be turned on its strap."""
 
@@ -101,3 +89,28 @@ class ViveSender(MessageSender):
     def message(self, k: int) -> bytes:
         """The message number ``k``."""
         return encode(self.trackers(k / self.rate))
+
+
+# -- options ------------------------------------------------------------------------------------
+
+CONNECT = "seerob probe vive --set link=websocket --set host={host} --port {port}"
+"""How one that listens is heard."""
+
+
+class Vive(PersonOptions, frozen=True, kw_only=True):
+    """The sender beside SteamVR (Vive trackers), which sends those of a moving person."""
+
+    rate: Annotated[float, option("samples per second", "Hz", ge=1, le=250)] = 90.0
+    to: Annotated[str, option("address to send datagrams to")] = "127.0.0.1"
+    port: Annotated[int, port("port to send to, or to listen at with --websocket")] = PORT
+    websocket: Annotated[bool, option("let listeners connect; else UDP")] = False
+    all: Annotated[bool, option("nine trackers; else the least five")] = False
+
+    def ready(self) -> Ready:
+        """The sender."""
+        trackers = worn(self.person(), tuple(WORN) if self.all else FIVE)
+        to = None if self.websocket else (self.to, self.port)
+        server = ViveSender(trackers, to=to, host=self.host, port=self.port, rate=self.rate)
+        where = self.host if self.websocket else self.to
+        hear = (CONNECT,) if self.websocket else ()
+        return Ready(server, f"trackers on a person, {self.file}", f"{where}:{self.port}", hear)

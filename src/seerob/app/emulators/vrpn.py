@@ -7,9 +7,11 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from threading import Thread
+from typing import Annotated
 
-from seerob.app.emulators.background import Emulator
-from seerob.app.emulators.mvn_person import Person
+from seerob.app.emulation.background import Emulator
+from seerob.app.emulation.mvn_person import FIVE, WORN, Person
+from seerob.app.emulation.options import PersonOptions, Ready, option, port
 from seerob.protocols.tracking import mvn_segments, vrpn
 
 OTHERS = 7
@@ -95,3 +97,19 @@ class VrpnServer(Emulator):
                 link.sendall(self.instant(k / self.rate))
                 late = time.monotonic() - begun - k / self.rate
                 k += 1 + (int(late * self.rate) if late > 0.5 else 0)
+
+
+# -- options ------------------------------------------------------------------------------------
+
+
+class Vrpn(PersonOptions, frozen=True, kw_only=True):
+    """A VRPN server (TCP) whose trackers a moving person wears."""
+
+    rate: Annotated[float, option("samples per second", "Hz", ge=1, le=1000)] = 100.0
+    port: Annotated[int, port()] = vrpn.PORT
+
+    def ready(self) -> Ready:
+        """The server."""
+        worn = {role: WORN[role] for role in FIVE}
+        server = VrpnServer(self.person(), worn, host=self.host, port=self.port, rate=self.rate)
+        return Ready(server, f"five trackers, {self.file}", f"{self.host}:{self.port}")

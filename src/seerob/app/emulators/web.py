@@ -6,9 +6,11 @@ import asyncio
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from seerob.app.emulators.http import HttpEmulator
+from seerob.app.emulation import plc_cell
+from seerob.app.emulation.http import HttpEmulator
+from seerob.app.emulation.options import EmulatorOptions, Ready, port
 
 Document = Callable[[float], Mapping[str, Any]]
 """What it tells at a time since the start [s]."""
@@ -74,3 +76,31 @@ class WebServer(HttpEmulator):
                 await asyncio.sleep(self.period)
         except (WebSocketDisconnect, RuntimeError):
             return
+
+
+# -- options ------------------------------------------------------------------------------------
+
+
+class Web(EmulatorOptions, frozen=True, kw_only=True):
+    """A web server that tells a belt, a light curtain and a door (/state, and /live by WebSocket)."""
+
+    port: Annotated[int, port()] = 8090
+
+    def ready(self) -> Ready:
+        """The machine."""
+        server = WebServer(_cell, host=self.host, port=self.port)
+        what = f"a belt, a light curtain and a door at {STATE}, and at {LIVE} by WebSocket"
+        hear = (f"seerob probe web http://{{at}}{STATE}", f"seerob probe web ws://{{at}}{LIVE}")
+        return Ready(server, what, f"{self.host}:{self.port}", hear)
+
+
+def _cell(t: float) -> Mapping[str, Any]:
+    return {
+        "belt": {
+            "running": plc_cell.running(t),
+            "speed": plc_cell.speed(t),
+            "position": plc_cell.position(t),
+        },
+        "curtain": {"clear": plc_cell.clear(t)},
+        "door": {"open": plc_cell.door_open(t)},
+    }

@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from seerob.app.emulators.background import LoopEmulator
+from seerob.app.emulation.background import LoopEmulator
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection

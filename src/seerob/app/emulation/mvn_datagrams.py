@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 
-from seerob.app.emulators.mvn_person import Pose
+from seerob.app.emulation.mvn_person import Pose
 from seerob.core.transforms import Array, rotation_from_wxyz
 from seerob.devices.capture.xsens import anatomical, joint_angles
 from seerob.protocols.tracking.mvn import Header, Kind, ScalePoint, encode, pack_items, pack_scale, pack_tags

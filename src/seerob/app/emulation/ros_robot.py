@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import ClassVar
+from typing import Annotated, ClassVar, Literal
 
-from seerob.app.emulators.background import LoopEmulator
-from seerob.app.emulators.motions import Motion
+from seerob.app.emulation.background import LoopEmulator
+from seerob.app.emulation.motions import Motion
+from seerob.app.emulation.options import Rate, Ready, RobotOptions, option, port
 from seerob.protocols.ros.ros_messages import Content, Joints, Said
 from seerob.protocols.ros.ros_serialised import Edition
 
@@ -63,3 +64,35 @@ class RosRobot(LoopEmulator):
         self.topics: dict[str, tuple[Content, Says]] = {JOINT_STATES: states, **(more or {})}
         """May be changed while it runs."""
         self._begun = 0.0
+
+
+# -- options ------------------------------------------------------------------------------------
+
+
+class RosOptions(RobotOptions, frozen=True, kw_only=True):
+    """What emulated servers of ROS have in common."""
+
+    port: Annotated[int, port()] = 0
+    ros: Annotated[Literal["1", "2"], option("edition of ROS")] = "2"
+    rate: Rate = 100.0
+
+    def served(self, server: Callable[..., LoopEmulator]) -> Ready:
+        """A server that speaks for the robot.
+
+        Args:
+            server: Made of a motion, the names of the joints, and ``host``, ``port``, ``edition``, ``rate``.
+
+        Raises:
+            InputError: No such robot, or a motion that it cannot do.
+        """
+        target = self.target()
+        motion, what = self.motion(target)
+        made = server(
+            motion,
+            target.joints,
+            host=self.host,
+            port=self.port,
+            edition=Edition(f"ros{self.ros}"),
+            rate=self.rate,
+        )
+        return Ready(made, f"{target.name}, {what}", f"{self.host}:{self.port}")

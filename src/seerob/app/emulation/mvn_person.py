@@ -20,6 +20,20 @@ from seerob.devices.sources import bvh, mvnx
 from seerob.protocols.tracking.mvn_segments import SEGMENTS
 from seerob.workstation.source import Target
 
+WORN = {
+    "waist": "Pelvis",
+    "chest": "T8",
+    "left_foot": "LeftFoot",
+    "right_foot": "RightFoot",
+    "left_hand": "LeftHand",
+    "right_hand": "RightHand",
+    "left_elbow": "LeftForeArm",
+    "right_elbow": "RightForeArm",
+    "head": "Head",
+}
+"""Roles and the segments that they sit on."""
+FIVE = ("waist", "left_foot", "right_foot", "left_hand", "right_hand")
+"""The least with which a whole body is followed."""
 RATE = 120.0
 """Of keyframes [Hz]."""
 _NAMES = {

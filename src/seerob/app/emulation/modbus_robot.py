@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
-from seerob.app.emulators.modbus import Program
-from seerob.app.emulators.motions import Motion
+from seerob.app.emulation.motions import Motion
 from seerob.protocols.plc.modbus import Place, Type
 from seerob.protocols.plc.modbus_map import Joints, RegisterMap, SignalEntry
 
+Program = Mapping[Place, Callable[[float], float | bool]]
+"""Place → the raw value in it at a time since it was made [s]."""
 Play = Callable[[float], float | bool]
 
 

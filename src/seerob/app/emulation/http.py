@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from seerob.app.emulators.background import Emulator
+from seerob.app.emulation.background import Emulator
 
 
 class HttpEmulator(Emulator):

@@ -1,0 +1,1 @@
+"""What emulators share: their base, their options, motions and people to play."""

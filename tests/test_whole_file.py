@@ -13,7 +13,7 @@ from seerob.app.console.whole_folder import whole_folder
 from seerob.core.errors import InputError
 from seerob.core.files.whole_file import whole_file
 from seerob.core.shapes.geometry import Mesh
-from seerob.description.shapes.mesh_out import stl_bytes, write_mesh
+from seerob.description.shapes.glb import stl_bytes, write_mesh
 from seerob.outputs.sinks.dossier import write_whole
 from seerob.outputs.tables.growing_table import GrowingTable
 from seerob.outputs.tables.whole_folder import WholeFolder

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from seerob.description.humans import anthropometry
-from seerob.description.humans.body_area import area_in, words
-from seerob.description.humans.body_areas import AREAS, body_area
+from seerob.description.humans.body_areas import AREAS, area_in, body_area, words
 from seerob.description.humans.skeleton import BONES
 from seerob.description.humans.skin import body_region, edges, skin
 from seerob.description.norms.body_limits import shipped

@@ -1,7 +1,7 @@
 """Of two devices that see a bone one is followed, and a confidence that wobbles does not change which."""
 
 from seerob.core.samples import BodyPoint
-from seerob.description.capture.chosen_points import BETTER, best
+from seerob.description.capture.handover import BETTER, best
 
 
 def point(name, weight, bone="head"):

@@ -13,7 +13,7 @@ from seerob.core.errors import InputError, UnknownName
 from seerob.core.shapes.geometry import Solid
 from seerob.core.snapshot import Origin
 from seerob.description.description import Description, JointKind
-from seerob.description.humans import anthropometry, manikin, skin, zatsiorsky
+from seerob.description.humans import anthropometry, manikin, skin
 from seerob.description.humans.skeleton import AXES, BONES, bone_poses
 from seerob.description.humans.tables import table
 
@@ -210,20 +210,20 @@ MEAN_MAN = {  # men's mean table of the same study, transcribed by others: kg, k
 def test_regressions_give_the_mean_man(segment):
     mass, *moments = MEAN_MAN[segment]
     reference = {"mass": 73.0, "stature": 1.741}
-    assert zatsiorsky.masses(**reference)[segment] == pytest.approx(mass, rel=0.02)
-    found = np.array(zatsiorsky.moments(segment, **reference)) * 1e4
+    assert anthropometry.zatsiorsky_masses(**reference)[segment] == pytest.approx(mass, rel=0.02)
+    found = np.array(anthropometry.zatsiorsky_moments(segment, **reference)) * 1e4
     assert found == pytest.approx(moments, rel=0.015)
 
 
 def test_regressions_nearly_conserve_mass_and_the_manikin_exactly():
-    masses = zatsiorsky.masses(mass=80.0, stature=1.8)
+    masses = anthropometry.zatsiorsky_masses(mass=80.0, stature=1.8)
     single = ("head", "upper_trunk", "middle_trunk", "lower_trunk")
     assert sum(m * (1 if k in single else 2) for k, m in masses.items()) == pytest.approx(80, rel=0.005)
     description = person(1.8, 80.0, masses="zatsiorsky")
     assert math.fsum(k.inertial.mass for k in description.links[1:]) == pytest.approx(80, rel=1e-12)
     mass, _, inertia = whole(description, ("head", "neck"))
     scale = mass / masses["head"]
-    sagittal, transverse, longitudinal = zatsiorsky.moments("head", mass=80.0, stature=1.8)
+    sagittal, transverse, longitudinal = anthropometry.zatsiorsky_moments("head", mass=80.0, stature=1.8)
     assert np.diag(inertia) == pytest.approx(scale * np.array([sagittal, transverse, longitudinal]))
     assert "Zatsiorsky" in description.link("left_thigh").inertial.source
 

@@ -9,8 +9,8 @@ import pytest
 
 from seerob.core.errors import InputError
 from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
+from seerob.description.capture.fit_check import marker_stature
 from seerob.description.capture.mapping import conventions, places, plain
-from seerob.description.capture.marker_stature import marker_stature
 from seerob.description.capture.observing import bind
 from seerob.description.humans import keyframes, manikin, motion
 from seerob.description.humans.skeleton import BONES, bone_poses

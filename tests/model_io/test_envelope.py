@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from seerob.description.loader import load_robot
-from seerob.description.rigid import groups
+from seerob.description.pose import groups
 from seerob.description.robots import library
 from seerob.description.robots.maker_geometry import with_geometry_of
 

@@ -8,9 +8,8 @@ import pytest
 import trimesh
 
 from seerob.core.shapes.geometry import Mesh, Solid, capsule, dilated_rectangle
-from seerob.description.shapes.glb import glb_bytes, mesh_hash, shown, solid_mesh
+from seerob.description.shapes.glb import glb_bytes, mesh_hash, shaded, shown, solid_mesh
 from seerob.description.shapes.moments import of_closed_mesh, of_solid
-from seerob.description.shapes.shading import shaded
 
 
 def mesh_of(body, color=(0.5, 0.25, 1.0, 1.0)):

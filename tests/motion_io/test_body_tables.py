@@ -6,7 +6,7 @@ import pytest
 from seerob.core.errors import InputError
 from seerob.description.capture.captured import Seen
 from seerob.files.motion_capture import body_csv
-from seerob.files.motion_capture.body_columns import Column, column
+from seerob.files.motion_capture.body_table import Column, column
 from seerob.files.motion_capture.markers import MarkerReading
 
 NAMES = ("Head", "Left Foot", "pelvis")

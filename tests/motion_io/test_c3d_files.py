@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from seerob.core.errors import InputError
-from seerob.files.motion_capture import c3d, c3d_format
+from seerob.files.motion_capture import c3d
 from seerob.files.motion_capture.markers import MarkerReading
 from seerob.files.motion_capture.upright import Up, height_of, up_axis, world_from_file
 
@@ -41,7 +41,7 @@ def test_the_numbers_are_those_of_two_foreign_readers(tmp_path):
     values = positions()
     values[3:6, 1] = np.nan
     path = written(tmp_path / "r.c3d", values)
-    found = c3d_format.read(path, file="r.c3d")
+    found = c3d.read_points(path, file="r.c3d")
     theirs = ezc3d.c3d(str(path))["data"]["points"]
     np.testing.assert_array_equal(found.points, np.moveaxis(theirs[:3], 0, 2).swapaxes(0, 1))
     other = pytest.importorskip("c3d")
@@ -89,7 +89,7 @@ def test_every_processor_and_both_number_formats(tmp_path, order, processor, sca
     rows = [[(100, -20, 3, 0), (7, 8, 9, -1)], [(101, -21, 4, 2), (-1, -2, -3, 0)]]
     path = tmp_path / "r.c3d"
     path.write_bytes(small(order, processor, scale, rows, dec=dec))
-    found = c3d_format.read(path, file="r.c3d")
+    found = c3d.read_points(path, file="r.c3d")
     factor = scale if scale > 0 else 1.0
     wanted = factor * np.array(rows, float)[..., :3]
     wanted[0, 1] = np.nan

@@ -8,7 +8,7 @@ import pytest
 
 from seerob.app.emulation.kinect_person import CAMERA
 from seerob.core.errors import InputError
-from seerob.files.motion_capture import kinect_bag, kinect_json, kinect_text
+from seerob.files.motion_capture import kinect_bag, kinect_recording
 from seerob.files.motion_capture.kinect_recording import Reading
 from seerob.protocols.tracking.kinect import JOINTS, body_object
 
@@ -30,13 +30,13 @@ def write(path, pictures, kind):
     if kind == "json":
         path = path / "r.json"
         path.write_text(made_pictures.offline_json(pictures))
-        return path, kinect_json.read
+        return path, kinect_recording.read_json
     if kind in ("ros1", "ros2"):
         path = path / ("r.bag" if kind == "ros1" else "r")
         return made_pictures.bag(path, pictures, ros2=kind == "ros2"), kinect_bag.read
     path = path / "r.csv"
     path.write_text(wide(pictures) if kind == "wide" else long(pictures))
-    return path, kinect_text.read
+    return path, kinect_recording.read_text
 
 
 def wide(pictures):
@@ -119,15 +119,15 @@ def test_what_is_wrong_with_a_json_file_is_said(tmp_path, text, message):
     path = tmp_path / "r.json"
     path.write_text(text)
     with pytest.raises(InputError, match=message):
-        kinect_json.read(path, KNOWN)
+        kinect_recording.read_json(path, KNOWN)
 
 
 def test_a_table_without_a_unit_is_asked_about(tmp_path, pictures):
     path = tmp_path / "r.csv"
     path.write_text(wide(pictures).replace(" [mm]", ""))
     with pytest.raises(InputError, match="no header says the unit"):
-        kinect_text.read(path, KNOWN)
-    assert kinect_text.read(path, KNOWN, unit="mm").count == len(pictures)
+        kinect_recording.read_text(path, KNOWN)
+    assert kinect_recording.read_text(path, KNOWN, unit="mm").count == len(pictures)
 
 
 def test_a_topic_that_is_not_there_is_named_with_those_that_are(tmp_path, pictures):

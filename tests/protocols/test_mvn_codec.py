@@ -13,6 +13,10 @@ from seerob.app.emulation.mvn_datagrams import datagrams
 from seerob.app.emulation.mvn_person import Pose
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking.mvn import (
+    LATE,
+    MAX_PARTS,
+    MAX_WAITING,
+    Assembly,
     Header,
     Items,
     Kind,
@@ -28,7 +32,6 @@ from seerob.protocols.tracking.mvn import (
     pack_scale,
     pack_tags,
 )
-from seerob.protocols.tracking.mvn_assembly import LATE, MAX_PARTS, MAX_WAITING, Assembly
 from seerob.protocols.tracking.mvn_pose import Up, looks_y_up, pose, unit_of
 from seerob.protocols.tracking.mvn_segments import FINGERS, JOINTS, PARENTS, SEGMENTS, UNITY, names
 

@@ -10,8 +10,7 @@ import pytest
 
 from seerob.core.transforms import rotation_from_wxyz
 from seerob.protocols import ProtocolError
-from seerob.protocols.tracking.openxr_devices import Located, OpenXr, serials
-from seerob.protocols.tracking.openxr_session import OpenXrSession
+from seerob.protocols.tracking.openxr_session import Located, OpenXr, OpenXrSession, serials
 from seerob.protocols.tracking.vive import MOST_DEVICES, decode, encode
 
 TOOL = Path(__file__).resolve().parents[2] / "tools/vive_sender/vive_sender.py"

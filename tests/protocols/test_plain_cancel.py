@@ -5,7 +5,7 @@ import asyncio
 import pytest
 from wait_for2 import wait_for
 
-from seerob.protocols.links.plain_cancel import plainly_cancelled
+from seerob.protocols.plc.opcua_client import plainly_cancelled
 
 
 async def answered_when_cancelled(timeout):

@@ -21,8 +21,15 @@ from seerob.app.emulation.motions import swing
 from seerob.app.emulators.rtde import RtdeServer
 from seerob.devices.sources.rtde import FIELDS, NEEDED
 from seerob.protocols import ProtocolError
-from seerob.protocols.robots.rtde import ControllerVersion, Kind, Splitter, TextMessage, pack
-from seerob.protocols.robots.rtde_client import Reading, connect
+from seerob.protocols.robots.rtde import (
+    ControllerVersion,
+    Kind,
+    Reading,
+    Splitter,
+    TextMessage,
+    connect,
+    pack,
+)
 
 MOTION = swing((0.0, -1.2, 1.4, -1.5, -1.5, 0.0))
 FOREIGN = """
@@ -185,13 +192,13 @@ def test_a_cb3_that_refuses_what_it_cannot_do_is_asked_for_what_it_can():
 
 
 def test_a_server_that_says_nothing_is_given_up(monkeypatch):
-    monkeypatch.setattr("seerob.protocols.robots.rtde_client.ANSWER_WITHIN", 0.2)
+    monkeypatch.setattr("seerob.protocols.robots.rtde.ANSWER_WITHIN", 0.2)
     with answering(YES, b"") as port, pytest.raises(TimeoutError, match=r"silent for 0\.2 s"):
         heard(port, 1, NEEDED)
 
 
 def test_data_that_stops_is_noticed(monkeypatch):
-    monkeypatch.setattr("seerob.protocols.robots.rtde_client.SILENCE", 0.2)
+    monkeypatch.setattr("seerob.protocols.robots.rtde.SILENCE", 0.2)
     reply = pack(Kind.OUTPUTS, b"\1DOUBLE,VECTOR6D")
     chunks = YES, CONTROLLER, reply, pack(Kind.START, b"\1")
     with answering(*chunks) as port, pytest.raises(TimeoutError, match=r"silent for 0\.2 s"):

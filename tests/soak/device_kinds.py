@@ -193,8 +193,8 @@ def natnet(patch):
     from seerob.app.emulators.natnet import NatnetServer
     from seerob.devices.sources.natnet import Natnet, Transmission
 
-    patch.setattr("seerob.protocols.tracking.natnet_session.SILENCE", SILENCE)
-    patch.setattr("seerob.protocols.tracking.natnet_session.ASK_AGAIN", 0.02)
+    patch.setattr("seerob.protocols.tracking.natnet.SILENCE", SILENCE)
+    patch.setattr("seerob.protocols.tracking.natnet.ASK_AGAIN", 0.02)
     server = NatnetServer({"Anna": person()}, port=free_port()).start()
     options = {"human": "anna", "timeout": 1.0, "transmission": Transmission.UNICAST}
     return Made(server, Natnet(host=HERE, port=server.port, **options))

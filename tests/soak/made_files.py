@@ -23,15 +23,13 @@ from seerob.files.motion_capture import (
     c3d,
     joint_angles,
     kinect_bag,
-    kinect_json,
-    kinect_text,
+    kinect_recording,
     storage,
     tracker_file,
     trc,
 )
 from seerob.files.motion_capture.frame_arrays import FAR
-from seerob.files.motion_capture.kinect_recording import Reading
-from seerob.files.motion_capture.kinect_text import FEWEST
+from seerob.files.motion_capture.kinect_recording import FEWEST, Reading
 from seerob.files.motion_capture.markers import MarkerReading
 from seerob.files.waypoints.reading import read_program
 from seerob.protocols.tracking.kinect import LAYOUT
@@ -292,9 +290,11 @@ KINDS = {
     "kinect json": Malformed(
         "json",
         lambda path: path.write_text(made_pictures.offline_json(made_pictures.pictures(2))),
-        lambda path: sound(kinect_json.read(path, Reading("f"))),
+        lambda path: sound(kinect_recording.read_json(path, Reading("f"))),
     ),
-    "kinect text": Malformed("csv", _kinect_text, lambda path: sound(kinect_text.read(path, Reading("f")))),
+    "kinect text": Malformed(
+        "csv", _kinect_text, lambda path: sound(kinect_recording.read_text(path, Reading("f")))
+    ),
     "kinect bag": Malformed(
         "bag",
         lambda path: made_pictures.bag(path, made_pictures.pictures(2)),

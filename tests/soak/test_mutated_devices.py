@@ -16,7 +16,7 @@ from seerob.app.server.hub import read_message
 from seerob.core.snapshot import Tracking
 from seerob.devices.live import headset_offers
 from seerob.protocols import ProtocolError
-from seerob.protocols.tracking import natnet, natnet_models, rokoko, vive, vrpn
+from seerob.protocols.tracking import natnet, rokoko, vive, vrpn
 from soak.mutations import refusals
 
 COUNTS = [pytest.param(1500, id="short"), pytest.param(100_000, id="long", marks=pytest.mark.soak)]
@@ -67,7 +67,7 @@ DECODERS = {
         for v in ((2, 6), (3, 1), (4, 1))
     },
     **{
-        f"models {v[0]}.{v[1]}": (lambda v=v: a_model(v), lambda data, v=v: natnet_models.models(data, v))
+        f"models {v[0]}.{v[1]}": (lambda v=v: a_model(v), lambda data, v=v: natnet.models(data, v))
         for v in ((3, 1), (4, 1))
     },
     "server info": (

@@ -16,8 +16,15 @@ from seerob.core.transforms import wxyz_from_rotation
 from seerob.devices.live.listening import Listener
 from seerob.devices.sources.kinect import Kinect, Link
 from seerob.protocols import ProtocolError
-from seerob.protocols.tracking.kinect import BODY_FROM_OPTICAL, Body, Picture, decode_message, encode_message
-from seerob.protocols.tracking.kinect_link import NONSENSE, Sieve
+from seerob.protocols.tracking.kinect import (
+    BODY_FROM_OPTICAL,
+    NONSENSE,
+    Body,
+    Picture,
+    Sieve,
+    decode_message,
+    encode_message,
+)
 from seerob.workstation.workstation import Pose
 
 PATIENCE = 120.0

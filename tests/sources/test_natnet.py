@@ -16,8 +16,7 @@ from seerob.devices.sources.natnet import Coordinates, Natnet, Tracked, Transmis
 from seerob.files.motion_capture.upright import world_from_file
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking import natnet
-from seerob.protocols.tracking.natnet import Message
-from seerob.protocols.tracking.natnet_models import models
+from seerob.protocols.tracking.natnet import Message, models
 from sources.listening import by_name, heard
 
 VERSIONS = [(2, 0), (2, 1), (2, 3), (2, 6), (2, 7), (2, 9), (2, 11), (3, 0), (3, 1), (4, 0), (4, 1), (4, 2)]

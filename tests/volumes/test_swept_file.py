@@ -9,7 +9,7 @@ from made_cell import TWO_R, made, two_r
 from seerob.app.commands import swept
 from seerob.core.errors import InputError
 from seerob.core.shapes.geometry import Mesh
-from seerob.description.shapes.mesh_out import write_mesh
+from seerob.description.shapes.glb import write_mesh
 
 
 def options(folder, *more):

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seerob.core.errors import InputError
-from seerob.files.waypoints.script_values import FUNCTIONS, NotConstant, PoseValue, Reader, tokens
-from seerob.files.waypoints.urscript import read_urscript
+from seerob.files.waypoints.urscript import FUNCTIONS, NotConstant, PoseValue, Reader, read_urscript, tokens
 from seerob.files.waypoints.waypoint import Move
 
 PROGRAM = """

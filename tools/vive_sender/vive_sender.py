@@ -15,8 +15,7 @@ import time
 
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking.openvr_devices import OpenVr
-from seerob.protocols.tracking.openxr_devices import OpenXr, Runtime
-from seerob.protocols.tracking.openxr_session import OpenXrSession
+from seerob.protocols.tracking.openxr_session import OpenXr, OpenXrSession, Runtime
 from seerob.protocols.tracking.vive import PORT, encode
 
 

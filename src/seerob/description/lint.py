@@ -18,7 +18,7 @@ from seerob.core.snapshot import Origin
 from seerob.core.transforms import Array
 from seerob.core.units import LENGTHS
 from seerob.description.description import Description, Inertial, Joint, JointKind, Link
-from seerob.description.rigid import groups
+from seerob.description.pose import groups
 from seerob.description.shapes import moments
 from seerob.description.shapes.mesh_bodies import is_closed
 from seerob.description.xml_values import Reader

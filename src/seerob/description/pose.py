@@ -1,11 +1,11 @@
-"""Where the links of a description are: forward kinematics in a few lines, for readers and tests."""
+"""Where the links of a description are, by forward kinematics in a few lines, and which links move as one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from seerob.core.transforms import Array, rotation_from_axis_angle, transform
-from seerob.description.description import Description, Joint, JointKind
+from seerob.description.description import Description, Joint, JointKind, Link
 
 
 def base_from_links(description: Description, q: Mapping[str, float]) -> dict[str, Array]:
@@ -30,3 +30,13 @@ def displacement(joint: Joint, q: float) -> Array:
         return transform(position=joint.axis * q)
     rotation = rotation_from_axis_angle(joint.axis, q)
     return transform(rotation, joint.anchor - rotation @ joint.anchor)
+
+
+def groups(links: Sequence[Link]) -> tuple[tuple[Link, ...], ...]:
+    """Links that no joint moves relative to each other; the first of each is the one its joint moves."""
+    head: dict[str, str] = {}
+    found: dict[str, list[Link]] = {}
+    for link in links:
+        head[link.name] = link.name if link.parent is None or link.joints else head[link.parent]
+        found.setdefault(head[link.name], []).append(link)
+    return tuple(map(tuple, found.values()))

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from seerob.core.transforms import Array
-from seerob.description.humans.body_area import words
-from seerob.description.humans.body_areas import body_area, in_front
+from seerob.description.humans.body_areas import body_area, in_front, words
 from seerob.description.humans.skeleton import BONES
 from seerob.description.humans.skin import body_region
 from seerob.model.model import Model

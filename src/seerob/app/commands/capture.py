@@ -14,7 +14,7 @@ from seerob.core.errors import InputError
 from seerob.workstation.workstation import FILE_NAME
 
 if TYPE_CHECKING:
-    from seerob.description.capture.marker_stature import MarkerStature
+    from seerob.description.capture.fit_check import MarkerStature
     from seerob.description.capture.observing import Observer
     from seerob.description.description import Description
     from seerob.devices.capture.file_source import CaptureFile
@@ -127,7 +127,7 @@ def _marker_stature(source: CaptureFile, recording: Path, options: argparse.Name
     Raises:
         InputError: They do not tell it.
     """
-    from seerob.description.capture.marker_stature import marker_stature
+    from seerob.description.capture.fit_check import marker_stature
     from seerob.description.humans import manikin
     from seerob.devices.capture.options import observer
 

@@ -56,7 +56,7 @@ def add(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Sweep, write the mesh and say what is in it."""
-    from seerob.description.shapes.mesh_out import check_format, write_mesh
+    from seerob.description.shapes.glb import check_format, write_mesh
     from seerob.description.shapes.moments import signed_volume
 
     check_format(options.output)

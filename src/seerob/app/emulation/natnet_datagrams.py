@@ -5,9 +5,8 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
+from seerob.protocols.tracking.natnet import RIGID_BODY, SKELETON, BoneModel, Frame, Models, Skeleton, Version
 from seerob.protocols.tracking.natnet import Body as RigidBody
-from seerob.protocols.tracking.natnet import Frame, Skeleton, Version
-from seerob.protocols.tracking.natnet_models import RIGID_BODY, SKELETON, BoneModel, Models
 
 ONE_MARKER = struct.pack("<i", 1) + struct.pack("<3f", 0.1, 0.2, 0.3)
 

@@ -17,8 +17,16 @@ from seerob.app.emulation.options import PersonOptions, Ready, option, port
 from seerob.core.transforms import turned
 from seerob.files.motion_capture.upright import world_from_file
 from seerob.protocols.tracking import mvn_segments, natnet
-from seerob.protocols.tracking.natnet import Body, Frame, Message, Skeleton, Version
-from seerob.protocols.tracking.natnet_models import BoneModel, Models, SkeletonModel
+from seerob.protocols.tracking.natnet import (
+    Body,
+    BoneModel,
+    Frame,
+    Message,
+    Models,
+    Skeleton,
+    SkeletonModel,
+    Version,
+)
 
 FORGET = 4.0
 """A client that is not heard for so long is not sent to any more [s]."""

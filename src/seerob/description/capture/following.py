@@ -22,12 +22,11 @@ from msgspec import structs
 
 from seerob.core.samples import BodyPoint, BodySample, Quality, Vec3
 from seerob.core.transforms import Array, inverse
-from seerob.description.capture.chosen_points import between
 from seerob.description.capture.ends import ENDS, Turn, aimed, bare, swing, turned, untold
 from seerob.description.capture.estimated import estimated, in_doubt_with, located
 from seerob.description.capture.fitting import Fitter, Pulls, pulls
 from seerob.description.capture.frozen import Frozen
-from seerob.description.capture.handover import Handover
+from seerob.description.capture.handover import Handover, between
 from seerob.description.capture.smoothing import HIGHEST, LOWEST, POINT_SLACK, POINT_SPEED, Smoother
 from seerob.description.description import Description, JointKind
 from seerob.description.humans.skeleton import AXES, BONES, without_side

@@ -1,24 +1,93 @@
-"""From one device to another without a jump: devices are offset against each other.
+"""What several devices see of a person made one, and from one device to another without a jump.
 
-A bone is taken from the device that counts most for it. One that loses the bone for a frame would else
-throw the twin to where another device sees it, and back. Here the device that takes over is shifted at
-first, so that it goes on where the twin is, and the shift fades. The shift is told: what a device really
-sees stays what the twin is compared with. A device that has lost the bone for longer must see it for a
-while before it gets it back.
+A bone is taken from the device that counts most for it. One that loses the bone for a frame would else throw
+the twin to where another device sees it, and back. Here the device that takes over is shifted at first, so
+that it goes on where the twin is, and the shift fades. The shift is told: what a device really sees stays
+what the twin is compared with. A device that has lost the bone for longer must see it for a while before it
+gets it back.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 
-from seerob.core.samples import BodyPoint, Vec3
+from seerob.core.samples import BodyPoint, Vec3, Vec4
 from seerob.core.transforms import Array, rotation_from_axis_angle, wxyz_from_rotation
-from seerob.description.capture.chosen_points import best
 from seerob.description.capture.fitting import Pulls
 from seerob.description.humans.skeleton import BONES
+
+BETTER = 1.25
+"""By how much another device must count more for a bone before it takes it over: devices are offset."""
+
+
+def best(
+    devices: Sequence[Sequence[BodyPoint]],
+    chosen: dict[tuple[str, bool], int],
+    barred: Collection[tuple[str, bool, int]] = (),
+) -> list[BodyPoint]:
+    """Per bone the positions, and the orientations, of the device that counts most for it.
+
+    Args:
+        devices: What each of them sees.
+        chosen: The choice of the instant before, which holds until another device counts clearly more;
+            brought up to date.
+        barred: Bone, whether its orientation is meant, and a device that it is not taken from now.
+    """
+    if len(devices) == 1:
+        return list(devices[0])
+    best: dict[tuple[str, bool], tuple[float, int]] = {}
+    for k, points in enumerate(devices):
+        for p in points:
+            for turned, value, weight in (
+                (False, p.position, p.position_weight),
+                (True, p.wxyz, p.orientation_weight),
+            ):
+                counts = weight * (BETTER if chosen.get((p.bone, turned)) == k else 1.0)
+                if value is None or (barred and (p.bone, turned, k) in barred):
+                    continue
+                if counts > best.get((p.bone, turned), (0.0, 0))[0]:
+                    best[p.bone, turned] = counts, k
+    chosen |= {key: k for key, (_, k) in best.items()}
+    out = []
+    for k, points in enumerate(devices):
+        for p in points:
+            here = best.get((p.bone, False), (0.0, -1))[1] == k
+            turned = best.get((p.bone, True), (0.0, -1))[1] == k
+            if (here and p.position is not None) or (turned and p.wxyz is not None):
+                out.append(
+                    structs.replace(p, position=p.position if here else None, wxyz=p.wxyz if turned else None)
+                )
+    return out
+
+
+def between(before: Sequence[BodyPoint], after: Sequence[BodyPoint], share: float) -> list[BodyPoint]:
+    """Points that both samples have, a share of the way from one to the other."""
+    later = {p.name: p for p in after}
+    out = []
+    for p in before:
+        other = later.get(p.name)
+        position: Vec3 | None = None
+        wxyz: Vec4 | None = None
+        if other is not None and p.position is not None and other.position is not None:
+            x, y, z = ((1 - share) * a + share * b for a, b in zip(p.position, other.position, strict=True))
+            position = x, y, z
+        if other is not None and p.wxyz is not None and other.wxyz is not None:
+            wxyz = _nlerp(p.wxyz, other.wxyz, share)
+        out.append(structs.replace(p, position=position, wxyz=wxyz))
+    return out
+
+
+def _nlerp(a: Vec4, b: Vec4, share: float) -> Vec4:
+    sign = 1.0 if sum(x * y for x, y in zip(a, b, strict=True)) >= 0 else -1.0
+    mixed = [(1 - share) * x + share * sign * y for x, y in zip(a, b, strict=True)]
+    norm = float(np.linalg.norm(mixed)) or 1.0
+    w, x, y, z = (value / norm for value in mixed)
+    return w, x, y, z
+
 
 AGAIN = 0.25
 """A device that did not see a bone for longer must see it for so long before it gets it back [s]."""

@@ -2,8 +2,11 @@
 
 Lengths: Drillis and Contini 1966 (fractions of stature; the paper cites Drillis et al. 1964) or de Leva 1996
 (distances of joint centres). Masses, centres and radii of gyration: de Leva 1996, Table 4, or for men the
-regressions of Zatsiorsky and Seluyanov 1979 (what the paper cites). The tables
-with their sources are ``data/*.toml``. What has no published source is a choice that the findings name.
+regressions of Zatsiorsky and Seluyanov 1979 (what the paper cites). The tables with their sources are
+``data/*.toml``. What has no published source is a choice that the findings name.
+
+The regressions are ``y = b0 + b1 · body mass [kg] + b2 · stature [cm]``. They are made for ordinary builds:
+far from them a mass or a moment becomes impossible, and the person is refused.
 """
 
 from __future__ import annotations
@@ -18,10 +21,32 @@ import numpy as np
 from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
-from seerob.description.humans import zatsiorsky
 from seerob.description.humans.overrides import with_lengths, with_masses
 from seerob.description.humans.skeleton import SIDES
 from seerob.description.humans.tables import table
+
+KG_CM2 = 1e-4
+"""[kg·m²]"""
+
+
+def zatsiorsky_masses(*, mass: float, stature: float) -> dict[str, float]:
+    """Masses [kg] of the segments of a man of that body mass [kg] and stature [m]; limbs of one side."""
+    return {name: _value(row["mass"], mass, stature) for name, row in table("zatsiorsky")["segments"].items()}
+
+
+def zatsiorsky_moments(segment: str, *, mass: float, stature: float) -> tuple[float, float, float]:
+    """Moments [kg·m²] about the sagittal, transverse and longitudinal axis through a segment's centre."""
+    row = table("zatsiorsky")["segments"][segment]
+    sagittal, transverse, longitudinal = (
+        _value(row[axis], mass, stature) * KG_CM2 for axis in ("sagittal", "transverse", "longitudinal")
+    )
+    return sagittal, transverse, longitudinal
+
+
+def _value(row: list[float], mass: float, stature: float) -> float:
+    b0, b1, b2 = row
+    return b0 + b1 * mass + b2 * stature * 100
+
 
 STATURE_RANGE = (1.2, 2.3)
 """Statures that are believed [m]; the tables are of adults."""
@@ -302,7 +327,7 @@ def _shares(sex: Sex, by: Masses, mass: float, stature: float) -> dict[str, floa
     percent = {k: row["mass"] for k, row in people["segments"].items()}
     pieces = dict(people["pieces"])
     if by is Masses.ZATSIORSKY:
-        shares = zatsiorsky.masses(mass=mass, stature=stature)
+        shares = zatsiorsky_masses(mass=mass, stature=stature)
         # Pieces keep their part of the segment that they belong to.
         for piece, of in (("neck", "head"), ("clavicle", "upper_trunk"), ("toes", "foot")):
             pieces[piece] *= shares[of] / percent[of]

@@ -1,17 +1,45 @@
-"""Which of the 29 specific body areas of ISO/TS 15066:2016 Table A.2 a point on the skin is in.
+"""Which of the 29 specific body areas of ISO/TS 15066:2016 Table A.2 a point on the skin is in, in words.
 
 The table names areas and draws no borders. The borders here are choices, fractions of a bone's length and
-breadth; names and numbers are the table's, front and rear as it is remembered (no public source was found).
-A point of a region that is in none of its areas, such as the back of a thigh, has no area.
+breadth; names and numbers are the table's, front and rear as it is remembered (no public source was found). A
+point of a region that is in none of its areas, such as the back of a thigh, has no area. The words are
+written into reasons, and found in them again for tables.
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from seerob.core.transforms import Array
 from seerob.description.humans.anthropometry import Body
 from seerob.description.humans.skeleton import without_side
+
+FEET = "feet, in no region of the table"
+NOWHERE = ""
+
+
+def words(bone: str, region: str | None, *, front: bool, dominant: bool, area: str | None = None) -> str:
+    """A bone with its body area: ``op/right_hand (Hands and fingers, front, palm, dominant side)``.
+
+    Args:
+        bone: Full name.
+        region: Of ISO/TS 15066:2016 Table A.3; None where that has none.
+        front: Whether in front.
+        dominant: Whether on the side of the dominant hand.
+        area: Of Table A.2 (`seerob.description.humans.body_areas`); None where that has none.
+    """
+    told = [FEET] if region is None else [region, "front" if front else "rear"]
+    told += [area.partition(",")[0]] if area else []
+    told += ["dominant side"] if dominant else []
+    return f"{bone} ({', '.join(told)})"
+
+
+def area_in(reason: str, human: str) -> tuple[str, str]:
+    """Bone without the person's name and body area that a reason names; empty where it names none."""
+    found = re.search(rf"(?:^|[\s↔]){re.escape(human)}/(\w+)(?: \(([^()]*)\))?", reason)
+    return (NOWHERE, NOWHERE) if found is None else (found[1], found[2] or NOWHERE)
+
 
 EYE_HEIGHT = 0.936
 """Share of the stature (Drillis and Contini)."""

@@ -1,27 +1,192 @@
 """A digital human from stature, body mass and sex: the same kind of description as a robot's.
 
-At zero the person stands upright on the floor (z = 0) with the middle of the hips over the root's origin
-and faces +x, in the anatomical position: arms hanging, palms forward. `seerob.description.humans.skeleton`
-has the frames, axes and signs, `seerob.description.humans.posture` named postures.
+At zero the person stands upright on the floor (z = 0) with the middle of the hips over the root's origin and
+faces +x, in the anatomical position: arms hanging, palms forward. `seerob.description.humans.skeleton` has
+the frames, axes and signs, `seerob.description.humans.posture` named postures.
+
+Mass properties of every bone are from the tables of de Leva 1996 or Zatsiorsky and Seluyanov 1979. A table's
+segment that is one bone here keeps mass, centre and radii of gyration, scaled by the length. Where a segment
+is several bones (trunk top = thorax and two clavicles, head = head and neck, foot = foot and toes), the small
+piece is a uniform body of the bone's length and the large one is what remains, so that the bones together
+have exactly the segment's mass, centre and inertia. Pieces scale with the lengths, as de Leva's table does:
+what remains is a possible body for every stature and mass. The regressions replace masses and moments, the
+centres stay de Leva's.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Finding, Origin
-from seerob.core.transforms import transform
-from seerob.description.description import Description, Joint, JointKind, Link, Quantity
-from seerob.description.humans.anthropometry import Body, Masses, Sex, body
-from seerob.description.humans.inertia import MENDED, inertials
-from seerob.description.humans.skeleton import AXES, BONES, PARENTS, ROOT, ROOT_FROM_ISB, SIDES, Axis
+from seerob.core.transforms import Array, transform
+from seerob.description.description import Description, Inertial, Joint, JointKind, Link, Quantity
+from seerob.description.humans import anthropometry
+from seerob.description.humans.anthropometry import Body, Masses, Sex, body, unfit
+from seerob.description.humans.skeleton import (
+    AXES,
+    BONES,
+    PARENTS,
+    ROOT,
+    ROOT_FROM_ISB,
+    SIDES,
+    Axis,
+    without_side,
+)
 from seerob.description.humans.skin import skin
 from seerob.description.humans.tables import table
+
+SOURCES = {
+    Masses.DELEVA: "de Leva 1996, Table 4 (shares of body mass, radii of gyration)",
+    Masses.ZATSIORSKY: "Zatsiorsky and Seluyanov 1979, regressions for men; centre: de Leva 1996, Table 4",
+}
+SPLIT = "; split (share and shape are a choice): uniform body of the bone's length"
+REMAINDER = "; less what was split off"
+MENDED = "; largest moment lowered to that of a possible body"
+ALMOST = 0.98
+"""Of the sum of the two smaller moments, which the largest of a body cannot exceed."""
+SEGMENTS = {"pelvis": "lower_trunk", "lumbar": "middle_trunk", "thorax": "upper_trunk"}
+"""Bone → the tables' name where it is another."""
+CLAVICLE_RADIUS = 0.2
+"""Of the cylinder that stands for clavicle and flesh, as a share of its length: a choice."""
+
+
+def _shifted(inertia: Array, mass: float, by: Array) -> Array:
+    """Inertia about a point ``by`` [m] away from the centre of mass (Steiner)."""
+    return np.asarray(inertia + mass * (by @ by * np.eye(3) - np.outer(by, by)))
+
+
+def remainder(whole: Inertial, pieces: list[tuple[float, Array, Array]]) -> Inertial:
+    """What is left of a body when pieces (mass [kg], centre [m], inertia [kg·m²]) are taken out of it."""
+    mass = whole.mass - math.fsum(m for m, _, _ in pieces)
+    com = (whole.mass * whole.com - sum((m * c for m, c, _ in pieces), np.zeros(3))) / mass
+    about_whole = whole.inertia - sum((_shifted(i, m, c - whole.com) for m, c, i in pieces), np.zeros((3, 3)))
+    inertia = _shifted(about_whole, -mass, com - whole.com)
+    return Inertial(mass, com, inertia, Origin.ESTIMATED, whole.source + REMAINDER)
+
+
+def inertials(body: Body) -> dict[str, Inertial]:
+    """Mass properties of every bone in its own frame.
+
+    Raises:
+        InputError: The regressions were asked for and give a bone that cannot exist.
+    """
+    result = {bone: (_piece if without_side(bone) in _PIECES else _segment)(body, bone) for bone in BONES}
+    groups = {"head": ("neck",), "thorax": tuple(f"{s}_clavicle" for s in SIDES)}
+    groups |= {f"{s}_foot": (f"{s}_toes",) for s in SIDES}
+    for bone, pieces in groups.items():
+        taken = []
+        for piece in pieces:
+            shift = -body.offset["head"] if piece == "neck" else body.offset[piece]
+            taken.append((result[piece].mass, result[piece].com + shift, result[piece].inertia))
+        result[bone] = remainder(result[bone], taken)
+    if body.by_hand:
+        result = {bone: each if _possible(each) else _mended(each) for bone, each in result.items()}
+    if not all(map(_possible, result.values())):
+        raise unfit(body.name, body.mass, body.stature)
+    return result
+
+
+def _possible(inertial: Inertial) -> bool:
+    """Whether any distribution of mass has these moments."""
+    smallest, middle, largest = np.linalg.eigvalsh(inertial.inertia)
+    return bool(inertial.mass > 0 and smallest > 0 and smallest + middle > largest)
+
+
+def _mended(inertial: Inertial) -> Inertial:
+    """With the largest moment as small as the others allow: proportions by hand are not the tables'."""
+    values, axes = np.linalg.eigh(inertial.inertia)
+    values[2] = min(values[2], ALMOST * (values[0] + values[1]))
+    return replace(inertial, inertia=axes @ np.diag(values) @ axes.T, source=inertial.source + MENDED)
+
+
+_PIECES = ("neck", "clavicle", "toes")
+
+
+def _piece(body: Body, bone: str) -> Inertial:
+    """A piece of a segment as a uniform body: toes a box, neck and clavicle bodies of revolution."""
+    length, mass = body.length, body.bone_mass(bone)
+    if without_side(bone) == "toes":
+        forward, side = length["foot"] - length["heel"] - length["toe_joint"], length["foot_breadth"]
+        com = np.array([forward / 2, -length["toe_joint_height"] / 2, 0.0])
+        square = np.array([forward**2, length["toe_joint_height"] ** 2, side**2]) / 12
+        return Inertial(
+            mass, com, mass * np.diag(square.sum() - square), Origin.ESTIMATED, SOURCES[body.masses] + SPLIT
+        )
+    if bone == "neck":
+        along = body.offset["head"]
+        row = table("de_leva")[body.sex]["alternatives"]["head_2"]
+        turning = row["radii"][2] / 100 * (length["neck"] + length["head"])  # as wide as the head
+    else:
+        along = body.offset[bone.replace("clavicle", "upper_arm")]
+        turning = float(np.linalg.norm(along)) * CLAVICLE_RADIUS / math.sqrt(2)
+    size = float(np.linalg.norm(along))
+    axis = np.outer(along, along) / size**2
+    inertia = mass * (turning**2 * axis + (turning**2 / 2 + size**2 / 12) * (np.eye(3) - axis))
+    return Inertial(mass, along / 2, inertia, Origin.ESTIMATED, SOURCES[body.masses] + SPLIT)
+
+
+def _segment(body: Body, bone: str) -> Inertial:
+    """A whole segment of the table, in the frame of the bone that it is reported at."""
+    people = table("de_leva")[body.sex]
+    rows = people["segments"] | people["alternatives"]
+    plain, length = without_side(bone), body.length
+    mass = body.bone_mass(bone)
+    if plain in ("pelvis", "lumbar", "thorax"):
+        lower, middle, upper = rows["lower_trunk"], rows["middle_trunk"], rows["upper_trunk_2"]
+        scale = length["trunk"] / (lower["length"] + middle["length"] + upper["length"])
+        up_to_xiphion = lower["length"] + middle["length"]
+        row, height, start = {
+            "pelvis": (lower, lower["length"], 0.0),
+            "lumbar": (middle, up_to_xiphion, length["pelvis"]),
+            "thorax": (upper, up_to_xiphion + upper["length"], length["pelvis"] + length["lumbar"]),
+        }[plain]
+        height -= row["com"] / 100 * row["length"]
+        if plain == "thorax":
+            mass += sum(body.bone_mass(f"{s}_clavicle") for s in SIDES)
+        return _inertial(
+            body, bone, mass, np.array([0, height * scale - start, 0]), row["radii"], row["length"] * scale
+        )
+    if plain == "head":
+        row, both = rows["head_2"], length["neck"] + length["head"]
+        com = np.array([0, length["head"] - row["com"] / 100 * both, 0])
+        return _inertial(body, bone, mass + body.bone_mass("neck"), com, row["radii"], both)
+    if plain == "foot":
+        row = rows["foot"]
+        forward = row["com"] / 100 * length["foot"] - length["heel"]
+        com = np.array([forward, length["foot_com_height"] - length["ankle_height"], 0])
+        sagittal, transverse, longitudinal = row["radii"]
+        # The foot's long axis points forward.
+        radii = [longitudinal, transverse, sagittal]
+        mass += body.bone_mass(bone.replace("foot", "toes"))
+        return _inertial(body, bone, mass, com, radii, length["foot"])
+    row = rows["hand_2"] if plain == "hand" else rows[plain]
+    return _inertial(
+        body, bone, mass, np.array([0, -row["com"] / 100 * length[plain], 0]), row["radii"], length[plain]
+    )
+
+
+def _inertial(body: Body, bone: str, mass: float, com: Array, radii: list[float], length: float) -> Inertial:
+    """Radii of gyration [%] about the bone's X, Z and Y axis, or the regressions' moments about them."""
+    x, z, y = (mass * (r / 100 * length) ** 2 for r in radii)
+    if body.masses is Masses.ZATSIORSKY:
+        plain = without_side(bone)
+        name = SEGMENTS.get(plain, plain)
+        given = {"mass": body.mass, "stature": body.stature}
+        # Masses were brought to the sum of the body mass; moments go with them.
+        scale = mass / anthropometry.zatsiorsky_masses(**given)[name]
+        own = anthropometry.zatsiorsky_moments(name, **given)
+        sagittal, transverse, longitudinal = (scale * i for i in own)
+        x, y, z = sagittal, longitudinal, transverse
+        if plain == "foot":
+            x, y = y, x
+    return Inertial(mass, com.astype(float), np.diag([x, y, z]), Origin.ESTIMATED, SOURCES[body.masses])
+
 
 DAMPING = {
     "lumbar": 2.0,

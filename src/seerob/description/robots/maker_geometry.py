@@ -17,8 +17,7 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, inverse
 from seerob.description.description import Description, Link
 from seerob.description.formats.urdf_geometry import moved
-from seerob.description.pose import base_from_links
-from seerob.description.rigid import groups
+from seerob.description.pose import base_from_links, groups
 
 TOLERANCE = 2e-3
 """How far the frames of one link may differ between poses [m and rad]: figures differ between releases."""

@@ -18,8 +18,7 @@ from seerob.description.capture.captured import CaptureFrame, Layout, Seen
 from seerob.devices.capture.xsens import anatomical, differences
 from seerob.devices.live.listening import say_once
 from seerob.protocols import ProtocolError
-from seerob.protocols.tracking.mvn import Items, Kind, Scale, Tags, decode
-from seerob.protocols.tracking.mvn_assembly import Assembly
+from seerob.protocols.tracking.mvn import Assembly, Items, Kind, Scale, Tags, decode
 from seerob.protocols.tracking.mvn_pose import METRES, POSES, Up, looks_y_up, pose, unit_of
 from seerob.protocols.tracking.mvn_segments import JOINTS, PARENTS, SEGMENTS
 

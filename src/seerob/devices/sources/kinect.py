@@ -27,8 +27,7 @@ from seerob.devices.capture.options import placement
 from seerob.devices.capture.stream_source import CaptureStream
 from seerob.files.motion_capture.persons import Follower, numbers
 from seerob.files.motion_capture.upright import camera_upright, upright_rotation
-from seerob.protocols.tracking.kinect import LAYOUT, PORT, Body, Picture
-from seerob.protocols.tracking.kinect_link import from_datagrams, from_websocket
+from seerob.protocols.tracking.kinect import LAYOUT, PORT, Body, Picture, from_datagrams, from_websocket
 from seerob.workstation.source import Opened, Target
 from seerob.workstation.workstation import Pose
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from seerob.core.errors import InputError
 from seerob.description.capture.captured import Captured
 from seerob.devices.capture.file_source import CaptureFile
-from seerob.files.motion_capture import kinect_bag, kinect_json, kinect_text
+from seerob.files.motion_capture import kinect_bag, kinect_recording
 from seerob.files.motion_capture.frame_arrays import about
 from seerob.files.motion_capture.kinect_recording import Reading
 from seerob.files.tables.mapping import LengthUnit, TimeUnit
@@ -39,9 +39,11 @@ class KinectRecording(CaptureFile, frozen=True, kw_only=True):
         if suffix in BAGS or path.is_dir():
             captured = kinect_bag.read(path, reading, topic=self.topic)
         elif suffix == ".json":
-            captured = kinect_json.read(path, reading)
+            captured = kinect_recording.read_json(path, reading)
         elif suffix in TEXTS:
-            captured = kinect_text.read(path, reading, unit=self.unit or "", time_unit=self.time_unit or "")
+            captured = kinect_recording.read_text(
+                path, reading, unit=self.unit or "", time_unit=self.time_unit or ""
+            )
         else:
             what = f"{path.suffix or 'no suffix'}: unknown kind of file"
             remedy = f"known: .json, {', '.join(BAGS)}, {', '.join(TEXTS)}, the folder of a ROS 2 bag"

@@ -17,9 +17,7 @@ from seerob.description.capture.captured import CaptureFrame, Layout, Seen
 from seerob.devices.capture.stream_source import CaptureStream
 from seerob.files.motion_capture.upright import Up, world_from_file
 from seerob.protocols.tracking import natnet
-from seerob.protocols.tracking.natnet import Body
-from seerob.protocols.tracking.natnet_models import BoneModel, Models, SkeletonModel
-from seerob.protocols.tracking.natnet_session import Heard, frames
+from seerob.protocols.tracking.natnet import Body, BoneModel, Heard, Models, SkeletonModel, frames
 
 ASKED = 0.4
 """How long frames are listened to at start [s]."""

@@ -24,9 +24,8 @@ from seerob.description.robots.calibration import Calibration, off_by
 from seerob.devices.live.listening import LiveSource, at_start, because
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
-from seerob.protocols.robots import rtde, rtde_client, ur_primary
-from seerob.protocols.robots.rtde import Level, TextMessage, Value
-from seerob.protocols.robots.rtde_client import CB3_RATE, is_cb3
+from seerob.protocols.robots import rtde, ur_primary
+from seerob.protocols.robots.rtde import CB3_RATE, Level, TextMessage, Value, is_cb3
 from seerob.protocols.robots.rtde_states import RobotMode, SafetyStatus, name, quality
 from seerob.workstation.source import Opened, Target
 
@@ -225,7 +224,7 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
 
     async def ask(self) -> tuple[Finding, ...]:
         """Software, protocol, and what the controller does not have."""
-        async with rtde_client.connect(self.host, self.port, FIELDS, self.frequency) as session:
+        async with rtde.connect(self.host, self.port, FIELDS, self.frequency) as session:
             if lacking := self._lacking(session):
                 raise InputError.at(f"rtde {self.host}", "host", lacking, "is it a robot's controller?")
             where = f"rtde {self.host}:{self.port}"
@@ -238,14 +237,14 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
             return (heard, *(Finding(level=level, subject=self.robot, text=text) for level, text in said))
 
     @staticmethod
-    def _lacking(session: rtde_client.Session) -> str:
+    def _lacking(session: rtde.Session) -> str:
         """What the controller has to have and has not; empty when it has everything."""
         lacking = [f for f in NEEDED if f in session.missing]
         return f"the controller has no {' and no '.join(lacking)}" if lacking else ""
 
     async def listen(self, target: Target | None) -> AsyncGenerator[Sample, None]:
         """Joint samples, and signals ten times a second and whenever a state changes."""
-        async with rtde_client.connect(self.host, self.port, FIELDS, self.frequency) as session:
+        async with rtde.connect(self.host, self.port, FIELDS, self.frequency) as session:
             if lacking := self._lacking(session):
                 raise ProtocolError(lacking)
             said: tuple[Value | None, ...] = ()
@@ -263,7 +262,7 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
                         yield SignalSample(source="", seq=0, t=reading.arrived, values=values)
 
 
-def remarks(session: rtde_client.Session, frequency: float) -> list[tuple[str, str]]:
+def remarks(session: rtde.Session, frequency: float) -> list[tuple[str, str]]:
     """What is to be said of a controller, as level and text."""
     said = [("note", f"controller software {session.controller or 'unknown'}, RTDE {session.version}")]
     if session.missing:

@@ -20,8 +20,7 @@ from seerob.files.waypoints.arm import Arm
 from seerob.files.waypoints.branches import parse
 from seerob.files.waypoints.continuous import Continuous, Wish, continuous
 from seerob.files.waypoints.joint_limits import JointLimits
-from seerob.files.waypoints.point import Point
-from seerob.files.waypoints.reading import read_program
+from seerob.files.waypoints.reading import Point, read_program
 from seerob.files.waypoints.waypoint import Program
 from seerob.workstation.source import Target
 

@@ -1,9 +1,14 @@
-"""Joint angles of a person from a file: OpenSim's storage format, or a table with our names of joints."""
+"""Joint angles of a person from a file: OpenSim's storage format, or a table with our names of joints.
+
+The table is delimited text whose first row names the columns and whose other rows are numbers only.
+"""
 
 from __future__ import annotations
 
 import re
+from array import array
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +19,54 @@ from seerob.core.transforms import Array
 from seerob.description.humans.skeleton import JOINTS, resolve
 from seerob.files.motion_capture import opensim_coordinates as opensim
 from seerob.files.motion_capture import storage
+from seerob.files.motion_capture.decimal_comma import Commas
+from seerob.files.motion_capture.frame_arrays import check_size
 from seerob.files.motion_capture.storage import Storage
+from seerob.files.tables.candidates import candidates
+from seerob.files.tables.grid import MAX_COLUMNS, MAX_PROBLEMS, Grid
 from seerob.files.tables.headers import Role, understand
+from seerob.files.tables.mapping import Mapping
+
+
+def read_columns(path: Path, *, file: str) -> tuple[list[str], Array, Array]:
+    """Header, first column (n,) and the other columns (n, k); empty cells and ``NaN`` are NaN.
+
+    Raises:
+        InputError: It is no such table; every row that is wrong, up to a bound.
+    """
+    for grid, _ in candidates(path, file, Mapping()):
+        rows = [list(map(str, row)) for row in islice(grid.rows(), 2)]
+        if len(rows) == 2 and 2 <= len(rows[0]) <= MAX_COLUMNS and len(rows[0]) == len(rows[1]):
+            return _read(grid, [cell.strip() for cell in rows[0]])
+    raise InputError.at(file, "", "no table: a row of names and rows of numbers", "is it delimited text?")
+
+
+def _read(grid: Grid, header: list[str]) -> tuple[list[str], Array, Array]:
+    flat = array("d")
+    count = 0
+    problems: list[Problem] = []
+    commas = Commas(grid.file)
+    for number, row in enumerate(islice(grid.rows(), 1, None), start=2):
+        cells = [str(cell).strip() for cell in row]
+        if not any(cells):
+            continue
+        if len(cells) != len(header):
+            problems.append(Problem(grid.file, f"row {number}", f"{len(cells)} cells, {len(header)} names"))
+        else:
+            try:
+                flat.extend([commas.number(cell or "nan") for cell in cells])
+                count += 1
+            except ValueError as error:
+                problems.append(Problem(grid.file, f"row {number}", str(error)[:120]))
+        if len(problems) >= MAX_PROBLEMS:
+            break
+        check_size(grid.file, count, len(header))
+    if problems:
+        raise InputError(problems)
+    commas.check()
+    table = np.array(flat).reshape(count, len(header)) if count else np.empty((0, len(header)))
+    return header, table[:, 0], table[:, 1:]
+
 
 LENGTHS = tuple(name for name in JOINTS if name in ("pelvis_x", "pelvis_y", "pelvis_z"))
 FACTORS = {"deg": np.pi / 180, "rad": 1.0, "mm": 1e-3, "m": 1.0}
@@ -96,8 +147,6 @@ def from_table(path: Path, *, file: str) -> JointAngles:
     Raises:
         InputError: A header that is no joint or has no unit, a cell that is no number; all of them.
     """
-    from seerob.files.motion_capture.numeric_table import read_columns
-
     header, t, values = read_columns(path, file=file)
     names, units = [], []
     problems: list[Problem] = []

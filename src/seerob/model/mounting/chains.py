@@ -12,8 +12,7 @@ from seerob.core.snapshot import Finding, LinkMass, Origin
 from seerob.core.transforms import Array
 from seerob.description.description import Description, Inertial, Joint, Link
 from seerob.description.lint import DENSITIES, FLANGES, LIGHT, TIPS, too_light
-from seerob.description.pose import base_from_links
-from seerob.description.rigid import groups
+from seerob.description.pose import base_from_links, groups
 from seerob.model.model import Mechanism
 from seerob.model.mounting.specification import extreme_points
 

@@ -14,7 +14,7 @@ import numpy as np
 from seerob.core.figures import figure
 from seerob.core.snapshot import CriterionInfo, Scene
 from seerob.core.transforms import Array
-from seerob.description.humans.body_area import area_in
+from seerob.description.humans.body_areas import area_in
 from seerob.outputs.html import Html, joined, table, tag, whole
 from seerob.outputs.palette import WORD
 from seerob.recording.result_log import ResultLog

@@ -1,7 +1,8 @@
 """An OPC UA client that only reads: sessions, nodes by names that last, and changes, the newest of each.
 
-Namespaces are meant by their URI and resolved at every connection: their numbers may change when a
-server restarts.
+Namespaces are meant by their URI and resolved at every connection: their numbers may change when a server
+restarts. The socket below a session, which asyncua leaves open when it is cancelled or the link breaks, is
+closed here, and cancellations are made those that asyncio knows.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ import logging
 import os
 import time
 import traceback
-from collections.abc import AsyncGenerator, Mapping
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncGenerator, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager, suppress
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
@@ -23,15 +24,50 @@ from msgspec import Meta
 
 from seerob.core.errors import InputError, SeerobError
 from seerob.protocols import ProtocolError
-from seerob.protocols.links.plain_cancel import plainly_cancelled
 from seerob.protocols.plc.opcua_address import Address, browse_name, node_name
-from seerob.protocols.plc.opcua_link import hang_up, hung_up_on_failure
 from seerob.protocols.plc.opcua_units import unit
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client
     from asyncua.common.node import Node
     from asyncua.ua import NodeId, QualifiedName
+
+
+@contextmanager
+def plainly_cancelled() -> Iterator[None]:
+    """Pass on any cancellation as `asyncio.CancelledError` itself.
+
+    In Python 3.11 `asyncio.timeout` takes no other for its own. wait_for2, which asyncua waits with, raises a
+    subclass where an answer comes together with the cancellation: no time-out would follow, and the program
+    would end.
+    """
+    try:
+        yield
+    except asyncio.CancelledError as error:
+        if type(error) is asyncio.CancelledError:
+            raise
+        raise asyncio.CancelledError(*error.args) from error
+
+
+def hang_up(link: Any) -> None:
+    """Close the socket of a link, if there is one; the loop does it next.
+
+    Args:
+        link: ``client.uaclient.protocol`` of asyncua; None before there was one.
+    """
+    if link is not None and link.transport is not None:
+        link.transport.close()
+
+
+@contextmanager
+def hung_up_on_failure(client: Client) -> Iterator[None]:
+    """Leave no socket open when connecting fails, or is cancelled."""
+    try:
+        yield
+    except BaseException:
+        hang_up(client.uaclient.protocol)
+        raise
+
 
 PATIENCE = 2.0
 """With each answer [s]."""

@@ -1,14 +1,15 @@
-"""Skeletons of Azure Kinect body tracking: the 32 joints, and the object per frame in JSON.
+"""Skeletons of Azure Kinect body tracking: the 32 joints, the object per frame in JSON, and live messages.
 
 The object is that of Microsoft's ``offline_processor`` (Azure-Kinect-Samples): ``timestamp_usec``,
 ``frame_id``, ``num_bodies``, ``bodies``; per body ``body_id``, ``joint_positions`` [mm] and
-``joint_orientations`` (w, x, y, z), in the frame of the depth camera: x right, y down, z forward.
-Our live message is the same object with a few keys more, one per datagram or WebSocket message.
-Orbbec's Femto cameras run the same tracker through a wrapper and say the same.
+``joint_orientations`` (w, x, y, z), in the frame of the depth camera: x right, y down, z forward. Our live
+message is the same object with a few keys more, one per datagram or WebSocket message. Orbbec's Femto cameras
+run the same tracker through a wrapper and say the same.
 """
 
 from __future__ import annotations
 
+from collections.abc import AsyncGenerator
 from dataclasses import dataclass
 from typing import Annotated, TypeVar
 
@@ -19,6 +20,8 @@ from msgspec import Meta, Struct
 from seerob.core.transforms import Array, turned
 from seerob.description.capture.captured import Layout, Seen
 from seerob.protocols import ProtocolError
+from seerob.protocols.links import live_messages
+from seerob.protocols.links.live_messages import NONSENSE, SILENCE
 
 T = TypeVar("T")
 
@@ -277,3 +280,27 @@ def _body(said: BodyObject) -> Body:
 
 def _floats(rows: object) -> Array:
     return np.array(rows, dtype=float)
+
+
+__all__ = ["NONSENSE", "SILENCE", "Sieve", "from_datagrams", "from_websocket"]
+
+
+class Sieve(live_messages.Sieve[Picture]):
+    """Lets through pictures that are newer."""
+
+    def __init__(self) -> None:
+        super().__init__(decode_message, "the camera")
+
+
+def from_datagrams(
+    bind: str, port: int, sender: str | None, silence: float = SILENCE
+) -> AsyncGenerator[tuple[float, Picture], None]:
+    """Pictures that somebody sends to this machine; see `live_messages.from_datagrams`."""
+    return live_messages.from_datagrams(Sieve(), bind, port, sender, silence)
+
+
+def from_websocket(
+    host: str, port: int, silence: float = SILENCE
+) -> AsyncGenerator[tuple[float, Picture], None]:
+    """Pictures over a connection to the sender; see `live_messages.from_websocket`."""
+    return live_messages.from_websocket(Sieve(), host, port, silence)

@@ -5,9 +5,7 @@
 
 The goal is that closing every sink takes at most 30 % of the time of the motion. The peer, in the same run,
 is openpyxl in its write-only mode with the same cells, plain: no formats, no colours, no widths. Times are
-the processor's, so that what else the machine does is nearly left out; the first use of matplotlib is in
-them. Where Python keeps no compiled modules (PYTHONDONTWRITEBYTECODE), that use is told but not counted:
-it is compilation, which is done once when a package is installed.
+the processor's, so that what else the machine does is nearly left out.
 """
 
 from __future__ import annotations
@@ -31,7 +29,6 @@ from seerob.session import run as road
 
 FOLDER = Path(__file__).parents[1] / "workstations" / "captured_operator"
 GOAL = 0.3
-PLOTS = "matplotlib's import"
 
 
 def written(seconds: float | None, folder: Path) -> tuple[float, dict[str, float]]:
@@ -49,28 +46,12 @@ def written(seconds: float | None, folder: Path) -> tuple[float, dict[str, float
         for writer in writers:
             writer.write(snapshot, samples)
         end = snapshot.t
-    spent = {PLOTS: imported()} if seconds is None else {}
+    spent = {}
     for writer in writers:
         begun = time.process_time()
         writer.close()
         spent[type(writer).__name__.removesuffix("Writer").lower()] = time.process_time() - begun
     return end, spent
-
-
-def imported() -> float:
-    """The processor's time to import what draws plots [s]."""
-    begun = time.process_time()
-    import matplotlib.backends.backend_svg
-    import matplotlib.figure  # noqa: F401
-
-    return time.process_time() - begun
-
-
-def compiled() -> bool:
-    """Whether matplotlib was compiled before."""
-    import matplotlib.figure
-
-    return Path(matplotlib.figure.__cached__).exists()
 
 
 def peer(path: Path) -> tuple[float, int]:
@@ -101,7 +82,7 @@ def main() -> int:
         folder = Path(name)
         motion, spent = written(0.3 if smoke else None, folder)
         plain, cells = peer(folder / "results.xlsx")
-    whole = sum(used for sink, used in spent.items() if sink != PLOTS or compiled())
+    whole = sum(spent.values())
     told = ", ".join(f"{sink} {1e3 * used:.0f} ms" for sink, used in spent.items())
     sys.stdout.write(
         f"{motion:.1f} s of motion: written in {whole:.2f} s ({told}), {100 * whole / motion:.0f} % of it "

@@ -178,12 +178,17 @@ def in_front(camera: Camera, corners: Array) -> Array:
 @cache
 def font(size: int) -> FreeTypeFont:
     """A font that has ✓, ✕ and ↔, which comes along with matplotlib."""
+    from importlib.util import find_spec
     from pathlib import Path
 
-    import matplotlib
     from PIL import ImageFont
 
-    return ImageFont.truetype(Path(matplotlib.get_data_path()) / "fonts/ttf/DejaVuSans-Bold.ttf", size)
+    # Where it lies is known without importing it, which takes longer than a picture.
+    found = find_spec("matplotlib")
+    assert found is not None
+    assert found.origin is not None
+    folder = Path(found.origin).parent / "mpl-data/fonts/ttf"
+    return ImageFont.truetype(folder / "DejaVuSans-Bold.ttf", size)
 
 
 def words(draw: ImageDraw, at: tuple[float, float], text: str, color: Color, type_: FreeTypeFont) -> None:

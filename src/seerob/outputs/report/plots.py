@@ -1,42 +1,65 @@
-"""Plots of a report as SVG that stands inside an HTML page and refers to nothing outside it."""
+"""Plots of a report as SVG that stands inside an HTML page and refers to nothing outside it.
+
+Polylines, axes and bands are written as they are: a plotting library takes a second to start and one to draw
+what a report of ten criteria shows.
+"""
 
 from __future__ import annotations
 
-import re
-import warnings
+import math
+import unicodedata
 from collections.abc import Sequence
-from io import StringIO
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seerob.core.snapshot import Verdict
-from seerob.outputs.html import Html, legal, text
+from seerob.core.transforms import Array
+from seerob.outputs.html import Html, tag
 from seerob.outputs.palette import DARK_HEX, HEX, MARK, WORD
 from seerob.recording.series import CODES, Series
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 POINTS = 1500
 """Ticks per curve; thinned without losing an extremum."""
+_WIDTH, _HEIGHT = 533.0, 180.0
+"""Of a curve; a unit is 1/72 inch on paper of the usual size."""
+_LEFT, _RIGHT, _TOP, _BOTTOM = 53.0, 8.0, 22.0, 34.0
+"""Margins of a curve."""
+_FONT, _SMALL = 9.0, 8.0
+_INK, _TICK, _FRAME, _RULE = "#1A2430", "#44505C", "#6B7785", "#E1E6EB"
 _TINT = {Verdict.EXCEEDED: 0.2, Verdict.UNDECIDED: 0.6}
-_HATCH = {Verdict.EXCEEDED: "//", Verdict.UNDECIDED: "....", Verdict.WITHIN: "", None: ""}
-_STYLE: dict[str, Any] = {
-    "svg.fonttype": "none",
-    "font.family": "sans-serif",
-    "font.size": 9,
-    # Names come from files: a dollar sign is a dollar sign.
-    "text.parse_math": False,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#6B7785",
-    "axes.linewidth": 0.8,
-    "xtick.color": "#44505C",
-    "ytick.color": "#44505C",
-    "hatch.linewidth": 0.9,
-}
+_DASH = "6.5 2.6"
+_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+_LONGEST_NAME = 36
+_LEAST, _LARGEST = 1e-290, 1e300
+"""What is drawn lies between these: no span of two such figures is beyond a double."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Values between two ends as places on the drawing.
+
+    Attributes:
+        low: Value at the begin.
+        high: Value at the end, above ``low``.
+        begin: Place of ``low``.
+        end: Place of ``high``.
+    """
+
+    low: float
+    high: float
+    begin: float
+    end: float
+
+    def at(self, values: Array) -> Array:
+        """Places of values, any shape."""
+        share = (values - self.low) / (self.high - self.low)
+        return np.asarray(self.begin + share * (self.end - self.begin))
+
+    def place(self, value: float) -> float:
+        """Place of one value."""
+        return float(self.at(np.array(value)))
 
 
 def curve(series: Series, *, salt: str) -> Html:
@@ -46,75 +69,89 @@ def curve(series: Series, *, salt: str) -> Html:
         series: Of one criterion; must have been heard at least once.
         salt: Makes the ids inside the drawing unique on the page.
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
     i = series.thinned(POINTS)
-    t, values, limits = series.t[i], series.values[i], series.limits[i]
-    with mpl.rc_context(_style(salt)):
-        # Margins by hand: finding them takes as long as drawing.
-        figure = Figure(figsize=(7.4, 2.5))
-        figure.subplots_adjust(left=0.1, right=0.985, bottom=0.19, top=0.88)
-        axes = figure.add_subplot()
-        span = float(series.t[-1] - series.t[0]) or 1.0
-        for verdict in (Verdict.UNDECIDED, Verdict.EXCEEDED):
-            _bands(axes, series, verdict, span)
-        marker = "o" if np.count_nonzero(np.isfinite(values)) < 3 else None
-        axes.plot(
-            t, _finite(values), color="#1A2430", linewidth=1.3, label="value", marker=marker, markersize=3
-        )
-        if np.isfinite(limits).any():
-            name = "limit (at most)" if series.at_most else "limit (at least)"
-            axes.plot(
-                t,
-                _finite(limits),
-                color=DARK_HEX[Verdict.EXCEEDED],
-                linewidth=1.3,
-                linestyle=(0, (5, 2)),
-                label=name,
-            )
-        worst = series.worst()
-        if worst.value is not None and np.isfinite(worst.value):
-            color = DARK_HEX[worst.verdict]
-            axes.plot(
-                [worst.t], [worst.value], "o", color=color, markersize=5, label=f"worst, {worst.t:.2f} s"
-            )
-        axes.set_xlabel("time [s]")
-        axes.set_ylabel(f"[{series.unit}]" if series.unit else "")
-        axes.set_xlim(float(series.t[0]) - 0.01 * span, float(series.t[-1]) + 0.01 * span)
-        axes.grid(axis="y", color="#E1E6EB", linewidth=0.6)
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.18), ncols=5, frameon=False, fontsize=8)
-        return svg(figure, f"{series.name} over time")
+    t, values, limits = series.t[i], _shown(series.values[i]), _shown(series.limits[i])
+    worst = series.worst()
+    begin, end = float(series.t[0]), float(series.t[-1])
+    span = end - begin or 1.0
+    x = Axis(begin - 0.01 * span, end + 0.01 * span, _LEFT, _WIDTH - _RIGHT)
+    known = [values[np.isfinite(values)], limits[np.isfinite(limits)]]
+    shown = worst.value is not None and abs(worst.value) < _LARGEST
+    y = Axis(*_room(np.concatenate([*known, [worst.value] if shown else []])), _HEIGHT - _BOTTOM, _TOP)
+    under: list[Html] = []
+    over: list[Html] = []
+    legend: list[tuple[str, list[Html]]] = []
+    for verdict in (Verdict.UNDECIDED, Verdict.EXCEEDED):
+        bars = _bands(series, verdict, span)
+        for start, stop in bars:
+            under += _band(x, start, stop, _TOP, y.begin - _TOP, verdict, salt)
+        if bars:
+            # A patch of its own for the hatch, so that it is not as faint as the tint.
+            legend.append((WORD[verdict], _patches(0, -6, 16, 7, verdict, salt)))
+    few = np.count_nonzero(np.isfinite(values)) < 3
+    over.append(_line(x.at(t), y.at(values), _INK))
+    if few:
+        over += [_dot(a, b, 1.5, _INK) for a, b in _finite(x.at(t), y.at(values))]
+    legend.append(("value", [_stroke("M0,-2.5H16", _INK)]))
+    if len(known[1]):
+        color = DARK_HEX[Verdict.EXCEEDED]
+        over.append(_line(x.at(t), y.at(limits), color, dash=_DASH))
+        name = "limit (at most)" if series.at_most else "limit (at least)"
+        legend.append((name, [_stroke("M0,-2.5H16", color, dash=_DASH)]))
+    if worst.value is not None and shown:
+        color = DARK_HEX[worst.verdict]
+        over.append(_dot(x.place(worst.t), y.place(worst.value), 2.5, color))
+        legend.append((f"worst, {worst.t:.2f} s", [_dot(8, -2.5, 2.5, color)]))
+    unit = f"[{series.unit}]" if series.unit else ""
+    middle = _number((y.begin + y.end) / 2)
+    return _svg(
+        _HEIGHT,
+        f"{series.name} over time",
+        _hatches(salt),
+        under,
+        [
+            _stroke(f"M{_number(x.begin)},{_number(y.place(v))}H{_number(x.end)}", _RULE, 0.6)
+            for v in ticks(y)
+        ],
+        over,
+        _time_axis(x, y.begin),
+        _stroke(f"M{_number(x.begin)},{_number(y.begin)}V{_number(y.end)}", _FRAME, 0.8),
+        [_tick(v, _LEFT - 5, y.place(v) + 3, y, "end") for v in ticks(y)],
+        [_stroke(f"M{_number(_LEFT - 3.5)},{_number(y.place(v))}h3.5", _TICK, 0.8) for v in ticks(y)],
+        _text(unit, 0, 0, "middle", transform=f"translate(10 {middle}) rotate(-90)"),
+        _legend(legend),
+    )
 
 
 def lanes(series: Sequence[Series], *, salt: str) -> Html:
     """One row per criterion: its verdict over time."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(_style(salt)):
-        figure = Figure(figsize=(7.4, 0.55 + 0.3 * len(series)), layout="constrained")
-        axes = figure.add_subplot()
-        names = []
-        for row, one in enumerate(series):
-            names.append(f"{MARK[one.verdict]}  {one.name if len(one.name) < 36 else one.name[:35] + '…'}")
-            for verdict in CODES:
-                spans = [(a, max(b - a, 0.0) + _step(one)) for a, b in one.intervals(verdict)]
-                if spans:
-                    axes.broken_barh(
-                        merged(spans, _step(one) * max(1.0, len(one) / POINTS)),
-                        (row - 0.36, 0.72),
-                        facecolor=HEX[verdict] if verdict else "#E4E9EE",
-                        edgecolor="#FFFFFF" if verdict is Verdict.EXCEEDED else "#44505C",
-                        linewidth=0,
-                        hatch=_HATCH[verdict],
+    names = [f"{MARK[one.verdict]}  {_short(one.name)}" for one in series]
+    left = 12 + max(_wide(name, _FONT) for name in names)
+    height = 39.6 + 21.6 * len(series)
+    floor = height - _BOTTOM
+    known = [one.t for one in series if len(one.t)]
+    begin = min((float(t[0]) for t in known), default=0.0)
+    end = max((float(one.t[-1]) + _step(one) for one in series if len(one.t)), default=1.0)
+    span = end - begin or 1.0
+    x = Axis(begin - 0.02 * span, end + 0.02 * span, left, _WIDTH - _RIGHT)
+    row = (floor - 4) / len(series)
+    drawn: list[Html] = []
+    for k, one in enumerate(series):
+        top = 4 + (k + 0.14) * row
+        drawn.append(_text(names[k], left - 8, 4 + (k + 0.5) * row + 3, "end"))
+        step = _step(one)
+        for verdict in CODES:
+            spans = [(a, max(b - a, 0.0) + step) for a, b in one.intervals(verdict)]
+            for start, length in merged(spans, step * max(1.0, len(one) / POINTS)):
+                a, b = x.place(start), x.place(start + length)
+                drawn.append(_rectangle(a, top, b - a, 0.72 * row, HEX[verdict] if verdict else "#E4E9EE"))
+                if verdict in _TINT:
+                    drawn.append(
+                        _rectangle(a, top, b - a, 0.72 * row, f"url(#{_hatch(verdict, salt, on=True)})")
                     )
-        axes.set_yticks(range(len(series)), names)
-        axes.set_ylim(len(series) - 0.4, -0.6)
-        axes.set_xlabel("time [s]")
-        axes.tick_params(left=False)
-        axes.spines["left"].set_visible(False)
-        return svg(figure, "Verdict of every criterion over time")
+    return _svg(
+        height, "Verdict of every criterion over time", _hatches(salt, on=True), drawn, _time_axis(x, floor)
+    )
 
 
 def merged(spans: Sequence[tuple[float, float]], gap: float) -> list[tuple[float, float]]:
@@ -129,42 +166,44 @@ def merged(spans: Sequence[tuple[float, float]], gap: float) -> list[tuple[float
     return joined
 
 
-def svg(figure: Figure, title: str) -> Html:
-    """The drawing as an ``<svg>`` element without prologue, metadata and namespaces."""
-    out = StringIO()
-    with warnings.catch_warnings():
-        # Words stay words in the drawing: the fonts of who reads it count, not matplotlib's.
-        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
-        figure.savefig(out, format="svg", metadata={"Date": None})
-    drawing = legal(out.getvalue())
-    drawing = drawing[drawing.index("<svg") :]
-    drawing = re.sub(r"<metadata>.*?</metadata>", "", drawing, flags=re.DOTALL)
-    drawing = re.sub(r' xmlns(:\w+)?="[^"]*"', "", drawing)
-    drawing = re.sub(r'(<svg[^>]*?) (?:width|height)="[^"]*pt"', r"\1", drawing)
-    drawing = re.sub(r'(<svg[^>]*?) (?:width|height)="[^"]*pt"', r"\1", drawing)
-    return Html(drawing.replace("<svg", f'<svg role="img" aria-label="{text(title)}"', 1))
+def ticks(axis: Axis) -> list[float]:
+    """Round values on an axis, 1, 2, 2.5 or 5 times a power of ten apart, at most about nine."""
+    step = _step_of(axis)
+    first, last = math.ceil(axis.low / step - 1e-9), math.floor(axis.high / step + 1e-9)
+    return [k * step for k in range(first, last + 1)]
 
 
-def _bands(axes: Axes, series: Series, verdict: Verdict, span: float) -> None:
+def _step_of(axis: Axis) -> float:
+    rough = (axis.high - axis.low) / min(9.0, abs(axis.end - axis.begin) / 20)
+    power: float = 10.0 ** math.floor(math.log10(rough))
+    return power * next(s for s in _STEPS if s * power >= rough * (1 - 1e-9))
+
+
+# -- ranges -----------------------------------------------------------------------------------------
+
+
+def _room(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Ends of an axis that shows finite values with 5 % of room at both ends."""
+    if not len(values):
+        return 0.0, 1.0
+    low, high = float(values.min()), float(values.max())
+    size = max(abs(low), abs(high))
+    if high - low <= max(1e-9 * size, _LEAST):
+        # A constant: a tenth of it, so that its ticks have names.
+        around = 0.05 * size if size > _LEAST else 0.05
+        return low - around, high + around
+    return low - 0.05 * (high - low), high + 0.05 * (high - low)
+
+
+def _shown(values: Array) -> Array:
+    """Values, and NaN where one cannot be drawn."""
+    return np.where(np.abs(values) < _LARGEST, values, np.nan)
+
+
+def _bands(series: Series, verdict: Verdict, span: float) -> list[tuple[float, float]]:
+    """Begin and end of the stretches with a verdict [s], none too narrow to be seen."""
     bars = [(a, b - a + _step(series)) for a, b in series.intervals(verdict)]
-    for k, (start, length) in enumerate(merged(bars, span / 400)):
-        end = start + max(length, span / 600)
-        label = WORD[verdict] if k == 0 else None
-        axes.axvspan(start, end, facecolor=HEX[verdict], alpha=_TINT[verdict], linewidth=0)
-        # A patch of its own, so that the hatch is not as faint as the tint.
-        axes.axvspan(
-            start,
-            end,
-            facecolor="none",
-            edgecolor=DARK_HEX[verdict],
-            hatch=_HATCH[verdict],
-            linewidth=0,
-            label=label,
-        )
-
-
-def _style(salt: str) -> Any:
-    return {**_STYLE, "svg.hashsalt": salt}
+    return [(a, a + max(length, span / 600)) for a, length in merged(bars, span / 400)]
 
 
 def _step(series: Series) -> float:
@@ -173,5 +212,160 @@ def _step(series: Series) -> float:
     return float(np.median(np.diff(t))) if len(t) > 1 else 0.01
 
 
-def _finite(data: Any) -> Any:
-    return np.where(np.isfinite(data), data, np.nan)
+# -- elements ---------------------------------------------------------------------------------------
+
+
+def _svg(height: float, title: str, *content: Html | list[Html]) -> Html:
+    return tag(
+        "svg",
+        *content,
+        role="img",
+        aria_label=title,
+        viewBox=f"0 0 {_number(_WIDTH)} {_number(height)}",
+        font_family="sans-serif",
+        font_size=_number(_FONT),
+        fill=_TICK,
+    )
+
+
+def _time_axis(x: Axis, floor: float) -> list[Html]:
+    at = _number(floor)
+    marks = "".join(f"M{_number(x.place(v))},{at}v3.5" for v in ticks(x))
+    return [
+        _stroke(f"M{_number(x.begin)},{at}H{_number(x.end)}", _FRAME, 0.8),
+        _stroke(marks, _TICK, 0.8),
+        *(_tick(v, x.place(v), floor + 13, x, "middle") for v in ticks(x)),
+        _text("time [s]", (x.begin + x.end) / 2, floor + 27, "middle", fill=_INK),
+    ]
+
+
+def _tick(value: float, x: float, y: float, axis: Axis, anchor: str) -> Html:
+    return _text(_figure(value, axis), x, y, anchor)
+
+
+def _figure(value: float, axis: Axis) -> str:
+    """A tick's figure with the digits that tell it from its neighbours."""
+    step, size = _step_of(axis), max(abs(axis.low), abs(axis.high))
+    places = next((d for d in range(7) if abs(round(step, d) - step) < 1e-6 * step), None)
+    if abs(value) < 1e-9 * size:
+        shown = "0"
+    elif places is not None and size < 1e6:
+        shown = f"{value:.{places}f}"
+    else:
+        shown = f"{value:.{max(1, math.ceil(math.log10(size / step)) + 1)}g}"
+    return shown.replace("-", "\u2212")
+
+
+def _legend(entries: Sequence[tuple[str, list[Html]]]) -> list[Html]:
+    """In one row above the axes, centred."""
+    widths = [20 + _wide(name, _SMALL) for name, _ in entries]
+    gap = min(14.0, (_WIDTH - sum(widths)) / max(1, len(entries)))
+    at = (_LEFT + _WIDTH - _RIGHT - sum(widths) - gap * (len(entries) - 1)) / 2
+    found = []
+    for (name, sample), width in zip(entries, widths, strict=True):
+        words = _text(name, 20, 0, "start", fill=_INK, font_size=_number(_SMALL))
+        found.append(tag("g", *sample, words, transform=f"translate({_number(at)} 12)"))
+        at += width + gap
+    return found
+
+
+def _band(
+    x: Axis, start: float, stop: float, top: float, height: float, verdict: Verdict, salt: str
+) -> list[Html]:
+    a, b = x.place(start), x.place(min(stop, x.high))
+    return _patches(a, top, b - a, height, verdict, salt)
+
+
+def _patches(x: float, y: float, width: float, height: float, verdict: Verdict, salt: str) -> list[Html]:
+    """A tint and the hatch over it."""
+    return [
+        _rectangle(x, y, width, height, HEX[verdict], opacity=_TINT[verdict]),
+        _rectangle(x, y, width, height, f"url(#{_hatch(verdict, salt)})"),
+    ]
+
+
+def _hatch(verdict: Verdict, salt: str, *, on: bool = False) -> str:
+    return f"{verdict.value}-{'on-' if on else ''}{salt}"
+
+
+def _hatches(salt: str, *, on: bool = False) -> Html:
+    """Patterns of the verdicts: dots of what is undecided, strokes of what is exceeded.
+
+    Args:
+        salt: Of the ids.
+        on: Whether they lie on the full colour.
+    """
+    stroke = "#FFFFFF" if on else DARK_HEX[Verdict.EXCEEDED]
+    dots = [(1.5, 1.5), (4.5, 4.5)]
+    size = {"width": "6", "height": "6", "patternUnits": "userSpaceOnUse"}
+    return tag(
+        "defs",
+        tag(
+            "pattern",
+            [_dot(a, b, 0.6, DARK_HEX[Verdict.UNDECIDED]) for a, b in dots],
+            id=_hatch(Verdict.UNDECIDED, salt, on=on),
+            **size,
+        ),
+        tag(
+            "pattern",
+            _stroke("M-1,1L1,-1M0,6L6,0M5,7L7,5", stroke, 0.8),
+            id=_hatch(Verdict.EXCEEDED, salt, on=on),
+            **size,
+        ),
+    )
+
+
+def _line(x: Array, y: Array, color: str, *, dash: str | None = None) -> Html:
+    """A polyline with a gap where a value is missing; one value between gaps is a dot."""
+    path, pen = [], False
+    for a, b, known in zip(x.tolist(), y.tolist(), np.isfinite(y).tolist(), strict=True):
+        if known:
+            path.append(f"{'L' if pen else 'M'}{_number(a)},{_number(b)}{'' if pen else 'h0'}")
+        pen = known
+    return _stroke("".join(path), color, dash=dash, stroke_linejoin="round", stroke_linecap="round")
+
+
+def _finite(x: Array, y: Array) -> list[tuple[float, float]]:
+    return [(a, b) for a, b in zip(x.tolist(), y.tolist(), strict=True) if math.isfinite(b)]
+
+
+def _stroke(path: str, color: str, width: float = 1.3, *, dash: str | None = None, **more: str) -> Html:
+    return tag(
+        "path", d=path, fill="none", stroke=color, stroke_width=_number(width), stroke_dasharray=dash, **more
+    )
+
+
+def _rectangle(
+    x: float, y: float, width: float, height: float, fill: str, *, opacity: float | None = None
+) -> Html:
+    return tag(
+        "rect",
+        x=_number(x),
+        y=_number(y),
+        width=_number(width),
+        height=_number(height),
+        fill=fill,
+        fill_opacity=None if opacity is None else _number(opacity),
+    )
+
+
+def _dot(x: float, y: float, radius: float, color: str) -> Html:
+    return tag("circle", cx=_number(x), cy=_number(y), r=_number(radius), fill=color)
+
+
+def _text(words: str, x: float, y: float, anchor: str, **more: str) -> Html:
+    return tag("text", words, x=_number(x), y=_number(y), text_anchor=anchor, **more)
+
+
+def _number(value: float) -> str:
+    """A place to a hundredth of a unit."""
+    return f"{value:.2f}".rstrip("0").rstrip(".")
+
+
+def _short(name: str) -> str:
+    return name if len(name) < _LONGEST_NAME else name[: _LONGEST_NAME - 1] + "…"
+
+
+def _wide(words: str, size: float) -> float:
+    """About how wide text is."""
+    return size * sum(1.05 if unicodedata.east_asian_width(c) in "WF" else 0.56 for c in words)

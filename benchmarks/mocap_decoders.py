@@ -28,8 +28,8 @@ import numpy as np
 
 from seerob.app.emulation.mvn_datagrams import datagrams
 from seerob.app.emulation.mvn_person import Pose
-from seerob.devices.capture.mvn_frames import Frames
 from seerob.devices.sources import bvh, mvnx
+from seerob.devices.sources.mvn import Frames
 from seerob.protocols.tracking.mvn import Kind, decode
 from seerob.protocols.tracking.mvn_segments import JOINTS, PARENTS, SEGMENTS
 

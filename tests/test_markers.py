@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from seerob.core.shapes.ear_cutting import cut_ears
+from seerob.core.shapes.floor_polygon import cut_ears
 from seerob.core.snapshot import Polyline, Prism, Rays
 from seerob.core.transforms import Array
 

@@ -4,7 +4,7 @@ import re
 
 import httpx  # noqa: F401 - what is imported late would count as silence
 
-from seerob.app.commands.heard_variables import tell_heard
+from seerob.app.commands.probe import tell_heard
 from seerob.app.emulators.web import WebServer
 from seerob.devices.sources.web import Web
 from seerob.devices.variables.live_source import Node

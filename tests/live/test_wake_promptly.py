@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from threading import Thread
 
-from seerob.devices.live import wake_promptly as module
-from seerob.devices.live.wake_promptly import SLICE, wake_promptly
+from seerob.devices.live import listening_process as module
+from seerob.devices.live.listening_process import SLICE, wake_promptly
 
 LINUX = sys.platform == "linux" and platform.machine() in {"x86_64", "aarch64", "riscv64"}
 

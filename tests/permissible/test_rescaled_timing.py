@@ -11,8 +11,7 @@ from seerob.core.errors import InputError
 from seerob.session.permissible.given_motion import GivenMotion, largest_hermite, largest_on
 from seerob.session.permissible.joint_limits import JointLimits
 from seerob.session.permissible.path import path_of
-from seerob.session.permissible.profile import Parabolas, Profile
-from seerob.session.permissible.timing import timed
+from seerob.session.permissible.timing import Parabolas, Profile, timed
 
 
 def motion(t, q, qd):

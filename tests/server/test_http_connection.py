@@ -8,7 +8,7 @@ import httpx
 import pytest
 from websockets.exceptions import WebSocketException
 
-from seerob.app.server.http_connection import PromptRequests
+from seerob.app.server.connection import PromptRequests
 from seerob.app.server.player import Player
 from seerob.app.server.serving import Server
 from seerob.core.snapshot import Snapshot

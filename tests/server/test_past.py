@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seerob.app.server.past import KEPT_PER_BUCKET, Past, keep, width_of
+from seerob.app.server.live import KEPT_PER_BUCKET, Past, keep, width_of
 from seerob.core.snapshot import Result, Snapshot, Verdict
 
 CODES = {Verdict.WITHIN: 0, Verdict.EXCEEDED: 1, Verdict.UNDECIDED: 2, None: 255}

@@ -12,8 +12,7 @@ from seerob.core.errors import InputError
 from seerob.description.humans.skeleton import BONES, JOINTS
 from seerob.files.motion_capture import joint_angles, opensim_coordinates, trc
 from seerob.outputs.sinks import opensim
-from seerob.outputs.sinks.opensim import OpenSim
-from seerob.outputs.tables.measured_coordinates import EstimatedCoordinates
+from seerob.outputs.sinks.opensim import EstimatedCoordinates, OpenSim
 from seerob.outputs.tables.people import people
 
 N = 100

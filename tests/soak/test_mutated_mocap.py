@@ -16,7 +16,7 @@ from made_mvnx import Q  # tests/sources
 
 from seerob.app.emulation.mvn_datagrams import datagrams
 from seerob.app.emulation.mvn_person import Pose, segments
-from seerob.devices.capture.mvn_frames import Frames
+from seerob.devices.sources.mvn import Frames
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking.mvn import HEADER, Kind, Splitter, decode
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from seerob.core.errors import InputError
 from seerob.description.capture.captured import Seen
-from seerob.devices.capture import bvh_file as _bvh_file
+from seerob.devices.sources import bvh as _bvh_file
 from seerob.devices.sources.bvh import METRES, Unit, Up, guess_unit, read
 
 BODY = {  # joint → parent, offset [m] with y up, facing z

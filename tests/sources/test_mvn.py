@@ -22,9 +22,8 @@ from seerob.app.emulators.mvn import MvnSender
 from seerob.core.errors import InputError
 from seerob.core.transforms import rotation_from_wxyz, wxyz_from_rotation
 from seerob.description.humans.skeleton import BONES, bone_poses
-from seerob.devices.capture.mvn_frames import BETTER_GONE, MOST_CHARACTERS, Frames, Unit
 from seerob.devices.live.listening import Listener
-from seerob.devices.sources.mvn import Mvn, Transport
+from seerob.devices.sources.mvn import BETTER_GONE, MOST_CHARACTERS, Frames, Mvn, Transport, Unit
 from seerob.protocols.tracking.mvn import Header, Items, Kind, decode, encode, pack_items
 from seerob.protocols.tracking.mvn_segments import SEGMENTS, names
 from seerob.workstation.source import Target

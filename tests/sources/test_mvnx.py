@@ -11,11 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from seerob.core.errors import InputError
 from seerob.description.capture.captured import Seen
-from seerob.devices.capture import mvnx_stream as _mvnx_stream
-from seerob.devices.capture.mvnx_head import lengths
 from seerob.devices.capture.xsens import anatomical, differences, joint_angles, turns
 from seerob.devices.sources import mvnx
-from seerob.devices.sources.mvnx import read
+from seerob.devices.sources import mvnx as _mvnx_stream
+from seerob.devices.sources.mvnx import lengths, read
 from seerob.protocols.tracking.mvn_segments import JOINTS, SEGMENTS
 
 CLEAR = np.abs(angles(Q)[..., 0]) < 85

@@ -1,15 +1,20 @@
-"""The workstation of a recording, made again from the files inside it."""
+"""The workstation of a recording, made again from its files, and its sources, to be played again."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from msgspec.structs import replace
+
 from seerob.core.errors import InputError, Problem
+from seerob.core.samples import Sample
 from seerob.recording.filing import SOURCES
 from seerob.recording.recording import Recording
 from seerob.session.reading import read
 from seerob.session.station import Station
+from seerob.workstation.source import Opened, Source
 from seerob.workstation.workstation import FILE_NAME
 
 _REMEDY = "give the workstation that it was made with (--workstation)"
@@ -44,3 +49,25 @@ def load_recorded(recording: Recording, *, cache: Path | None = None) -> Station
 def _workstation_file(recording: Recording) -> str:
     names = [name for name in recording.files if "/" not in name and name.endswith(".toml")]
     return FILE_NAME if FILE_NAME in names or len(names) != 1 else names[0]
+
+
+def recorded_sources(
+    sources: Iterable[Source], samples: Iterable[Sample], duration: float
+) -> tuple[tuple[Source, Opened], ...]:
+    """Every source with its recorded samples; rounds of a loop follow each other as they were played.
+
+    Args:
+        sources: Of the workstation.
+        samples: Of the recording, in order.
+        duration: Of the recording [s].
+    """
+    heard: dict[str, list[Sample]] = {}
+    for sample in samples:
+        own = heard.setdefault(sample.source, [])
+        # A sample that speaks of no later instant says nothing new.
+        if not own or sample.t > own[-1].t:
+            own.append(sample)
+    return tuple(
+        (replace(source, loop=False), Opened(samples=heard.get(source.name, []), duration=duration))
+        for source in sources
+    )

@@ -72,8 +72,7 @@ def add_sections(
 ) -> None:
     """Add what was found to the reports among the writers."""
     from seerob.outputs.sinks.dossier import DossierWriter
-    from seerob.session.permissible.report_place import ReportPlace
-    from seerob.session.permissible.summary import sections
+    from seerob.session.permissible.summary import ReportPlace, sections
 
     place = ReportPlace(station.scene(with_sources=False), station.model.meshes, tuple(cut))
     for writer in writers:

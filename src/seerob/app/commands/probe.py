@@ -1,22 +1,83 @@
-"""``seerob probe``: connect to a controller, say what is heard, and what to write into the workstation."""
+"""``seerob probe``: connect to a controller, say what is heard, and what to write into the workstation.
+
+Of variables, before there is a dictionary of them, it says how regularly a device tells them.
+"""
 
 from __future__ import annotations
 
 import argparse
+import asyncio
 import time
+import tomllib
 from collections import Counter
-from contextlib import suppress
+from collections.abc import Sequence
+from contextlib import aclosing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from seerob.app.console.interruption import Stopped
 from seerob.app.console.terminal import OUT, Exit, line, port, seconds
 from seerob.core.errors import InputError, SeerobError
+from seerob.devices.live.arrivals import Arrivals
+from seerob.devices.variables.live_source import Change, Node, VariablesSource
+from seerob.workstation.variables.dictionary import Kind, Variable
 
 if TYPE_CHECKING:
     from seerob.core.samples import Sample
     from seerob.devices.live.listening import LiveSource
     from seerob.devices.variables.live_source import VariablesSource
+
+
+def tell_heard(source: VariablesSource, nodes: Sequence[Node], wait: float) -> None:
+    """Listen to variables, and print how regularly they come, which do not, and what is wrong with which.
+
+    Args:
+        source: Reads them.
+        nodes: The variables.
+        wait: How long [s].
+
+    Raises:
+        OSError: The device is gone.
+        SeerobError: What it says cannot be understood.
+    """
+    arrivals, doubts = asyncio.run(_heard(source, nodes, wait))
+    line("heard", f"{arrivals.statistics()}; {len(doubts)} of {len(nodes)} variables")
+    for node in nodes:
+        if (doubt := doubts.get(node.address, "not heard")) != "":
+            line("doubt", f"{node.address}: {doubt}", "yellow")
+
+
+async def _heard(
+    source: VariablesSource, nodes: Sequence[Node], wait: float
+) -> tuple[Arrivals, dict[str, str]]:
+    """Arrivals of anything, and by address what is wrong with what was said last; empty when nothing is."""
+    # As texts: no unit is asked for what is not looked at.
+    variables = tuple(
+        Variable(name=f"v{k}", source="probe", address=_address(node.address), type=Kind.TEXT)
+        for k, node in enumerate(nodes)
+    )
+    addresses = {variable.name: node.address for variable, node in zip(variables, nodes, strict=True)}
+    arrivals, doubts = Arrivals(), dict[str, str]()
+    clock = asyncio.get_running_loop()
+    try:
+        async with (
+            aclosing(source.changes(variables, Path())) as said,
+            asyncio.timeout_at(clock.time() + wait),
+        ):
+            async for changes in said:
+                told = [change for change in changes if isinstance(change, Change)]
+                if told:
+                    arrivals.add(time.monotonic(), None)
+                doubts |= {addresses[change.name]: change.doubt for change in told}
+    except TimeoutError:
+        pass  # of the listening, or of a device that has nothing to say
+    return arrivals, doubts
+
+
+def _address(shown: str) -> Any:
+    """An address as a dictionary has it; some are tables."""
+    return tomllib.loads(f"value = {shown}")["value"] if shown.startswith("{") else shown
+
 
 HELP = "connect to a controller and print what it says, how regularly, and what is missing"
 EXAMPLE = "seerob probe rtde 192.168.0.10"
@@ -142,7 +203,6 @@ def _variables(source: VariablesSource, kind: str, given: dict[str, Any], wait: 
     """Print what a device has, and how regularly; a dictionary says what it means."""
     import asyncio
 
-    from seerob.app.commands.heard_variables import tell_heard
     from seerob.app.commands.variables import nodes_of
     from seerob.devices.live.listening import because
 

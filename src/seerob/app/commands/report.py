@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     refuse_existing(sinks, folder)
     every = []
     if options.permissible:
-        from seerob.session.permissible.recorded_sources import recorded_sources
+        from seerob.session.recorded_station import recorded_sources
 
         samples = (sample for tick in recording.ticks() for sample in tick.samples)
         sources = recorded_sources(station.workstation.sources, samples, recording.duration)

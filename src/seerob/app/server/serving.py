@@ -1,4 +1,7 @@
-"""The server as a whole: a thread with a loop of its own, started and stopped from ordinary code."""
+"""The server as a whole: a thread with a loop of its own, started and stopped from ordinary code.
+
+At ``/`` is the page, at ``/mesh/<hash>.glb`` are the meshes, at ``/ws`` the snapshots.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,8 @@ import contextlib
 import errno
 import logging
 import socket
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
+from contextlib import AbstractAsyncContextManager
 from ipaddress import ip_address
 from pathlib import Path
 from threading import Event, Thread
@@ -16,18 +20,53 @@ from typing import Self
 
 import uvicorn
 from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
 
-from seerob.app.server.app import build
+from seerob.app.server import page
 from seerob.app.server.client import Closing
-from seerob.app.server.connection import WholeBinaryFrames
+from seerob.app.server.connection import PromptRequests, WholeBinaryFrames
 from seerob.app.server.door import Door
 from seerob.app.server.feed import Feed
-from seerob.app.server.http_connection import PromptRequests
 from seerob.app.server.hub import PATIENCE, Hub
 from seerob.app.server.page import FOLDER
 from seerob.core.errors import InputError
 from seerob.core.host_name import is_address, is_loopback
 from seerob.core.snapshot import Scene
+
+Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
+
+
+def build(*, hub: Hub, meshes: Mapping[str, bytes], folder: Path, lifespan: Lifespan) -> Starlette:
+    """The application behind the `Door`.
+
+    Args:
+        hub: Serves the WebSockets.
+        meshes: Binary glTF by hash.
+        folder: The built page.
+        lifespan: What runs while the application does.
+    """
+
+    async def mesh(request: Request) -> Response:
+        data = meshes.get(request.path_params["name"].removesuffix(".glb"))
+        if data is None:
+            return PlainTextResponse("no such mesh\n", 404)
+        # The address is the content's hash, so that it never changes; private, as it is the user's.
+        headers = {"Cache-Control": "private, max-age=31536000, immutable"}
+        return Response(data, media_type="model/gltf-binary", headers=headers)
+
+    async def file(request: Request) -> Response:
+        return await run_in_threadpool(page.answer, folder, request.path_params["path"])
+
+    routes = [
+        WebSocketRoute("/ws", hub.attend),
+        Route("/mesh/{name}", mesh),
+        Route("/{path:path}", file),
+    ]
+    return Starlette(routes=routes, lifespan=lifespan)
+
 
 _log = logging.getLogger(__name__)
 

@@ -1,16 +1,23 @@
 """Recordings of Xsens MVN in its XML format, MVNX 3 and 4.
 
-Positions and orientations of the 23 segments, the calibration poses, the lengths of the segments. Frames are
-read as they are needed, so a file may be larger than memory. Joint angles that the file has are compared
-with those of its segments: when both agree, file and reader mean the same thing.
+Positions and orientations of the 23 segments, the calibration poses, the lengths of the segments. Joint
+angles that the file has are compared with those of its segments: when both agree, file and reader mean the
+same thing.
+
+Files of an hour have gigabytes: one is read from front to back without ever holding it, the head once, then
+frame by frame. Only the text of elements that are asked for is kept, and only until the element ends; a
+document type, entities and anything too deep, too long or without an end are refused.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, BinaryIO
+from xml.etree.ElementTree import ParseError
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +28,235 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array
 from seerob.description.capture.captured import Captured, CaptureFrame, Layout, Seen
 from seerob.devices.capture.file_source import CaptureFile
-from seerob.devices.capture.mvnx_head import lengths, numbers, unmeasured
-from seerob.devices.capture.mvnx_stream import Head, RawFrame, stream
 from seerob.devices.capture.xsens import anatomical, correction, differences
 from seerob.protocols.tracking.mvn_pose import METRES, unit_of
 from seerob.protocols.tracking.mvn_segments import JOINTS, PARENTS, SEGMENTS
+
+CHUNK = 1 << 16
+LONGEST = 1 << 20
+"""Of the text of one element [bytes]: a frame's longest has 63 segments of four numbers."""
+SILENCE = 1 << 24
+"""Read without the end of a tag [bytes]."""
+DEEPEST = 32
+MOST = 4096
+"""Points, segments, joints, sensors."""
+WANTED = frozenset({"orientation", "position", "jointAngle"})
+"""What is read of a frame."""
+
+
+@dataclass
+class Head:
+    """What a file says before its frames."""
+
+    version: str = ""
+    software: str = ""
+    rate: float | None = None
+    configuration: str = ""
+    subject: str = ""
+    segments: list[str] = field(default_factory=list)
+    sensors: list[str] = field(default_factory=list)
+    joints: list[str] = field(default_factory=list)
+    points: dict[tuple[str, str], str] = field(default_factory=dict)
+    """(Segment, point) → coordinates, as text."""
+    subjects: int = 0
+
+
+@dataclass
+class RawFrame:
+    """One frame, as text."""
+
+    attributes: dict[str, str]
+    texts: dict[str, str] = field(default_factory=dict)
+
+
+class _Target:
+    """Called by the parser."""
+
+    def __init__(self) -> None:
+        self.head = Head()
+        self.frames: deque[RawFrame] = deque()
+        self.tags = 0
+        self._path: list[str] = []
+        self._text: list[str] | None = None
+        self._length = 0
+        self._frame: RawFrame | None = None
+        self._segment = self._point = ""
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        self.tags += 1
+        name = tag.rpartition("}")[2]
+        self._path.append(name)
+        if len(self._path) > DEEPEST:
+            raise ValueError(f"elements are nested more than {DEEPEST} deep")
+        self._text = None
+        if self._frame is not None:
+            if name in WANTED and len(self._path) >= 2 and self._path[-2] == "frame":
+                self._text, self._length = [], 0
+        elif name == "frame":
+            self._frame = RawFrame(attributes)
+        else:
+            self._begin(name, attributes)
+
+    def _begin(self, name: str, attributes: dict[str, str]) -> None:
+        head = self.head
+        label = attributes.get("label", "")
+        match name:
+            case "mvnx":
+                head.version = attributes.get("version", "")
+            case "mvn":
+                head.software = attributes.get("version", "")
+            case "subject":
+                head.subjects += 1
+                head.subject, head.configuration = label, attributes.get("configuration", "")
+                head.rate = _number(attributes.get("frameRate", ""))
+            case "segment":
+                self._segment = label
+                head.segments.append(label)
+            case "point":
+                self._point = label
+            case "sensor":
+                head.sensors.append(label)
+            case "joint":
+                head.joints.append(label)
+            case "pos_b" | "pos_s":
+                self._text, self._length = [], 0
+            case _:
+                pass
+        if max(len(head.segments), len(head.sensors), len(head.joints), len(head.points)) > MOST:
+            raise ValueError(f"more than {MOST} segments, points, sensors or joints")
+
+    def data(self, text: str) -> None:
+        if self._text is not None:
+            self._length += len(text)
+            if self._length > LONGEST:
+                raise ValueError(f"<{self._path[-1]}> has more than {LONGEST} characters")
+            self._text.append(text)
+
+    def end(self, tag: str) -> None:
+        self.tags += 1
+        name = self._path.pop()
+        if self._text is not None:
+            text, self._text = "".join(self._text), None
+            if self._frame is not None:
+                self._frame.texts.setdefault(name, text)
+            else:
+                self.head.points[self._segment, self._point] = text
+        elif name == "frame" and self._frame is not None:
+            self.frames.append(self._frame)
+            self._frame = None
+
+    def close(self) -> None:
+        """Nothing is kept."""
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def stream(path: Path, file: str) -> Iterator[Head | RawFrame]:
+    """The head as it is before the first frame, then every frame; the head alone when there is none.
+
+    Args:
+        path: The file.
+        file: Its name, for messages.
+
+    Raises:
+        InputError: The file is missing, is not XML, or is more than these bounds allow.
+    """
+    from defusedxml import DefusedXmlException
+    from defusedxml.ElementTree import XMLParser
+
+    target = _Target()
+    parser: Any = XMLParser(target=target, forbid_dtd=True)
+    told = False
+    try:
+        with path.open("rb") as opened:
+            for _ in _fed(opened, parser, target):
+                if target.frames and not told:
+                    told = True
+                    yield target.head
+                while target.frames:
+                    yield target.frames.popleft()
+        parser.close()
+    except FileNotFoundError as error:
+        raise InputError.at(file, "", "no such file", "give the path of an .mvnx file") from error
+    except OSError as error:
+        what = f"cannot be read: {error.strerror}"
+        raise InputError.at(file, "", what, "give an .mvnx file that may be read") from error
+    except ParseError as error:
+        raise InputError.at(
+            file, f"line {error.position[0]}", f"not XML: {error}", "export it again"
+        ) from error
+    except (DefusedXmlException, ValueError, LookupError) as error:
+        raise InputError.at(file, "", str(error), "export it from MVN as MVNX") from error
+    if not told:
+        yield target.head
+
+
+def _fed(file: BinaryIO, parser: Any, target: _Target) -> Iterator[None]:
+    silent, tags = 0, 0
+    while chunk := file.read(CHUNK):
+        parser.feed(chunk)
+        silent = 0 if target.tags != tags else silent + len(chunk)
+        tags = target.tags
+        if silent > SILENCE:
+            raise ValueError(f"{silent} bytes without the end of an element")
+        yield
+
+
+_ENDS = {"Head": "pTopOfHead", "RightHand": "pRightTopOfHand", "LeftHand": "pLeftTopOfHand"}
+_LIMBS = {
+    "legs": tuple(f"{side}{part}" for side in ("Right", "Left") for part in ("UpperLeg", "LowerLeg", "Foot")),
+    "arms": tuple(f"{side}{part}" for side in ("Right", "Left") for part in ("UpperArm", "ForeArm", "Hand")),
+    "head": ("Head",),
+}
+
+
+def numbers(text: str, count: int) -> Array:
+    """So many numbers [as written], shape (count,).
+
+    Raises:
+        ValueError: There are more or fewer, or one is none.
+    """
+    words = text.split()
+    if len(words) != count:
+        raise ValueError(f"{len(words)} numbers, {count} are expected")
+    return np.array([float(word) for word in words])
+
+
+def unmeasured(head: Head) -> tuple[str, ...]:
+    """Segments that no sensor says anything of: they follow a neighbour stiffly."""
+    sensors = set(head.sensors)
+    if sensors:
+        lost = {name for limb in _LIMBS.values() for name in limb if name not in sensors}
+        for side in ("Right", "Left"):
+            if f"{side}Foot" in lost:
+                lost.add(f"{side}Toe")
+        return tuple(name for name in SEGMENTS if name in lost)
+    configuration = head.configuration.lower()
+    if "upperbody" in configuration:
+        return SEGMENTS[SEGMENTS.index("RightUpperLeg") :]
+    return SEGMENTS[1 : SEGMENTS.index("RightUpperLeg")] if "lowerbody" in configuration else ()
+
+
+def lengths(head: Head) -> dict[str, float]:
+    """Segment lengths [m] from the points of the head: from the origin to where the next segment begins."""
+    found = {}
+    for name in SEGMENTS[1:]:
+        following = [label for label, parent, child in JOINTS if parent == name and child[:4] != "Righ"]
+        following = following or [label for label, parent, _ in JOINTS if parent == name]
+        text = head.points.get((name, following[0] if following else _ENDS.get(name, "")))
+        try:
+            length = 0.0 if text is None else float(np.linalg.norm(numbers(text, 3)))
+        except ValueError:
+            continue
+        if 0.0 < length < 1.0:
+            found[name] = length
+    return found
+
 
 KEPT = 50_000
 """Frames that are kept in memory, 65 MB; a longer file is read again whenever it is needed."""

@@ -12,8 +12,8 @@ from msgspec import Meta
 from seerob.core.errors import InputError, Problem
 from seerob.core.quantities import Seconds
 from seerob.core.snapshot import Finding
+from seerob.devices.variables.access import missing
 from seerob.devices.variables.live_source import LONGEST_PULSE, PULSES, Change, Node, Shown, VariablesSource
-from seerob.devices.variables.opcua_files import missing
 from seerob.protocols import ProtocolError
 from seerob.protocols.plc.opcua_address import address, written
 from seerob.protocols.plc.opcua_client import (

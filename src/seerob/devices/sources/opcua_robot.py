@@ -17,8 +17,8 @@ from seerob.core.quantities import Seconds
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.devices.live.listening import LiveSource
+from seerob.devices.variables.access import at_home, missing
 from seerob.devices.variables.live_source import PULSES
-from seerob.devices.variables.opcua_files import at_home, missing
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
 from seerob.protocols.plc.opcua_client import Changes, Said, Security, Way, connect, needed

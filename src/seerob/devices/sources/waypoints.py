@@ -1,7 +1,11 @@
-"""Programmed waypoints made into a continuous motion: a first look, before a controller has run it."""
+"""Programmed waypoints made into a continuous motion: a first look, before a controller has run it.
+
+Logs of motions are programs of waypoints, too: RoboDK's joint lists and KUKA's DataRecorder.
+"""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -9,11 +13,11 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core.errors import InputError, Problem, suggestion
+from seerob.core.plugin import load
 from seerob.core.quantities import Pose, Radians, unit
 from seerob.core.same_names import by_name
 from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz, transform
-from seerob.devices.motion_files.logged_program import log_kind, logged_program
 from seerob.devices.motion_files.trajectory_file import TrajectoryFile, notes
 from seerob.files.trajectories.trajectory import MotionOrigin, Trajectory
 from seerob.files.waypoints.arm import Arm
@@ -21,8 +25,48 @@ from seerob.files.waypoints.branches import parse
 from seerob.files.waypoints.continuous import Continuous, Wish, continuous
 from seerob.files.waypoints.joint_limits import JointLimits
 from seerob.files.waypoints.reading import Point, read_program
+from seerob.files.waypoints.reduction import reduced
 from seerob.files.waypoints.waypoint import Program
 from seerob.workstation.source import Target
+
+HEAD = 16 << 10
+"""Of a file in which its header is looked for [bytes]."""
+
+
+def log_kind(path: Path) -> str | None:
+    """The kind of source that plays a file, told by its header; None for what is no log."""
+    if path.suffix.lower() not in (".log", ".csv", ".tsv", ".txt") or not path.is_file():
+        return None
+    with path.open("rb") as file:
+        head = file.read(HEAD).decode("latin-1")
+    if "ZeitInSec" in head:
+        return "kuka_log"
+    lines = (set(re.split(r"[^A-Z0-9_]+", line.upper())) for line in head.splitlines()[:20])
+    return "robodk" if any({"J1", "ERROR"} <= words for words in lines) else None
+
+
+def logged_program(kind: str, path: Path, file: str, robot: str, tolerance: float | None) -> Program:
+    """The waypoints that a log is reduced to.
+
+    Args:
+        kind: What `log_kind` says.
+        path: The file.
+        file: Its name, for messages.
+        robot: The robot that it is to drive.
+        tolerance: See `reduced`.
+
+    Raises:
+        InputError: The log is wrong, or nobody gave a tolerance.
+    """
+    if tolerance is None:
+        what = "is a log of a motion: how far waypoints may leave it, nobody said"
+        remedy = f'give tolerance [rad or m], or play it as it is with kind = "{kind}"'
+        raise InputError.at(file, "tolerance", what, remedy)
+    log = load("sources", kind, TrajectoryFile)
+    motion, findings = log(robot=robot, file=file).read(path, Target(name=robot))
+    program = reduced(motion, tolerance)
+    return Program(file, program.waypoints, (*(f.text for f in findings), *program.remarks))
+
 
 Above = Annotated[float, Meta(gt=0, le=1e6)]
 BY_HAND = "points"

@@ -24,7 +24,6 @@ from seerob.distance.least import Shapes
 from seerob.model.model import Body, Frame, Mechanism, Model
 from seerob.model.mounting import machines as machine_mounting
 from seerob.model.mounting.areas import mount_sensor, mount_swept
-from seerob.model.mounting.body_list import listed
 from seerob.model.mounting.chains import assumed, payload, placeholder
 from seerob.model.mounting.contacts import add_contacts
 from seerob.model.mounting.in_place import implausible
@@ -32,7 +31,7 @@ from seerob.model.mounting.mechanisms import Chain, Riders, mechanism
 from seerob.model.mounting.overrides import home, overridden
 from seerob.model.mounting.people import describe
 from seerob.model.mounting.picked_up import picked_up
-from seerob.model.mounting.specification import Mounting
+from seerob.model.mounting.specification import Mounting, extreme_points
 from seerob.model.mounting.specification import pose_matrix as pose_matrix  # noqa: PLC0414
 from seerob.model.mounting.things import (
     AREA_COLOR,
@@ -46,6 +45,34 @@ from seerob.model.mounting.unasked import unasked
 from seerob.model.variables import Bound, bound
 from seerob.recording.filing import filed
 from seerob.workstation.workstation import Area, Human, Machine, Mounted, Robot, Tool, Workpiece, Workstation
+
+
+def listed(mounting: Mounting) -> tuple[Body, ...]:
+    """The bodies, with `mujoco` indices still to come: contacts are added by name first."""
+    bodies = []
+    for index, entry in enumerate(mounting.entries):
+        corners, radius = extreme_points(entry.solids)
+        notes = list(dict.fromkeys(solid.note for solid in entry.solids if solid.note))
+        bodies.append(
+            Body(
+                index=index,
+                name=entry.name,
+                role=entry.role,
+                owner=entry.owner,
+                carrier=entry.carrier,
+                mj=-1,
+                solids=entry.solids,
+                corners=corners,
+                radius=radius,
+                mass=entry.mass,
+                mesh=entry.mesh,
+                triangles=entry.triangles,
+                note="; ".join(notes),
+                holder=entry.holder,
+            )
+        )
+    return tuple(bodies)
+
 
 # MuJoCo's own way is a file in the folder where the user happens to be.
 mujoco.set_mju_user_warning(logging.getLogger("mujoco").debug)

@@ -1,13 +1,13 @@
-"""The report's page, from the summary down to the evidence."""
+"""The report's page, from the summary down to the evidence, with the sections that a command added."""
 
 from __future__ import annotations
 
 from base64 import b64encode
 
+from seerob.core.report_section import ReportSection, ReportTable
 from seerob.core.snapshot import Basis, CriterionInfo, Verdict
 from seerob.outputs.html import Html, joined, table, tag, whole
 from seerob.outputs.report import plots as _plots
-from seerob.outputs.report.added import added
 from seerob.outputs.report.evidence import assumed, evaluated, not_covered
 from seerob.outputs.report.page_style import STYLE
 from seerob.outputs.report.posture_safety import told
@@ -15,6 +15,34 @@ from seerob.outputs.report.report import Report, badge, input_row
 from seerob.outputs.report.time_shares import spread_over_time
 from seerob.outputs.sentences import about, bound, extremum, listed, percent, reached, summary
 from seerob.recording.series import Series
+
+
+def added(sections: tuple[ReportSection, ...]) -> Html:
+    """All of them, in order."""
+    return joined([_section(section) for section in sections])
+
+
+def _section(section: ReportSection) -> Html:
+    picture = None
+    if section.picture is not None:
+        source = f"data:image/png;base64,{b64encode(section.picture).decode()}"
+        image = tag("img", src=source, alt=section.caption)
+        picture = tag("figure", image, tag("figcaption", section.caption))
+    return joined(
+        [
+            tag("h2", section.title),
+            [tag("p", sentence) for sentence in section.sentences],
+            picture,
+            [_table(one) for one in section.tables],
+        ]
+    )
+
+
+def _table(one: ReportTable) -> Html:
+    return joined(
+        [table(list(one.head), [list(row) for row in one.rows]), tag("p", one.caption, class_="lead")]
+    )
+
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
 

@@ -1,4 +1,7 @@
-"""Everything of a run as CSV files: what was heard, joints, bones, how far they are off, and results."""
+"""Everything of a run as CSV files: what was heard, joints, bones, how far they are off, and results.
+
+A result is cells with a title each: the figure, its parts, and its rows about places of a body.
+"""
 
 from __future__ import annotations
 
@@ -13,16 +16,56 @@ from msgspec import Meta
 from seerob.core.errors import InputError
 from seerob.core.files.no_formula import no_formula
 from seerob.core.samples import Sample
-from seerob.core.snapshot import Scene, Snapshot
+from seerob.core.snapshot import Result, Row, Scene, Snapshot, Verdict
 from seerob.outputs.report.bone_errors import HEAD, bone_rows
 from seerob.outputs.sink import Sink
 from seerob.outputs.tables import sample_cells as _sample_cells
 from seerob.outputs.tables.growing_table import GrowingTable
 from seerob.outputs.tables.pace import Pace
 from seerob.outputs.tables.people import people
-from seerob.outputs.tables.result_cells import result_cells
 from seerob.outputs.tables.whole_folder import NAME, WholeFolder, checked
 from seerob.recording.bone_errors import BoneErrors
+
+Cell = str | float | None
+
+
+def result_cells(result: Result) -> dict[str, Cell]:
+    """Title with unit → value."""
+    unit = f" [{result.unit}]" if result.unit else ""
+    found: dict[str, Cell] = {
+        f"value{unit}": result.value,
+        f"limit{unit}": result.limit,
+        "verdict": _word(result.verdict),
+        "reason": result.reason,
+    }
+    if result.interval is not None:
+        found |= {f"least{unit}": result.interval[0], f"largest{unit}": result.interval[1]}
+    for part in result.parts:
+        found[_titled(f"{part.name}: value", part.unit)] = part.value
+        found[f"{part.name}: verdict"] = _word(part.verdict)
+    for row in result.rows:
+        found |= _row_cells(row)
+    return found
+
+
+def _row_cells(row: Row) -> dict[str, Cell]:
+    name = " ".join(filter(None, (row.group, row.side, row.name)))
+    found: dict[str, Cell] = {_titled(name, row.unit): row.value}
+    if row.scale is not None:
+        # Of a score, what it was made from.
+        found |= {_titled(f"{name}, {a.name}", a.unit): a.value for a in row.aspects}
+    elif row.limit is not None or row.verdict is not None:
+        found |= {_titled(f"{name}, limit", row.unit): row.limit, f"{name}, verdict": _word(row.verdict)}
+    return found
+
+
+def _titled(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def _word(verdict: Verdict | None) -> str:
+    return "" if verdict is None else verdict.value
+
 
 Value = str | float | bool | None
 _LINE_ENDS = str.maketrans("\r\n\x00", "   ")

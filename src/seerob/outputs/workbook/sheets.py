@@ -1,20 +1,119 @@
-"""Sheets of a workbook as a person reads them: widths that fit, a header that stays, and units."""
+"""Sheets of a workbook as a person reads them: widths that fit, a header that stays, and units.
+
+The file is written by XlsxWriter: a row in memory at a time, and the same bytes for the same cells.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO, TYPE_CHECKING
 
 from seerob.core.figures import DECIMALS
-from seerob.outputs.workbook.book import book
-from seerob.outputs.workbook.cell_formats import HEAD, WRAP, Formats
-from seerob.outputs.workbook.sheet_rows import Cell, SheetRows
+from seerob.core.files.whole_file import hidden_folder
+from seerob.outputs.workbook.sheet_rows import HEAD, WRAP, Cell, Formats, SheetRows
 
 if TYPE_CHECKING:
     from xlsxwriter import Workbook
+
+
+_CREATED = datetime(1980, 1, 1, tzinfo=UTC)
+"""What every file says, so that the same cells are the same bytes."""
+
+
+@contextmanager
+def book(file: IO[bytes] | Path) -> Iterator[Workbook]:
+    """A workbook to add sheets to, written when the block ends; what an error leaves is no workbook.
+
+    Sheets wait in temporary files, beside the file if it has a path.
+
+    Args:
+        file: Where to, open for writing bytes, or its path.
+
+    Raises:
+        OSError: The disk refuses.
+    """
+    if isinstance(file, Path):
+        with hidden_folder(file) as beside, file.open("wb") as out:
+            yield from _written(out, str(beside))
+    else:
+        with TemporaryDirectory() as folder:
+            yield from _written(file, folder)
+
+
+def _written(file: IO[bytes], folder: str) -> Iterator[Workbook]:
+    from xlsxwriter import Workbook
+    from xlsxwriter.exceptions import FileCreateError
+
+    out = _Output(file)
+    made = Workbook(
+        out,
+        {
+            "constant_memory": True,
+            "tmpdir": folder,
+            "strings_to_formulas": False,
+            "strings_to_urls": False,
+            "strings_to_numbers": False,
+        },
+    )
+    made.set_properties({"created": _CREATED})
+    try:
+        yield made
+        made.close()
+    except FileCreateError as error:
+        raise error.args[0] from error
+    finally:
+        for sheet in made.worksheets():
+            with suppress(OSError):  # of a full disk, once more; the file is closed all the same
+                sheet.row_data_fh.close()
+        out.over = True
+    if out.refused is not None:
+        raise out.refused
+
+
+class _Output:
+    """What the archive is written to: it takes everything, and remembers that the disk did not.
+
+    An archive that fails half-way would try again when it is forgotten, where nobody hears its error.
+    """
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+        self.refused: OSError | None = None
+        """Why the disk took no more."""
+        self.over = False
+        """The file is no longer ours."""
+        self._at = file.tell()
+
+    def write(self, data: bytes) -> int:
+        """Write, or drop what comes after an error."""
+        if self.refused is None and not self.over:
+            try:
+                self._file.write(data)
+            except OSError as error:
+                self.refused = error
+        self._at += len(data)
+        return len(data)
+
+    def tell(self) -> int:
+        return self._at
+
+    def seek(self, at: int, whence: int = 0) -> int:
+        """To a place that is counted from the begin: an archive asks for no other."""
+        if whence:
+            raise ValueError(f"seek from {whence}, not from the begin")
+        if self.refused is None and not self.over:
+            self._file.seek(at)
+        self._at = at
+        return at
+
+    def flush(self) -> None:
+        """The file is flushed when it is closed."""
+
 
 EXCEL_ROWS = 1_048_576
 """Rows of a sheet, header included; longer data goes on in a further sheet."""
@@ -31,7 +130,7 @@ _OWN_UNIT = ("worst value", "limit", "value")
 
 @contextmanager
 def workbook(file: IO[bytes] | Path) -> Iterator[Sheets]:
-    """A workbook to add sheets to; see `seerob.outputs.workbook.book.book`.
+    """A workbook to add sheets to; see `seerob.outputs.workbook.sheets.book`.
 
     Raises:
         OSError: The disk refuses.

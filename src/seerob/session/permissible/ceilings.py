@@ -1,24 +1,193 @@
-"""Which criteria of a workstation limit the speed of a robot, and how each is asked."""
+r"""Which criteria of a workstation limit the speed of a robot, and how each is asked.
+
+Speed and separation monitoring permits a share of the robot's speed at a state.
+
+With ``mode = "fixed"`` the largest :math:`S_p` of the whole run counts at every instant. It is kept when at
+every place no part has an :math:`S_p` above the least distance that it has anywhere on the way,
+
+.. math:: S_{p,i}(t) \le \min_\tau d_i(\tau)\ \text{for all } t
+    \quad\Rightarrow\quad \max_{\tau \le t} S_{p,i}(\tau) \le d_i(t),
+
+so the inverse is that of the dynamic mode with the least distance of each part instead of the present one.
+That is enough, and more than is needed only before the largest :math:`S_p` has occurred.
+
+Power and force limiting permits shares of the robot's speed at a state. The permissible speeds of every
+moving surface against every body region are asked for, nothing is computed anew; of each region
+the surface that permits the least share of its own speed counts.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 
+import numpy as np
+from msgspec.structs import replace as changed
+
 from seerob.core.errors import Undecided
+from seerob.core.snapshot import Verdict
+from seerob.core.transforms import Array
 from seerob.core.verdict import admitted
+from seerob.criteria.contact.collision import Governing
+from seerob.criteria.contact.limits import Judged
+from seerob.criteria.contact.regions import REGIONS, without_limit
 from seerob.criteria.criterion import Criterion
 from seerob.criteria.judging import held
 from seerob.criteria.safety.kinetic_energy import KineticEnergy
-from seerob.criteria.safety.power_and_force import PowerAndForce
+from seerob.criteria.safety.power_and_force import STANDSTILL, Contacts, PowerAndForce
 from seerob.criteria.safety.separation import Separation
 from seerob.criteria.safety.velocity import Velocity
 from seerob.model.model import Model
 from seerob.session.permissible.ceiling import Answer, Ask, Ceiling, Figure, Look, Method
-from seerob.session.permissible.contact_ceiling import contact
-from seerob.session.permissible.separation_ceiling import separation
+from seerob.twin.accuracy.distance_ends import DistanceEnds
 from seerob.twin.state import State
+
+ANYWHERE = 1e3
+"""Horizon within which everybody is [m]: a method that permits a speed by itself has to judge everybody."""
+
+
+def contact(criterion: PowerAndForce, model: Model, *, anywhere: bool = False) -> Answer:
+    """How to ask for the shares, one for each body region that something could hit.
+
+    Args:
+        criterion: Of the workstation.
+        model: The compiled workstation.
+        anywhere: Whether to ask wherever people are, not only within its horizon.
+    """
+    contacts = Contacts(changed(criterion, horizon=ANYWHERE) if anywhere else criterion, model)
+
+    def ask(state: State) -> tuple[Ceiling, ...]:
+        judged = contacts.judge(state)
+        regions = np.flatnonzero(judged.near.any(axis=0)).tolist()
+        return tuple(
+            ceiling for k in regions if (ceiling := _of_region(contacts, judged, int(k))) is not None
+        )
+
+    return ask
+
+
+def _of_region(contacts: Contacts, judged: Judged, k: int) -> Ceiling | None:
+    """Of one of `REGIONS` that something could hit; None for one that other measures keep from contact."""
+    spec, model, name = contacts.spec, contacts.model, REGIONS[k]
+    if name in spec.excluded:
+        return None
+    rows = np.flatnonzero(judged.near[:, k])
+    bodies = [model.bodies[contacts.moving[row]].name for row in rows]
+    column = contacts.columns.get(name)
+    if column is None:
+        region = contacts.limits.region(name)
+        row = int(judged.v_r[rows].argmax())
+        within = None if contacts.people is None else f"{bodies[row]} moves {_where(spec)}"
+        permitted = region is None or region.permitted
+        verdict, reason = without_limit(name, permitted, within, contacts.limits.file)
+        stopped = verdict is Verdict.EXCEEDED
+        return Ceiling(
+            spec.name, 0.0 if stopped else math.nan, 0.0 if stopped else math.nan, name, bodies[row],
+            governs="no contact permitted" if stopped else "", reason=reason,
+        )  # fmt: skip
+    speeds = judged.speeds
+    measured = contacts.measured.permits(column, judged.clamped[:, column])[rows]
+    v = np.maximum(np.minimum(judged.least[rows, column], measured) - judged.v_h[k], 0.0)
+    own = judged.v_r if judged.closing is None else np.maximum(judged.v_r, judged.closing[:, k])
+    shares = v / np.maximum(own[rows], STANDSTILL)
+    open_rows = np.isnan(speeds.pressure[rows, column]) | np.isnan(measured)
+    i = int(open_rows.argmax()) if open_rows.any() else int(shares.argmin())
+    row = int(rows[i])
+    how = "clamped" if judged.clamped[row, column] else "free"
+    if judged.on_floor is not None and judged.on_floor[row, column]:
+        how = "clamped on the floor"
+    if open_rows.any():
+        why = f"contact pressure of {bodies[i]} ({how}): {contacts.unknown[row]}"
+        if np.isnan(measured[i]):
+            why = f"what was measured of {bodies[i]} permits no speed that is known"
+        return Ceiling(spec.name, math.nan, math.nan, name, bodies[i], how, reason=why)
+    governs = Governing(int(speeds.governing[row, column])).name.lower()
+    reason = ""
+    if shares[i] == 0:
+        moves = judged.v_h[k] > 0
+        reason = "the person alone is faster than permitted" if moves else "no speed of contact is permitted"
+    limit = _limit(contacts, name, governs, row, clamped=bool(judged.clamped[row, column]))
+    share, speed = float(shares[i]), float(v[i])
+    if measured[i] < judged.least[row, column]:
+        return Ceiling(spec.name, share, speed, name, bodies[i], how, "measurement", reason)
+    return Ceiling(spec.name, share, speed, name, bodies[i], how, governs, reason, limit=limit)
+
+
+def _where(spec: PowerAndForce) -> str:
+    """How near to the person, in words."""
+    if spec.horizon >= ANYWHERE:
+        return "and nothing else keeps the person away"
+    return f"within {spec.horizon:g} m"
+
+
+def _limit(contacts: Contacts, region: str, governs: str, row: int, *, clamped: bool) -> Figure | None:
+    """The figure of the table that governs: quasi-static when clamped, else transient."""
+    arrays, column = contacts.arrays, contacts.columns[region]
+    of = arrays.regions[column]
+    factor = 1.0 if clamped else float(arrays.multiplier[column])
+    kind = "quasi-static" if clamped else f"transient, {factor:g} times the quasi-static"
+    if governs == "force":
+        return Figure(factor * of.force.value, of.force.unit, f"{kind}; {of.force.source}")
+    if governs == "pressure":
+        own = np.flatnonzero(arrays.owner == column)
+        k = int(contacts.forces[row, 0 if not clamped else 1, own].argmin())
+        area = of.areas[k]
+        source = f"{area.name}, {kind}; {area.pressure.source}"
+        return Figure(factor * area.pressure.value, area.pressure.unit, source)
+    # Only a printed energy can be below that of the force.
+    return None if of.energy is None else Figure(of.energy.value, of.energy.unit, of.energy.source)
+
+
+def separation(criterion: Separation, model: Model, robot: str) -> tuple[Answer, Look | None]:
+    """How to ask for the share, and for the fixed mode how to show the places on the way before that.
+
+    Args:
+        criterion: Of the workstation; one of its sides is the robot.
+        model: The compiled workstation.
+        robot: Whose speed is asked about.
+    """
+    unknown = criterion.unknown(model)
+    inverse = criterion.at_worst(model).inverse(model)
+    human = next(name for name in criterion.between if name != robot)
+    gap = model.gap(model.select(human), model.robot(robot).moving)
+    names = [model.bodies[i].name for i in gap.b]
+    ends = DistanceEnds(model, gap)
+    least = np.full(len(gap.b), np.inf)
+    fixed = criterion.mode == "fixed"
+
+    def distances(state: State) -> Array:
+        # As the criterion has them: the least that the errors of the twin's bones leave possible.
+        return ends.of_bodies(state, state.closest_per_body(gap).distance)[0]
+
+    def look(state: State) -> None:
+        # Where somebody's place is not known the map has no number either.
+        with suppress(Undecided):
+            np.minimum(least, distances(state), out=least)
+
+    def ask(state: State) -> tuple[Ceiling, ...]:
+        if unknown:
+            raise Undecided(unknown)
+        distance = distances(state)
+        if fixed:
+            distance = np.minimum(distance, least)
+        S_p, (speed, share) = inverse(state, distance)
+        k = int((distance - S_p).argmin())
+        part = f"{names[k]}: {distance[k]:.3f} m from {human}"
+        part += " at the nearest place of the way" if fixed else ""
+        if share.value is not None:
+            at = math.nan if speed.value is None else speed.value
+            reason = f"too near at any speed ({part})" if share.value == 0 else ""
+            return (
+                Ceiling(criterion.name, share.value, at, surface=part, governs="separation", reason=reason),
+            )
+        # Without a share it stands still, and then the distance alone says whether it may move.
+        near = share.reason.startswith("stands still") and bool((distance < S_p).any())
+        reason = f"too near at standstill ({part})" if near else ""
+        return (Ceiling(criterion.name, 0.0 if near else math.inf, governs="separation", reason=reason),)
+
+    return ask, look if fixed else None
 
 
 def ceilings_of(criterion: Criterion, model: Model, robot: str, *, anywhere: bool = False) -> Ask | None:

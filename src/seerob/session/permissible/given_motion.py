@@ -1,18 +1,26 @@
-"""The motion that is given: a cubic from sample to sample, as the twin's reference has it."""
+"""The motion that is given: a cubic from sample to sample, as the twin's reference has it.
+
+A path of the tool is solved into joint positions: inverse kinematics from pose to pose, as the twin solves
+it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.errors import InputError
-from seerob.core.samples import LARGEST_SPEED, JointSample, Quality
-from seerob.core.transforms import Array
+from seerob.core.samples import LARGEST_SPEED, JointSample, PoseSample, Quality
+from seerob.core.transforms import Array, rotation_from_wxyz
 from seerob.files.trajectories.trajectory import derive_velocities
 from seerob.kernels.pull import SLACK
+from seerob.model.model import Mechanism, Model
+from seerob.twin.control.inverse_kinematics import solve_pose
+from seerob.twin.engine import POSE_TOLERANCE
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,3 +146,43 @@ def largest_hermite(d0: Array, d1: Array, e0: Array, e1: Array) -> Array:
         inside = np.clip(np.nan_to_num(x, nan=0.0, posinf=0.0, neginf=0.0), 0.0, 1.0)
         best = np.maximum(best, np.abs(d0 + inside * (e0 + inside * (c2 + inside * c3))))
     return np.asarray(best)
+
+
+def solved(model: Model, robot: Mechanism, samples: Sequence[PoseSample]) -> list[JointSample]:
+    """Joint positions for poses, each from those before it; the branch is the nearest, as in the engine.
+
+    Args:
+        model: The compiled workstation.
+        robot: Who is to bring the tool there.
+        samples: In the order of time.
+
+    Raises:
+        InputError: A pose that is not finite, or out of reach.
+    """
+    data = mujoco.MjData(model.mj)
+    q = robot.home
+    out: list[JointSample] = []
+    for sample in samples:
+        position, wxyz = np.array(sample.position), np.array(sample.wxyz)
+        if not (np.isfinite(position).all() and np.isfinite(wxyz).all()):
+            what = f"a pose that is not finite at {sample.t:.3f} s"
+            raise InputError.at("permissible speed", robot.name, what, "correct the source")
+        frame = model.frame(sample.target)
+        q, miss = solve_pose(
+            model.mj, data, robot, frame, rotation_from_wxyz(wxyz), position, start=q
+        )  # fmt: skip
+        good = sample.quality is Quality.GOOD
+        if miss.larger > POSE_TOLERANCE and good:
+            what = f"the pose at {sample.t:.3f} s is out of reach: the nearest that was found is {miss}"
+            raise InputError.at("permissible speed", robot.name, what, "move the path or the robot")
+        out.append(
+            JointSample(
+                source=sample.source,
+                target=robot.name,
+                seq=sample.seq,
+                t=sample.t,
+                quality=sample.quality,
+                q=tuple(q.tolist()),
+            )
+        )
+    return out

@@ -1,22 +1,66 @@
-"""What was found, in sentences, tables and a picture for the report."""
+"""What was found, in sentences, tables and a picture for the report.
+
+The picture of the map is drawn in the cell; the table lists segments.
+"""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import starmap
 
 import numpy as np
 
 from seerob.core.report_section import ReportSection, ReportTable
+from seerob.core.snapshot import Result, Scene
 from seerob.core.transforms import Array
+from seerob.files.trajectories.path_markers import Place, path_markers
 from seerob.session.permissible.between_samples import METHOD, Bound
 from seerob.session.permissible.ceiling import Ceiling
 from seerob.session.permissible.evaluation import PermissibleSpeed
 from seerob.session.permissible.methods import BY, EITHER_NEEDS, By
-from seerob.session.permissible.report_place import ReportPlace
 from seerob.session.permissible.segments import PathSegment
+from seerob.session.permissible.speed_map import SpeedMap
 from seerob.session.permissible.tables import COST_HEAD, Cell, cost_rows, least_by_region
 from seerob.session.permissible.verification import Verified
+
+
+@dataclass(frozen=True, eq=False)
+class ReportPlace:
+    """What a report needs beside the result."""
+
+    scene: Scene
+    meshes: Mapping[str, bytes]
+    """Binary glTF per mesh hash of the scene's nodes."""
+    segments: tuple[PathSegment, ...]
+
+    def picture(self, found: PermissibleSpeed) -> bytes:
+        """The way of the tool point in the cell, PNG."""
+        from seerob.outputs.picture.picture import Stage
+
+        drawn = Result(name=found.map.robot, unit="m/s", markers=path_markers(places(found.map)))
+        stage = Stage(self.scene, dict(self.meshes))
+        return stage.picture(found.first, drawn, subjects=(found.map.robot,))
+
+
+def places(found: SpeedMap) -> list[list[Place]]:
+    """The stations of every piece as they are drawn."""
+    return [
+        list(
+            starmap(
+                Place,
+                zip(
+                    map(tuple, one.tool.tolist()),
+                    (one.permissible * one.lever).tolist(),
+                    (one.given * one.lever).tolist(),
+                    strict=True,
+                ),
+            )
+        )
+        for one in found.stations
+    ]
+
 
 LONGEST = 12
 """Rows of what governs; the rest is in the workbook."""

@@ -314,6 +314,29 @@ kind = "separation_area"
 name = "around"
 separation = "bound"
 of = "op"
+[[safety]]
+kind = "separation"
+name = "ever"
+mode = "fixed"
+between = ["a", "op"]
+stop = {{ reaction = 0.1, stopping = 0.2 }}
+intrusion = 0
+human_uncertainty = 0
+robot_uncertainty = 0
+[[safety]]
+kind = "separation"
+name = "ever held"
+mode = "fixed"
+between = ["a", "op"]
+stop = {{ model = "constant_deceleration", reaction = 0.1, deceleration = 12, acceleration = 2 }}
+intrusion = 0
+human_uncertainty = 0
+robot_uncertainty = 0
+[[safety]]
+kind = "separation_area"
+name = "around it"
+separation = "ever"
+of = "op"
 """
 
 
@@ -339,6 +362,7 @@ def test_nothing_that_is_met_between_two_ticks_is_worse_than_the_bound(tmp_path,
     station = random_cell(tmp_path, np.random.default_rng(seed), tick=tick, physics=physics, rate=rate)
     room = worst_found(station, looks=9)
     assert set(room) >= {"distance", "area", "fastest", "point", "energy", "bound", "braking"}
+    assert set(room) >= {"ever", "ever held", "around it"}
     # The first arm's last joint moves its point nowhere: it is on its limit of 0, which is exceeded.
     assert ("singularity" in room) is (seed != 1)
     for name, found in room.items():
@@ -435,6 +459,53 @@ def test_what_is_too_near_just_when_a_criterion_begins_to_apply_is_exceeded(tmp_
     found = touching(tmp_path, shaking(0.01), separation, kind="separation", told=told)
     assert (found.verdict is Verdict.EXCEEDED) is exceeds
     assert (found.worst().t == pytest.approx(0.0775, abs=2e-3)) is exceeds
+
+
+EVER = """
+[[safety]]
+kind = "separation"
+name = "s"
+mode = "{mode}"
+between = ["arm", "op"]
+stop = {{ reaction = 0.01, stopping = 0.1{ahead} }}
+human_speed = {speed}
+intrusion = 0
+human_uncertainty = 0
+robot_uncertainty = 0
+"""
+AROUND = '[[safety]]\nkind = "separation_area"\nname = "c"\nseparation = "s"\nof = "op"\n'
+
+
+NEARING = np.sort(np.append(np.arange(51) * 0.002, [0.0245, 0.025, 0.0255]))
+
+
+def nearing(faster):
+    """To the person at 0.5 rad/s, and by some rad/s faster within a millisecond about 25 ms."""
+    qd = 0.5 + np.where(NEARING == 0.025, faster, 0.0)
+    q = np.concatenate([[0], np.cumsum((qd[1:] + qd[:-1]) / 2 * np.diff(NEARING))])
+    return lambda t: ((np.interp(t, NEARING, q), 0.0), (np.interp(t, NEARING, qd), 0.0))
+
+
+@pytest.mark.parametrize("mode", ["fixed", "dynamic"])
+@pytest.mark.parametrize(
+    ("kind", "ahead"), [("separation", ""), ("separation", ", acceleration = 0"), ("area", "")]
+)
+def test_a_fixed_separation_remembers_what_s_p_was_between_two_ticks(tmp_path, kind, ahead, mode):
+    """At 0.7 rad/s for a moment between ticks, and 50 ms later as near as is enough for 0.5 rad/s alone."""
+
+    def found(faster, speed):
+        text = f"engine = {{ physics = false, gravity = [0, 0, 0] }}\n{TWO_R}{person('op', 2.4, 0.5, 0)}"
+        text += SOURCE + EVER.format(mode=mode, speed=speed, ahead=ahead) + (AROUND if kind == "area" else "")
+        files = {"arm.urdf": two_r(), "motion.csv": rows(nearing(faster), NEARING.tolist())}
+        summary = made(tmp_path / f"{faster}", text, files).run()
+        return summary.results["c" if kind == "area" else "s"]
+
+    steady = found(0.0, 1.6)
+    # What comes when the log has ended, nobody knows, and up to then it comes nearer.
+    speed = 1.6 + (float((steady.values - steady.limits)[7]) - 0.005) / 0.11
+    moved = found(0.2, speed)
+    assert not moved.verdicts[:2].any()
+    assert bool(moved.verdicts[7]) is (mode == "fixed")
 
 
 def contact(only="", **more):

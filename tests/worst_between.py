@@ -13,7 +13,7 @@ def worst_found(station, looks):
     engine = engine_of(station.model)
     judge = Judge(station.bound)
     between = judge._between
-    room = {}
+    room, largest = {}, {}
 
     def watching(i, watch, ends, state):
         if ends[0].margin is None or ends[1].margin is None:
@@ -24,7 +24,15 @@ def worst_found(station, looks):
         met = []
         for t in instants.tolist():
             _, there, _ = between._look(i, watch, path, t, state)
-            met.append(-1.0 if there.margin is None else np.min(there.margin[0] - there.margin[1]))
+            if there.margin is None:
+                met.append(-1.0)
+                continue
+            rise = 0.0
+            if watch.follows is not None and watch.follows.keeps and np.ndim(there.margin[0]):
+                # The largest that was met counts, at ticks and between them.
+                largest[watch] = np.maximum(largest.get(watch, 0.0), there.figure)
+                rise = largest[watch] - there.figure
+            met.append(np.min(there.margin[0] - rise - there.margin[1]))
         room.setdefault(watch.criterion.name, []).append(min(met) - low)
         return Told()
 

@@ -68,6 +68,9 @@ def bounded(seed):
     turn = rng.uniform(-np.pi, np.pi)
     more = by_table("held", len(cell.links), ", acceleration = 0") + by_table("ahead", len(cell.links), "")
     more += by_table("ever", len(cell.links), ", acceleration = 0", 'mode = "fixed"\n')
+    for name in ("held", "ahead", "ever"):
+        more += f'[[safety]]\nkind = "separation_area"\nname = "around {name}"\n'
+        more += f'separation = "{name}"\nof = "op"\n'
     more += '[[safety]]\nkind = "path_speed"\nname = "path"\nrobot = "arm"\nmap = "map.csv"\n'
     more += '[[safety]]\nkind = "force_polytope"\nname = "force"\nat = "arm"\nlimit = 1e7\n'
     more += '[[safety]]\nkind = "force_polytope"\nname = "bare"\nat = "arm"\nlimit = 1e7\nload = "none"\n'
@@ -93,7 +96,8 @@ def test_no_bound_is_beaten_by_what_is_met_between_two_ticks(tmp_path, seed):
         (tmp_path / name).write_text(text)
     room = worst_found(load(tmp_path), looks=3)
     # An arm of two joints can press with any force in some direction: that exceeds every limit.
-    assert set(room) - {"force", "bare"} == {"energy", "held", "ahead", "ever", "path"}
+    around = {"around held", "around ahead", "around ever"}
+    assert set(room) - {"force", "bare"} == {"energy", "held", "ahead", "ever", "path", *around}
     for name, found in room.items():
         assert min(found) >= -1e-9, name
         assert np.isfinite(found).mean() > 0.5, name  # it bounds something

@@ -11,7 +11,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ from msgspec.structs import replace
 from seerob.core.errors import Undecided, UnknownName
 from seerob.core.snapshot import Result, Verdict
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate, Lowest
+from seerob.criteria.criterion import Criterion, Evaluate, Follows, Lowest, Moment
 from seerob.model.model import Model
 from seerob.twin.spans import Fall, Falls, Indices, Margin, Path, Points, Span
 from seerob.twin.state import State
@@ -51,6 +51,10 @@ class Watch:
     """Whether it is asked in the order of time only."""
     again: Callable[[], Evaluate]
     """Makes another one of it, which is asked of instants in any order."""
+    follows: Follows | None
+    """What its limit follows from, when that is bounded apart."""
+    within: Follows | None
+    """Another one of it, which is asked of instants between ticks."""
     people: tuple[str, ...]
     """Whose place it depends on: how well devices know that changes from tick to tick."""
 
@@ -61,7 +65,10 @@ def watched(criterion: Criterion, model: Model, points: Points) -> Watch | None:
     if falls is None and lowest is None:
         return None
     remembers, people = criterion.remembers(model), _people(criterion, model)
-    return Watch(criterion, points, falls, lowest, remembers, lambda: criterion.bind(model), people)
+    follows = criterion.follows(model, points)
+    within = criterion.follows(model, points)
+    again = follows.again if follows is not None else lambda: criterion.bind(model)
+    return Watch(criterion, points, falls, lowest, remembers, again, follows, within, people)
 
 
 def _people(criterion: Criterion, model: Model) -> tuple[str, ...]:
@@ -85,6 +92,22 @@ class End(NamedTuple):
     """Nothing was there to judge."""
     muted: bool = False
     """It did not apply."""
+    figure: Array | None = None
+    """What its limit follows from there, see `Follows`; None where nothing is, or it is not known."""
+
+
+@dataclass
+class Followed:
+    """What a limit follows from, up to now."""
+
+    last: Moment | None = None
+    """At the last tick; None where it was not known."""
+    known: Array | None = None
+    """The largest at any instant at which the criterion was asked."""
+    most: Array = field(default_factory=lambda: np.zeros(0))
+    """A bound on it: of the way from the last tick or, where it keeps, ever."""
+    open: bool = True
+    """Whether nobody knows it on the way from the last tick."""
 
 
 class Asking(NamedTuple):
@@ -123,6 +146,7 @@ class BetweenTicks:
         self._whole: Span | None = None
         """Of the way from tick to tick, which all criteria ask for."""
         self._again: dict[int, Evaluate] = {}
+        self._followed: dict[Watch, Followed] = {}
         self._failed: dict[int, str] = {}
         """Why nothing bounds a criterion any more in this run."""
         self.looks = 0
@@ -146,7 +170,7 @@ class BetweenTicks:
             return tuple(found)
         speeds, ids, path = state.largest_speeds(), state.attachments.ids, state.path
         if path is None or self._ids is None or self._speeds is None:
-            path, self._before = None, [None] * len(found)
+            path, self._before, self._followed = None, [None] * len(found), {}
         self._way, self._asking, self._whole = path, asking, None
         for i, watch in enumerate(self._watches):
             if watch is None:
@@ -166,12 +190,16 @@ class BetweenTicks:
         """What a criterion says of a tick, with what happened since the last one."""
         before = self._before[i]
         switches = self._switches(watch, before, state)
+        if watch.follows is not None:
+            self._follow(watch, watch.follows, state, speeds, muted=result.muted)
         if result.t is not None and result.t != state.t and before is not None:
             self._before[i] = None if switches else self._falling(watch, before, state, speeds)
             if self._before[i] is not None:
                 return result
             result = self._asking.now(i)
         now = _end(watch.criterion, result, state.t, speeds)
+        if watch.follows is not None:
+            now = now._replace(figure=self._figure(watch, watch.follows, result, state.t))
         if self._way is not None and before is not None:
             told = (
                 self._switched(i, watch, (before, now), switches, state)
@@ -185,6 +213,87 @@ class BetweenTicks:
                 result = replace(self._asking.take_back(result, told.open), muted=False)
         self._before[i] = now
         return result
+
+    def _follow(self, watch: Watch, follows: Follows, state: State, speeds: Array, *, muted: bool) -> None:
+        """Bound what a limit follows from on the way to this tick."""
+        told = self._followed.setdefault(watch, Followed())
+        now: Moment | None = None
+        with suppress(Undecided):
+            now = None if muted and follows.keeps else follows.now(state)
+        before, path = told.last, self._way
+        told.last, told.open = now, True
+        if now is None:
+            return
+        highest = [now.figure]
+        if before is not None and path is not None and self._speeds is not None:
+            ends = End(float(path.t[0]), None, None, self._speeds), End(state.t, None, None, speeds)
+            most = self._highest(watch, follows, ends, (before, now), told, state)
+            told.open = not np.isfinite(most).all()
+            highest += [] if told.open else [most]
+        if follows.keeps and told.most.size:
+            highest.append(told.most)
+        told.most = np.max(highest, axis=0)
+
+    def _highest(
+        self,
+        watch: Watch,
+        follows: Follows,
+        ends: tuple[End, End],
+        moments: tuple[Moment, Moment],
+        told: Followed,
+        state: State,
+    ) -> Array:
+        """Bound what a limit follows from between two ticks; looks at instants where that is worth it."""
+        path, within = self._way, watch.within
+        assert path is not None
+        assert within is not None
+        least = np.maximum(*(moment.figure for moment in moments))
+        if follows.keeps and told.most.size:
+            least = np.maximum(least, told.most)
+
+        def bounded(a: End, b: End, at: Moment) -> tuple[float, float, End, End, Moment, Array]:
+            most = follows.most(self._span(watch, path, (a, b), state), at)
+            return -float((most - least).max(initial=0.0)), a.t, a, b, at, most
+
+        spans = [bounded(*ends, moments[0])]
+        for _ in range(FEW):
+            if not follows.close < -spans[0][0] < np.inf:
+                break
+            _, _, a, b, at, _ = heapq.heappop(spans)
+            t = path.middle(a.t, b.t)
+            self.looks += 1
+            shadow = self._placed(path, t, state)
+            try:
+                moment = within.now(shadow)
+            except Undecided:
+                return np.full(len(least), np.inf)
+            least = np.maximum(least, moment.figure)
+            middle = End(t, None, None, shadow.largest_speeds())
+            heapq.heappush(spans, bounded(a, middle, at))
+            heapq.heappush(spans, bounded(middle, b, moment))
+        return np.asarray(np.max([span[-1] for span in spans], axis=0))
+
+    def _figure(self, watch: Watch, follows: Follows, result: Result, t: float) -> Array | None:
+        """What the margin of a result that was asked now rests on."""
+        told = self._followed[watch]
+        if told.last is None:
+            return None
+        if not follows.keeps:
+            return told.last.figure
+        if result.value is not None and result.t in (None, t):
+            now = told.last.figure
+            told.known = now if told.known is None else np.maximum(told.known, now)
+        return told.known
+
+    def _left(self, watch: Watch, end: End) -> Margin | None:
+        """What is left of the margin at an end, were its limit as bad as anywhere on the way."""
+        if end.margin is None or watch.follows is None:
+            return end.margin
+        told, (margin, off) = self._followed[watch], end.margin
+        if told.open or end.figure is None:
+            return -np.inf if type(margin) is float else np.full(np.shape(margin), -np.inf), off
+        rise = np.maximum(told.most - end.figure, 0.0)
+        return margin - (float(rise.max(initial=0.0)) if type(margin) is float else rise), off
 
     @staticmethod
     def _switches(watch: Watch, before: End | None, state: State) -> tuple[float, ...]:
@@ -239,8 +348,10 @@ class BetweenTicks:
             return before._replace(t=state.t, speeds=speeds)
         fall = self._fall(watch, path, (before, before._replace(t=state.t, speeds=speeds)), state)
         margin, off = before.margin
-        left = margin - fall.fall
-        return End(state.t, _WITHIN, (left, off), speeds) if np.all(left - off >= 0) else None
+        end = before._replace(t=state.t, margin=(margin - fall.fall, off), speeds=speeds)
+        left = self._left(watch, end)
+        assert left is not None
+        return end if np.all(left[0] - left[1] >= 0) else None
 
     def _judge(self, i: int, watch: Watch, ends: tuple[End, End], state: State, *, cut: bool = False) -> Told:
         """The way between two instants at which a criterion was asked.
@@ -300,7 +411,7 @@ class BetweenTicks:
             except Undecided:
                 return -np.inf
         fall, bend = self._fall(watch, path, ends, state)
-        (m, off), *rest = [end.margin for end in ends if end.margin is not None]
+        (m, off), *rest = [m for m in (self._left(watch, end) for end in ends) if m is not None]
         if not rest:
             return float(np.min(m - fall - off))
         ((other, also),) = rest
@@ -314,8 +425,9 @@ class BetweenTicks:
         assert path is not None
         begin, end = (f"{each.t:.4g} s" for each in ends)
         assert self._ids is not None
-        if watch.remembers or not np.array_equal(self._ids, state.attachments.ids):
-            what = "it remembers" if watch.remembers else "something was picked up or let go"
+        remembers = watch.remembers and watch.follows is None
+        if remembers or not np.array_equal(self._ids, state.attachments.ids):
+            what = "it remembers" if remembers else "something was picked up or let go"
             return Told(open=f"not known to be within from {begin} to {end}: {what}")
         spans = [(low, ends[0].t, *ends)]
         doubt = ""
@@ -348,6 +460,16 @@ class BetweenTicks:
         self.looks += 1
         if i not in self._again:
             self._again[i] = watch.again()
+        shadow = self._placed(path, t, state)
+        result = self._asking.at(i, self._again[i], shadow, applies)
+        end = _end(watch.criterion, result, t, shadow.largest_speeds())
+        if watch.within is not None:
+            with suppress(Undecided):
+                end = end._replace(figure=watch.within.now(shadow).figure)
+        return result, end, shadow
+
+    def _placed(self, path: Path, t: float, state: State) -> State:
+        """The twin at an instant between two ticks."""
         if self._shadow is None:
             data = mujoco.MjData(state.model.mj)
             self._shadow = State(state.model, data, state.hearings, state.signals)
@@ -356,8 +478,7 @@ class BetweenTicks:
         shadow.columns, shadow.foresee = state.columns, state.foresee
         shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)
         shadow.refresh(t)
-        result = self._asking.at(i, self._again[i], shadow, applies)
-        return result, _end(watch.criterion, result, t, shadow.largest_speeds()), shadow
+        return shadow
 
 
 def _end(criterion: Criterion, result: Result, t: float, speeds: Array) -> End:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple
 
 from msgspec import Meta, Struct
 
@@ -15,6 +15,7 @@ from seerob.core.snapshot import Basis, Result, Verdict
 from seerob.core.verdict import keeps
 
 if TYPE_CHECKING:
+    from seerob.core.transforms import Array
     from seerob.model.model import Model
     from seerob.recording.answers import Answers
     from seerob.twin.spans import Falls, Margin, Points, Span
@@ -26,6 +27,35 @@ Evaluate = Callable[["State"], Result]
 Lowest = Callable[["State", "Span"], float]
 """Below its margin at every instant of a span, negative where that is not known, given the twin at one end of
 the span; may raise `Undecided`."""
+
+
+class Moment(NamedTuple):
+    """What a limit follows from at an instant, one per part."""
+
+    figure: Array
+    """That a margin falls by as much as it rises, in the unit of the margin, shape (n,)."""
+    beside: tuple[Array, ...] = ()
+    """What else bounds its rise from then."""
+
+
+class Follows(NamedTuple):
+    """A limit that changes with the twin, apart from what is compared with it.
+
+    What `Criterion.falls` says is then how far margins fall while the limit stays.
+    """
+
+    now: Callable[[State], Moment]
+    """May raise `Undecided`."""
+    most: Callable[[Span, Moment], Array]
+    """The largest figure at any instant of a span, given that at its begin; infinity where nobody knows."""
+    close: float
+    """A rise that is no reason to look at more instants, in the unit of the margin."""
+    keeps: bool
+    """Whether the largest since a run began counts."""
+    again: Callable[[], Evaluate]
+    """Makes what judges an instant by the figure of that instant."""
+
+
 EvaluateMany = Callable[["States"], "Answers"]
 """Called with many instants; may raise `Undecided`, of all of them."""
 
@@ -108,6 +138,10 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def lowest(self, model: Model, points: Points) -> Lowest | None:
         """Instead of `falls`: what bounds its margin within a span of which the twin at one end is given."""
+        return None
+
+    def follows(self, model: Model, points: Points) -> Follows | None:
+        """What its limit follows from between instants, when that is bounded apart; see `Follows`."""
         return None
 
     def margin(self, result: Result) -> Margin:

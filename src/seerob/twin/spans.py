@@ -233,13 +233,17 @@ class Span:
         """How far a velocity gets from the straight line between those at both ends [m/s], shape (p,)."""
         self.slow = np.zeros(len(fast))
         """Least speed of the fastest point of each body [m/s], shape (n,)."""
+        self.ends = fast
+        """Larger of its speeds at both ends [m/s], shape (n,), once these are known."""
         self.qd, self.qdd, _, self.away = joints
         """Largest absolute speed and acceleration of every joint, and way from the model's pose, (nv,)."""
 
     def between_speeds(self, before: Array, after: Array) -> None:
         """Take into account how fast bodies are at both ends [m/s], shape (n,) each."""
         n = len(before)
-        most = (before + after + self.quick[:n] * self.T) / 2
+        self.ends = np.maximum(before, after)
+        # Along the straight line between two velocities no speed is larger than at both ends.
+        most = np.minimum((before + after + self.quick[:n] * self.T) / 2, self.ends + self.bend[:n])
         np.minimum(self.fast[:n], most, out=self.fast[:n])
         self.slow = np.maximum((before + after - self.quick[:n] * self.T) / 2, 0.0)
 

@@ -16,7 +16,15 @@ from seerob.core.errors import InputError, Undecided
 from seerob.core.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.core.tolerances import Shifts, Tolerance, deciding
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge_interval, worst
+from seerob.criteria.criterion import (
+    Criterion,
+    Evaluate,
+    EvaluateMany,
+    Follows,
+    Moment,
+    judge_interval,
+    worst,
+)
 from seerob.criteria.partly_seen import partly_seen
 from seerob.criteria.sensors.detection import Detection, device_of
 from seerob.criteria.stopping.inputs import approach_speed, intrusion
@@ -28,7 +36,7 @@ from seerob.criteria.stopping.search import TOP, factor_by_search
 from seerob.criteria.stopping.terms import At, Course, separation_distance, way_of_person
 from seerob.criteria.stopping.tolerances import SIMULATED, SeparationEnds, intervals, shifted, tolerances
 from seerob.description.norms import iso_13855
-from seerob.description.norms.iso_13855 import WALKING
+from seerob.description.norms.iso_13855 import REACHING, WALKING
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
 from seerob.twin.accuracy.distance_ends import DistanceEnds
@@ -40,6 +48,9 @@ from seerob.twin.state import State
 __all__ = ["Detection", "Separation", "Stop", "separation_bound"]
 
 
+CLOSE = 1e-4
+"""A rise of S_p between ticks that is not looked into [m]; our choice, a tenth of the tolerance to which
+`seerob.session.permissible.between_samples` bounds distances."""
 MORE = "S_p may be larger by"
 """Name of the part of a result that says so; there is none where S_p is known."""
 
@@ -372,6 +383,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
         """Bound the margin of each moving part between instants; None where nobody knows how S_p changes."""
         gap, rises = self._gap(model), self.rises(model)
         people, parts, lasts = rows_of(gap.a), rows_of(gap.b), self.lasts(model)
+        if self.mode == "fixed":
+            # How S_p rises is in `follows`.
+            return lambda span, _: Fall(span.way(people) + span.fast[parts] * span.T)
         if rises is None:
             most = self._most(model, points)
             n = len(parts)
@@ -393,6 +407,59 @@ class Separation(Criterion, frozen=True, kw_only=True):
             return Fall(np.inf, lost) if lasts else Fall(lost)
 
         return falls
+
+    def follows(self, model: Model, points: Points) -> Follows | None:
+        """With ``mode = "fixed"`` the largest S_p counts, also of instants between two ticks."""
+        if self.mode != "fixed":
+            return None
+        present = replace(self, mode="dynamic")
+        return self.limit_follows(model, points, keeps=True, again=lambda: present.bind(model))
+
+    def limit_follows(
+        self, model: Model, points: Points, *, keeps: bool, again: Callable[[], Evaluate]
+    ) -> Follows | None:
+        """S_p of each of `moving` as what a limit follows from; None where nothing bounds it within a span.
+
+        Args:
+            model: The compiled workstation.
+            points: Of which the motion is bounded.
+            keeps: See `Follows`, as the next.
+            again: Of whom the limit is.
+        """
+        own = replace(self.at_worst(model), mode="dynamic")._by_device(model)[0]
+        gap, stop, required = own._gap(model), own._stop(model), own.required(model)
+        people, parts, by_speed = rows_of(gap.a), rows_of(gap.b), stop.by_speed
+        K, longest = sum(own._terms()[0]) + gap.deviation, own._most(model, points)
+
+        def now(state: State) -> Moment:
+            onsets = (each(1.0).v_s for each in stop.reactions(state) if each is not None)
+            return Moment(required(state).most, (np.max([*onsets], axis=0), np.array(own._seen(state, gap))))
+
+        def known_ahead(span: Span, at: Moment) -> Array:
+            """S_p at the begin covers the tick, but for how fast parts and people get between its ends."""
+            assert by_speed is not None
+            v, seen = at.beside
+            low, high = by_speed(v), by_speed(v + np.maximum(span.fast[parts] - span.ends[parts], 0.0))
+            fastest, T_r = float(span.fast[people].max(initial=0.0)), own.stop.reaction
+            v_h = max(own.human_speed or REACHING, fastest)
+            longer = separation_distance(high, v_h, T_r, K) - separation_distance(low, v_h, T_r, K)
+            faster = max(fastest - max(own.human_speed or WALKING, float(seen)), 0.0)
+            return np.asarray(at.figure + longer + faster * (T_r + high.T_s))
+
+        def at_speeds(span: Span, _: Moment) -> Array:
+            assert by_speed is not None
+            seen = float(span.fast[people].max(initial=0.0))
+            return own._at_speeds(by_speed, K, span.fast[parts], seen)
+
+        def by_joints(span: Span, _: Moment) -> Array:
+            assert longest is not None
+            found = longest(span)
+            return np.full(len(parts), np.inf) if found is None else found
+
+        if by_speed is None and longest is None:
+            return None
+        most = by_joints if by_speed is None else known_ahead if stop.lasts else at_speeds
+        return Follows(now, most, CLOSE, keeps, again)
 
     def lasts(self, model: Model) -> bool:
         """Whether S_p of an instant is at least that of any other in the tick that begins with it.
@@ -445,6 +512,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
         away = np.array([part.value or 0.0 for part in parts])
         least = np.array([part.limit or 0.0 for part in parts])
         near = np.array([part.interval[0] if part.interval else part.value or 0.0 for part in parts])
+        if self.mode == "fixed":
+            return away - least, away - near
         return np.concatenate([away - least, near]), np.concatenate([away - near, np.zeros(len(parts))])
 
     def _required(self, now: Course, K: float, seen: float) -> Required:

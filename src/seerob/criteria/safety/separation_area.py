@@ -14,12 +14,13 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from msgspec import Meta
+from msgspec.structs import replace
 
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.snapshot import Basis, Highlight, Hull, Marker, Result, Segment, Verdict
 from seerob.core.transforms import Array
 from seerob.core.verdict import ROUNDING, keeps
-from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.criterion import Criterion, Evaluate, Follows
 from seerob.criteria.partly_seen import seen_first
 from seerob.criteria.sensors.sensing import Names, bodies_of, names_of
 from seerob.distance.least import Per
@@ -74,7 +75,9 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
 
     def bind(self, model: Model) -> Evaluate:
         """Look up every name in the model once and return the function that judges one instant."""
-        criterion = self._criterion(model)
+        return self._bind(model, self._criterion(model))
+
+    def _bind(self, model: Model, criterion: Any) -> Evaluate:
         moving, outside = self._sides(model)
         required = criterion.required(model)
 
@@ -171,18 +174,34 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         return bool(self._criterion(model).remembers(model))
 
     def falls(self, model: Model, points: Points) -> Falls | None:
-        """Bound the loss of distance between instants; None unless S_p follows from speeds alone."""
-        rises, lasts = self._criterion(model).rises(model), self._criterion(model).lasts(model)
-        if rises is None:
+        """Bound the loss of distance between instants; None unless S_p is bounded, too."""
+        criterion = self._criterion(model)
+        rises, lasts = criterion.rises(model), criterion.lasts(model)
+        apart = self.follows(model, points) is not None
+        if rises is None and not apart:
             return None
         moving, outside = map(rows_of, self._sides(model))
 
         def falls(span: Span, _: Array | float) -> Fall:
+            if apart:
+                return Fall(span.way(outside) + span.way(moving))
             nearer = span.fast[moving] * span.T + rises(span)
             lost = span.way(outside) + float(nearer.max(initial=0.0))
             return Fall(np.inf, lost) if lasts else Fall(lost)
 
         return falls
+
+    def follows(self, model: Model, points: Points) -> Follows | None:
+        """S_p is bounded apart where the largest counts, or where speeds alone do not tell how it changes."""
+        criterion = self._criterion(model)
+        keeps = criterion.remembers(model)
+        if not keeps and criterion.rises(model) is not None:
+            return None
+        present = replace(criterion, mode="dynamic")
+        found: Follows | None = criterion.limit_follows(
+            model, points, keeps=keeps, again=lambda: self._bind(model, present)
+        )
+        return found
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""

@@ -3,7 +3,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from seerob.kernels.primitives import segment_segment, segment_triangle, triangle_triangle
+from seerob.kernels.primitives import nearest_edge, segment_segment, segment_triangle, triangle_triangle
 from seerob.kernels.tree import triangle_rows
 
 RNG = np.random.default_rng(1)
@@ -79,6 +79,21 @@ def test_an_upper_bound_changes_no_bit_of_what_lies_below_it():
         assert triangle_triangle(ra, k, rb, k, bound, W) == free
         assert (V[:6] == W[:6]).all()
         assert triangle_triangle(ra, k, rb, k, free / 2, W) >= free
+
+
+def test_three_edges_at_once_are_the_three_one_by_one_bit_for_bit():
+    T = triangles(1200)
+    rt = rows(T)
+    for k in range(len(T)):
+        a, d = RNG.normal(size=(2, 3)) * (1.0, 1e-3, 1e-20, 1e60)[k % 4]
+        if k % 3 == 0:
+            d = T[k, 1] - T[k, 0] + (k % 2) * 1e-6 * RNG.normal(size=3)  # parallel to an edge, or nearly
+        origins = rt[k, :3], rt[k, :3], rt[k, :3] + rt[k, 3:6]
+        edges = rt[k, 3:6], rt[k, 6:9], rt[k, 6:9] - rt[k, 3:6]
+        one_by_one = [segment_segment(*a, *d, *o, *e) for o, e in zip(origins, edges, strict=True)]
+        least = min(range(3), key=lambda c: one_by_one[c][0])
+        found = nearest_edge(*a, *d, rt, k)
+        assert found == (*one_by_one[least], least)
 
 
 def exact_square(a, d, b, e) -> float:

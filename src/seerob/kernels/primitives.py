@@ -21,6 +21,7 @@ import numpy as np
 from numba import njit
 
 from seerob.core.transforms import Array
+from seerob.kernels.edges import nearest_in_lanes
 
 TOUCH = 1e-24
 """Squared distance below which two primitives touch [m²]."""
@@ -140,6 +141,41 @@ def over_face(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _edge(T: Array, k: int, c: int) -> tuple[float, float, float, float, float, float]:
+    """Where edge c of triangle ``T[k]`` begins, and the edge."""
+    if c < 2:
+        e = 3 + 3 * c
+        return T[k, 0], T[k, 1], T[k, 2], T[k, e], T[k, e + 1], T[k, e + 2]
+    return (
+        T[k, 0] + T[k, 3], T[k, 1] + T[k, 4], T[k, 2] + T[k, 5],
+        T[k, 6] - T[k, 3], T[k, 7] - T[k, 4], T[k, 8] - T[k, 5],
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _on_edge(T: Array, k: int, c: int, t: float) -> tuple[float, float, float]:
+    """Point of edge c of triangle ``T[k]``."""
+    ox, oy, oz, gx, gy, gz = _edge(T, k, c)
+    return ox + t * gx, oy + t * gy, oz + t * gz
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def nearest_edge(
+    ax: float, ay: float, az: float, dx: float, dy: float, dz: float, T: Array, k: int
+) -> tuple[float, float, float, int]:
+    """Squared distance of ``a + s·d`` to the first nearest edge of ``T[k]``, s and t there, which edge."""
+    settled, best, bs, bt, bc = nearest_in_lanes(ax, ay, az, dx, dy, dz, T, k)
+    if not settled:
+        best = np.inf
+        for c in range(3):
+            ox, oy, oz, gx, gy, gz = _edge(T, k, c)
+            g, s, t = segment_segment(ax, ay, az, dx, dy, dz, ox, oy, oz, gx, gy, gz)
+            if g < best:
+                best, bs, bt, bc = g, s, t, c
+    return best, bs, bt, bc
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def segment_triangle(
     ax: float, ay: float, az: float, dx: float, dy: float, dz: float, T: Array, k: int, cut: float
 ) -> tuple[float, float, float, float, float]:
@@ -203,21 +239,11 @@ def segment_triangle(
                     px = vx + fx
                     py = vy + fy
                     pz = vz + fz
-    for c in range(3):
-        if c == 0:
-            ox, oy, oz, gx, gy, gz = vx, vy, vz, e0x, e0y, e0z
-        elif c == 1:
-            ox, oy, oz, gx, gy, gz = vx, vy, vz, e1x, e1y, e1z
-        else:
-            ox, oy, oz = vx + e0x, vy + e0y, vz + e0z
-            gx, gy, gz = e1x - e0x, e1y - e0y, e1z - e0z
-        g, s, t = segment_segment(ax, ay, az, dx, dy, dz, ox, oy, oz, gx, gy, gz)
-        if g < best:
-            best = g
-            bs = s
-            px = ox + t * gx
-            py = oy + t * gy
-            pz = oz + t * gz
+    g, s, t, c = nearest_edge(ax, ay, az, dx, dy, dz, T, k)
+    if g < best:
+        best = g
+        bs = s
+        px, py, pz = _on_edge(T, k, c, t)
     return (0.0 if best < TOUCH else best), bs, px, py, pz
 
 
@@ -309,28 +335,12 @@ def triangle_triangle(A: Array, i: int, B: Array, j: int, cut: float, W: Array) 
         best = g
         W[:6] = other
     for a in range(3):
-        if a == 0:
-            ax, ay, az, dx, dy, dz = A[i, 0], A[i, 1], A[i, 2], A[i, 3], A[i, 4], A[i, 5]
-        elif a == 1:
-            ax, ay, az, dx, dy, dz = A[i, 0], A[i, 1], A[i, 2], A[i, 6], A[i, 7], A[i, 8]
-        else:
-            ax, ay, az = A[i, 0] + A[i, 3], A[i, 1] + A[i, 4], A[i, 2] + A[i, 5]
-            dx, dy, dz = A[i, 6] - A[i, 3], A[i, 7] - A[i, 4], A[i, 8] - A[i, 5]
-        for b in range(3):
-            if b == 0:
-                bx, by, bz, ex, ey, ez = B[j, 0], B[j, 1], B[j, 2], B[j, 3], B[j, 4], B[j, 5]
-            elif b == 1:
-                bx, by, bz, ex, ey, ez = B[j, 0], B[j, 1], B[j, 2], B[j, 6], B[j, 7], B[j, 8]
-            else:
-                bx, by, bz = B[j, 0] + B[j, 3], B[j, 1] + B[j, 4], B[j, 2] + B[j, 5]
-                ex, ey, ez = B[j, 6] - B[j, 3], B[j, 7] - B[j, 4], B[j, 8] - B[j, 5]
-            g, s, t = segment_segment(ax, ay, az, dx, dy, dz, bx, by, bz, ex, ey, ez)
-            if g < best:
-                best = g
-                W[0] = ax + s * dx
-                W[1] = ay + s * dy
-                W[2] = az + s * dz
-                W[3] = bx + t * ex
-                W[4] = by + t * ey
-                W[5] = bz + t * ez
+        ax, ay, az, dx, dy, dz = _edge(A, i, a)
+        g, s, t, c = nearest_edge(ax, ay, az, dx, dy, dz, B, j)
+        if g < best:
+            best = g
+            W[0] = ax + s * dx
+            W[1] = ay + s * dy
+            W[2] = az + s * dz
+            W[3], W[4], W[5] = _on_edge(B, j, c, t)
     return 0.0 if best < TOUCH else best

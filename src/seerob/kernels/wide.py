@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.boxes import fit_box
-from seerob.kernels.lanes import WIDTH, Lanes, of_rows
+from seerob.kernels.lanes import HUGE, WIDTH, Lanes, first_lane, of_rows
 from seerob.kernels.primitives import segment_triangle, triangle_triangle
 from seerob.kernels.search import cut_of, row_in
 
@@ -212,13 +212,15 @@ def nearest_to_segment(
                 continue
             i = stack[depth]
             if i >= 0:
-                _to_segment(boxes, i, given, low)
+                hits = _to_segment(boxes, i, given, cut, low)
                 base = depth
-                for c in range(WIDTH):
+                while hits:
+                    c = first_lane(hits)
+                    hits &= hits - 1
                     kid = kids[i, c]
                     if kid == NONE:
                         break
-                    bound = low[c] if low[c] < 1e30 else np.float32(0.0)  # too large for single precision
+                    bound = low[c] if low[c] < HUGE else np.float32(0.0)
                     if bound > cut:
                         continue
                     at = depth
@@ -405,12 +407,14 @@ def nearest_of_meshes(
                 else:
                     _box_in(boxes, ra, Q, p, given)
                     i = nb
-                _to_box(boxes, i, given, low)
+                hits = _to_box(boxes, i, given, cut, low)
                 base = depth
-                for c in range(WIDTH):
+                while hits:
+                    c = first_lane(hits)
+                    hits &= hits - 1
                     if kids[i, c] == NONE:
                         break
-                    bound = low[c] if low[c] < 1e30 else np.float32(0.0)  # too large for single precision
+                    bound = low[c] if low[c] < HUGE else np.float32(0.0)
                     if bound > cut:
                         continue
                     at = depth

@@ -6,6 +6,7 @@ import errno
 import io
 import math
 import resource
+import zipfile
 
 import numpy as np
 import openpyxl
@@ -134,3 +135,35 @@ def test_many_sheets_are_not_as_many_open_files():
         resource.setrlimit(resource.RLIMIT_NOFILE, before)
     book = openpyxl.load_workbook(out)
     assert [sheet["A2"].value for sheet in book] == list(range(100))
+
+
+def test_rows_are_what_the_library_would_write_itself():
+    head = ["t [s]", "value [m]", "word", "more"]
+    rows = [
+        [0.1, 1 / 3, "within", None],
+        [1e-300, -0.0, " a_x0041_<&", 7],
+        [math.nan, 12, "", True],
+        [],
+        [2.5],
+    ]
+    by_library = io.BytesIO()
+    with _sheets.book(by_library) as book:
+        formats = _sheets.Formats(book)
+        sheet = book.add_worksheet("sheet")
+        sheet.freeze_panes(1, 1)
+        looks = [*(formats.of(_sheets._format(unit)) for unit in ("s", "m")), None, None]
+        for k, look in enumerate(looks):
+            sheet.set_column(k, k, 11 if k == 1 else 9, look)
+        for k, title in enumerate(head):
+            sheet.write_string(0, k, title, formats.of(_sheets.HEAD))
+        for n, row in enumerate(rows, 1):
+            for k, value in enumerate(row):
+                if isinstance(value, str) and value:
+                    sheet.write_string(n, k, value, formats.of(value) if value == "within" else None)
+                elif isinstance(value, bool):
+                    sheet.write_boolean(n, k, value)
+                elif value is not None and value == value and value != "":
+                    sheet.write_number(n, k, value)
+    parts = [zipfile.ZipFile(out) for out in (written(head, rows), by_library)]
+    for name in ("xl/worksheets/sheet1.xml", "xl/styles.xml"):
+        assert parts[0].read(name) == parts[1].read(name)

@@ -182,9 +182,10 @@ class Sheets:
     ) -> SheetRows:
         sheet = self._book.add_worksheet(self._unique(name))
         sheet.freeze_panes(1, 1)
-        for k, (width, look) in enumerate(zip(widths, looks, strict=True)):
-            sheet.set_column(k, k, width, self._formats.of(look))
-        rows = SheetRows(sheet, self._formats)
+        columns = [self._formats.of(look) for look in looks]
+        for k, (width, column) in enumerate(zip(widths, columns, strict=True)):
+            sheet.set_column(k, k, width, column)
+        rows = SheetRows(sheet, self._formats, columns)
         rows.append([str(title) for title in head], word=HEAD)
         return rows
 

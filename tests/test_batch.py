@@ -273,29 +273,36 @@ def within(value, limit=2.0, interval=None, n=N):
     return Answers(*rows, np.full(n, CODES[Verdict.WITHIN], np.uint8), ends)
 
 
-@pytest.mark.parametrize(
-    ("says", "told"),
-    [
-        (lambda states: within(np.nan), "own: it is within, and has no value"),
-        (lambda states: within(-np.inf), "it is within, and has no value"),
-        (lambda states: within(1, np.nan), "it is within, and has no limit"),
-        (lambda states: within(3), "it is within, beyond its limit"),
-        (lambda states: within(1, 2, (0.5, 2.5)), "it is within, beyond its limit"),
-        (lambda states: within(1, 2, (np.nan, np.nan)), "it is within, beyond its limit"),
-        (lambda states: replace(within(np.nan, np.nan), verdict=NOTHING), "it says nothing, neither"),
-        (lambda states: replace(within(1), verdict=NOTHING), "it has a limit and no verdict"),
-        (lambda states: replace(within(1), nothing=np.ones(N, bool)), "says that there is nothing to judge"),
-        (lambda states: within(1, n=N - 1), f"of {N} instants, not"),
-        (lambda states: replace(within(1), verdict=np.full(N, 7, np.uint8)), "its verdicts \\[7\\] are none"),
-        (lambda states: np.ones(N), "returns ndarray, not seerob.api.Answers"),
-        (lambda states: 1 / 0, "own failed: ZeroDivisionError: division by zero"),
-    ],
+CONTRADICTING = (
+    (lambda states: within(np.nan), "own 0: it is within, and has no value"),
+    (lambda states: within(-np.inf), "it is within, and has no value"),
+    (lambda states: within(1, np.nan), "it is within, and has no limit"),
+    (lambda states: within(3), "it is within, beyond its limit"),
+    (lambda states: within(1, 2, (0.5, 2.5)), "it is within, beyond its limit"),
+    (lambda states: within(1, 2, (np.nan, np.nan)), "it is within, beyond its limit"),
+    (lambda states: replace(within(np.nan, np.nan), verdict=NOTHING), "it says nothing, neither"),
+    (lambda states: replace(within(1), verdict=NOTHING), "it has a limit and no verdict"),
+    (lambda states: replace(within(1), nothing=np.ones(N, bool)), "says that there is nothing to judge"),
+    (lambda states: within(1, n=N - 1), f"of {N} instants, not"),
+    (lambda states: replace(within(1), verdict=np.full(N, 7, np.uint8)), "its verdicts \\[7\\] are none"),
+    (lambda states: np.ones(N), "returns ndarray, not seerob.api.Answers"),
+    (lambda states: 1 / 0, "own 12 failed: ZeroDivisionError: division by zero"),
 )
-def test_arrays_of_ones_own_that_contradict_themselves_are_undecided(cell, motion, says, told):
-    found = cell.with_criteria(Own(name="own", says=says)).batch(*motion, t=T, threads=1)
-    assert found["own"].verdict is Verdict.UNDECIDED
-    assert set(found["own"].answers.verdict.tolist()) == {CODES[Verdict.UNDECIDED]}
-    assert all(re.search(told, reason) for reason in found["own"].reasons)
+
+
+@pytest.fixture(scope="module")
+def contradicting(cell, motion):
+    """All of them in one batch."""
+    own = [Own(name=f"own {k}", says=says) for k, (says, _) in enumerate(CONTRADICTING)]
+    return cell.with_criteria(*own).batch(*motion, t=T, threads=1)
+
+
+@pytest.mark.parametrize("k", range(len(CONTRADICTING)))
+def test_arrays_of_ones_own_that_contradict_themselves_are_undecided(contradicting, k):
+    found, told = contradicting[f"own {k}"], CONTRADICTING[k][1]
+    assert found.verdict is Verdict.UNDECIDED
+    assert set(found.answers.verdict.tolist()) == {CODES[Verdict.UNDECIDED]}
+    assert all(re.search(told, reason) for reason in found.reasons)
 
 
 def test_arrays_of_ones_own_say_where_there_is_nothing_to_judge(cell, motion):

@@ -130,3 +130,13 @@ def test_a_door_that_nobody_asks_about_is_told(tmp_path):
     told = [f for f in station.model.findings if "not evaluated" in f.text]
     assert [(f.subject, f.holds) for f in told] == [("door", ())]
     assert 'between = ["door", "op"]' in told[0].text
+
+
+def test_the_energy_of_a_cart_that_carries_nobody_is_the_same_in_arrays(tmp_path):
+    text = CELL[: CELL.index("[[robots]]")] + ENERGY.format("agv")
+    rows = "".join(f"{0.01 * k:.2f},{0.001 * k * k:.6f},0,0,0\n" for k in range(21))
+    station = made(tmp_path, text, {**FILES, "signals.csv": "t,x,y,heading,angle\n" + rows})
+    run, column = station.run().results["agv"], station.batch()["agv"]
+    assert np.nanmax(run.values) > 100
+    np.testing.assert_allclose(column.value, run.values, rtol=1e-9)
+    np.testing.assert_array_equal(column.answers.verdict, run.verdicts)

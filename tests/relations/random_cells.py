@@ -60,6 +60,31 @@ class Link:
 
 
 @dataclass(frozen=True)
+class Machine:
+    """What a PLC tells of, and what it may carry the robot on."""
+
+    kind: str
+    """agv, axis, turntable or door."""
+    carries: bool
+    """Whether the robot stands on it."""
+    place: np.ndarray
+    """x, y, yaw where its joints are 0."""
+    mass: float
+    amplitude: float
+    """Of its way about 0.3 [m or rad]: angles that no degrees could be."""
+    frequency: float
+    phase: float
+    height: float = 0.3
+    """Of its shape [m]."""
+    wider: float = 0.0
+    """Of its shape, to all sides [m]."""
+    heard: bool = True
+    """Whether there is anything in what the PLC told."""
+    by_file: bool = False
+    """Whether a file of joint positions drives it instead of variables."""
+
+
+@dataclass(frozen=True)
 class Cell:
     links: tuple[Link, ...]
     """Of a random arm; empty for one of the library."""
@@ -84,6 +109,8 @@ class Cell:
     world: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """x, y, yaw of everything."""
     names: tuple[str, str] = ("arm", "op")
+    cart: str = "cart"
+    """Name of the machine."""
     turned_tables: bool = False
     units: bool = False
     """Whether figures are written in mm and degrees."""
@@ -96,6 +123,7 @@ class Cell:
     uncertainty: float = 0.0
     mass_tolerance: float = 0.0
     obstacle: bool = False
+    machine: Machine | None = None
     more: str = ""
     """More tables."""
     left_out: frozenset[str] = field(default=frozenset())
@@ -104,6 +132,8 @@ class Cell:
 
 def random_cell(seed: int, *, published: bool = True) -> Cell:
     """An arm of two to seven joints that swings beside a person who stands or reaches.
+
+    Every other cell has a machine.
 
     Args:
         seed: Equal seeds are equal cells.
@@ -153,6 +183,33 @@ def random_cell(seed: int, *, published: bool = True) -> Cell:
             "distance": float(rng.uniform(0.05, 1.0)),
             "mass": float(rng.uniform(1, 15)),
         },
+        machine=random_machine(rng, far * np.array([np.cos(heading), np.sin(heading)])) if seed % 2 else None,
+    )
+
+
+def random_machine(rng: np.random.Generator, person: np.ndarray | None = None) -> Machine:
+    """A machine of any kind, which carries the arm in half of the cases where it can.
+
+    Args:
+        rng: Chance.
+        person: x, y of the person near whom one stands that carries nothing [m].
+    """
+    kind = str(rng.choice(["agv", "axis", "turntable", "door"]))
+    turn, far = rng.uniform(-np.pi, np.pi), rng.uniform(0.5, 2.0)
+    carries = kind != "door" and bool(rng.random() < 0.6)
+    beside = np.array(
+        [*(far * np.array([np.cos(turn), np.sin(turn)]) + (0.0 if person is None else person)), turn]
+    )
+    place = np.zeros(3) if carries else beside
+    return Machine(
+        kind=kind,
+        carries=carries,
+        place=place,
+        mass=float(rng.uniform(20, 200)),
+        amplitude=float(rng.uniform(0.02, 0.15)),
+        frequency=float(rng.uniform(0.5, 3.0)),
+        phase=float(rng.uniform(-np.pi, np.pi)),
+        by_file=bool(rng.random() < 0.4),
     )
 
 
@@ -234,6 +291,81 @@ def motion(cell: Cell) -> str:
     return "\n".join(rows) + "\n"
 
 
+WAYS = {"agv": ("x", "y", "heading"), "axis": ("way",), "turntable": ("angle",), "door": ("angle",)}
+"""Of each kind of machine, what tells its joints."""
+
+
+def machine_tables(cell: Cell, machine: Machine) -> list[str]:
+    """The machine, and what moves it."""
+    x, y, yaw = machine.place.tolist()
+    box = (np.array([0.06, 0.8, 1.8] if machine.kind == "door" else [0.6, 0.5, 0.0]) + machine.wider).tolist()
+    box[2] = 1.8 if machine.kind == "door" else machine.height
+    motion = {
+        "agv": 'vehicle = { x = "x", y = "y", heading = "heading" }',
+        "axis": 'slide = { along = [0, 1, 0], position = "way" }',
+        "turntable": 'turn = { angle = "angle" }',
+        "door": 'turn = { angle = "angle" }',
+    }[machine.kind]
+    table = (
+        f'[[machines]]\nname = "{cell.cart}"\nshape = {{ box = {box} }}\nmass = {machine.mass!r}\n'
+        f"at = {_place(cell, x, y, box[2] / 2 + 0.02, yaw)}\n"
+    )
+    if machine.by_file:
+        table += motion.split("=")[0] + "= { " + "along = [0, 1, 0] " * (machine.kind == "axis") + "}\n"
+        source = f'[[sources]]\nkind = "csv"\nrobot = "{cell.cart}"\nfile = "machine.csv"\n'
+    else:
+        table += motion + "\n"
+        source = (
+            '[[sources]]\nkind = "signals_csv"\nname = "plc"\nfile = "machine.csv"\ntime = "t"\n'
+            'time_unit = "s"\n'
+        )
+    return [table, source]
+
+
+def machine_files(cell: Cell, machine: Machine) -> dict[str, str]:
+    """What a PLC told of it, and what its variables mean; or the log of its joints."""
+    ways = WAYS[machine.kind]
+    unit = [("deg" if way in ("heading", "angle") else "mm") if cell.units else
+            ("rad" if way in ("heading", "angle") else "m") for way in ways]  # fmt: skip
+    factor = np.array([{"deg": 180 / np.pi, "mm": 1000.0}.get(u, 1.0) for u in unit])
+    rows = [",".join(["t [s]", *(f"j{i} [{u}]" for i, u in enumerate(unit))])]
+    if not machine.by_file:
+        rows = [",".join(["t", *ways])]
+    for k in range(round(cell.duration * cell.rate) + 1):
+        t = k / cell.rate
+        if cell.gap and cell.gap[0] < t < cell.gap[1]:
+            continue
+        phase = machine.frequency * t + machine.phase + np.arange(len(ways))
+        q = (0.3 + machine.amplitude * np.sin(phase)) * factor
+        rows.append(",".join([repr(t + cell.start), *(repr(v) if machine.heard else "" for v in q.tolist())]))
+    found = {"machine.csv": "\n".join(rows) + "\n"}
+    if not machine.by_file:
+        found["variables.toml"] = "".join(
+            f'[[variables]]\nname = "{way}"\nsource = "plc"\naddress = "{way}"\nunit = "{u}"\n'
+            for way, u in zip(ways, unit, strict=True)
+        )
+    return found
+
+
+def machine_criteria(cell: Cell) -> dict[str, str]:
+    """What is asked of the machine: speed, energy, distance, separation, contact."""
+    cart, op, limits = cell.cart, cell.names[1], cell.limits
+    return {
+        "cart speed": f'kind = "velocity"\nof = "{cart}"\nlimit = {limits["speed"]!r}\n',
+        "cart energy": f'kind = "kinetic_energy"\nrobot = "{cart}"\nlimit = {limits["energy"]!r}\n',
+        "cart distance": f'kind = "minimum_distance"\nbetween = ["{cart}", "{op}"]\n'
+        + _length(cell, "limit", limits["distance"])
+        + _length(cell, "uncertainty", cell.uncertainty),
+        "cart separation": f'kind = "separation"\nbetween = ["{cart}", "{op}"]\n'
+        "stop = { reaction = 0.1, stopping = 0.2, acceleration = 2.0 }\n"
+        + _length(cell, "intrusion", 0.1)
+        + _length(cell, "human_uncertainty", 0.02 + cell.uncertainty)
+        + _length(cell, "robot_uncertainty", 0.01),
+        "cart contact": f'kind = "power_and_force"\nrobot = "{cart}"\nhuman = "{op}"\n'
+        f"contact_area = {{ {cart} = 1e-4 }}\nlargest_area = 1e-4\ndrive_force = 20\n",
+    }
+
+
 def files(cell: Cell) -> dict[str, str]:
     """The folder of the workstation."""
     arm, op = cell.names
@@ -242,9 +374,12 @@ def files(cell: Cell) -> dict[str, str]:
     tip = "" if cell.tool is not None or cell.library else 'tool = "tip"\n'
     model = f"library:{cell.library}" if cell.library else "arm.urdf"
     end = LIBRARY[cell.library][1] if cell.library else "tip"
+    machine = cell.machine
+    base = f"base = {_place(cell, 0, 0, 0.8, 0)}\n"
+    if machine is not None and machine.carries:
+        base = f'on = "{cell.cart}"\nbase = {{ position = [0, 0, {machine.height / 2 + 0.02}] }}\n'
     tables = [
-        f'[[robots]]\nname = "{arm}"\nmodel = "{model}"\n{tip}{tolerance}'
-        f"base = {_place(cell, 0, 0, 0.8, 0)}\n",
+        f'[[robots]]\nname = "{arm}"\nmodel = "{model}"\n{tip}{tolerance}{base}',
         f'[[humans]]\nname = "{op}"\nstature = {cell.stature!r}\nmass = 75\nsex = "male"\n'
         f"at = {_place(cell, x, y, 0.0, yaw)}\n",
         f'[[areas]]\nname = "side"\nshape = {{ box = [1.0, 1.0, 2.0] }}\n'
@@ -263,6 +398,9 @@ def files(cell: Cell) -> dict[str, str]:
     if cell.heard:
         tables.append(f'[[sources]]\nkind = "csv"\nrobot = "{arm}"\nfile = "motion.csv"\n')
     found = {"motion.csv": motion(cell)}
+    if machine is not None:
+        tables += machine_tables(cell, machine)
+        found |= machine_files(cell, machine)
     if cell.links:
         found["arm.urdf"] = urdf(cell)
     if cell.walks:
@@ -272,6 +410,7 @@ def files(cell: Cell) -> dict[str, str]:
             f'[[keyframes]]\nt = {cell.duration!r}\nposture = "reach_forward"\n'
         )
     limits = cell.limits
+    carried = machine is not None and machine.carries
     criteria = {
         "speed": f'kind = "velocity"\nat = "{arm}"\nlimit = {limits["speed"]!r}\n',
         "fastest": f'kind = "velocity"\nof = "{arm}"\nlimit = {limits["speed"]!r}\n',
@@ -280,7 +419,7 @@ def files(cell: Cell) -> dict[str, str]:
         + _length(cell, "limit", limits["distance"])
         + _length(cell, "uncertainty", cell.uncertainty),
         "separation": f'kind = "separation"\nbetween = ["{arm}", "{op}"]\n'
-        "stop = { reaction = 0.1, stopping = 0.2 }\n"
+        + f"stop = {{ reaction = 0.1, stopping = 0.2{', acceleration = 2.0' * carried} }}\n"
         + _length(cell, "intrusion", 0.1)
         + _length(cell, "human_uncertainty", 0.02 + cell.uncertainty)
         + _length(cell, "robot_uncertainty", 0.01),
@@ -289,9 +428,9 @@ def files(cell: Cell) -> dict[str, str]:
         "felt": f'kind = "effective_mass"\nat = "{arm}"\ntoward = "{op}"\nlimit = {limits["mass"]!r}\n',
         "contact": f'kind = "power_and_force"\nrobot = "{arm}"\nhuman = "{op}"\n'
         f"contact_area = {{ {arm} = 1e-4{', tool = 1e-4' if cell.tool is not None else ''} }}\n"
-        "largest_area = 1e-4\n",
+        "largest_area = 1e-4\n" + "drive_force = 20\n" * carried,
         "posture": f'kind = "owas"\nhuman = "{op}"\n',
-    }
+    } | ({} if machine is None else machine_criteria(cell))
     asked = [(name, text) for name, text in criteria.items() if name not in cell.left_out]
     if cell.turned_tables:
         tables, asked = tables[::-1], asked[::-1]
@@ -299,7 +438,11 @@ def files(cell: Cell) -> dict[str, str]:
         group = "ergonomics" if name == "posture" else "safety"
         tables.append(f'[[{group}]]\nname = "{name}"\n{text}')
     phase = '[[phases]]\ntitle = "all"\nstart = 0.0\nload = 1.0\nlegs = "posture"\n'
-    head = f"[engine]\ntimestep = 0.001\ntick = {cell.tick!r}\nphysics = {str(cell.physics).lower()}\n"
+    spoken = machine is not None and not machine.by_file
+    head = (
+        'variables = "variables.toml"\n' * spoken
+        + f"[engine]\ntimestep = 0.001\ntick = {cell.tick!r}\nphysics = {str(cell.physics).lower()}\n"
+    )
     found["workstation.toml"] = "\n".join([head, *tables, phase, cell.more])
     return found
 
@@ -315,9 +458,19 @@ def station(cell: Cell, folder: Path) -> Station:
     return load(folder)
 
 
+_kept: dict[tuple[str, ...], ResultLog] = {}
+"""What cells that many relations are asked of said, by their files."""
+KEPT = 64
+
+
 def said(cell: Cell, folder: Path) -> ResultLog:
-    """What every criterion says over the run."""
-    return station(cell, folder).run().results
+    """What every criterion says over the run; a cell that was run of late is not run again."""
+    key = tuple(files(cell).values())
+    if key not in _kept:
+        while len(_kept) >= KEPT:
+            del _kept[next(iter(_kept))]
+        _kept[key] = station(cell, folder).run().results
+    return _kept[key]
 
 
 def least_margin(series: Series) -> float:
@@ -336,15 +489,23 @@ def heavier(cell: Cell) -> Cell:
         replace(k, inertial=Inertial(1.5 * k.inertial.mass, k.inertial.com, 1.5 * k.inertial.inertia))
         for k in cell.links
     )
-    return replace(cell, links=links, tool=None if cell.tool is None else 1.5 * cell.tool)
+    machine = cell.machine and replace(cell.machine, mass=1.5 * cell.machine.mass)
+    return replace(cell, links=links, machine=machine, tool=None if cell.tool is None else 1.5 * cell.tool)
 
 
 def thicker(cell: Cell) -> Cell:
-    return replace(cell, links=tuple(replace(k, box=k.box + 0.04) for k in cell.links))
+    machine = cell.machine and replace(cell.machine, wider=0.04)
+    return replace(cell, links=tuple(replace(k, box=k.box + 0.04) for k in cell.links), machine=machine)
 
 
 def faster(cell: Cell) -> Cell:
     """Twice as fast on the same way, asked at the same places."""
+    machine = cell.machine and replace(cell.machine, frequency=2 * cell.machine.frequency)
     return replace(
-        cell, frequency=2 * cell.frequency, rate=2 * cell.rate, duration=cell.duration / 2, tick=cell.tick / 2
+        cell,
+        frequency=2 * cell.frequency,
+        rate=2 * cell.rate,
+        duration=cell.duration / 2,
+        tick=cell.tick / 2,
+        machine=machine,
     )

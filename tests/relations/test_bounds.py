@@ -82,6 +82,7 @@ def bounded(seed):
         physics=bool(seed % 2),
         more=more,
         left_out=OTHERS,
+        machine=None,
     )
     made = files(cell)
     made["workstation.toml"] = made["workstation.toml"].replace(

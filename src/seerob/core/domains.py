@@ -26,6 +26,8 @@ def number(
         ValueError: A value is not a number, or beyond what can be.
     """
     found = np.asarray(value, float)
+    if not found.ndim and low <= found.item() <= high:  # most are one figure, of which reductions take long
+        return found
     good = (found >= low) & (found <= high)  # false for NaN
     if not good.all():
         bad = float(found[~good].flat[0]) if found.ndim else float(found)
@@ -41,6 +43,8 @@ def at_least(name: str, value: ArrayLike, low: float = 0.0, unit: str = "") -> A
         ValueError: A value is below what can be.
     """
     found = np.asarray(value, float)
+    if not found.ndim and not found.item() < low:
+        return found
     if (found < low).any():
         number(name, found[found < low], low, unit=unit)
     return found
@@ -53,6 +57,8 @@ def whole(name: str, value: ArrayLike, low: int, high: int) -> NDArray[np.int64]
         ValueError: A value is no whole number, or there is no such score.
     """
     found = number(name, value, low, high)
+    if not found.ndim and found.item().is_integer():
+        return found.astype(np.int64)
     if (found != np.round(found)).any():
         bad = float(found[found != np.round(found)].flat[0]) if found.ndim else float(found)
         raise ValueError(f"{name} is {bad:g}, it is a whole number, {_range(low, high)}")

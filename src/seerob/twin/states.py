@@ -96,7 +96,7 @@ class Bench:
         self.columns = {m.name: Columns.of(m, mj) for m in model.mechanisms.values()}
         # A mass that nobody gave may be none at all, and is never asked for.
         self.weighed = tuple(
-            m for m in model.mechanisms.values() if m.role == "robot" and not m.unknown_masses
+            m for m in model.mechanisms.values() if m.role != "human" and not m.unknown_masses
         )
 
     def place(self, motion: Motion) -> States:

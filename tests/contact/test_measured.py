@@ -215,7 +215,8 @@ def test_records_are_read_with_their_units(tmp_path: Path, text: str) -> None:
     [
         ("Time;Force\n0;1\n1;2\n", "no columns of time and force with units"),
         ("Time [s];Force [N]\n1;1\n0;2\n", "do not rise"),
-        ("Time [s];Force [N]\n0;-1\n1;0\n", "no force above 0"),
+        ("Time [s];Force [N]\n0;0\n1;0\n", "no force above 0"),
+        ("Time [s];Force [N]\n0;2\n0,01;-900\n0,02;1\n", "pressing is positive: turn the sign"),
         ("Time [s];Force [N]\n0;x\n1;0\n", "'x'"),
         ("", "empty"),
     ],
@@ -225,6 +226,33 @@ def test_what_is_no_record_says_so(tmp_path: Path, text: str, what: str) -> None
     path.write_text(text)
     with pytest.raises(InputError, match=what):
         read_curve(path, "a.csv")
+
+
+INSTANTS = np.arange(0, 0.7, 1e-3)
+
+
+def pulse(peak: float, at: float, width: float) -> np.ndarray:
+    return peak * np.exp(-(((INSTANTS - at) / width) ** 2))
+
+
+@pytest.mark.parametrize(
+    ("force", "rows", "why"),
+    [
+        (pulse(200, 0.1, 0.02), slice(None), ""),
+        (pulse(200, 0.0, 0.02), slice(None), "begins in contact"),
+        (pulse(900, 0.1, 0.02), slice(70), "ends in contact"),
+        (pulse(900, 0.125, 0.01) + 5, slice(None, None, 50), "samples are 50 ms apart"),
+        (pulse(200, 0.1, 0.02), slice(None, None, 3), "samples are 3 ms apart"),
+        (np.minimum(pulse(900, 0.1, 0.02), 250), slice(None), "stands still"),
+    ],
+)
+def test_a_record_that_may_miss_its_peak_is_never_within(tmp_path: Path, force, rows, why: str) -> None:
+    t, F = INSTANTS[rows], force[rows]
+    curve = "Time [s];Force [N]\n" + "".join(f"{a:.6g};{b:.6g}\n" for a, b in zip(t, F, strict=True))
+    station = cell(tmp_path, entry(curve='"a.csv"', force_N=None), files={"a.csv": curve})
+    part = chest(station)
+    assert part.verdict is (Verdict.UNDECIDED if why else Verdict.WITHIN)
+    assert why in part.reason
 
 
 def test_a_curve_is_judged_like_its_peaks_and_goes_with_the_recording(tmp_path: Path) -> None:

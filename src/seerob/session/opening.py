@@ -17,13 +17,14 @@ from seerob.devices.live.listening import LiveSource, delay_of
 from seerob.devices.live.looked_at import looked_at
 from seerob.devices.variables.live_source import VariablesSource
 from seerob.files.plausible import noise_of_speeds, quantities
+from seerob.files.trajectories.checks import STARTS
 from seerob.files.trajectories.trajectory import TrajectorySamples
 from seerob.model.model import Model
 from seerob.model.mounting.compilation import pose_matrix
 from seerob.model.mounting.in_place import implausible_motion
 from seerob.twin.own_words import compared, said_by
 from seerob.workstation.plausibility.of_file import findings as implausible
-from seerob.workstation.source import Matrix4, Opened, Source, Target
+from seerob.workstation.source import Matrix4, Opened, Source, Target, delayed
 
 FIRST, LOOKS = 2000, 8
 """Samples at the begin of a recorded motion, and how many of them are looked at for where it goes."""
@@ -55,14 +56,16 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
                 found = looked_at(found, source.name or kind_of("sources", source), driven)
             found = replace(found, findings=(*found.findings, *_lateness(model, source)))
             opened.append((source, _compared(model, i, source, found)))
+            problems += _begun(source, i, file)
         except InputError as error:
             problems += (_placed(problem, source, f"sources[{i}].file", file) for problem in error.problems)
     if problems:
         raise InputError(problems)
-    if opened and (found := implausible_motion(model, _begins(model, opened))):
+    if opened:
+        found = (*implausible_motion(model, _begins(model, opened)), *_clocks(opened))
         source, first = opened[0]
         opened[0] = source, replace(first, findings=(*first.findings, *found))
-    return tuple(opened)
+    return tuple((source, delayed(each, source.begins or 0.0)) for source, each in opened)
 
 
 def _ships(source: Source) -> bool:
@@ -119,6 +122,38 @@ def _lateness(model: Model, source: Source) -> Iterator[Finding]:
         yield Finding(
             level="assumed", subject=source.name, text=f"{text}; the file says {source.delay:g} s at most"
         )
+
+
+def _begun(source: Source, i: int, file: str) -> Iterator[Problem]:
+    """Why a source cannot begin when it is said to."""
+    if source.begins is not None and source.live:
+        what = "a live source speaks of now"
+        yield Problem(file, f"sources[{i}].begins", what, "leave it out")
+    if source.begins and source.loop:
+        what = "one that loops has no silence before each round"
+        yield Problem(file, f"sources[{i}].begins", what, "leave out begins or loop")
+
+
+def _file(source: Source) -> str:
+    return str(getattr(source, "file", source.name))
+
+
+def _clocks(opened: Sequence[tuple[Source, Opened]]) -> Iterator[Finding]:
+    """Files that begin at different instants of their clocks: which of these are the same, nobody says."""
+    began = [(i, each.began) for i, (_, each) in enumerate(opened) if each.began is not None]
+    first, earliest = min(began, key=lambda one: one[1], default=(0, 0.0))
+    for i, start in began:
+        source, of = opened[i][0], opened[first][0]
+        if source.begins is not None or not abs(start - earliest) >= STARTS:
+            continue
+        after = start - earliest + (of.begins or 0.0)
+        text = (
+            f"sources[{i}] ({_file(source)}) begins at {start:.3f} s of its clock, sources[{first}] "
+            f"({_file(of)}) at {earliest:.3f} s, and nobody says whether that is one clock: write "
+            f"begins = {after:.6g} in sources[{i}] where it is, begins = 0 where both begin together"
+        )
+        subject = source.target() or source.name
+        yield Finding(level="warning", subject=subject, text=text, holds=(source.target() or "*",))
 
 
 def _compared(model: Model, i: int, source: Source, opened: Opened) -> Opened:

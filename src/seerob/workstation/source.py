@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from seerob.core.quantities import Seconds
+from seerob.core.quantities import NotBefore, Seconds
 from seerob.core.samples import JointSample, PoseSample, Quality, Sample
 from seerob.core.snapshot import Finding
 from seerob.description.description import Description
@@ -62,7 +63,9 @@ class Opened(Struct, frozen=True, kw_only=True):
     samples: Iterable[Sample]
     """In time order, ``t`` from 0; iterating again starts again."""
     duration: float
-    """From the first to the last sample [s]."""
+    """From run time 0 to the last sample [s]."""
+    began: float | None = None
+    """Instant of its first sample on the clock of its file [s]; None where it has none."""
     findings: tuple[Finding, ...] = ()
     """The mapping that was used, limits that were passed, losses in the file."""
 
@@ -88,6 +91,9 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     where they differ, the way back takes as long and is UNDECIDED: nobody drove it."""
     loop_pause: Seconds = 1.0
     """[s]"""
+    begins: NotBefore | None = None
+    """Run time of its first sample [s], of a recorded source. Files that begin at different instants of their
+    clocks need it, unless it is 0: the difference where they keep one clock, 0 where each has its own."""
 
     def target(self) -> str:
         """Name of the robot or human it drives; empty for signals."""
@@ -112,6 +118,24 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             InputError: The file is missing or wrong; names file, place, value and remedy.
         """
         raise NotImplementedError
+
+
+@dataclass(frozen=True, eq=False)
+class _Later:
+    """Samples that come later than a source says."""
+
+    samples: Iterable[Sample]
+    by: float
+
+    def __iter__(self) -> Iterator[Sample]:
+        return (replace(sample, t=sample.t + self.by) for sample in self.samples)
+
+
+def delayed(opened: Opened, by: float) -> Opened:
+    """A recorded source that begins at another run time than 0 [s]."""
+    if by == 0:
+        return opened
+    return replace(opened, samples=_Later(opened.samples, by), duration=opened.duration + by)
 
 
 SAME_PLACE = 1e-3

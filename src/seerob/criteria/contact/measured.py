@@ -50,6 +50,11 @@ BEGIN = 0.05
 SPRING = 0.1
 """By which share a spring may be off the stiffness of the body part: springs of devices are chosen for their
 working range and not linear (GTE, 1S)."""
+COARSE = 2e-3
+"""Largest step of a record that shows its peak [s]: of half a sine of 9 ms, the shortest contact of the table
+(a hand, 0.6 kg and 75 N/mm: π √(m/k)), samples so far apart meet 94 % at least. Own choice (D)."""
+FLAT = 10
+"""So many samples in a row at the largest force are the end of a device's range, rather than a peak."""
 CALIBRATED = dt.timedelta(days=366)
 """How long a calibration holds: pads and devices are renewed every year (GTE manual, 1S)."""
 ROUNDING = 1e-9
@@ -76,7 +81,7 @@ class Measurement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Specific body area, for the pressure; else the most sensitive of the region counts."""
     contact: Literal["free", "clamped"]
     """Whether a body part there could give way, or not."""
-    speed: _Positive
+    speed: Annotated[float, Meta(gt=0, le=10)]
     """Speed of the part at the contact [m/s]."""
     curve: _Name | None = None
     """CSV file of force over time, beside the workstation file."""
@@ -125,6 +130,8 @@ class Measured:
     """Why it leaves open what it says, whatever the robot does."""
     stiff: str
     """Why it may say more than a body part would feel."""
+    unshown: tuple[str, ...] = ()
+    """Why its record may not show the largest force."""
 
     @property
     def name(self) -> str:
@@ -152,6 +159,33 @@ def peaks(t: Array, force: Array) -> tuple[float, float | None]:
     early = t < t[first] + TRANSIENT
     static = float(force[late].max()) if late.any() else None
     return float(force[early].max()), static
+
+
+def missing(t: Array, force: Array) -> tuple[str, ...]:
+    """Why a record may not show the largest force of its contact.
+
+    Args:
+        t: Instants, rising [s], shape (n,).
+        force: Pressing is positive [N], shape (n,).
+    """
+    peak = float(force.max())
+    touches = force >= BEGIN * peak
+    first = int(np.argmax(touches))
+    early = np.flatnonzero((t >= t[max(first - 1, 0)]) & (t < t[first] + TRANSIENT))
+    found = []
+    if first == 0:
+        found.append("the record begins in contact: what was before it is not known")
+    if touches[-1] and t[-1] < t[first] + TRANSIENT:
+        found.append(f"the record ends in contact, {t[-1] - t[first]:.3g} s after it began")
+    seen = np.append(t[early], t[early[-1] + 1 : early[-1] + 2])
+    step = float(np.diff(seen).max(initial=0.0))
+    if step > COARSE * (1 + ROUNDING):
+        found.append(f"samples are {1e3 * step:.3g} ms apart, and a peak between them is not seen")
+    top = np.concatenate([[False], force == peak, [False]]).astype(int)
+    starts, ends = (np.flatnonzero(np.diff(top) == way) for way in (1, -1))
+    if int((ends - starts).max()) >= FLAT:
+        found.append(f"its largest force, {peak:g} N, stands still: the device may not show more")
+    return tuple(found)
 
 
 def judged(value: float, limit: float, *, doubts: Sequence[str], above: Sequence[str]) -> tuple[Verdict, str]:
@@ -220,8 +254,10 @@ class Measurements:
         if said.area is not None and said.area not in areas:
             raise UnknownName(f"body area of {said.region} ({self._file})", said.area, areas)
         transient, static = said.force_N, said.static_force_N
+        unshown: tuple[str, ...] = ()
         if said.curve is not None:
-            transient, static = peaks(*read_curve(folder / said.curve, said.curve))
+            record = read_curve(folder / said.curve, said.curve)
+            (transient, static), unshown = peaks(*record), missing(*record)
         pressure = None if said.pressure_N_cm2 is None else said.pressure_N_cm2 * 1e4
         rows = tuple(k for k, body in enumerate(robot.moving) if body in bodies)
         k = float(self._arrays.stiffness[column])
@@ -237,7 +273,7 @@ class Measurements:
         elif sorted(set(said.tools)) != self._carried:
             now, then = (", ".join(those) or "nothing" for those in (self._carried, sorted(said.tools)))
             doubts.append(f"the robot carried {then}, and carries {now} here")
-        return Measured(said, rows, column, transient, static, pressure, tuple(doubts), stiff)
+        return Measured(said, rows, column, transient, static, pressure, tuple(doubts), stiff, unshown)
 
     def results(self, column: int, v: Array, near: Flags, clamped: Flags) -> tuple[Result, ...]:
         """What was measured of a body region, against its limits.
@@ -304,7 +340,8 @@ class Measurements:
                     continue
                 verdict, reason = Verdict.UNDECIDED, "not measured"
             else:
-                verdict, reason = judged(value, limit, doubts=doubts, above=above)
+                more = one.unshown if unit == "N" else ()
+                verdict, reason = judged(value, limit, doubts=(*doubts, *more), above=above)
             found.append(
                 Result(name=label, value=value, unit=unit, limit=limit, verdict=verdict, reason=reason)
             )
@@ -416,6 +453,9 @@ def read_curve(path: Path, name: str) -> tuple[Array, Array]:
             instants, forces = numbers.values[:, 0] * t[1], numbers.values[:, 1] * force[1]
             if len(instants) < 2 or not (np.diff(instants) > 0).all():
                 raise InputError.at(name, cells[t[0]], "instants that do not rise", "give the record itself")
+            if -forces.min() > forces.max():
+                what = f"{forces.min():g} N is the largest force, against {forces.max():g} N"
+                raise InputError.at(name, cells[force[0]], what, "pressing is positive: turn the sign")
             if not forces.max() > 0 or not math.isfinite(float(forces.max())):
                 raise InputError.at(name, cells[force[0]], "no force above 0", "pressing is positive")
             return instants, forces

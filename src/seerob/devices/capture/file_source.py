@@ -112,7 +112,12 @@ class CaptureFile(Source, frozen=True, kw_only=True):
         bound, left_out = placed_only(bound, subject, "no frame shows where")
         findings = (*findings, *fit, *left_out)
         samples = BodySamples(self, captured, bound)
-        return Opened(samples=samples, duration=duration, findings=(*captured.findings, *findings, *checked))
+        return Opened(
+            samples=samples,
+            duration=duration,
+            began=next(iter(captured.frames)).t,
+            findings=(*captured.findings, *findings, *checked),
+        )
 
     def _window(self, captured: Captured) -> Iterator[CaptureFrame]:
         """Calibration frames: those of the file that are in the pose, else those of the time given."""

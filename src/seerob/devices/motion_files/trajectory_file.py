@@ -94,6 +94,7 @@ class TrajectoryFile(Source, frozen=True, kw_only=True):
         return Opened(
             samples=TrajectorySamples(trajectory, name, target.name, qd, error),
             duration=trajectory.duration,
+            began=float(trajectory.t[0]),
             findings=(origin, *findings, *limits, *about_velocities, *sampling),
         )
 

@@ -74,6 +74,7 @@ class Bag(TrajectoryFile, frozen=True, kw_only=True):
         return Opened(
             samples=PoseSamples(path, self.name or f"bag {target.name}", at),
             duration=path.duration,
+            began=float(path.t[0]),
             findings=(
                 origin_finding(self.origin, target.name, self.file),
                 Finding(level="assumed", subject=target.name, text=text),

@@ -107,6 +107,7 @@ class JointAngleFile(Source, frozen=True, kw_only=True):
                 t, q, qd, degraded, self.name or f"joint_angles {self.human}", target.name, placed
             ),
             duration=float(t[-1]),
+            began=float(found.t[0]),
             findings=about((*found.findings, *left_out, *limits), target.name),
         )
 

@@ -48,7 +48,7 @@ class SignalsCsv(Source, frozen=True, kw_only=True):
         path = folder / self.file
         try:
             with path.open(encoding="utf-8-sig", newline="") as table:
-                samples = self._samples(table, variables)
+                began, samples = self._samples(table, variables)
         except FileNotFoundError as error:
             raise InputError.at(path, "", "no such file", "give its path from the workstation") from error
         except OSError as error:
@@ -64,14 +64,16 @@ class SignalsCsv(Source, frozen=True, kw_only=True):
             what = f"up to {gap:g} s between two rows, longer than timeout = {self.timeout:g} s"
             text = f"{self.file}: {what}: undecided in between"
             findings.append(Finding(level="warning", subject=self.name, text=text))
-        return Opened(samples=samples, duration=samples[-1].t - start, findings=tuple(findings))
+        duration = samples[-1].t - start
+        return Opened(samples=samples, duration=duration, began=began, findings=tuple(findings))
 
-    def _samples(self, table: TextIO, variables: tuple[Variable, ...]) -> list[Sample]:
+    def _samples(self, table: TextIO, variables: tuple[Variable, ...]) -> tuple[float, list[Sample]]:
         rows = csv.reader(_lines(table, self.file), delimiter=self.delimiter, strict=True)
         try:
             header = [cell.strip() for cell in next(rows, [])]
             columns = self._columns(header, variables)
-            return list(self._read(rows, header.index(self.time), columns))
+            said = list(self._read(rows, header.index(self.time), columns))
+            return (said[0][0] if said else 0.0), [sample for _, sample in said]
         except csv.Error as error:
             raise InputError.at(self.file, f"row {rows.line_num}", str(error), "mend the row") from error
 
@@ -92,7 +94,7 @@ class SignalsCsv(Source, frozen=True, kw_only=True):
 
     def _read(
         self, rows: Iterator[list[str]], time: int, columns: list[tuple[Variable, int]]
-    ) -> Iterator[SignalSample]:
+    ) -> Iterator[tuple[float, SignalSample]]:
         values: dict[str, Value] = {}
         doubts: dict[str, str] = {}
         first, last = math.nan, -math.inf
@@ -113,8 +115,11 @@ class SignalsCsv(Source, frozen=True, kw_only=True):
                     doubts.pop(variable.name, None)
                 except BadValue as error:
                     doubts[variable.name] = str(error)
-            yield SignalSample(
-                source=self.name, seq=n - 2, t=t - first, values=dict(values), doubts=dict(doubts)
+            yield (
+                t,
+                SignalSample(
+                    source=self.name, seq=n - 2, t=t - first, values=dict(values), doubts=dict(doubts)
+                ),
             )
 
 

@@ -85,6 +85,7 @@ class ToolPath(Source, frozen=True, kw_only=True):
         return Opened(
             samples=PoseSamples(path, self.name or f"tool_path {target.name}", self.at or target.name),
             duration=path.duration,
+            began=float(path.t[0]),
             findings=(
                 origin_finding(self.origin, target.name, self.file),
                 Finding(level="assumed", subject=target.name, text=text),

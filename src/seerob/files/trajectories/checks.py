@@ -315,10 +315,7 @@ def sampling_findings(trajectory: Timed, target: str, timeout: float) -> tuple[F
         findings.append(Finding(level="warning", subject=target, text=text))
     start = float(trajectory.t[0])
     if abs(start) >= STARTS:
-        text = (
-            f"starts at {start:.3f} s on its own clock; shifted to 0: two files keep no common clock "
-            f"({trajectory.file})"
-        )
+        text = f"starts at {start:.3f} s on its own clock; shifted to 0 ({trajectory.file})"
         findings.append(Finding(level="note", subject=target, text=text))
     return tuple(findings)
 

@@ -323,11 +323,36 @@ class State(Validity):
         Raises:
             Undecided: Not heard, heard without torques, or with torques of another sign or unit.
         """
+        return np.asarray(self.torques_within(mechanism, self.t, self.t)[0])
+
+    def torques_within(self, mechanism: Mechanism, begin: float, end: float) -> Array:
+        """Joint torques at two instants of the last tick, and as its source measured them between these.
+
+        From one to the next they lie on straight lines.
+
+        Args:
+            mechanism: The robot.
+            begin: [s].
+            end: [s].
+
+        Returns:
+            Shape (k, n) [N·m or N], the first of ``begin`` and the last of ``end``.
+
+        Raises:
+            Undecided: As `measured_torques`, at any of these instants.
+        """
         self.require(mechanism.name)
         hearing = self._hearings[mechanism.name]
         if hearing.coarse:
             raise Undecided(f"{mechanism.name}: {hearing.coarse}")
-        k = sum(1 for instant, _ in hearing.heard if instant <= self.t + SLACK)
+        inside = [(t, why) for t, why in hearing.heard if begin + SLACK < t < end - SLACK]
+        if reason := next((why for _, why in inside if why), ""):
+            raise Undecided(f"{mechanism.name}: {reason}")
+        return np.array([self._torques_at(mechanism, t) for t in (begin, *(t for t, _ in inside), end)])
+
+    def _torques_at(self, mechanism: Mechanism, t: float) -> Array:
+        hearing = self._hearings[mechanism.name]
+        k = sum(1 for instant, _ in hearing.heard if instant <= t + SLACK)
         times = [instant for instant, _ in hearing.heard[max(k - 1, 0) : k + 1]]
         around = [torques for torques in hearing.torques[max(k - 1, 0) : k + 1] if torques is not None]
         if not around or len(around) < len(times):
@@ -335,7 +360,7 @@ class State(Validity):
         if hearing.torque_doubt:
             raise Undecided(f"{mechanism.name}: {hearing.torque_doubt}")
         # Outside its range np.interp holds the last value, as the reference does.
-        return np.array([np.interp(self.t, times, joint) for joint in np.transpose(around)])
+        return np.array([np.interp(t, times, joint) for joint in np.transpose(around)])
 
     # -- dynamics ---------------------------------------------------------------------------
 

@@ -16,10 +16,11 @@ from seerob.core.domains import at_least
 from seerob.core.errors import InputError, Undecided
 from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate, judge_interval, worst
+from seerob.criteria.criterion import Criterion, Evaluate, Lowest, judge_interval, worst
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin import joint_torques
+from seerob.twin.spans import Points, Span
 from seerob.twin.state import State
 
 PerJoint = tuple[Annotated[float, Meta(ge=0)], ...]
@@ -150,6 +151,23 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
             )
 
         return evaluate
+
+    def lowest(self, model: Model, points: Points) -> Lowest | None:
+        """Least margin in a span of torques that are measured: they lie on straight lines between samples.
+
+        Nothing bounds what a model needs, whose accelerations are differences of ticks.
+        """
+        if self.torques == "model" or self.largest_residual is not None:
+            return None
+        robot = model.robot(self.robot)
+        limits, given = self._limits(model, robot), self._per_joint(model, robot, "torque_uncertainty")
+        uncertainty = np.zeros(len(limits)) if given is None else given
+
+        def lowest(state: State, span: Span) -> float:
+            _, _, high = shares(state.torques_within(robot, span.begin, span.end), limits, uncertainty)
+            return self.limit - float(high.max())
+
+        return lowest
 
     def _limits(self, model: Model, robot: Mechanism) -> Array:
         """Of every joint [N·m or N], NaN where nobody knows, shape (n,)."""

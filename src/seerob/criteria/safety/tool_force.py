@@ -7,6 +7,7 @@ F is the force that the robot exerts on its surroundings.
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -18,10 +19,11 @@ from seerob.core.errors import InputError, Undecided
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Arrow, Basis, Input, Marker, Origin, Result, Sphere, Verdict
 from seerob.core.transforms import Array
-from seerob.criteria.criterion import Criterion, Evaluate, judge, judge_interval
+from seerob.criteria.criterion import Criterion, Evaluate, Lowest, judge, judge_interval
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin import joint_torques
+from seerob.twin.spans import Points, Span
 from seerob.twin.state import State
 
 DRAWN = 0.002
@@ -153,6 +155,40 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
             return self._result(found, tau, position + rotation @ offset, uncertainty)
 
         return evaluate
+
+    def lowest(self, model: Model, points: Points) -> Lowest | None:
+        r"""Least margin in a span of a force without moment, from external torques that are measured.
+
+        Torques lie on straight lines between samples. With a Jacobian that changes by at most Δ and stays
+        above where it is damped, its pseudo-inverse changes by at most
+        :math:`\sqrt 2 \Delta / (\sigma (\sigma - \Delta))`, σ its least singular value (Wedin 1973).
+        """
+        limit = self.limit
+        if limit is None or self.torques != "external" or self.contact != "zero_moment":
+            return None
+        if self.largest_residual is not None:
+            return None
+        frame = model.frame(self.at)
+        robot, offset = model.carrier(frame), np.array(self.offset)
+        given = self._uncertainty(model, robot)
+        uncertainty = np.zeros(len(robot.joints)) if given is None else given
+        point = points.add(frame.mj, frame.body_from_frame[:3, :3] @ offset + frame.body_from_frame[:3, 3])
+        coupling = dict(zip(robot.v_address.tolist(), robot.coupling, strict=True))
+
+        def lowest(state: State, span: Span) -> float:
+            J = state.jacobian(frame, robot, offset)[:3]
+            least = float(np.linalg.svd(J, compute_uv=False)[-1]) if J.shape[1] >= 3 else 0.0
+            change = float(np.linalg.norm(points.column_changes(point, span, coupling))) * span.T
+            if not least - change > self.damped_below:
+                return -math.inf
+            tau = state.torques_within(robot, span.begin, span.end)
+            found = wrench_from_torques(J, tau, damped_below=self.damped_below)
+            forces = np.linalg.norm(found.wrench, axis=1) + largest_error(found.gain, uncertainty)
+            more = math.sqrt(2) * change / (least * (least - change))
+            errors = np.linalg.norm(tau, axis=1) + float(uncertainty.sum())
+            return limit - float((forces + more * errors).max())
+
+        return lowest
 
     def _result(self, found: Wrench, tau: Array, at: Array, uncertainty: Array | None) -> Result:
         force = found.wrench[:3]

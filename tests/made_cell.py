@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from seerob.core.samples import JointSample
-from seerob.core.snapshot import Result
+from seerob.core.snapshot import Basis, Result
 from seerob.session.run import Bound, Judge
 from seerob.session.station import Station, load
 from seerob.twin.engine import Engine
@@ -97,6 +97,11 @@ def state_at(station: Station, **motion: tuple[Sequence[float], Sequence[float]]
 def results_at(station: Station, **motion: tuple[Sequence[float], Sequence[float]]) -> dict[str, Result]:
     """What every criterion says at (q, qd)."""
     return {r.name: r for r in judged(station.bound, state_at(station, **motion))}
+
+
+def basis_in(folder: Path) -> Basis:
+    """What the first criterion of the workstation in a folder rests on."""
+    return load(folder).bound[0].basis
 
 
 def judged(bound: Sequence[Bound], state: State) -> tuple[Result, ...]:

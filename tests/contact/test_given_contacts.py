@@ -46,7 +46,9 @@ def test_the_area_of_an_arm_says_nothing_of_its_tool(tmp_path, more, known):
     cell = made(tmp_path, text, {"arm.urdf": two_r()})
     result = results_at(cell, arm=((0.0, 0.0), (0.05, 0.0)))["pfl"]
     assert result.verdict == ("within" if known else "undecided")
-    sources = {i.name: i.source for i in result.basis.inputs if "grip" in i.name and "contact" in i.name}
+    sources = {
+        i.name: i.source for i in cell.bound[0].basis.inputs if "grip" in i.name and "contact" in i.name
+    }
     assert ("workstation file, of grip" in sources.values()) is known
 
 

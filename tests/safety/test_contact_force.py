@@ -22,10 +22,14 @@ from seerob.session.station import Station
 from seerob.twin.engine import Engine
 
 
-def results(criterion, depth=0.7, **options):
+def made(criterion, depth=0.7, **options):
     t, q = pressing(depth=depth, seconds=1.2)
     tables = desk() | options
-    stage = Station(replace(workstation(source(captured(frames_of(t, q))), **tables), safety=(criterion,)))
+    return Station(replace(workstation(source(captured(frames_of(t, q))), **tables), safety=(criterion,)))
+
+
+def results(criterion, depth=0.7, **options):
+    stage = made(criterion, depth, **options)
     engine, judge = Engine(stage.model, driven={"operator": 0.2}), Judge(stage.bound)
     told = []
     for seq, samples in enumerate(road.pump(stage.sources, 0.01)):
@@ -49,7 +53,8 @@ def test_a_hand_pressed_on_a_desk_is_a_force_and_never_within():
     pressures = [part for part in last.parts if part.unit == "Pa"]
     assert [p.value for p in pressures] == pytest.approx([1e4 * f.value for f in forces])
     assert last.verdict is Verdict.EXCEEDED
-    inputs = {i.name: i.origin for i in last.basis.inputs}
+    (bound,) = made(ContactForce(name="f", human="operator", area=1e-4)).bound
+    inputs = {i.name: i.origin for i in bound.basis.inputs}
     assert inputs["contact forces"] is Origin.ESTIMATED
 
 

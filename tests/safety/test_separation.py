@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, made, results_at, two_r
+from made_cell import FLOATING, TWO_R, basis_in, made, results_at, two_r
 from seerob.core.errors import InputError
 from seerob.criteria.safety.separation import separation_bound
 
@@ -94,7 +94,7 @@ def test_an_input_that_is_not_given_is_undecided_above_and_exceeded_below(tmp_pa
     far, _, _ = separation(tmp_path / "far", options=options)
     assert far.verdict == "undecided"
     assert missing in far.reason
-    assert any(i.origin == "missing" for i in far.basis.inputs)
+    assert any(i.origin == "missing" for i in basis_in(tmp_path / "far").inputs)
     near, _, _ = separation(tmp_path / "near", options=options, x=3.0)
     assert near.verdict == "exceeded"
     given = {"intrusion": 0.2, "human_uncertainty": 0.1, "robot_uncertainty": 0.05}[missing]
@@ -133,7 +133,7 @@ def test_what_the_surface_may_stick_out_is_added(tmp_path):
     S, _, v = separation(
         tmp_path, urdf=two_r().replace("</collision></link>", f"</collision>{visual}</link>")
     )
-    out = next(i.value for i in S.basis.inputs if i.name == "surfaces may be nearer by")
+    out = next(i.value for i in basis_in(tmp_path).inputs if i.name == "surfaces may be nearer by")
     assert 0.02 - 1e-9 <= out <= 0.02 * np.sqrt(3) + 1e-9
     assert v.value == pytest.approx(np.hypot(2, 0.05) + out)
     assert S.limit == pytest.approx((v.value + 1.6) * 0.4 + 0.35 + out)

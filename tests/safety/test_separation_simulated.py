@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import state_at, two_r
+from made_cell import basis_in, state_at, two_r
 from made_separation import ROTOR, SIMULATED, K, V, part, separation, station, terms
 from seerob.core.verdict import Verdict
 from seerob.criteria.stopping import models as stop_models
@@ -108,20 +108,20 @@ def test_toward_is_the_least_distance_looked_at_and_what_the_ways_between_leave_
 def test_what_a_simulated_stop_says_of_itself(tmp_path):
     """Far away the present speeds hold, and faster ones are not searched for: a simulation takes long."""
     path = separation(tmp_path / "p", SIMULATED, x=9.0)
-    assert "whole path" in path.basis.formula
+    assert "whole path" in basis_in(tmp_path / "p").formula
     share = part(path, "share of the present speed")
     assert (share.value, share.reason) == (1.0, "or more")
     toward = separation(tmp_path / "t", SIMULATED + ', direction = "toward"', x=9.0)
-    assert "loss of distance" in toward.basis.formula
+    assert "loss of distance" in basis_in(tmp_path / "t").formula
     one = two_r().replace('effort="1000.0" ', "", 1)
     for folder, urdf, origin, said in (
         ("a", two_r(effort=50.0), "estimated", "0.8 of the torque limits"),
         ("b", one, "missing", "0.8 of the torque limits"),
     ):
-        S = separation(
+        separation(
             tmp_path / folder, 'acceleration = 0, reaction = 0.1, model = "simulated"', urdf=urdf, x=9.0
         )
-        (brakes,) = (i for i in S.basis.inputs if i.name == "brake torques")
+        (brakes,) = (i for i in basis_in(tmp_path / folder).inputs if i.name == "brake torques")
         assert (brakes.origin, said in brakes.source) == (origin, True)
         assert "not given" not in brakes.source
 

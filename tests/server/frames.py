@@ -9,12 +9,11 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from seerob.core import snapshot as wire
-from seerob.core.snapshot import Arrow, Basis, Command, CriterionInfo, Node, Result, Scene, Snapshot, Verdict
+from seerob.core.snapshot import Arrow, Command, CriterionInfo, Node, Result, Scene, Snapshot, Verdict
 
 PATIENCE = 60.0
 """With what comes for sure [s]."""
 
-BASIS = Basis(formula="d(a, b)", source="the paper, Eq. 1")
 MESHES = {"ab" * 32: b"glTF" + bytes(100)}
 
 
@@ -47,15 +46,8 @@ def snapshot(k, nodes=3):
                 limit=1.0,
                 verdict=Verdict.WITHIN if value <= 1.0 else Verdict.EXCEEDED,
                 markers=(Arrow(origin=(0.0, 0.0, 0.0), vector=tuple(rng.normal(size=3).tolist())),),
-                basis=BASIS,
             ),
         ),
-    )
-
-
-def stripped(s):
-    return msgspec.structs.replace(
-        s, results=tuple(msgspec.structs.replace(r, basis=None) for r in s.results)
     )
 
 

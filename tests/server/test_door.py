@@ -13,7 +13,7 @@ from seerob.app.server.serving import Server
 from seerob.core.errors import InputError
 from seerob.core.host_name import is_loopback
 from seerob.core.snapshot import PROTOCOL, Snapshot
-from server.frames import MESHES, PATIENCE, Remembered, Visitor, raw, scene, snapshot, stripped
+from server.frames import MESHES, PATIENCE, Remembered, Visitor, raw, scene, snapshot
 
 TOKEN = "0123456789abcdef0123456789abcdef"
 HASH = next(iter(MESHES))
@@ -111,7 +111,7 @@ def test_a_page_that_was_not_built_says_how(tmp_path):
                 assert answer.status_code == 503
                 assert "make web" in answer.text
             with Visitor(server) as page:  # a script needs no page
-                assert page.of(Snapshot) == stripped(snapshot(0))
+                assert page.of(Snapshot) == snapshot(0)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from seerob.app.server.connection import PromptRequests
 from seerob.app.server.player import Player
 from seerob.app.server.serving import Server
 from seerob.core.snapshot import Snapshot
-from server.frames import MESHES, Remembered, Visitor, scene, snapshot, stripped
+from server.frames import MESHES, Remembered, Visitor, scene, snapshot
 
 DEADLINE = 30.0
 
@@ -60,7 +60,7 @@ def test_who_does_not_ask_is_cut_and_who_looks_on_is_not(server, monkeypatch, sa
             slow.sendall(said)
             assert ended(slow)
         page.ask("step", 1)
-        assert page.of(Snapshot, timeout=DEADLINE) == stripped(snapshot(1))
+        assert page.of(Snapshot, timeout=DEADLINE) == snapshot(1)
 
 
 def test_there_are_only_so_many_connections(server, monkeypatch):

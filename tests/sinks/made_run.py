@@ -226,7 +226,6 @@ def snapshot(k, *, period=0.01):
                     part("hand", distance + 1, Verdict.WITHIN),
                 ),
                 markers=red,
-                basis=SEPARATION,
             ),
             Result(
                 name="tool speed",
@@ -235,7 +234,6 @@ def snapshot(k, *, period=0.01):
                 limit=1.0,
                 verdict=Verdict.WITHIN,
                 markers=every,
-                basis=SPEED,
             ),
             Result(
                 name=HOSTILE,
@@ -243,7 +241,6 @@ def snapshot(k, *, period=0.01):
                 unit="kg",
                 verdict=Verdict.UNDECIDED if undecided else None,
                 reason=f"not heard for {k} ticks" if undecided else "",
-                basis=None if k < 10 else SPEED,
             ),
         ),
     )

@@ -22,7 +22,7 @@ from seerob.core.errors import InputError, SeerobError
 from seerob.core.snapshot import Scene, Snapshot
 from seerob.outputs.sinks import recorder as recorder_module
 from seerob.outputs.sinks.recorder import Recorder
-from seerob.recording.format import BASIS, SAMPLES, SCENE, SNAPSHOT
+from seerob.recording.format import SAMPLES, SCENE, SNAPSHOT
 from seerob.recording.recording import Recording
 
 N = 150
@@ -72,12 +72,6 @@ def test_seek_agrees_with_search_in_all_of_it(tmp_path, monkeypatch):
         assert recording.snapshot_at(t) == (before[-1] if before else every[0])
         end = t + rng.uniform(0, 0.3)
         assert list(recording.snapshots(t, end)) == [s for s in every if t <= s.t <= end]
-
-
-def test_basis_is_stored_when_it_changes_and_not_at_every_tick(path):
-    with path.open("rb") as file:
-        changes = list(make_reader(file, validate_crcs=True).iter_messages(topics=[BASIS]))
-    assert len(changes) == 3  # separation and speed from the start, the third from tick 10
 
 
 def test_cut_anywhere_it_opens_shorter_or_says_why(path, tmp_path):
@@ -185,7 +179,7 @@ def test_a_foreign_reader_understands_every_channel(path):
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         summary = reader.get_summary()
         topics = {c.topic: c for c in summary.channels.values()}
-        assert set(topics) == {SCENE, SAMPLES, SNAPSHOT, BASIS, "/scene", "/markers", "/tf", "/results"}
+        assert set(topics) == {SCENE, SAMPLES, SNAPSHOT, "/scene", "/markers", "/tf", "/results"}
         assert summary.statistics.attachment_count == len(made_run.MESHES) + len(made_run.FILES)
         scenes = [m.decoded_message for m in reader.iter_decoded_messages(topics=["/scene"])]
         transforms = [m.decoded_message for m in reader.iter_decoded_messages(topics=["/tf"])]

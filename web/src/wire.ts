@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "a4cb619a82085c8f";
+export const SCHEMA = "dc2d4d47fbce7bbb";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -247,7 +247,7 @@ export interface Row {
 }
 
 /**
- * What one criterion says at one instant.
+ * What one criterion says at one instant; its basis does not change in a run (`CriterionInfo.basis`).
  *
  * A result with a figure and without a limit has no verdict: it informs. UNDECIDED always carries a reason.
  * One that says nothing is UNDECIDED, unless it says that there is nothing to judge, and why.
@@ -271,8 +271,6 @@ export interface Result {
   markers: Marker[];
   /** One row per place of a person's body, where a criterion judges such places. */
   rows: Row[];
-  /** None on parts, which share their parent's, and on the wire, where it is sent once. */
-  basis: Basis | null;
   /** Instant it speaks of [s] when that is not the snapshot's (a criterion with a period). */
   t: number | null;
   /** Whether the criterion does not apply now, as a variable says: then it says nothing. */

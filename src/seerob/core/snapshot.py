@@ -204,7 +204,7 @@ class Row(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Result(Struct, frozen=True, kw_only=True):
-    """What one criterion says at one instant.
+    """What one criterion says at one instant; its basis does not change in a run (`CriterionInfo.basis`).
 
     A result with a figure and without a limit has no verdict: it informs. UNDECIDED always carries a reason.
     One that says nothing is UNDECIDED, unless it says that there is nothing to judge, and why.
@@ -228,8 +228,6 @@ class Result(Struct, frozen=True, kw_only=True):
     markers: tuple[Marker, ...] = ()
     rows: tuple[Row, ...] = ()
     """One row per place of a person's body, where a criterion judges such places."""
-    basis: Basis | None = None
-    """None on parts, which share their parent's, and on the wire, where it is sent once."""
     t: float | None = None
     """Instant it speaks of [s] when that is not the snapshot's (a criterion with a period)."""
     muted: bool = False

@@ -370,7 +370,7 @@ class Judge:
         except Exception as error:
             # One's own criterion that fails must not end a run that others are judged in.
             result = _unknown(bound.criterion, self._failed(bound, error))
-        return replace(result, basis=bound.basis), muted is not None
+        return result, muted is not None
 
     def _asked(self, i: int, evaluate: Evaluate, state: State) -> Result:
         """What a criterion says, as far as it may be green.

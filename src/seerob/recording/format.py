@@ -1,10 +1,9 @@
 """What our recordings hold, in one place for the writer and the reader.
 
-A recording is an MCAP file. Per tick there is one message on `SAMPLES` (what came in) and one on
-`SNAPSHOT` (what went out), both MessagePack with float64. A result's basis is long and rarely
-changes: it is taken out of the snapshots and written to `BASIS` when it changes. `SCENE` is the
-first message. Attachments hold the meshes and every input file. All other channels serve foreign
-viewers only and are never read back.
+A recording is an MCAP file. Per tick there is one message on `SAMPLES` (what came in) and one on `SNAPSHOT`
+(what went out), both MessagePack with float64. `SCENE` is the first message, with what does not change: the
+basis of each criterion is there. Attachments hold the meshes and every input file. All other channels serve
+foreign viewers only and are never read back.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ from __future__ import annotations
 from msgspec import Struct
 
 from seerob.core.samples import BodySample, JointSample, PoseSample, SignalSample
-from seerob.core.snapshot import Basis
 
 VERSION = "1"
 """Of this layout; a reader refuses one that it does not know."""
@@ -25,7 +23,6 @@ END_METADATA = "seerob.end"
 SCENE = "/seerob/scene"
 SAMPLES = "/seerob/samples"
 SNAPSHOT = "/seerob/snapshot"
-BASIS = "/seerob/basis"
 
 VIEW_SCENE, VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS = "/scene", "/markers", "/tf", "/results"
 VIEW_PEOPLE = "/people"
@@ -45,15 +42,6 @@ class Tick(Struct, frozen=True, kw_only=True):
     t: float
     """Run time [s]."""
     samples: tuple[JointSample | PoseSample | BodySample | SignalSample, ...] = ()
-
-
-class BasisChange(Struct, frozen=True, kw_only=True):
-    """From snapshot ``seq`` on, the result at ``index`` named ``name`` rests on ``basis``."""
-
-    seq: int
-    index: int
-    name: str
-    basis: Basis | None
 
 
 def nanoseconds(t: float) -> int:

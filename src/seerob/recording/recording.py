@@ -11,12 +11,10 @@ from threading import Lock
 from typing import TypeVar
 
 import msgspec
-from msgspec.structs import replace
 
 from seerob.core.errors import InputError
-from seerob.core.snapshot import Basis, Finding, Scene, Snapshot
+from seerob.core.snapshot import Finding, Scene, Snapshot
 from seerob.recording.format import (
-    BASIS,
     END_METADATA,
     FILE_PREFIX,
     MESH_PREFIX,
@@ -27,7 +25,6 @@ from seerob.recording.format import (
     VERSION,
     VIEW_SCENE,
     VIEWS,
-    BasisChange,
     Tick,
     nanoseconds,
 )
@@ -46,13 +43,12 @@ T = TypeVar("T")
 _POSE = 7 * 4
 _CACHED_CHUNKS = 8
 _TICK = {SAMPLES, SNAPSHOT}
-_TICK_VIEWS = {SAMPLES, SNAPSHOT, BASIS, *VIEWS}
+_TICK_VIEWS = {SAMPLES, SNAPSHOT, *VIEWS}
 _REMEDY = "give a recording (.mcap) made by seerob"
 
 _decode_scene = msgspec.msgpack.Decoder(Scene).decode
 _decode_snapshot = msgspec.msgpack.Decoder(Snapshot).decode
 _decode_tick = msgspec.msgpack.Decoder(Tick).decode
-_decode_basis = msgspec.msgpack.Decoder(BasisChange).decode
 
 
 class Recording:
@@ -72,7 +68,6 @@ class Recording:
         self._damage: dict[str, None] = {}
         self.scene = self._read_scene()
         """What did not change during the run."""
-        self._bases = self._read_bases()
         self._tick_chunks = [c for c in index.chunks if self._has(c, SAMPLES, SNAPSHOT)]
         self._starts = [c.start for c in self._tick_chunks]
         self.start, self.end = self._span()
@@ -229,21 +224,7 @@ class Recording:
         if len(snapshot.poses) != _POSE * len(self.scene.nodes):
             what = f"has {len(snapshot.poses)} bytes of poses for {len(self.scene.nodes)} nodes"
             raise InputError.at(self.path, f"{SNAPSHOT} seq {snapshot.seq}", what, _REMEDY)
-        results = snapshot.results
-        if not self._bases or not results:
-            return snapshot
-        restored = tuple(
-            r if (basis := self._basis(i, r.name, snapshot.seq)) is None else replace(r, basis=basis)
-            for i, r in enumerate(results)
-        )
-        return replace(snapshot, results=restored)
-
-    def _basis(self, index: int, name: str, seq: int) -> Basis | None:
-        changes = self._bases.get((index, name))
-        if changes is None:
-            return None
-        k = bisect_right(changes[0], seq) - 1
-        return changes[1][k] if k >= 0 else None
+        return snapshot
 
     def _read_scene(self) -> Scene:
         for chunk in self._index.chunks[:4]:
@@ -253,17 +234,6 @@ class Recording:
         if self._index.finished:
             raise InputError.at(self.path, "", f"has no readable {SCENE}", _REMEDY)
         raise InputError.at(self.path, "", "was cut off before anything was recorded", "record again")
-
-    def _read_bases(self) -> dict[tuple[int, str], tuple[list[int], list[Basis | None]]]:
-        bases: dict[tuple[int, str], tuple[list[int], list[Basis | None]]] = {}
-        for chunk in self._index.chunks:
-            if self._has(chunk, BASIS):
-                for message in self._messages(chunk, BASIS):
-                    change: BasisChange = self._decode(_decode_basis, message, BASIS)
-                    seqs, values = bases.setdefault((change.index, change.name), ([], []))
-                    seqs.append(change.seq)
-                    values.append(change.basis)
-        return bases
 
     def _span(self) -> tuple[float, float]:
         first = next((t for c in self._tick_chunks for t in self._times(c)), 0.0)

@@ -10,7 +10,6 @@ from math import isfinite
 from typing import Any
 
 import msgspec
-from msgspec.structs import replace
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from seerob.app.server.client import Client, Closing
@@ -39,13 +38,6 @@ _encode = msgspec.msgpack.Encoder().encode
 _decode: Callable[[bytes], Command | Tracking] = msgspec.msgpack.Decoder(Command | Tracking).decode
 LARGEST_COMMAND = 512
 """[B]; one has less than 100."""
-
-
-def on_the_wire(snapshot: Snapshot) -> Snapshot:
-    """A snapshot without what was sent once with the scene: the basis of each result."""
-    if all(result.basis is None for result in snapshot.results):
-        return snapshot
-    return replace(snapshot, results=tuple(replace(r, basis=None) for r in snapshot.results))
 
 
 def read_message(data: bytes) -> Command | Tracking:
@@ -88,7 +80,7 @@ class Hub:
         self._newest = snapshot
         if not self.clients:
             return
-        payload = _encode(on_the_wire(snapshot))
+        payload = _encode(snapshot)
         for client in self.clients:
             client.offer_frame(snapshot.seq, payload)
 
@@ -131,7 +123,7 @@ class Hub:
             client.offer("SoFar", _encode(so_far))
         client.offer("Transport", _encode(self._feed.transport()))
         if self._newest is not None:
-            client.offer_frame(self._newest.seq, _encode(on_the_wire(self._newest)))
+            client.offer_frame(self._newest.seq, _encode(self._newest))
         self.clients.add(client)
         tasks = [asyncio.create_task(client.send()), asyncio.create_task(self._listen(client, socket))]
         try:

@@ -14,14 +14,12 @@ from typing import Any
 import msgspec
 from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import register_schema
-from msgspec.structs import replace
 
 from seerob.core.samples import Sample
-from seerob.core.snapshot import Basis, Result, Scene, Snapshot
+from seerob.core.snapshot import Scene, Snapshot
 from seerob.outputs.mcap.foxglove import frame_transforms, marker_update, scene_update
 from seerob.outputs.versions import versions
 from seerob.recording.format import (
-    BASIS,
     END_METADATA,
     FILE_PREFIX,
     MESH_PREFIX,
@@ -35,7 +33,6 @@ from seerob.recording.format import (
     VIEW_PEOPLE,
     VIEW_RESULTS,
     VIEW_SCENE,
-    BasisChange,
     Tick,
     nanoseconds,
 )
@@ -94,7 +91,6 @@ class McapTape:
         self._scene = scene
         self._people = {m.name: [j.name for j in m.joints] for m in scene.mechanisms if m.role == "human"}
         self._encode = msgspec.msgpack.Encoder(enc_hook=_plain).encode
-        self._bases: dict[tuple[int, str], Basis | None] = {}
         self._next_view = -math.inf
         self.ticks = 0
         """Ticks that were taken."""
@@ -128,8 +124,7 @@ class McapTape:
         from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
         channels = {
-            topic: self._mcap.register_channel(topic, "msgpack", 0)
-            for topic in (SCENE, SAMPLES, SNAPSHOT, BASIS)
+            topic: self._mcap.register_channel(topic, "msgpack", 0) for topic in (SCENE, SAMPLES, SNAPSHOT)
         }
         update = register_schema(self._mcap, SceneUpdate)
         transforms = register_schema(self._mcap, FrameTransforms)
@@ -157,7 +152,7 @@ class McapTape:
         self._put(SAMPLES, seq, t, self._encode(Tick(seq=seq, t=t, samples=samples)))
         if snapshot is None:
             return
-        self._put(SNAPSHOT, seq, t, self._encode(self._without_basis(snapshot)))
+        self._put(SNAPSHOT, seq, t, self._encode(snapshot))
         if t >= self._next_view:
             self._next_view = t + VIEW_PERIOD * (1 - 1e-6)
             self._put(VIEW_FRAMES, seq, t, frame_transforms(self._scene, snapshot).SerializeToString())
@@ -204,18 +199,6 @@ class McapTape:
     def _put(self, topic: str, seq: int, t: float, data: bytes) -> None:
         time = nanoseconds(t)
         self._mcap.add_message(self._channels[topic], time, data, time, seq & 0xFFFFFFFF)
-
-    def _without_basis(self, snapshot: Snapshot) -> Snapshot:
-        stripped: list[Result] = []
-        for i, result in enumerate(snapshot.results):
-            place, basis = (i, result.name), result.basis
-            known = self._bases.get(place)
-            if basis is not known and basis != known:
-                change = BasisChange(seq=snapshot.seq, index=i, name=result.name, basis=basis)
-                self._put(BASIS, snapshot.seq, snapshot.t, self._encode(change))
-            self._bases[place] = basis
-            stripped.append(result if basis is None else replace(result, basis=None))
-        return replace(snapshot, results=tuple(stripped))
 
 
 def _results_json(snapshot: Snapshot) -> bytes:

@@ -122,12 +122,7 @@ class DossierWriter(AtEndWithResults):
         return drawn
 
     def _bases(self) -> dict[str, Basis]:
-        found = {info.name: info.basis for info in self._scene.criteria if info.basis is not None}
-        for name, snapshot in self._worst.items():
-            result = result_named(snapshot, name)
-            if result is not None and result.basis is not None:
-                found[name] = result.basis
-        return found
+        return {info.name: info.basis for info in self._scene.criteria if info.basis is not None}
 
 
 def write_whole(path: Path, data: bytes) -> None:

@@ -23,7 +23,6 @@ from seerob.outputs.sink import Sink
 from seerob.outputs.workbook.motion_sheets import MotionSheets
 from seerob.outputs.workbook.sheet_rows import Cell
 from seerob.outputs.workbook.sheets import workbook
-from seerob.recording.result_log import result_named
 from seerob.recording.series import CODES, Series
 
 _VERDICT_OF = {code: verdict for verdict, code in CODES.items()}
@@ -91,10 +90,7 @@ class ExcelWriter(AtEndWithResults):
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Take one tick."""
-        for name in self.log.add(snapshot):
-            result = result_named(snapshot, name)
-            if result is not None and result.basis is not None:
-                self._bases[name] = result.basis
+        self.log.add(snapshot)
         self._motion.take(snapshot, samples)
 
     def close(self) -> None:

@@ -111,7 +111,7 @@ def test_what_a_simulated_stop_says_of_itself(tmp_path):
     assert "whole path" in basis_in(tmp_path / "p").formula
     share = part(path, "share of the present speed")
     assert (share.value, share.reason) == (1.0, "or more")
-    toward = separation(tmp_path / "t", SIMULATED + ', direction = "toward"', x=9.0)
+    separation(tmp_path / "t", SIMULATED + ', direction = "toward"', x=9.0)
     assert "loss of distance" in basis_in(tmp_path / "t").formula
     one = two_r().replace('effort="1000.0" ', "", 1)
     for folder, urdf, origin, said in (

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from seerob.files.trajectories.trajectory import derive_velocities
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import Series
 from seerob.session.station import Station, load
@@ -99,6 +100,10 @@ class Cell:
     duration: float
     speeds: bool
     """Whether the log has velocities."""
+    noise: float = field(default=0.0, kw_only=True)
+    """Standard deviation of the log's positions [rad or m]."""
+    derived: bool = field(default=False, kw_only=True)
+    """Whether the velocities of the log are derived from its positions."""
     stature: float
     person: np.ndarray
     """x, y, yaw of the person."""
@@ -278,15 +283,18 @@ def motion(cell: Cell) -> str:
     factor = np.array([{"deg": 180 / np.pi, "mm": 1000.0}.get(u, 1.0) for u in unit])
     header = ["t [s]", *(f"j{i} [{unit[i]}]" for i in range(n))]
     if cell.speeds:
-        header += [f"dj{i} [{unit[i]}/s]" for i in range(n)]
+        header += [f"qd_j{i} [{unit[i]}/s]" for i in range(n)]
     rows = [",".join(header)]
-    for k in range(round(cell.duration * cell.rate) + 1):
-        t = k / cell.rate
+    every = np.arange(round(cell.duration * cell.rate) + 1) / cell.rate
+    angles = cell.frequency * every[:, None] + cell.phase
+    q, qd = cell.amplitude * np.sin(angles), cell.amplitude * cell.frequency * np.cos(angles)
+    q = q + np.random.default_rng(0).normal(0.0, cell.noise, q.shape)
+    if cell.derived:
+        qd = derive_velocities(every, q).qd
+    for t, at, speed in zip(every.tolist(), q * factor, qd * factor, strict=True):
         if cell.gap and cell.gap[0] < t < cell.gap[1]:
             continue
-        q = cell.amplitude * np.sin(cell.frequency * t + cell.phase) * factor
-        qd = cell.amplitude * cell.frequency * np.cos(cell.frequency * t + cell.phase) * factor
-        row = [t + cell.start, *q.tolist(), *(qd.tolist() if cell.speeds else ())]
+        row = [t + cell.start, *at.tolist(), *(speed.tolist() if cell.speeds else ())]
         rows.append(",".join(repr(v) for v in row))
     return "\n".join(rows) + "\n"
 

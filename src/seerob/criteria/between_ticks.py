@@ -382,6 +382,8 @@ class BetweenTicks:
             span = watch.points.span(path, a.t, b.t, self._ids, state.model.mj)
             span.between_speeds(a.speeds, b.speeds)
             span.foresee = state.foresee
+            if state.speed_errors:
+                span.derived(state.speed_noise(tuple(range(len(a.speeds)))), state.joint_noise())
             self._whole = span if whole else self._whole
         return span
 

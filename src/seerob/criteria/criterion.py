@@ -79,7 +79,8 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Whether it rests on torques that a source measured."""
     by_speed: ClassVar[bool] = False
     """Whether its interval holds how far speeds may be off that were derived from noisy positions
-    (`State.speed_error`)."""
+    (`State.speed_error`). Of any other that asks for such speeds the judge finds out what their errors change
+    (`seerob.criteria.noisy_speeds`)."""
     by_shape: ClassVar[bool] = True
     """Whether it is about the shapes of its subjects, so that what no shape shows of a robot could make it
     worse; False only where no distance, area, volume or point of a surface is in it."""

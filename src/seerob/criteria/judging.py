@@ -19,6 +19,7 @@ from seerob.core.verdict import ROUNDING, keeps
 from seerob.criteria.as_heard import AsHeard
 from seerob.criteria.between_ticks import Asking, BetweenTicks, Watch
 from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.criteria.noisy_speeds import shaken
 from seerob.model.model import Model
 from seerob.twin.state import State
 from seerob.twin.validity.hearing import SLACK
@@ -288,6 +289,8 @@ class Judge:
         self._needs: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] | None = None
         self._unmentioned: tuple[dict[str, str], ...] = ()
         self._kept: dict[int, _Kept] = {}
+        self._again: dict[int, Evaluate | None] = {}
+        """Another one of a criterion, for what errors of speeds would change; None of one that remembers."""
         self._why = [""] * len(bound)
         """Of each criterion, why nothing that it said last is within."""
         self._between = BetweenTicks([one.watch for one in bound])
@@ -404,7 +407,20 @@ class Judge:
                 raise Undecided(reason)
         elif result.value is not None and not math.isfinite(result.value):
             raise Undecided(f"the value is {result.value}, not a finite number")
+        elif not bound.criterion.by_speed and state.speed_errors:
+            return self._shaken(i, result, state)
         return undecided(result, reason) if reason else result
+
+    def _shaken(self, i: int, result: Result, state: State) -> Result:
+        """A result with the noise of speeds that it asked for in its interval; undecided across a limit."""
+        criterion = self._bound[i].criterion
+        if i not in self._again:
+            self._again[i] = None if criterion.remembers(state.model) else criterion.bind(state.model)
+        noise = shaken(result, criterion, self._again[i], state)
+        if noise.off and result.value is not None:
+            low, high = result.interval or (result.value, result.value)
+            result = replace(result, interval=(low - noise.off, high + noise.off))
+        return undecided(result, noise.reason) if noise.reason else result
 
     def _failed(self, bound: Bound, error: Exception) -> str:
         what = f"{_where(bound)} failed: {told(error)}"

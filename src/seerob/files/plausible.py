@@ -39,7 +39,7 @@ def noise_of_speeds(motion: Trajectory, description: Description, name: str) -> 
     text = (
         f"{motion.file}: speeds are derived from noisy positions: standing, its flange "
         f"seems to move at up to {1e3 * speed:.0f} mm/s, and figures of speed are uncertain by so much "
-        "(velocity and kinetic_energy are intervals; other criteria take the speeds as they are)"
+        "(what rests on them is not within where that could exceed a limit)"
     )
     return Finding(level="assumed", subject=name, text=text)
 

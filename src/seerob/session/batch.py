@@ -154,11 +154,12 @@ def judged(
     """
     n = len(motion.t)
     findings = tuple(dict.fromkeys((*model.findings, *findings)))
-    asked, notes = _able(model, bound, findings, noisy=bool(motion.speed_errors))
+    asked, notes = _able(model, bound, findings)
     parts = [motion.part(begin, end) for begin, end in pairwise([*range(0, n, STRETCH), n]) if begin < end]
     questions = Questions(model)
     found: dict[str, list[tuple[Answers, Reasons]]] = {name: [] for name in asked}
     speeds: list[Array] = []
+    noisy: set[str] = set()
     if asked and parts:
         # Learns what distances are asked, so that every stretch asks for all of them together.
         _stretch(Bench(model, questions), asked, parts[0].part(0, 1))
@@ -166,10 +167,15 @@ def judged(
             shares = [parts[k::threads] for k in range(max(1, threads))]
             made = list(pool.map(lambda share: _share(model, questions, asked, share), shares))
         for k in range(len(parts)):
-            stretch, fast = made[k % len(shares)][k // len(shares)]
+            stretch, fast, rested = made[k % len(shares)][k // len(shares)]
             speeds.append(fast)
+            noisy |= rested
             for name, answers in stretch.items():
                 found[name].append(answers)
+    for name in noisy:
+        # How far errors of speeds reach is asked of a state (`seerob.criteria.noisy_speeds`).
+        del asked[name], found[name]
+        notes[name] = "asked instant by instant: speeds are derived from noisy positions"
     slow = [one for one in bound if one.criterion.name not in asked]
     walked = _walked(model, slow, motion, findings) if slow else {}
     walked |= {name: _joined(answers) for name, answers in found.items()}
@@ -252,7 +258,7 @@ def _with(
 
 
 def _able(
-    model: Model, bound: Sequence[Bound], findings: Sequence[Finding], *, noisy: bool
+    model: Model, bound: Sequence[Bound], findings: Sequence[Finding]
 ) -> tuple[dict[str, _Able], dict[str, str]]:
     """Criteria that judge many instants at once; why others do not."""
     able: dict[str, _Able] = {}
@@ -267,8 +273,6 @@ def _able(
             notes[criterion.name] = "asked instant by instant: a finding holds what it is about"
         elif criterion.heavier_is_worse and any(m.unknown_masses for m in model.mechanisms.values()):
             notes[criterion.name] = "asked instant by instant: masses are not known"
-        elif noisy and criterion.by_speed:
-            notes[criterion.name] = "asked instant by instant: speeds are derived from noisy positions"
         elif criterion.variables():
             notes[criterion.name] = "asked instant by instant: it follows variables"
         else:
@@ -303,18 +307,24 @@ def _share(
     questions: Questions,
     asked: dict[str, _Able],
     parts: Sequence[Motion],
-) -> list[tuple[Stretch, Array]]:
+) -> list[tuple[Stretch, Array, set[str]]]:
     """The work of one thread."""
     bench = Bench(model, questions)
     return [_stretch(bench, asked, part) for part in parts]
 
 
-def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Stretch, Array]:
+def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Stretch, Array, set[str]]:
+    """What criteria say, speeds of all bodies, and which criteria asked for speeds that are noisy."""
     states = bench.place(motion)
     found: Stretch = {}
+    noisy: set[str] = set()
     for name, one in asked.items():
         states.asked.clear()
+        states.speeds_asked.clear()
         answers, reasons = _said(one, states)
+        with_carriers = {above for who in states.speeds_asked for above in bench.model.carriers_of(who)}
+        if not motion.speed_errors.keys().isdisjoint(with_carriers | states.speeds_asked):
+            noisy.add(name)
         for who in sorted(states.asked):
             reasons = np.where(motion.doubts[who] != "", motion.doubts[who], reasons)
         answers = _doubted(answers, one.criterion, reasons)
@@ -322,7 +332,8 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Str
             reasons = np.where(answers.verdict == WITHIN, "; ".join(dict.fromkeys(texts)), reasons)
             answers = answers.open()
         found[name] = answers, reasons
-    return found, states.largest_speeds() if motion.ways is not None else np.zeros((len(states), 0))
+    speeds = states.largest_speeds() if motion.ways is not None else np.zeros((len(states), 0))
+    return found, speeds, noisy
 
 
 def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:

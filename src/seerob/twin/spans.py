@@ -235,6 +235,11 @@ class Span:
         """Least speed of the fastest point of each body [m/s], shape (n,)."""
         self.ends = fast
         """Larger of its speeds at both ends [m/s], shape (n,), once these are known."""
+        self.noise = np.zeros(len(fast))
+        """How far speeds of points of bodies may be off that were derived from noisy positions [m/s], shape
+        (p,), which is in no other figure here; 0 of points that criteria add."""
+        self.joint_noise = np.zeros(mj.nv)
+        """How far speeds of joints may be off by that noise [rad/s or m/s], shape (nv,)."""
         self.qd, self.qdd, _, self.away = joints
         """Largest absolute speed and acceleration of every joint, and way from the model's pose, (nv,)."""
 
@@ -246,6 +251,16 @@ class Span:
         most = np.minimum((before + after + self.quick[:n] * self.T) / 2, self.ends + self.bend[:n])
         np.minimum(self.fast[:n], most, out=self.fast[:n])
         self.slow = np.maximum((before + after - self.quick[:n] * self.T) / 2, 0.0)
+
+    def derived(self, points: Array, joints: Array) -> None:
+        """Take into account how far speeds may be off at one end, of bodies [m/s] (n,) and joints (nv,).
+
+        Until the other end, the distance of a point from an axis changes by no more than both of them move.
+        """
+        n, some = len(points), points > 0
+        moved = 2 * float(self.fast[:n].max(initial=0.0)) * self.T
+        self.noise[:n][some] = points[some] + float(np.linalg.norm(joints)) * moved
+        self.joint_noise = joints
 
     def way(self, rows: Indices) -> float:
         """Longest way of any of some points within the span [m]."""

@@ -11,7 +11,7 @@ engine, the picture and the recorder. While a criterion is asked (`asking`) it i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -29,6 +29,7 @@ from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.twin.joint_columns import Columns
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Path
+from seerob.twin.speed_noise import SpeedNoise
 from seerob.twin.validity.hearing import SLACK
 from seerob.twin.validity.hearing import Hearing as Hearing  # noqa: PLC0414
 from seerob.twin.validity.validity import Validity
@@ -42,6 +43,8 @@ n) each, and why they may be others; None where nobody knows."""
 
 MOST_PLACES = 512
 """Sets of bodies of which places are kept from tick to tick."""
+WRITTEN = ("placed", "velocities of")
+"""What is kept of them lies in buffers."""
 
 
 class State(Validity):
@@ -53,13 +56,13 @@ class State(Validity):
         super().__init__(model, hearings, signals)
         self._data = data
         self._at_least = False
-        self.path: Path | None = None
-        """How everybody came here from the last tick, whoever was heard: for bounds; None where there was
-        none."""
-        self.foresee: Foresee = lambda name, t: None
-        """What a motion that is known ahead will do."""
+        self._path: Path | None = None
+        self._ahead: Foresee = lambda name, t: None
         self.touches: list[tuple[int, int, float]] | None = None
         """Of every contact two of MuJoCo's bodies and the normal force [N]; None where none is calculated."""
+        self._quicker: dict[str, Array] = {}
+        """By how much joints are faster than the twin has them, while that is asked for (`quicker`)."""
+        self._noise = SpeedNoise(model)
         n = len(model.bodies)
         self._rotations, self._positions = np.zeros((n, 3, 3)), np.zeros((n, 3))
         self._quaternions = np.zeros((n, 4))
@@ -125,6 +128,16 @@ class State(Validity):
         """World from body, w first, shape (n, 4)."""
         self._open("quaternions", "placed(bodies)")
         return self._quaternions
+
+    @property
+    def path(self) -> Path | None:
+        """How everybody came here from the last tick, whoever was heard: for bounds; None at the first."""
+        self._open("path", "foresee, or bound what happens between two ticks in falls or lowest")
+        return self._path
+
+    @path.setter
+    def path(self, path: Path | None) -> None:
+        self._path = path
 
     def joint_positions(self, mechanism: Mechanism) -> Array:
         """Joint positions as they are shown [rad or m], shape (n,)."""
@@ -229,7 +242,8 @@ class State(Validity):
             Undecided: It may not be relied on.
         """
         self.asked.add(VARIABLE + name)
-        return () if self.path is None else self._signals.meanwhile(name, float(self.path.t[0]), self.t)
+        path = self._path
+        return () if path is None else self._signals.meanwhile(name, float(path.t[0]), self.t)
 
     def placed(
         self,
@@ -291,6 +305,7 @@ class State(Validity):
             Undecided: One of them was not heard.
         """
         self.require(*names)
+        self.speeds_asked.update(names)
         return self._data
 
     # -- joints -----------------------------------------------------------------------------
@@ -306,6 +321,7 @@ class State(Validity):
     def qd(self, mechanism: Mechanism) -> Array:
         """Joint velocities of the twin [rad/s or m/s], shape (n,)."""
         self.require(mechanism.name)
+        self.speeds_asked.add(mechanism.name)
         return np.asarray(self._data.qvel[self.columns[mechanism.name].own_v])
 
     def speed_error(self, mechanism: Mechanism) -> Array | None:
@@ -316,6 +332,80 @@ class State(Validity):
         """
         self.require(mechanism.name)
         return self._hearings[mechanism.name].speed_error(self.t)
+
+    @property
+    def speed_errors(self) -> Mapping[str, Array]:
+        """By name of whose speeds were derived from noisy positions: `speed_error`, where there is any."""
+        if "speed errors" not in self._cache:
+            every = {name: hearing.speed_error(self.t) for name, hearing in self._hearings.items()}
+            self._cache["speed errors"] = {n: e for n, e in every.items() if e is not None and e.any()}
+        found: dict[str, Array] = self._cache["speed errors"]
+        return found
+
+    def speed_noise(self, bodies: tuple[int, ...]) -> Array:
+        """How far the speed of any point of bodies may be off by `speed_errors` [m/s], shape (b,).
+
+        Args:
+            bodies: By index. Whether they may be relied on is for who asks for their speeds.
+        """
+        errors = self.speed_errors
+        if not errors:
+            return np.zeros(len(bodies))
+        ids, rows = self.attachments.ids, self._rows_of(bodies)
+        return self._noise.of_bodies(self._data, ids, self._rotations, self._positions, rows, errors)
+
+    def joint_noise(self) -> Array:
+        """How far ``MjData.qvel`` may be off by `speed_errors` [rad/s or m/s], shape (nv,)."""
+        found = np.zeros(self.model.mj.nv)
+        for name, error in self.speed_errors.items():
+            mechanism = self.model.mechanisms[name]
+            found[mechanism.v_address] = np.abs(mechanism.coupling) @ error
+        return found
+
+    @contextmanager
+    def quicker(self, name: str, by: Array) -> Iterator[None]:
+        """While joints of a robot or human are by so much faster than the twin has them, now and ahead.
+
+        For the judge, who asks what an error of speeds would change.
+
+        Args:
+            name: Of the robot or human.
+            by: [rad/s or m/s], shape (n,).
+        """
+        data, mechanism = self._data, self.model.mechanisms[name]
+        speeds, cache = data.qvel.copy(), self._cache
+        self._quicker[name] = by
+        data.qvel[mechanism.v_address] += mechanism.coupling @ by
+        mujoco.mj_comVel(self.model.mj, data)
+        self._cache = {}
+        try:
+            yield
+        finally:
+            del self._quicker[name]
+            data.qvel[:] = speeds
+            mujoco.mj_comVel(self.model.mj, data)
+            # What was written into buffers meanwhile is of other speeds.
+            self._cache = {key: kept for key, kept in cache.items() if key[0] not in WRITTEN}
+
+    def _ask_speeds(self, bodies: tuple[int, ...]) -> None:
+        self.speeds_asked |= self._owners(bodies).everyone
+
+    @property
+    def foresee(self) -> Foresee:
+        """What a motion that is known ahead will do."""
+        return self._foreseen if self._closed else self._ahead
+
+    @foresee.setter
+    def foresee(self, ahead: Foresee) -> None:
+        self._ahead = ahead
+
+    def _foreseen(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
+        self.speeds_asked.add(name)
+        found = self._ahead(name, t)
+        if found is None or name not in self._quicker:
+            return found
+        q, qd, doubt = found
+        return q, qd + self._quicker[name], doubt
 
     def measured_torques(self, mechanism: Mechanism) -> Array:
         """Joint torques that its source measured, between samples as positions are [N·m or N], shape (n,).
@@ -498,6 +588,7 @@ class State(Validity):
             Valid until the next tick.
         """
         self.placed(bodies, estimates=estimates)
+        self._ask_speeds(bodies)
         key = ("velocities of", bodies)
         if key not in self._cache:
             self._cache[key] = True
@@ -528,6 +619,7 @@ class State(Validity):
             Speed [m/s], the corner in the world [m] (3,), its velocity [m/s] (3,).
         """
         self.require_bodies((index,))
+        self._ask_speeds((index,))
         speed, point, velocity = self._fastest()
         return float(speed[index]), point[index], velocity[index]
 
@@ -541,6 +633,7 @@ class State(Validity):
             estimates: As in `require_bodies`.
         """
         self.require_bodies(bodies, estimates=estimates)
+        self._ask_speeds(bodies)
         rows = self._rows_of(bodies)
         speed, point, velocity = self._fastest()
         return speed[rows], point[rows], velocity[rows]

@@ -135,6 +135,8 @@ class States:
         self.model, self._motion, self.doubts = bench.model, motion, motion.doubts
         self.asked: set[str] = set()
         """Robots and humans that answers have depended on since the set was last cleared."""
+        self.speeds_asked: set[str] = set()
+        """Those of which speeds were asked since it was last cleared."""
         self._bench, self._moved, self._masses = bench, moved, masses
         n = len(motion.t)
         self._rotations = np.ascontiguousarray(moved["xmat"][:, bench.ids]).reshape(n, -1, 3, 3)
@@ -167,6 +169,7 @@ class States:
     def qd(self, mechanism: Mechanism) -> Array:
         """Joint velocities [rad/s or m/s], shape (N, n)."""
         self.require(mechanism.name)
+        self.speeds_asked.add(mechanism.name)
         return self._motion.v[:, self._bench.columns[mechanism.name].own_v]
 
     def mass_matrix(self, mechanism: Mechanism) -> Array:
@@ -228,7 +231,9 @@ class States:
         Returns:
             Shapes (N, b), (N, b, 3) and (N, b, 3).
         """
-        self.require(*filter(None, (self.model.bodies[i].carrier for i in bodies)))
+        movers = tuple(filter(None, (self.model.bodies[i].carrier for i in bodies)))
+        self.require(*movers)
+        self.speeds_asked.update(movers)
         self._settled(bodies)
         speed, point, velocity = (found[:, list(bodies)] for found in self._fastest())
         return speed, point, velocity

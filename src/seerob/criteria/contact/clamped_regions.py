@@ -72,7 +72,7 @@ class FloorGap:
         """Which moving bodies clamp which body parts at any instant of a span, given the twin at one end."""
         fast = span.fast[self._moving]
         gap = self.lowest_and_falling(state)[:, 0] - fast * span.T
-        return self._clamped(gap, fast, thickness, wanted)
+        return self._clamped(gap, fast + span.noise[self._moving], thickness, wanted)
 
     def _clamped(self, gap: Array, fall: Array, thickness: Array, wanted: Flags) -> Flags:
         # As for other surfaces: where it may be no wider by the next tick, whatever way it goes.

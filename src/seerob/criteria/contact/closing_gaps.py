@@ -86,8 +86,8 @@ class ClosingGaps:
     ) -> tuple[Flags, Array]:
         """Which moving bodies clamp which body parts at any instant of a span, given one end of it."""
         bodies, first = np.array(self._pairs.moving, np.int64), self._pairs.first
-        speed = self._speeds(rotations, positions, twists, span.fast[bodies])
-        speed[self._seen] += relative.quick(span) * span.T
+        speed = self._speeds(rotations, positions, twists, span.fast[bodies] + span.noise[bodies])
+        speed[self._seen] += relative.quick(span) * span.T + span.noise[self._pair].sum(axis=1)
         ways = span.fast[bodies][first] * span.T
         ways[self._seen] += span.fast[self._pairs.across[self._seen]] * span.T
         return self._within(rotations, positions, speed, ways, wanted)

@@ -201,6 +201,7 @@ class JointGaps:
             if span is not None:
                 dof = mechanism.v_address[mechanism.own[table.column]]
                 way, change = span.qd[dof] * span.T, span.qdd[dof] * span.T
+                change += span.joint_noise[dof]
                 least, most = qd - change, qd + change
             if least or most:
                 start, end = q - way + min(least, 0.0) * self._period, q + way + max(most, 0.0) * self._period

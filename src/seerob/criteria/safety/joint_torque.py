@@ -68,6 +68,10 @@ class JointTorque(Criterion, frozen=True, kw_only=True):
         """The robot."""
         return (self.robot,)
 
+    def remembers(self, model: Model) -> bool:
+        """Say whether it rests on accelerations, which are differences of speeds from tick to tick."""
+        return self.torques == "model" or self.largest_residual is not None
+
     def bind(self, model: Model) -> Evaluate:
         """Look up every name in the model once and return the function that judges one instant."""
         robot = model.robot(self.robot)

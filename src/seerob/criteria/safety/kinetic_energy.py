@@ -14,6 +14,7 @@ from seerob.core.snapshot import Basis, Result, Sphere, Verdict
 from seerob.core.tolerances import deciding, spread
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
+from seerob.criteria.noisy_speeds import NOISE
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.recording.answers import Answers
@@ -100,7 +101,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
                 )
                 verdict = judge_interval(interval, self.limit)
                 if verdict is Verdict.UNDECIDED:
-                    reason = reason or "decided by the noise of positions that its speeds are derived from"
+                    reason = reason or NOISE
             _, position = state.pose(robot.tip)
             sphere = Sphere(
                 center=tuple(position.tolist()),

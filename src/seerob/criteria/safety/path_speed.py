@@ -142,7 +142,8 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
                 return UNBOUNDED
             ends = [float(np.linalg.norm(span.path.at(t)[1][own_v])) for t in (span.begin, span.end)]
             most = (ends[0] + ends[1] + float(np.linalg.norm(quick)) * span.T) / 2
-            fast = min(float(np.linalg.norm(speeds)), most) + ROUNDING
+            noise = float(np.linalg.norm(span.joint_noise[own_v]))
+            fast = min(float(np.linalg.norm(speeds)), most) + noise + ROUNDING
             q, qd = (each[own] for each, own in zip(
                 span.path.at((span.begin + span.end) / 2), (own_q, own_v), strict=True
             ))  # fmt: skip
@@ -152,7 +153,7 @@ class PathSpeed(Criterion, frozen=True, kw_only=True):
             if nearest + way > self.tolerance:
                 return UNBOUNDED
             there = distance <= nearest + SAME + 2 * way
-            turned = float(np.linalg.norm(quick)) * span.T / 2
+            turned = float(np.linalg.norm(quick)) * span.T / 2 + noise
             along, length = legs[1] @ qd, np.linalg.norm(legs[1], axis=1)
             # Whom it surely follows and is as near as any counts, and none that it surely does not follow.
             if (there & (along > turned * length) & (distance + 2 * way <= nearest + SAME)).any():

@@ -470,11 +470,14 @@ class Contacts:
         def turned(span: Span) -> Array:
             """How much faster surfaces are than the points whose direction counts [m/s], shape (b,)."""
             chains = (points.chain(int(i)) for i in moving)
-            return np.asarray(reach * [span.qd[joints][turns].sum() for joints, turns, _ in chains])
+            return np.asarray(
+                reach * [(span.qd + span.joint_noise)[joints][turns].sum() for joints, turns, _ in chains]
+            )
 
         def energy(state: State, span: Span) -> float:
             qd = state.qd(robot)
-            now = math.sqrt(float(qd @ state.mass_matrix(robot) @ qd))
+            M, off = state.mass_matrix(robot), span.joint_noise[robot.v_address[robot.own]]
+            now = math.sqrt(float(qd @ M @ qd)) + math.sqrt(float(np.diagonal(M) @ off**2))
             return (now + changes(span)[0]) ** 2 / 2
 
         def shares(v: Array, m_R: Array, clamped: NDArray[np.bool_]) -> Array:
@@ -486,7 +489,8 @@ class Contacts:
 
         def lowest(state: State, span: Span) -> float:
             state.require_bodies(self.moving)
-            fast = span.fast[moving]
+            noise = span.noise[moving]
+            fast = span.fast[moving] + noise
             if not np.isfinite(fast).all():
                 return -math.inf
             if self.people is None:
@@ -513,7 +517,7 @@ class Contacts:
             m_hit = m_closing = np.full(len(moving), simplified)
             if spec.mass != "simplified":
                 more, E = turned(span), energy(state, span)
-                slower = np.maximum(span.slow[moving] - more, STANDSTILL)
+                slower = np.maximum(span.slow[moving] - noise - more, STANDSTILL)
                 # m_u (v_r + v_h)² of a point that is at least so fast: as a share of v² it is most at an end.
                 ends = [np.maximum(fast + v_h.min(), STANDSTILL), np.maximum(fast + v_h.max(), STANDSTILL)]
                 most = np.max([(slower + more + each - fast) / (slower * each) for each in ends], axis=0)

@@ -59,7 +59,7 @@ class Required(NamedTuple):
     """S_p of each moving part."""
 
     S_p: Array
-    """What is sure from below [m], shape (n,)."""
+    """What is sure from below, of the speeds as they are known [m], shape (n,)."""
     most: Array
     """A bound from above [m], shape (n,)."""
     doubt: str
@@ -90,6 +90,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
     """Speed and separation monitoring: every moving part of a robot or machine against the person."""
 
     unit: ClassVar[str] = "m"
+    by_speed: ClassVar[bool] = True
     whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 
@@ -173,6 +174,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
         """Bodies of which each has an S_p: the moving parts of the robot or machine, and what carries it."""
         return model.moving_of(self._sides(model)[0])
 
+    def _everybody(self, model: Model) -> tuple[str, ...]:
+        """The robot or machine, what it carries, and what carries it."""
+        robot = model.mover(self._sides(model)[0])
+        return (robot.name, *robot.riders, *model.carriers_of(robot.name))
+
     def _gap(self, model: Model) -> Gap:
         robot, human = self._sides(model)
         return model.gap(model.select(human), model.moving_of(robot))
@@ -227,13 +233,18 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return np.asarray(np.maximum(assumed, at_speed(seen))) if np.any(seen > WALKING) else assumed
 
     @staticmethod
-    def _seen(state: State, gap: Gap) -> float:
-        """Speed of the person's fastest point that may be relied on [m/s]; 0 of a twin that is stopped."""
+    def _seen(state: State, gap: Gap) -> tuple[float, float]:
+        """Speed of the person's fastest point that may be relied on [m/s]; 0 of a twin that is stopped.
+
+        Returns:
+            As it is known, and as it may be by the noise of positions that it was derived from.
+        """
         if state.strays(gap.a):
-            return 0.0
+            return 0.0, 0.0
         lost = state.lost_bodies(gap.a)
         people = tuple(i for i in gap.a if i not in lost)
-        return float(state.fastest_points(people, estimates=True)[0].max(initial=0.0))
+        speeds = state.fastest_points(people, estimates=True)[0]
+        return float(speeds.max(initial=0.0)), float((speeds + state.speed_noise(people)).max(initial=0.0))
 
     def looks_ahead(self, model: Model) -> Mapping[str, float]:
         """Look ahead as long as the robot takes to react [s], by its name."""
@@ -248,12 +259,20 @@ class Separation(Criterion, frozen=True, kw_only=True):
         if self.stop.model == "simulated":
             model.mover(self._sides(model)[0]).require_masses(self.name)
 
+        tops: dict[Shifts, Array] = {}
+
         def figure(shifts: Shifts) -> Callable[[State], Array]:
             required = own._shifted(shifts).required(model)
-            return lambda state: required(state).S_p
+
+            def at(state: State) -> Array:
+                found = required(state)
+                tops[shifts] = found.most
+                return found.S_p
+
+            return at
 
         ends = SeparationEnds(own._tolerances(), figure, remembers=own.mode == "fixed")
-        rest = self.unknown(model), (LargestSeparation(), LargestSeparation()), ends
+        rest = self.unknown(model), (LargestSeparation(), LargestSeparation()), ends, tops
         return partly_seen(model, own._gap(model), lambda gap: own._bound(model, gap, *rest))
 
     def _bound(
@@ -263,6 +282,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         unknown_ever: str,
         largest: tuple[LargestSeparation, LargestSeparation],
         ends: SeparationEnds,
+        tops: Mapping[Shifts, Array],
     ) -> Evaluate:
         stop = self._stop(model)
         C, Z_d, Z_r = self._terms()[0]
@@ -270,6 +290,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
         places, names = BodyPlaces(model), [body.name for body in model.bodies]
         human = self._sides(model)[1]
         ends_of_distance = DistanceEnds(model, gap)
+        largest_ends = (1,) * len(ends.tolerances)
+        movers = (human, *self._everybody(model))
 
         def evaluate(state: State) -> Result:
             found = state.closest_per_body(gap, estimates=True, strayed=True)
@@ -277,7 +299,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             course = stop.courses(state)
             now = course(1.0)
             seen = self._seen(state, gap)
-            S_p, most, doubt = self._required(now, K, seen)
+            S_p, most, doubt = self._required(now, K, *seen)
             if self.mode == "fixed":
                 S_p, most = (each.including(state, x) for each, x in zip(largest, (S_p, most), strict=True))
             slower = f"{stray}: how fast the person is nobody knows" if stray else ""
@@ -285,8 +307,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
             unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
             near, far = ends_of_distance.of_bodies(state, found.distance)
             span = ends.at(state) if ends.tolerances else None
-            # What its acceleration may add to S_p is as much less distance.
-            spans = intervals(near - (most - S_p), far, S_p, span)
+            # What acceleration and noise may add to S_p, with all inputs at their worst, is less distance.
+            more = most - S_p if span is None else np.maximum(tops[largest_ends] - span.high, 0.0)
+            spans = intervals(near - more, far, S_p, span)
             open_at_all = span is not None or bool((far > near).any() or (most > S_p).any())
             bodies = found.body_a.tolist()
             parts = tuple(
@@ -314,11 +337,14 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 open_ = deciding((*ends.tolerances, tracking(wide / 2)), np.append(widths, wide))
                 if most[k] > S_p[k] and bool((most - S_p)[k] >= max(wide, *widths.tolist(), 0.0)):
                     faster = "if the robot gets faster during the reaction time as its torques allow: give "
-                    open_ = f"S_p is up to {most[k]:.3f} m {stop.more or faster + 'stop.acceleration'}"
+                    why = stop.more or f"{faster}stop.acceleration"
+                    if not state.speed_errors.keys().isdisjoint(movers):
+                        why = "by the noise of positions that speeds are derived from"
+                    open_ = f"S_p is up to {most[k]:.3f} m {why}"
             nearest = places.named(state, int(found.body_a[k]), found.point_a[k])
             where = f"{parts[k].name} ↔ {nearest}"
-            if seen > (self.human_speed or WALKING):
-                where += f", and {human} is seen at {seen:.2f} m/s, faster than v_h"
+            if seen[0] > (self.human_speed or WALKING):
+                where += f", and {human} is seen at {seen[0]:.2f} m/s, faster than v_h"
             shown = figures.against(float(found.distance[k]), float(S_p[k]), self.unit, at_most=self.at_most)
             segment = Segment(
                 start=tuple(found.point_b[k].tolist()),
@@ -337,7 +363,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 interval=parts[k].interval,
                 parts=(
                     *parts,
-                    *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r), seen),
+                    *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r), seen[0]),
                     *self._more(most - S_p, doubt),
                     *self._permissible(stop, state, course, now, found.distance, K),
                 ),
@@ -433,14 +459,16 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
         def now(state: State) -> Moment:
             onsets = (each(1.0).v_s for each in stop.reactions(state) if each is not None)
-            return Moment(required(state).most, (np.max([*onsets], axis=0), np.array(own._seen(state, gap))))
+            return Moment(
+                required(state).most, (np.max([*onsets], axis=0), np.array(own._seen(state, gap)[1]))
+            )
 
         def known_ahead(span: Span, at: Moment) -> Array:
             """S_p at the begin covers the tick, but for how fast parts and people get between its ends."""
             assert by_speed is not None
             v, seen = at.beside
             low, high = by_speed(v), by_speed(v + np.maximum(span.fast[parts] - span.ends[parts], 0.0))
-            fastest, T_r = float(span.fast[people].max(initial=0.0)), own.stop.reaction
+            fastest, T_r = float((span.fast + span.noise)[people].max(initial=0.0)), own.stop.reaction
             v_h = max(own.human_speed or REACHING, fastest)
             longer = separation_distance(high, v_h, T_r, K) - separation_distance(low, v_h, T_r, K)
             faster = max(fastest - max(own.human_speed or WALKING, float(seen)), 0.0)
@@ -448,8 +476,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
         def at_speeds(span: Span, _: Moment) -> Array:
             assert by_speed is not None
-            seen = float(span.fast[people].max(initial=0.0))
-            return own._at_speeds(by_speed, K, span.fast[parts], seen)
+            fast = span.fast + span.noise
+            return own._at_speeds(by_speed, K, fast[parts], float(fast[people].max(initial=0.0)))
 
         def by_joints(span: Span, _: Moment) -> Array:
             assert longest is not None
@@ -481,9 +509,16 @@ class Separation(Criterion, frozen=True, kw_only=True):
             required.append(partial(own._at_speeds, by_speed, K))
 
         def rises(span: Span) -> Array:
-            sides = [(v[parts], float(v[people].max(initial=0.0))) for v in (span.fast, span.slow)]
-            ends = ([S_p(*side) for side in sides] for S_p in required)
-            return np.asarray(np.max([most - least for most, least in ends], axis=0))
+            # Speeds that may be off by noise are that at both ends.
+            ranges = [(span.fast, span.slow)]
+            if span.noise.any():
+                ranges.append((span.fast + span.noise, span.slow + span.noise[: len(span.slow)]))
+            sides = [
+                [(v[parts], float(v[people].max(initial=0.0))) for v in (most, least)]
+                for most, least in ranges
+            ]
+            risen = [S_p(*most) - S_p(*least) for S_p in required for most, least in sides]
+            return np.asarray(np.max(risen, axis=0))
 
         return rises
 
@@ -498,7 +533,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
         def most(span: Span) -> Array | None:
             course = longest(span)
-            seen = float(span.fast[people].max(initial=0.0))
+            seen = float((span.fast + span.noise)[people].max(initial=0.0))
             return None if course is None or not np.isfinite(seen) else own._distance(course, K, seen)
 
         return most
@@ -516,9 +551,10 @@ class Separation(Criterion, frozen=True, kw_only=True):
             return away - least, away - near
         return np.concatenate([away - least, near]), np.concatenate([away - near, np.zeros(len(parts))])
 
-    def _required(self, now: Course, K: float, seen: float) -> Required:
-        S_p = self._distance(now, K, seen)
-        most = S_p if now.most is None else np.maximum(self._distance(now.most, K, seen), S_p)
+    def _required(self, now: Course, K: float, seen: float, seen_most: float) -> Required:
+        S_p = most = self._distance(now, K, seen)
+        if now.most is not None or seen_most > seen:
+            most = np.maximum(self._distance(now.most or now, K, seen_most), S_p)
         doubts = (now.doubt, "" if now.most is None else now.most.doubt)
         return Required(S_p, most, "; ".join(dict.fromkeys(filter(None, doubts))))
 
@@ -530,7 +566,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         K = sum(own._terms()[0]) + gap.deviation
 
         def at(state: State) -> Required:
-            found = own._required(stop.courses(state)(1.0), K, own._seen(state, gap))
+            found = own._required(stop.courses(state)(1.0), K, *own._seen(state, gap))
             if own.mode != "fixed":
                 return found
             S_p, most = (each.including(state, x) for each, x in zip(largest, found[:2], strict=True))
@@ -552,7 +588,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         def at(state: State, distance: Array) -> tuple[Array, tuple[Result, ...]]:
             course = stop.courses(state)
             now = course(1.0)
-            required = self._required(now, K, self._seen(state, gap))
+            required = self._required(now, K, *self._seen(state, gap))
             if required.doubt:
                 raise Undecided(required.doubt)
             return required.most, self._permissible(stop, state, course, now, distance, K)
@@ -567,7 +603,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         seen = self._seen(state, self._gap(state.model))
 
         def S_p(scale: float) -> Array:
-            required = self._required(course(scale), K, seen)
+            required = self._required(course(scale), K, *seen)
             if required.doubt:
                 raise Undecided(required.doubt)
             return required.most
@@ -579,7 +615,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         elif stop.inverse is not None and onset(1.0).linear:
             given = self.human_speed
             assumed = iso_13855.speed_at(distance) if given is None else np.full(len(distance), given)
-            v_h = np.maximum(assumed, seen)
+            v_h = np.maximum(assumed, seen[1])
             speed, factor = stop.inverse(onset(0.0), onset(1.0), distance, v_h, K)
         elif now.v_r.max() > MOVING:
             factor = factor_by_search(S_p, distance, stop.costly)
@@ -643,7 +679,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
         )
         return Basis(
             formula=f"{formula}{fixed}; v_h is no less than that of the twin's person; the distance must "
-            "not fall below S_p",
+            "not fall below S_p, nor below that of speeds that are higher by three standard deviations of "
+            "noise where they are derived from positions",
             source=f"Weistroffer et al. 2022, Eq. 2 (upper bound of {norm})" if bound else norm,
             inputs=tuple(inputs),
             not_modelled=(

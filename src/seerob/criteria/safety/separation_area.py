@@ -36,6 +36,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
     """Whether anything is nearer to a robot than the protective separation distance of this moment."""
 
     unit: ClassVar[str] = "m"
+    by_speed: ClassVar[bool] = True
     whole: ClassVar[bool] = False
     at_most: ClassVar[bool] = False
 

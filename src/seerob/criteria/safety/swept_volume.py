@@ -24,6 +24,7 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
     """Volume that a set has swept so far; no voxel that any of its points crossed is missing."""
 
     unit: ClassVar[str] = "m³"
+    by_speed: ClassVar[bool] = True
     instants: ClassVar[str] = "accepted: what is crossed between two instants is in the figure of the second"
 
     of: str
@@ -123,7 +124,7 @@ class _Way:
                     self.unheard.append(f"not known where it went from {self._t:.2f} s to {state.t:.2f} s")
                 self.sweep.start(data.qpos, data.qvel)
             else:
-                self.sweep.advance(data.qpos, data.qvel, state.t - self._t)
+                self.sweep.advance(data.qpos, data.qvel, state.t - self._t, state.joint_noise())
         except InputError as error:
             raise Undecided(str(error)) from error
         self._t = state.t

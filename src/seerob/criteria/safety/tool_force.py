@@ -127,6 +127,10 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
         """The point."""
         return (self.at,)
 
+    def remembers(self, model: Model) -> bool:
+        """Say whether it rests on accelerations, which are differences of speeds from tick to tick."""
+        return self.torques == "measured"
+
     def bind(self, model: Model) -> Evaluate:
         """Look up every name in the model once and return the function that judges one instant."""
         frame = model.frame(self.at)

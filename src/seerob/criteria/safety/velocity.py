@@ -15,6 +15,7 @@ from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Arrow, Basis, Input, Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
+from seerob.criteria.noisy_speeds import NOISE
 from seerob.model import provenance
 from seerob.model.model import Model
 from seerob.recording.answers import Answers
@@ -54,9 +55,6 @@ def speed_noise(J: Array, error: Array) -> Array:
     """
     error = at_least("error", error, unit="rad/s or m/s")
     return np.asarray(np.sqrt(((J * error) ** 2).sum(axis=(-2, -1))))
-
-
-NOISE = "decided by the noise of positions that its speeds are derived from"
 
 
 class Velocity(Criterion, frozen=True, kw_only=True):

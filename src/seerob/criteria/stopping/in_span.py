@@ -94,7 +94,8 @@ def bind_in_span(
         row = points.add(flange.mj, tip)
 
         def at_most(span: Span) -> Course | None:
-            speeds, v = span.qd[own_v], span.fast[parts]
+            noise = span.joint_noise[own_v]
+            speeds, v = span.qd[own_v] + noise, (span.fast + span.noise)[parts]
             if not (np.isfinite(speeds).all() and np.isfinite(v).all()):
                 return None
             middle = span.path.at((span.begin + span.end) / 2)[0]
@@ -107,6 +108,7 @@ def bind_in_span(
                 onset = Onset(v, v * T_r, v, speeds * T_r, speeds)
             elif (known := _known(span, robot.name, T_r, period, own_v)) is not None:
                 u, ways, whole, q = known
+                u, ways, whole = u + noise, ways + noise * T_r, whole + noise * T_r
                 moved = np.maximum(whole, np.abs(q - middle[own_q]).max(axis=0)) + ROUNDING
                 every = np.abs(robot.coupling) @ moved
                 far = [travel(turns.tolist(), every[rows], arms) for turns, rows, arms in chains]

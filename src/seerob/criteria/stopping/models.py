@@ -388,6 +388,7 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
     brakes, origin, source = _brakes(stop, robot)
     unknown = [joint.name for joint, torque in zip(robot.joints, brakes, strict=True) if np.isnan(torque)]
     simulation = StopSimulation(model, robot, brakes, gap.b)
+    everybody = (robot.name, *robot.riders, *model.carriers_of(robot.name))
     masses = simulation.masses
     followed = not masses.moved and len(masses) <= MOST_OFF
     corners = [*product((-1, 1), repeat=len(masses))] if followed and len(masses) else []
@@ -399,6 +400,9 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
         def once(onset: Onset, scale: float, known: tuple[Array, Array] | None, shifts: Shifts) -> Course:
             stopped = simulation.stop(state, stop.reaction, scale, known, shifts)
             found = stopped.course()
+            if not state.speed_errors.keys().isdisjoint(everybody):
+                why = f"the noise of positions that speeds of {robot.name} are derived from is not followed"
+                onset = replace(onset, doubt=onset.doubt or f"{why} in a simulated stop")
             S_r = np.maximum(found.S_r, onset.S_r)
             if stop.direction == "path":
                 return Course(found.v_r, S_r, found.S_s, found.T_s, onset.doubt)

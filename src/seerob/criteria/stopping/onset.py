@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import mujoco
@@ -35,6 +35,7 @@ from seerob.core.transforms import Array
 from seerob.kernels.speed import fastest, placed, stacked, velocities
 from seerob.model.model import Body, Gap, Mechanism, Model
 from seerob.twin.attachments import Attachments
+from seerob.twin.speed_noise import levers as levers_of
 from seerob.twin.state import State
 from seerob.twin.validity.hearing import SLACK
 
@@ -64,6 +65,20 @@ class Onset:
     """Why it may be more than this."""
     linear: bool = True
     """Whether way and speed grow linearly with the factor on the present speeds."""
+
+
+def shaken(onset: Onset, v: Array, qd: Array, T_r: float) -> Onset:
+    """Widen an onset by how far speeds may be off that were derived from noisy positions.
+
+    Args:
+        onset: Of the speeds as they were derived.
+        v: How far those of the parts may be off, all the time until braking [m/s], shape (n,).
+        qd: Likewise of the joints [rad/s or m/s], shape (j,).
+        T_r: Reaction time [s].
+    """
+    ways = None if onset.ways is None else onset.ways + qd * T_r
+    speeds = None if onset.speeds is None else onset.speeds + qd
+    return replace(onset, S_r=onset.S_r + v * T_r, v_s=onset.v_s + v, ways=ways, speeds=speeds)
 
 
 At = Callable[[float], Onset]
@@ -283,7 +298,7 @@ class Levers:
             body = self._model.bodies[i]
             R, x = data.xmat[body.mj].reshape(3, 3), data.xpos[body.mj]
             joints = self._model.mj.dof_jntid[self._robot.v_address[rows]]
-            found.append(Chain(turns, rows, _arms(data, joints, body, R, x)))
+            found.append(Chain(turns, rows, levers_of(data, joints, body, R, x)))
         return found
 
 
@@ -305,16 +320,7 @@ def _levers(state: State, robot: Mechanism, chain: NDArray[np.int64], index: int
         return np.zeros(len(chain))
     joints = state.model.mj.dof_jntid[robot.v_address[chain]]
     R, x = state.placed((index,))
-    return _arms(state.data_of(robot.name), joints, body, R[index], x[index])
-
-
-def _arms(data: mujoco.MjData, joints: NDArray[np.int64], body: Body, R: Array, x: Array) -> Array:
-    """Largest distance of a body at x, turned by R, from axes [m], shape (k,)."""
-    corners = x + body.corners @ R.T
-    arms = corners[None] - data.xanchor[joints][:, None]
-    along = np.einsum("kci,ki->kc", arms, data.xaxis[joints])
-    squares = np.einsum("kci,kci->kc", arms, arms) - along**2
-    return np.asarray(np.sqrt(np.maximum(squares, 0.0).max(axis=1)) + body.radius + body.deviation)
+    return levers_of(state.data_of(robot.name), joints, body, R[index], x[index])
 
 
 def by_joints(

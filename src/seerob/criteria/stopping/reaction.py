@@ -20,13 +20,15 @@ from seerob.criteria.stopping.onset import (
     constant,
     from_torques,
     held,
+    shaken,
 )
 from seerob.model.model import Gap, Mechanism, Model
 from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.state import State
 
 Reactions = Callable[[State], tuple[At, At | None]]
-"""What is sure from below, and a bound from above where that is another one."""
+"""What follows from the speeds as they are known, and a bound from above where that is another one: of what
+torques allow, and of speeds that may be off by the noise of positions that they were derived from."""
 
 NAME = "acceleration during T_r"
 GIVE = "give stop.acceleration"
@@ -48,26 +50,41 @@ def bind_reaction(
     Returns:
         How to ask, where it is from, and what is left out.
     """
+
+    def noise(state: State) -> tuple[Array, Array] | None:
+        """How far speeds of parts and joints may be off [m/s, rad/s or m/s]; None where they are not."""
+        if state.speed_errors.keys().isdisjoint((robot.name, *robot.riders, *model.carriers_of(robot.name))):
+            return None
+        off = state.speed_error(robot)
+        return state.speed_noise(gap.b), np.zeros(len(robot.joints)) if off is None else off
+
+    def with_noise(state: State, found: tuple[At, At | None]) -> tuple[At, At | None]:
+        off, (least, most) = noise(state), found
+        if off is None:
+            return found
+        top = least if most is None else most
+        return least, lambda scale: shaken(top(scale), *off, T_r)
+
     if a is not None:
         unsaid = (
             "" if points or a == 0 else "its simulated stop begins at the present speeds: give 0, or a table"
         )
         given = constant(robot, gap, T_r, a, unsaid)
         what = Input(name=NAME, value=a, unit="m/s²", origin=Origin.GIVEN, source="workstation file")
-        return lambda state: (given(state), None), what, ()
+        return lambda state: with_noise(state, (given(state), None)), what, ()
     foreseen = Foreseen(model, robot, gap, T_r)
     limits = _acceleration_limits(model, robot)
     torques = np.array([np.nan if limit is None else limit.value for limit in robot.effort_limits])
     levers = Levers(model, robot, gap)
     largest = np.array([np.inf if limit is None else limit.value for limit in robot.velocity_limits])
     carriers, now = model.carriers_of(robot.name), np.zeros(0)
-    off = ", ".join(map(str, MassTolerances(model, robot).tolerances))
+    uncertain = ", ".join(map(str, MassTolerances(model, robot).tolerances))
     bias, lead = _Bias(model, robot), model.workstation.engine.tick
 
     def reactions(state: State) -> tuple[At, At | None]:
         known = foreseen.at(state)
         if known is not None and all(state.foresee(each, now) is not None for each in carriers):
-            return known, None
+            return with_noise(state, (known, None))
         v, qd = state.fastest_points(gap.b)[0], state.qd(robot)
         if robot.role != "robot":
             why = f"nobody says how fast {robot.name} may get faster during the reaction time: {GIVE}"
@@ -75,8 +92,8 @@ def bind_reaction(
             why = f"{robot.name} is carried by {robot.on}, and nobody says how fast both get faster: {GIVE}"
         elif not points:
             why = f"what {robot.name} does during the reaction time is not known: {GIVE} = 0 where it may not"
-        elif limits is None and off:
-            why = f"what torques allow where {off} is not known: {GIVE}, or acceleration_limits"
+        elif limits is None and uncertain:
+            why = f"what torques allow where {uncertain} is not known: {GIVE}, or acceleration_limits"
         elif limits is None and np.isnan(torques).any():
             names = ", ".join(j.name for j, x in zip(robot.joints, torques, strict=True) if np.isnan(x))
             why = f"{robot.name}: neither acceleration_limits nor the torque limit of {names}: {GIVE}"
@@ -89,15 +106,23 @@ def bind_reaction(
             except Undecided as reason:
                 why = f"{reason}: {GIVE}"
         if why or qdd is None:
-            return (lambda scale: held(scale * v, T_r, scale * qd, why)), None
+            return with_noise(state, (lambda scale: held(scale * v, T_r, scale * qd, why), None))
         accelerations, chains = qdd, levers.at(state)
 
-        def most(scale: float) -> Onset:
-            return by_joints(scale * v, T_r, scale * qd, accelerations, largest, robot.coupling, chains, lead)
+        def joints(v: Array, qd: Array) -> Onset:
+            return by_joints(v, T_r, qd, accelerations, largest, robot.coupling, chains, lead)
 
+        def most(scale: float) -> Onset:
+            return joints(scale * v, scale * qd)
+
+        off = noise(state)
+        top = most
+        if off is not None:
+            # How quickly points get faster depends on how fast joints are.
+            top = lambda scale: joints(scale * v + off[0], np.abs(scale * qd) + off[1])  # noqa: E731
         if limits is not None:
-            return most, None
-        return (lambda scale: held(scale * v, T_r, scale * qd)), most
+            return most, None if off is None else top
+        return (lambda scale: held(scale * v, T_r, scale * qd)), top
 
     named = {limit.source for limit in robot.effort_limits if limit is not None}
     value, origin, source, unit = (

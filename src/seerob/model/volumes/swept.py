@@ -148,21 +148,35 @@ class Sweep:
         self._last = qpos.copy(), None if qvel is None else qvel.copy()
         self.flush()
 
-    def advance(self, qpos: Array, qvel: Array | None = None, period: float | None = None) -> None:
+    def advance(
+        self,
+        qpos: Array,
+        qvel: Array | None = None,
+        period: float | None = None,
+        noise: Array | None = None,
+    ) -> None:
         """Mark the way from the last joint positions to these, or these alone when they are the first.
 
         Args:
             qpos: All joint positions [rad or m], shape (nq,).
             qvel: All joint velocities there [rad/s or m/s], shape (nv,); the way is then the cubic.
             period: Time since the last ones [s]; needed with ``qvel``.
+            noise: How far velocities may be off at both ends [rad/s or m/s], shape (nv,): a cubic of other
+                velocities is off by a quarter of what these make in that time, at most.
         """
         if self._last is None:
             self.start(qpos, qvel)
             return
-        self.enqueue(qpos, qvel, period)
+        self.enqueue(qpos, qvel, period, noise)
         self.flush()
 
-    def enqueue(self, qpos: Array, qvel: Array | None = None, period: float | None = None) -> None:
+    def enqueue(
+        self,
+        qpos: Array,
+        qvel: Array | None = None,
+        period: float | None = None,
+        noise: Array | None = None,
+    ) -> None:
         """As `advance`, but nothing is marked before `flush`."""
         assert self._last is not None
         before, speed = self._last
@@ -171,6 +185,7 @@ class Sweep:
         if qvel is not None and speed is not None and period is not None:
             address = self._joints.v_address
             bend = CUBIC * (np.abs(speed[address] * period - delta) + np.abs(qvel[address] * period - delta))
+            bend = bend + (0.0 if noise is None else noise[address] * period / 4)
         middle = self._bounded(before, qpos, 0.5, np.abs(delta) / 2 + bend)
         self.grid.cover(*self.moving.box(middle[0], middle[1], middle[2] + self.beyond))
         goal = self.slack * self.grid.pitch

@@ -49,6 +49,8 @@ class Validity:
         """Run time [s]."""
         self.asked: set[str] = set()
         """Robots and humans that answers have depended on since the set was last cleared."""
+        self.speeds_asked: set[str] = set()
+        """Those of them of which speeds were asked, or what holds them."""
         self.attachments = Attachments(model)
         """Which of MuJoCo's bodies moves each body."""
         self._hearings = hearings
@@ -79,6 +81,7 @@ class Validity:
     def asking(self) -> Iterator[None]:
         """While a criterion is asked: what would not raise `Undecided` is closed, and `asked` is noted."""
         self.asked.clear()
+        self.speeds_asked.clear()
         self._closed = True
         try:
             yield
@@ -325,13 +328,16 @@ class Validity:
             make: How to.
         """
         if key not in self._cache:
-            before, self.asked = self.asked, set()
+            before, self.asked, self.speeds_asked = (self.asked, self.speeds_asked), set(), set()
             try:
                 made = make()
             finally:
-                asked, self.asked = self.asked, before
-                before |= asked
-            self._cache[key] = made, asked
-        made, asked = self._cache[key]
-        self.asked |= asked
+                asked = self.asked, self.speeds_asked
+                self.asked, self.speeds_asked = before
+                self.asked |= asked[0]
+                self.speeds_asked |= asked[1]
+            self._cache[key] = made, *asked
+        made, names, speeds = self._cache[key]
+        self.asked |= names
+        self.speeds_asked |= speeds
         return made

@@ -239,3 +239,32 @@ def test_points_without_a_place_or_a_past_count_for_nothing():
     assert not last([body(0.0, {"a": 0.0}), body(0.03, {"a": None})])
     assert not last([body(0.0, {"a": 0.0}), body(0.03, {"a": 0.0, "b": 9.0, "c": 9.0})])
     assert last([body(0.0, {"a": 0.0, "b": None}), body(0.03, {"a": 9.0, "b": 9.0, "c": 0.0})])
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(
+    ("limits", "acceleration", "hurries"),
+    [
+        ((1.0, 1.0), 6.0, True),
+        ((1.0,), 6.0, True),  # one for all joints
+        ((6.0, 6.0), 6.0, False),
+        ((5.0, 5.0), 6.0, False),  # a fifth more, which filters and rounding are
+        ((4.0, 4.0), 6.0, True),
+        ((), 6.0, False),  # nobody stated any
+    ],
+)
+def test_a_joint_that_gets_faster_than_the_file_says_it_can(limits, acceleration, hurries, way):
+    target = Target(name="arm", joints=("a",), units=("rad",), velocity=(3.2,), acceleration=limits)
+    motion = [
+        said(t, (way * acceleration * t * t / 2,), (way * acceleration * t,))
+        for t in np.arange(0, 0.2, 0.008).tolist()
+    ]
+    found = last(motion, target)
+    assert ("joint 1 gets faster with 6 rad/s², and acceleration_limits says" in found) == hurries
+    assert not found or hurries
+
+
+def test_a_joint_that_is_stopped_may_brake_harder_than_it_accelerates():
+    target = Target(name="arm", joints=("a",), units=("rad",), velocity=(3.2,), acceleration=(1.0,))
+    motion = [said(t, (2 * t - 6 * t * t / 2,), (2 - 6 * t,)) for t in np.arange(0, 0.3, 0.008).tolist()]
+    assert not last(motion, target)

@@ -156,6 +156,23 @@ def test_no_motion_within_the_bounds_of_the_joints_is_faster_than_the_bound(tmp_
     assert tightest < 3
 
 
+@pytest.mark.parametrize(("limit", "holds"), [(2.0, True), (0.97, True), (0.9, False), (0.3, False)])
+def test_a_speed_limit_that_the_robot_is_beyond_bounds_nothing(tmp_path, limit, holds):
+    cell = made(tmp_path, "engine = { gravity = [0, 0, 0] }\n" + UR10 + person("op", 9, 0, 0))
+    robot = cell.model.robot("arm")
+    gap = cell.model.gap(cell.model.select("op"), robot.moving)
+    qd, qdd = np.array([1.0, 0, 0, 0, 0, 0]), np.full(6, 4.0)
+    state = state_at(cell, arm=(np.zeros(6), qd))
+    v, chains = state.fastest_points(gap.b)[0], Levers(cell.model, robot, gap).at(state)
+    largest = np.full(6, np.inf)
+    endless = by_joints(v, T_R, qd, qdd, largest, robot.coupling, chains)
+    largest[0] = limit
+    found = by_joints(v, T_R, qd, qdd, largest, robot.coupling, chains)
+    assert found.speeds[0] == pytest.approx(min(1 + 4 * T_R, max(limit, 1.0)) if holds else 1 + 4 * T_R)
+    if not holds:
+        np.testing.assert_array_equal(found.S_r, endless.S_r)
+
+
 def test_no_torque_within_its_limits_accelerates_more_than_the_bound(tmp_path):
     cell = made(tmp_path, UR10)
     robot, rng = cell.model.robot("arm"), np.random.default_rng(3)

@@ -39,6 +39,8 @@ from seerob.twin.speed_noise import levers as levers_of
 from seerob.twin.state import State
 from seerob.twin.validity.hearing import SLACK
 
+BEYOND = 0.05
+"""Share by which a joint may be faster than its limit without refuting it: noise. Own choice."""
 LARGEST_WINDOW = 2.0
 """A motion is looked at so far ahead at most [s]."""
 
@@ -347,7 +349,9 @@ def by_joints(
     """
     now = np.abs(qd)
     T, gained = T_r + lead, T_r**2 / 2 + lead * T_r
-    u = np.minimum(now + qdd * T, np.maximum(largest, now))
+    # A limit that the joint is beyond is none.
+    most = np.where(now > (1 + BEYOND) * largest, np.inf, np.maximum(largest, now))
+    u = np.minimum(now + qdd * T, most)
     ways = np.minimum(now * T_r + qdd * gained, u * T_r)
     every_u, every_way, every_a = (np.abs(coupling) @ each for each in (u, ways, qdd))
     S_r, v_s = np.empty_like(v), np.empty_like(v)

@@ -3,7 +3,8 @@ r"""Whether what one device says from sample to sample can be one motion: every 
 A run takes the newest sample of each tick; what came between is seen here only. Positions may not go
 farther than anybody could in the time between two stamps, and the velocities that a controller measures must
 be the derivative of the positions that it measures: over the last `SPAN`, no joint's way may differ from the
-integral of its velocity by more than noise, rounding and the lag of a filter explain.
+integral of its velocity by more than noise, rounding and the lag of a filter explain. Nor may a joint get
+faster more quickly than the accelerations that the file states, on which stopping distances rest.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ velocities are noisy by up to 0.01 rad/s, which this is half a second of."""
 SHARE = 0.2
 """Of the way: velocities that are rounded or filtered are off by a tenth, so is the trapezoidal rule at
 10 Hz."""
+SPEED_NOISE = {"rad": 0.02, "m": 0.005}
+"""Of a difference of two velocities [rad/s or m/s]: twice that of `NOISE`."""
 LAG = 0.03
 """By which a filter may delay velocities [s]: a low-pass of 5 Hz, lower than controllers have."""
 FASTEST = {"rad": 30.0, "m": 10.0}
@@ -57,7 +60,7 @@ class Contradictions:
     """What one source says of one target, sample by sample.
 
     Args:
-        target: With joint units and speed limits; None where nobody knows them.
+        target: With joint units, and limits of speed and acceleration; None where nobody knows them.
     """
 
     def __init__(self, target: Target | None) -> None:
@@ -68,6 +71,8 @@ class Contradictions:
             min(FASTEST[unit], FASTEST[unit] if limit is None else TIMES_LIMIT * limit)
             for unit, limit in zip(units, limits, strict=False)
         ]
+        stated = () if target is None else target.acceleration
+        self._quickest = stated * len(units) if len(stated) == 1 else stated
         self._before: Sample | None = None
         self._at = -math.inf
         self._told: deque[_Told] = deque(maxlen=ANCHORS)
@@ -122,11 +127,25 @@ class Contradictions:
         now = self._newest = _Told(t, q, qd, way, length)
         found = ""
         for then in self._told:
-            if t - then.t <= SPAN and (found := self._differ(then, now)):
+            if t - then.t <= SPAN and (found := self._differ(then, now) or self._hurries(then, now)):
                 break
         if t - self._told[-1].t >= SPAN / ANCHORS:
             self._told.append(now)
         return found
+
+    def _hurries(self, then: _Told, now: _Told) -> str:
+        """Whether a joint gets faster more quickly than it can; one that brakes may, it is stopped."""
+        dt = now.t - then.t
+        if dt < SPAN / ANCHORS:
+            return ""
+        for k, (a, limit) in enumerate(zip(then.qd, self._quickest, strict=False)):
+            gained, unit = abs(now.qd[k]) - abs(a), self._units[k]
+            if gained > (1 + SHARE) * limit * dt + SPEED_NOISE[unit]:
+                return (
+                    f"joint {k + 1} gets faster with {gained / dt:.3g} {unit}/s², and acceleration_limits says "
+                    f"{limit:g}"
+                )
+        return ""
 
     def _differ(self, then: _Told, now: _Told) -> str:
         for k, (a, b) in enumerate(zip(then.q, now.q, strict=True)):

@@ -193,7 +193,7 @@ CALLS = {
     "criteria.stopping.onset.farthest": {"t": TWO - 1, "speeds": TWO, "T_r": 0.1, "lead": 0.5},
     "criteria.stopping.onset.from_torques": {"M": M, "bias": TWO, "torques": TWO},
     "criteria.stopping.terms.way_of_person": {"v_h": 1.6, "T_r": 0.1, "T_s": 0.5},
-    "criteria.stopping.terms.course": {"v_r": HALF, "T_r": 0.1, "T_s": 0.5},
+    "criteria.stopping.terms.course": {"v_r": HALF, "T_r": 0.1, "T_s": 0.5, "share": 0.5},
     "criteria.stopping.terms.decelerating": {"v": HALF, "v_h": 1.6, "T_r": 0.1, "a": 2.0, "K": 0.2},
     "criteria.stopping.terms.largest_speed_decelerating": {
         "d": 4 * HALF,
@@ -208,6 +208,7 @@ CALLS = {
         "T_r": 0.1,
         "T_s": 0.5,
         "K": 0.2,
+        "share": 0.5,
     },
     "criteria.stopping.terms.largest_factor": {"c": HALF, "b": HALF, "a": HALF},
     "criteria.stopping.terms.worst_case": {"S_p": TWO},
@@ -233,6 +234,7 @@ CALLS = {
 }
 ELSEWHERE = {
     "criteria.contact.clamping.thickest": "of a table of sizes that ships",
+    "criteria.contact.measured.missing": "reasons in words, of records that `peaks` took",
     "criteria.contact.shape.patch_area": "of radii that `body_shape` made",
     "criteria.contact.shape.force_at_pressure": "of radii that `body_shape` made",
 }
@@ -260,10 +262,10 @@ BELOW = {
     "criteria.stopping.onset.farthest": "T_r lead",
     "criteria.stopping.onset.from_torques": "torques",
     "criteria.stopping.terms.way_of_person": "T_r T_s",
-    "criteria.stopping.terms.course": "T_r T_s",
-    "criteria.stopping.terms.decelerating": "v_h T_r a",
-    "criteria.stopping.terms.largest_speed_decelerating": "v_h T_r a",
-    "criteria.stopping.terms.largest_speed_in_time": "v_h T_r T_s",
+    "criteria.stopping.terms.course": "T_r T_s share",
+    "criteria.stopping.terms.decelerating": "v_h T_r a K",
+    "criteria.stopping.terms.largest_speed_decelerating": "v_h T_r a K",
+    "criteria.stopping.terms.largest_speed_in_time": "v_h T_r T_s K share",
     "criteria.contact.collision.robot_mass": "M m_L",
     "criteria.contact.collision.reduced_mass": "m_R",
     "criteria.contact.collision.spring_energy": "k",

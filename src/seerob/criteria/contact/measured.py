@@ -168,6 +168,7 @@ def missing(t: Array, force: Array) -> tuple[str, ...]:
         t: Instants, rising [s], shape (n,).
         force: Pressing is positive [N], shape (n,).
     """
+    t, force = number("t", t), number("force", force)
     peak = float(force.max())
     touches = force >= BEGIN * peak
     first = int(np.argmax(touches))

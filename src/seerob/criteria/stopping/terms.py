@@ -82,6 +82,7 @@ def course(v_r: Array, T_r: float, T_s: float, share: float = BOUND) -> Course:
         share: `BOUND` or `CONSTANT`.
     """
     _check(T_r=T_r, T_s=T_s)
+    number("share", share, 0.0, 1.0)
     v = np.maximum(np.asarray(v_r, float), 0.0)
     return Course(v, v * T_r, share * v * T_s, T_s)
 
@@ -108,7 +109,7 @@ def decelerating(v: Array | float, v_h: float, T_r: float, a: float, K: float) -
         a: Deceleration [m/s²].
         K: C + Z_d + Z_r [m].
     """
-    _check(T_r=T_r, v_h=v_h)
+    _check(T_r=T_r, v_h=v_h, K=K)
     number("a", a, LEAST, unit="m/s²")
     v = np.maximum(v, 0.0)
     return np.asarray(v_h * (T_r + v / a) + v * T_r + v**2 / (2 * a) + K)
@@ -119,7 +120,7 @@ def largest_speed_decelerating(d: Array | float, v_h: Array | float, T_r: float,
 
     :math:`\sqrt{b^2 + 2a(d - K - v_h T_r)} - b` with :math:`b = a T_r + v_h`; 0 where no speed is.
     """
-    _check(T_r=T_r)
+    _check(T_r=T_r, K=K)
     number("a", a, LEAST, unit="m/s²")
     at_least("v_h", v_h, unit="m/s")
     b = a * T_r + np.asarray(v_h)
@@ -134,7 +135,8 @@ def largest_speed_in_time(
 
     0 where no speed is, also when S_p is larger than ``d`` at standstill.
     """
-    _check(T_r=T_r, T_s=T_s)
+    _check(T_r=T_r, T_s=T_s, K=K)
+    number("share", share, 0.0, 1.0)
     at_least("v_h", v_h, unit="m/s")
     left = np.asarray(d) - K - np.asarray(v_h) * (T_r + T_s)
     return np.asarray(np.maximum(left, 0.0) / (T_r + share * T_s))
@@ -210,6 +212,7 @@ def travel(turns: Sequence[bool], ways: Array, levers: Array) -> float:
     Returns:
         [m]
     """
+    at_least("ways", ways, unit="rad or m")
     way = 0.0
     for turn, angle, lever in zip(reversed(turns), ways[::-1], levers[::-1], strict=True):
         way += float(angle) * (float(lever) + way) if turn else float(angle)

@@ -142,8 +142,8 @@ class Contradictions:
             gained, unit = abs(now.qd[k]) - abs(a), self._units[k]
             if gained > (1 + SHARE) * limit * dt + SPEED_NOISE[unit]:
                 return (
-                    f"joint {k + 1} gets faster with {gained / dt:.3g} {unit}/s², and acceleration_limits says "
-                    f"{limit:g}"
+                    f"joint {k + 1} gets faster with {gained / dt:.3g} {unit}/s², "
+                    f"and acceleration_limits says {limit:g}"
                 )
         return ""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 from made_capture import PERSON, captured, frames_of, source, workstation
@@ -11,6 +12,7 @@ from test_touching import desk, pressing
 from seerob.core.errors import Undecided
 from seerob.core.samples import JointSample
 from seerob.core.snapshot import Verdict
+from seerob.criteria.between_ticks import Told
 from seerob.criteria.postures.rule import bind_posture
 from seerob.criteria.safety.minimum_distance import MinimumDistance
 from seerob.criteria.safety.separation import Separation, Stop
@@ -21,6 +23,7 @@ from seerob.session.run import Judge
 from seerob.session.station import Station
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.engine import Engine
+from seerob.twin.state import Hearing, State
 
 POST = {"name": "post", "at": {"position": [1.0, -0.2, 0.9]}, "shape": {"box": [0.05, 0.05, 0.05]}}
 
@@ -72,6 +75,49 @@ def test_distances_of_a_stopped_hand_lie_between_the_worse_of_both(stopped):
         _, positions = bone_poses(PERSON, now)
         assert np.linalg.norm(positions[BONES.index("right_hand")] - place) <= bound + 2e-3
     assert max(each[5] for each in late) > 0.1
+
+
+def test_between_two_ticks_a_stopped_hand_may_be_where_it_was_captured():
+    """The capture, by its own course, is never nearer to a post than the bound."""
+    t, q = pressing()
+    tables = desk()
+    tables["parts"] = [*tables["parts"], POST]
+    station = workstation(source(captured(frames_of(t, q))), **tables)
+    criterion = MinimumDistance(name="far", between=("post", "operator/right_hand"), limit=0.02)
+    stage = Station(replace(station, safety=(criterion,)))
+    engine, judge = Engine(stage.model, driven={"operator": 0.2}), Judge(stage.bound)
+    between, room, ways, off = judge._between, [], [], []
+    person, data = stage.model.mechanisms["operator"], mujoco.MjData(stage.model.mj)
+    hand = next(b.index for b in stage.model.bodies if b.name == "operator/right_hand")
+    gap = stage.model.gap(stage.model.select("post"), stage.model.select("operator/right_hand"))
+    there = State(stage.model, data, {"operator": Hearing(given=True, driven=False)})
+
+    def watching(i, watch, ends, state):
+        if not (state.stray("operator") and ends[0].margin):
+            return Told()
+        low, found = between._low(watch, between._way, ends, state), []
+        for instant in np.linspace(ends[0].t, ends[1].t, 5).tolist():
+            data.qpos[person.q_address] = engine._references["operator"].at(instant)[0]
+            there.refresh(instant)
+            room.append(there.closest(gap).distance - 0.02 - low)
+            found.append(there.positions[hand].copy())
+        _, _, looked = between._look(i, watch, between._way, (ends[0].t + ends[1].t) / 2, state)
+        off.append(np.linalg.norm(looked.captured("operator", (hand,))[1][0] - found[2]))
+        span = between._span(watch, between._way, ends, state)
+        ways.append((np.linalg.norm(found[-1] - found[0]), span.fast[hand] * span.T, between._way))
+        return Told()
+
+    between._judge = watching
+    for seq, samples in enumerate(road.pump(stage.sources, 0.01)):
+        engine.take(samples)
+        judge(engine.tick() if seq else engine.start())
+    assert len(ways) > 50
+    assert min(room) >= -1e-9
+    assert max(off) < 1e-6
+    assert all(way <= most + 1e-9 for way, most, _ in ways)
+    # The twin, which lies on the desk, has gone less far.
+    gone = max(np.linalg.norm(path.captured[0][-1] - path.captured[0][0]) for *_, path in ways)
+    assert gone > 2 * min(np.linalg.norm(path.q[-1] - path.q[0]) for *_, path in ways)
 
 
 def test_nothing_is_relieved_where_the_capture_itself_is_in_doubt(stopped):

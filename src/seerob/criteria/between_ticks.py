@@ -479,6 +479,7 @@ class BetweenTicks:
         shadow = self._shadow
         shadow.columns, shadow.foresee = state.columns, state.foresee
         shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)
+        shadow.captured_qpos = path.captured_at(t)
         shadow.refresh(t)
         return shadow
 

@@ -421,8 +421,9 @@ class Engine:
             self._follow(t)
         self._check_finite()
         self._show(t)
-        self.state.path = self._path(start, t)
+        strayed = self._strays()
         self._note_errors()
+        self.state.path = self._path(start, t, captured=strayed or self._strays())
         self.state.heard()
         return self.state
 
@@ -431,7 +432,27 @@ class Engine:
         """Whether the velocities of mj_step belong half a step earlier than its positions (see _pull)."""
         return self.controllers and self.physics and not self._data.ncon
 
-    def _path(self, start: float, t: float) -> Path:
+    def _strays(self) -> bool:
+        """Whether the physics holds a person elsewhere than captured."""
+        limit = self.model.workstation.engine.human_tracking_limit
+        people = (h.name for h in self.model.workstation.humans)
+        return any(
+            self._hearings[name].captured is not None and self._hearings[name].error > limit
+            for name in people
+        )
+
+    def _captured(self) -> tuple[Array, Array]:
+        """As `_way`, with people where they were captured."""
+        q, v = (each.copy() for each in self._way)
+        q_all, v_all, a_all = self._course
+        for person in self._mechanisms:
+            if person.role == "human":
+                q[:, person.q_address] = q_all[:, person.q_address]
+                rows = person.v_address
+                v[:, rows] = v_all[:, rows] + 0.5 * self._dt * a_all[:, rows]
+        return q, v
+
+    def _path(self, start: float, t: float, *, captured: bool) -> Path:
         """How everybody came from the last tick to this one."""
         broken = tuple(sorted(self._broken))
         q, v = self._way
@@ -439,7 +460,7 @@ class Engine:
             instants: Array = np.asarray(start + self._dt * np.arange(self._steps + 1), float)
             instants[-1] = t
             q[-1], v[-1] = self._shown.qpos, self._shown.qvel
-            return Path(instants, q, v, broken)
+            return Path(instants, q, v, broken, self._captured() if captured else None)
         inside = {
             instant
             for mechanism in self._mechanisms

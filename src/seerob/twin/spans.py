@@ -48,6 +48,17 @@ class Path:
     """``qvel`` there, shape (k, nv)."""
     broken: tuple[str, ...] = ()
     """Robots, people and machines that were put elsewhere meanwhile: nobody knows their way."""
+    captured: tuple[Array, Array] | None = None
+    """``qpos`` and ``qvel`` of the same knots with people as they were captured, where the physics holds one
+    of them elsewhere at either end (`State.stray`)."""
+
+    def captured_at(self, t: float) -> Array | None:
+        """``qpos`` at an instant [s] of it with people as captured; None where the twin follows."""
+        if self.captured is None:
+            return None
+        q, v = np.empty(self.q.shape[1]), np.empty(self.v.shape[1])
+        joints_at(self.t, *self.captured, t, q, v)
+        return q
 
     def at(self, t: float) -> tuple[Array, Array]:
         """``qpos`` and ``qvel`` at an instant [s] of it."""
@@ -125,22 +136,43 @@ class Points:
         """
         if self._ids is None or not np.array_equal(self._ids, ids):
             self._chains(mj, ids)
-        joint_bounds(
-            path.t, path.q, path.v, begin, end, mj.qpos0,
-            self._speed, self._change, self._varies, self._away,
-        )  # fmt: skip
-        for name in path.broken:
-            self._speed[self._movers[name]] = np.inf
-        T, n = end - begin, self.count
+        n = self.count
         fast, quick, bend = np.empty((3, n))
-        point_bounds(
-            self._speed, self._change, self._varies, self._away, T,
-            self._start, self._joints, self._turns, self._lengths, fast, quick, bend,
-        )  # fmt: skip
+        captured: Array | None = None
+        if path.captured is not None:
+            # Who is held back may be where the twin is, or where the capture is: the larger motion of both.
+            self._bound(path, *path.captured, begin, end, mj, fast, quick, bend)
+            captured, joints, others = fast.copy(), self._bounds.copy(), (quick.copy(), bend.copy())
+        self._bound(path, path.q, path.v, begin, end, mj, fast, quick, bend)
+        if captured is not None:
+            np.maximum(self._bounds, joints, out=self._bounds)
+            for most, other in zip((fast, quick, bend), (captured, *others), strict=True):
+                np.maximum(most, other, out=most)
         if path.broken:
             lost = ~np.isfinite(fast)
             fast[lost], quick[lost], bend[lost] = np.inf, np.inf, np.inf
-        return Span(begin, end, fast, quick, bend, self._bounds.copy(), path, mj)
+        return Span(begin, end, fast, quick, bend, self._bounds.copy(), path, mj, captured)
+
+    def _bound(
+        self,
+        path: Path,
+        q: Array,
+        v: Array,
+        begin: float,
+        end: float,
+        mj: Any,
+        fast: Array,
+        quick: Array,
+        bend: Array,
+    ) -> None:
+        """Bound all joints, and with them all points, on cubics through the knots of a path."""
+        joint_bounds(path.t, q, v, begin, end, mj.qpos0, self._speed, self._change, self._varies, self._away)
+        for name in path.broken:
+            self._speed[self._movers[name]] = np.inf
+        point_bounds(
+            self._speed, self._change, self._varies, self._away, end - begin,
+            self._start, self._joints, self._turns, self._lengths, fast, quick, bend,
+        )  # fmt: skip
 
     def chain(self, point: int) -> tuple[Indices, NDArray[np.bool_], Array]:
         """Joints that move a point, from base to tip, whether each turns, the segments behind them [m]."""
@@ -217,6 +249,7 @@ class Span:
         joints: Array,
         path: Path,
         mj: Any,
+        captured: Array | None = None,
     ) -> None:
         self.begin, self.end = begin, end
         self.path, self.mj = path, mj
@@ -225,6 +258,7 @@ class Span:
         """What robots are known to do after the tick at which the path ends."""
         self.T = end - begin
         """Its length [s]."""
+        self._captured = captured
         self.fast = fast
         """Largest speed [m/s], shape (p,)."""
         self.quick = quick
@@ -250,6 +284,9 @@ class Span:
         # Along the straight line between two velocities no speed is larger than at both ends.
         most = np.minimum((before + after + self.quick[:n] * self.T) / 2, self.ends + self.bend[:n])
         np.minimum(self.fast[:n], most, out=self.fast[:n])
+        if self._captured is not None:
+            # How fast the twin is at both ends says nothing of who was captured elsewhere.
+            np.maximum(self.fast, self._captured, out=self.fast)
         self.slow = np.maximum((before + after - self.quick[:n] * self.T) / 2, 0.0)
 
     def derived(self, points: Array, joints: Array) -> None:

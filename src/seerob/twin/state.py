@@ -68,6 +68,9 @@ class State(Validity):
         self._quaternions = np.zeros((n, 4))
         self._places: dict[tuple[int, ...], tuple[Array, Array, Array, Array]] = {}
         self._movers: dict[int, tuple[tuple[str, ...], tuple[int, ...]]] = {}
+        self.captured_qpos: Array | None = None
+        """Of an instant between two ticks: ``qpos`` with people where they were captured; None at a tick,
+        and where nobody is held elsewhere (`seerob.twin.spans.Path.captured`)."""
         self._wanted: Any = None
         """Where people were captured; made when somebody asks."""
         self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
@@ -175,6 +178,8 @@ class State(Validity):
 
     def _captured(self, name: str, bodies: tuple[int, ...]) -> tuple[Array, Array]:
         rows, q = self._rows_of(bodies), self._hearings[name].captured
+        if q is not None and self.captured_qpos is not None:
+            q = self.captured_qpos[self.model.mechanisms[name].q_address]
         if q is None:
             return self._rotations[rows], self._positions[rows]
         key = ("captured", name)

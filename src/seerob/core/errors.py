@@ -15,7 +15,7 @@ class Problem(NamedTuple):
     """One mistake in one place of a file."""
 
     file: str
-    """The file, as the user named it."""
+    """The file, as the user named it; empty when none is meant."""
     key: str
     """The place in it: ``robots[0].base.position``, ``sheet 'J' row 4``; empty for the whole file."""
     what: str
@@ -24,7 +24,7 @@ class Problem(NamedTuple):
     """What would be right."""
 
     def __str__(self) -> str:
-        where = f"{self.file}: {self.key}: " if self.key else f"{self.file}: "
+        where = "".join(f"{part}: " for part in (self.file, self.key) if part)
         return where + self.what + (f"; {self.remedy}" if self.remedy else "")
 
 

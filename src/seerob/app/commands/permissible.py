@@ -32,6 +32,7 @@ from seerob.app.console.terminal import (
 )
 from seerob.app.console.whole_folder import whole_folder
 from seerob.core.errors import InputError
+from seerob.core.extras import need
 from seerob.core.same_names import by_name
 
 if TYPE_CHECKING:
@@ -107,6 +108,7 @@ def add(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Map, rescale, evaluate again, write, and return the exit code of the second evaluation."""
+    need("toppra", "matplotlib")
     station = compiled(options.workstation, quiet=options.json)
     from seerob.outputs.sinks.dossier import Dossier
     from seerob.session.permissible.evaluation import Wish

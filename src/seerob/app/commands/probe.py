@@ -264,6 +264,7 @@ def _save_calibration(source: LiveSource, path: Path, where: str) -> None:
 def _source(options: argparse.Namespace) -> tuple[LiveSource, dict[str, Any]]:
     """The source, and the options that make it."""
     from seerob.core.errors import Problem
+    from seerob.core.extras import need
     from seerob.core.plugin import load
     from seerob.devices.live.listening import LiveSource
     from seerob.workstation.conversion import convert
@@ -287,6 +288,7 @@ def _source(options: argparse.Namespace) -> tuple[LiveSource, dict[str, Any]]:
     source = convert(given, kind, file=f"seerob probe {options.kind}", key="", problems=problems)
     if source is None:
         raise InputError(problems)
+    need(*source.loads)
     return source, given
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Rate, Ready, RobotOptions, option, port
+from seerob.core.extras import need
 from seerob.protocols.ros.ros_messages import Content, Joints, Said
 from seerob.protocols.ros.ros_serialised import Edition
 
@@ -85,6 +86,7 @@ class RosOptions(RobotOptions, frozen=True, kw_only=True):
         Raises:
             InputError: No such robot, or a motion that it cannot do.
         """
+        need("rosbags")
         target = self.target()
         motion, what = self.motion(target)
         made = server(

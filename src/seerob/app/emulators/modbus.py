@@ -16,6 +16,7 @@ from seerob.app.emulation import plc_cell
 from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.modbus_robot import Program, program
 from seerob.app.emulation.options import Ready, RobotOptions, option, port
+from seerob.core.extras import need
 from seerob.protocols.plc.modbus import Place, Table, Type, Words, blocks, encode
 from seerob.protocols.plc.modbus_map import load
 
@@ -145,6 +146,7 @@ class Modbus(RobotOptions, frozen=True, kw_only=True):
 
     def ready(self) -> Ready:
         """The controller."""
+        need("pymodbus")
         found = load(self.map, Path())
         target = self.target(joints=found.joints, whose=f"the map {self.map}")
         home = (*HOME, *(0.0,) * found.joints)[: found.joints]

@@ -19,6 +19,7 @@ from seerob.app.emulation import plc_cell
 from seerob.app.emulation.background import LoopEmulator
 from seerob.app.emulation.motions import Motion, swing
 from seerob.app.emulation.options import EmulatorOptions, Ready, port
+from seerob.core.extras import need
 from seerob.protocols.plc.opcua_client import SILENT, content
 from seerob.protocols.plc.opcua_robotics import AXIS, DEVICE, DEVICES, ROBOTICS, SAFETY, SYSTEM
 from seerob.protocols.plc.opcua_units import CODES, NAMESPACE, number
@@ -317,6 +318,7 @@ class Opcua(EmulatorOptions, frozen=True, kw_only=True):
 
     def ready(self) -> Ready:
         """The server."""
+        need("asyncua")
         variables = {
             "Belt/running": Emulated(plc_cell.running),
             "Belt/speed": Emulated(plc_cell.speed, "mm/s"),

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Ready, port
 from seerob.app.emulation.ros_robot import LATE, RosOptions, RosRobot
+from seerob.core.extras import need
 from seerob.protocols.ros.ros_messages import Joints, Plan, Said, Transform, ros1_name
 from seerob.protocols.ros.ros_serialised import Edition, encode
 from seerob.protocols.ros.rosbridge import MAX_MESSAGE, Compression
@@ -222,4 +223,5 @@ class Rosbridge(RosOptions, frozen=True, kw_only=True):
 
     def ready(self) -> Ready:
         """The server."""
+        need("cbor2")
         return self.served(RosbridgeServer)

@@ -16,6 +16,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from seerob.core.errors import InputError
+from seerob.core.extras import need
 from seerob.core.files.whole_file import whole_file
 from seerob.core.shapes.geometry import Mesh
 from seerob.description.shapes.detail import display_mesh, manifold
@@ -107,6 +108,7 @@ def _hull_of(points: Any, color: tuple[float, float, float, float]) -> Mesh | No
 
 
 def _cut(mesh: Mesh, threshold: float, max_parts: int | None, max_triangles: int) -> Iterator[Mesh]:
+    need("coacd")
     import coacd
 
     coacd.set_log_level("error")

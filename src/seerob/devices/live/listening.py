@@ -28,6 +28,7 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from seerob.core.errors import InputError, SeerobError
+from seerob.core.extras import need
 from seerob.core.host_name import check_host, check_url
 from seerob.core.samples import BodySample, JointSample, Quality, Sample, SignalSample, key
 from seerob.core.snapshot import Finding
@@ -126,7 +127,9 @@ class LiveSource(Source, frozen=True, kw_only=True):
 
         Raises:
             InputError: It can be reached, and is not what this source can use.
+            MissingPackage: A package that it needs is not installed.
         """
+        need(*self.loads)
         about = self.target() or self.name
         text = (
             f"the twin runs {1e3 * self.behind():.0f} ms behind the world, where samples lie on either side"

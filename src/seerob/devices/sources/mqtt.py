@@ -14,6 +14,7 @@ import msgspec
 from msgspec import Meta
 
 from seerob.core.errors import InputError, Problem, SeerobError
+from seerob.core.extras import need
 from seerob.core.snapshot import Finding
 from seerob.devices.variables.access import missing_access
 from seerob.devices.variables.json_values import told
@@ -222,11 +223,9 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
 
     @asynccontextmanager
     async def _client(self, folder: Path = Path()) -> AsyncGenerator[aiomqtt.Client, None]:
-        try:
-            import aiomqtt
-        except ModuleNotFoundError as error:
-            remedy = "pip install seerob[mqtt]"
-            raise InputError.at("sources", "kind", "mqtt needs the package aiomqtt", remedy) from error
+        need("aiomqtt")
+        import aiomqtt
+
         password = None if self.password_env is None else os.environ.get(self.password_env)
         trusted = None if self.ca is None else folder / self.ca
         context = trusting(trusted, server=f"{self.host}:{self.port}") if self.tls else None

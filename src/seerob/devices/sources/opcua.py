@@ -10,6 +10,7 @@ import msgspec
 from msgspec import Meta
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.extras import need
 from seerob.core.quantities import Seconds
 from seerob.core.snapshot import Finding
 from seerob.devices.variables.access import missing
@@ -22,7 +23,6 @@ from seerob.protocols.plc.opcua_client import (
     Way,
     connect,
     find,
-    needed,
     said_unit,
     stated_unit,
     write_bool,
@@ -73,7 +73,7 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
             InputError: With every address that cannot be understood, certificate that is missing, and unit
                 that the server states otherwise.
         """
-        needed()
+        need(*self.loads)
         where = f"opcua {self.url}"
         problems = missing(where, self, folder)
         for variable in () if target is None else target.variables:

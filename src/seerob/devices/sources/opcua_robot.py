@@ -13,6 +13,7 @@ import msgspec
 from msgspec import Meta
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.extras import need
 from seerob.core.quantities import Seconds
 from seerob.core.samples import JointSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding
@@ -21,7 +22,7 @@ from seerob.devices.variables.access import at_home, missing
 from seerob.devices.variables.live_source import PULSES
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
-from seerob.protocols.plc.opcua_client import Changes, Said, Security, Way, connect, needed
+from seerob.protocols.plc.opcua_client import Changes, Said, Security, Way, connect
 from seerob.protocols.plc.opcua_robotics import MODES, Robot, robots
 from seerob.workstation.source import Opened, Target
 from seerob.workstation.variables.units import unit
@@ -83,7 +84,7 @@ class OpcuaRobot(LiveSource, frozen=True, kw_only=True):
         Raises:
             InputError: It can be reached, and has another number of axes, other names, or no units.
         """
-        needed()
+        need(*self.loads)
         if target is None:
             raise InputError.at("sources", "robot", f"no robot {self.robot!r}", "name a robot")
         where = f"opcua_robot {self.url}"

@@ -16,6 +16,7 @@ from urllib.parse import urlsplit
 from msgspec import Meta
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.extras import need
 from seerob.core.host_name import is_loopback
 from seerob.core.quantities import Seconds
 from seerob.core.snapshot import Finding
@@ -139,6 +140,7 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
 
     @asynccontextmanager
     async def _session(self, folder: Path) -> AsyncGenerator[_Session, None]:
+        need("httpx")
         import httpx
 
         context = trusting(None if self.ca is None else folder / self.ca, server=self.url)

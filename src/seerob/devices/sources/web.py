@@ -16,6 +16,7 @@ import msgspec
 from msgspec import Meta
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.extras import need
 from seerob.core.host_name import is_loopback
 from seerob.core.quantities import Seconds
 from seerob.core.snapshot import Finding
@@ -218,6 +219,7 @@ class Web(VariablesSource, frozen=True, kw_only=True):
     async def _asked(
         self, paths: tuple[str, ...], folder: Path
     ) -> AsyncGenerator[tuple[str, bytes | str | ProtocolError, float], None]:
+        need("httpx")
         import httpx
 
         clock = asyncio.get_running_loop()

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from seerob.core.errors import InputError
+from seerob.core.extras import need
 from seerob.core.snapshot import Finding
 from seerob.description.capture.captured import Captured
 from seerob.files.motion_capture.frame_arrays import check_size
@@ -125,6 +126,7 @@ def opened(path: Path, file: str) -> Iterator[Any]:
     size = path.stat().st_size if path.is_file() else sum(p.stat().st_size for p in path.glob("*"))
     if size > MAX_BYTES:
         raise InputError.at(file, "", f"{size} bytes, more than {MAX_BYTES}", "split the bag")
+    need("rosbags")
     # The reader of bags trusts their bytes: whatever it raises, the file is wrong.
     try:
         from rosbags import rosbag1, rosbag2

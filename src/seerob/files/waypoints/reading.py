@@ -21,6 +21,7 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core.errors import InputError, Problem
+from seerob.core.extras import need
 from seerob.core.orientation import wxyz_from
 from seerob.core.quantities import Metres3, Pose, Radians, Table, unit
 from seerob.core.samples import Vec4
@@ -305,6 +306,7 @@ def _toml(text: str, file: str) -> Mapping[str, Any]:
 
 
 def _yaml(text: str, file: str) -> Mapping[str, Any]:
+    need("ruamel.yaml")
     from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
     from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from seerob.core.errors import InputError
+from seerob.core.extras import need
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,7 @@ def profile(
     Raises:
         InputError: The time is too short.
     """
+    need("ruckig")
     from ruckig import InputParameter, Result, Ruckig, Trajectory
 
     asked = InputParameter(1)

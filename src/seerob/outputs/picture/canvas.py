@@ -177,18 +177,12 @@ def in_front(camera: Camera, corners: Array) -> Array:
 
 @cache
 def font(size: int) -> FreeTypeFont:
-    """A font that has ✓, ✕ and ↔, which comes along with matplotlib."""
-    from importlib.util import find_spec
+    """A font that has ✓, ✕ and ↔: DejaVu Sans, whose licence lies beside it."""
     from pathlib import Path
 
     from PIL import ImageFont
 
-    # Where it lies is known without importing it, which takes longer than a picture.
-    found = find_spec("matplotlib")
-    assert found is not None
-    assert found.origin is not None
-    folder = Path(found.origin).parent / "mpl-data/fonts/ttf"
-    return ImageFont.truetype(folder / "DejaVuSans-Bold.ttf", size)
+    return ImageFont.truetype(Path(__file__).with_name("DejaVuSans-Bold.ttf"), size)
 
 
 def words(draw: ImageDraw, at: tuple[float, float], text: str, color: Color, type_: FreeTypeFont) -> None:

@@ -8,6 +8,7 @@ from collections.abc import AsyncGenerator, Sequence
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
+from seerob.core.extras import need
 from seerob.protocols import ProtocolError
 from seerob.protocols.plc.modbus import Block, Place, Table, blocks, decode
 
@@ -173,6 +174,7 @@ async def connect(host: str, port: int, number: int) -> AsyncGenerator[Device, N
     Raises:
         OSError: There is no connection.
     """
+    need("pymodbus")
     from pymodbus.client import AsyncModbusTcpClient
 
     logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)

@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import msgspec
 from msgspec import Meta
 
-from seerob.core.errors import InputError, SeerobError
+from seerob.core.errors import SeerobError
+from seerob.core.extras import need
 from seerob.protocols import ProtocolError
 from seerob.protocols.plc.opcua_address import Address, browse_name, node_name
 from seerob.protocols.plc.opcua_units import unit
@@ -121,19 +122,6 @@ class Said(NamedTuple):
     """Source's time [s since 1970]."""
 
 
-def needed() -> None:
-    """Check that asyncua is installed.
-
-    Raises:
-        InputError: It is not.
-    """
-    try:
-        import asyncua  # noqa: F401
-    except ModuleNotFoundError as error:
-        remedy = "pip install seerob[opcua]"
-        raise InputError.at("sources", "kind", "OPC UA needs the package asyncua", remedy) from error
-
-
 @asynccontextmanager
 async def connect(way: Way, folder: Path) -> AsyncGenerator[Client, None]:
     """A session, until the block ends.
@@ -147,7 +135,7 @@ async def connect(way: Way, folder: Path) -> AsyncGenerator[Client, None]:
         ProtocolError: The server refuses.
         InputError: asyncua is not installed.
     """
-    needed()
+    need("asyncua")
     from asyncua.client.client import Client
     from asyncua.ua.uaerrors import UaError
 

@@ -10,6 +10,7 @@ from enum import StrEnum
 from functools import cache
 from typing import Any
 
+from seerob.core.extras import need
 from seerob.protocols import ProtocolError
 from seerob.protocols.ros.ros_messages import Content, Said, read
 
@@ -26,6 +27,7 @@ class Edition(StrEnum):
 @cache
 def store(edition: Edition) -> Any:
     """The definitions of the standard messages (a `rosbags` type store)."""
+    need("rosbags")
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     found = get_typestore(Stores.ROS1_NOETIC if edition is Edition.ROS1 else Stores.ROS2_HUMBLE)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from seerob.core.extras import need
 from seerob.protocols import ProtocolError
 from seerob.protocols.ros.ros_messages import Content, Said, read
 from seerob.protocols.ros.ros_serialised import Edition
@@ -207,6 +208,7 @@ def _json(text: str) -> Any:
 
 
 def _cbor(data: bytes) -> Any:
+    need("cbor2")
     import cbor2
 
     try:

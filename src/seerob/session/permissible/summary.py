@@ -12,6 +12,7 @@ from itertools import starmap
 
 import numpy as np
 
+from seerob.core.extras import need
 from seerob.core.report_section import ReportSection, ReportTable
 from seerob.core.snapshot import Result, Scene
 from seerob.core.transforms import Array
@@ -229,6 +230,7 @@ def bounds_section(bounds: Sequence[Bound]) -> ReportSection:
 
 def picture(found: PermissibleSpeed) -> bytes:
     """The map over time, PNG."""
+    need("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

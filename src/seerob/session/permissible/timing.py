@@ -38,6 +38,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seerob.core.errors import InputError
+from seerob.core.extras import need
 from seerob.core.transforms import Array
 from seerob.session.permissible.joint_limits import JointLimits
 from seerob.session.permissible.path import Piece
@@ -294,6 +295,7 @@ def _spread(s: Array, now: Timed, t: Array, over: Array) -> Array:
 
 def fastest(piece: Piece, s: Array, top: Array, limits: JointLimits) -> Array:
     """Fastest path speeds under the map and the joints' speeds and accelerations, by toppra; shape (n,)."""
+    need("toppra")
     from toppra import algorithm, constraint, interpolator
     from toppra.constraint.linear_constraint import LinearConstraint
 

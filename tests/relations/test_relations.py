@@ -66,13 +66,13 @@ def no_relief(one: ResultLog, worse: ResultLog, *names: str, slack: float = 1e-9
             assert margins[1] <= margins[0] + slack, name
 
 
-def never_greener(one: ResultLog, less: ResultLog, *, from_start: float = 0.0) -> None:
-    """At no instant that both have is the second WITHIN where the first is not."""
+def never_greener(one: ResultLog, less: ResultLog, *, unsure: tuple[float, float] = (np.inf, 0.0)) -> None:
+    """At no instant that both have, but between two, is the second WITHIN where the first is not."""
     for name in one:
         a, b = one[name], less[name]
         known = {round(t, 6): code for t, code in zip(a.t.tolist(), a.verdicts.tolist(), strict=True)}
         for t, code in zip(b.t.tolist(), b.verdicts.tolist(), strict=True):
-            if code == WITHIN and t >= from_start:
+            if code == WITHIN and not unsure[0] < t < unsure[1]:
                 assert known.get(round(t, 6), WITHIN) == WITHIN, (name, t)
 
 
@@ -117,7 +117,10 @@ def test_another_tick_does_not_contradict(seed, tmp_path):
     cell = random_cell(seed)
     one, other = pair(tmp_path, cell, replace(cell, tick=0.002))
     for name in one:
-        assert {one[name].verdict, other[name].verdict} != {Verdict.WITHIN, Verdict.EXCEEDED}, name
+        verdicts = one[name].verdict, other[name].verdict
+        # What may clamp by the next tick counts as clamped: a coarser one is stricter, and never a finer one.
+        strict = "contact" in name and verdicts == (Verdict.EXCEEDED, Verdict.WITHIN)
+        assert strict or set(verdicts) != {Verdict.WITHIN, Verdict.EXCEEDED}, name
 
 
 @CELLS
@@ -174,7 +177,9 @@ def test_wider_tolerances_never_relieve(seed, tmp_path):
 @CELLS
 def test_a_gap_in_the_log_is_never_greener(seed, tmp_path):
     cell = replace(random_cell(seed), duration=0.6, speeds=bool(seed % 2))
-    never_greener(*pair(tmp_path, cell, replace(cell, gap=(0.2, 0.5))))
+    # Of given speeds and slopes the larger counts: beside the gap there are fewer slopes.
+    unsure = (0.2 - 1 / cell.rate, 0.5 + 1 / cell.rate) if cell.speeds else (np.inf, 0.0)
+    never_greener(*pair(tmp_path, cell, replace(cell, gap=(0.2, 0.5))), unsure=unsure)
 
 
 APART = "cart speed", "cart distance", "cart separation"

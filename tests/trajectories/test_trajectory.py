@@ -92,3 +92,14 @@ def test_all_but_the_controller_and_recordings_are_preliminary(origin):
     preliminary = origin not in (MotionOrigin.CONTROLLER, MotionOrigin.RECORDING)
     assert ("preliminary" in finding.text) == preliminary
     assert (finding.level == "assumed") == preliminary
+
+
+def test_beside_a_gap_velocities_are_as_good_as_at_the_ends():
+    """A gap of 15 rows; central differences across it would be off by 2.5 %."""
+    h, omega = 0.02, 5.0
+    t = h * np.array([*range(11), *range(25, 36)])
+    found = derive_velocities(t, np.sin(omega * t)[:, None]).qd[:, 0]
+    # The one-sided difference is off by h² q⃛ / 3, the central one by h² q⃛ / 6.
+    bound = np.full(len(t), 1 / 6)
+    bound[[0, 10, 11, -1]] = 1 / 3
+    assert (np.abs(found - omega * np.cos(omega * t)) <= 1.1 * bound * h**2 * omega**3).all()

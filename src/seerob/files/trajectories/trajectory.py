@@ -236,10 +236,12 @@ def derive_velocities(
     largest: Array | float = np.inf,
     known: NDArray[np.bool_] | None = None,
 ) -> Derived:
-    r"""Second-order central differences, one-sided at the ends, for any spacing.
+    r"""Second-order differences, central ones but at the ends and beside a gap, for any spacing.
 
-    Nothing is differentiated across a jump or a row that is not known: there a motion ends and another
-    begins. A row between two of them has no velocity, and gets 0.
+    Beside a gap :math:`h_1` of rows that are :math:`h_0` apart a one-sided difference is off by
+    :math:`(h_0 + h_0') h_0` times what a central one is by :math:`h_0 h_1`, and is taken where that is less
+    than half. Nothing is differentiated across a jump or a row that is not known: there a motion ends and
+    another begins. A row between two of them has no velocity, and gets 0.
 
     The error is Richardson's estimate :math:`|\dot q_h - \dot q_{2h}| / 3` where every other sample
     is left out; noise in the positions raises it, as it should.
@@ -259,6 +261,13 @@ def derive_velocities(
         if b - a < 2:
             continue
         qd[a:b] = np.gradient(q[a:b], t[a:b], axis=0, edge_order=2 if b - a > 2 else 1)
+        step = np.diff(t[a:b])
+        wide = 2 * (step[:-2] + step[1:-1])
+        for k in a + 2 + np.flatnonzero(step[2:] > wide):
+            qd[k] = np.gradient(q[k - 2 : k + 1], t[k - 2 : k + 1], axis=0, edge_order=2)[-1]
+        wide = 2 * (step[1:-1] + step[2:])
+        for k in a + 1 + np.flatnonzero(step[:-2] > wide):
+            qd[k] = np.gradient(q[k : k + 3], t[k : k + 3], axis=0, edge_order=2)[0]
         if b - a >= 7:
             coarse = np.gradient(q[a:b:2], t[a:b:2], axis=0, edge_order=2)
             # The ends are one-sided there; the estimate holds inside.

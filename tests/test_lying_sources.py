@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
+import openpyxl
 import pytest
 from msgspec.structs import replace
 
 from made_cell import FLOATING, TWO_R, made, person, two_r
-from motion_io import made_pictures
+from motion_io import made_pictures, made_recordings
 from seerob.core.errors import SeerobError
 from seerob.core.plugin import kinds, load
 from seerob.core.samples import JointSample
@@ -58,6 +60,43 @@ def angles(folder):
     (folder / "a.csv").write_text("time [s],right_shoulder_flexion [deg]\n" + rows)
 
 
+def rows():
+    """Instant and joints [s, rad], from the recording's own start on."""
+    return [(k * PERIOD, *arm(k * PERIOD)) for k in range(121)]
+
+
+def spreadsheet(folder):
+    book = openpyxl.Workbook()
+    for row in (("time [s]", "j1 [rad]", "j2 [rad]"), *rows()):
+        book.active.append(row)
+    book.save(folder / "m.xlsx")
+
+
+def stations(folder):
+    """As RoboDK saves a program."""
+    head = "J1,J2,ERROR,MM_STEP,DEG_STEP,MOVE_ID,TIME,X,Y,Z\n"
+    lines = [f"{math.degrees(a)!r},{math.degrees(b)!r},0,1,1,1,{t:.2f},500,0,0\n" for t, a, b in rows()]
+    (folder / "m.csv").write_text(head + "".join(lines))
+
+
+def recorder(folder):
+    """As a KUKA controller's data recorder writes it."""
+    head = "% ZeitInSec ZeitInNanoSec axisQMsr_LBR[0] axisQMsr_LBR[1]\n"
+    lines = [f"{int(t)} {round(t % 1 * 1e9)} {math.degrees(a)!r} {math.degrees(b)!r}\n" for t, a, b in rows()]
+    (folder / "m.log").write_text(head + "".join(lines))
+
+
+def controller(folder):
+    """As UR's ``record.py`` writes it."""
+    lines = [f"{4000 + t:.2f} {a!r} {b!r}\n" for t, a, b in rows()]
+    (folder / "m.csv").write_text("timestamp actual_q_0 actual_q_1\n" + "".join(lines))
+
+
+def reach(record):
+    """A file of somebody who reaches, of half a second more than a person's time-out takes."""
+    return lambda folder: record(folder, made_recordings.reaching(45))
+
+
 ARM = FLOATING + TWO_R + SPEED.format("arm")
 STILL = "[engine]\nphysics = false\n"
 MAN = STILL + person("op", 3, 0, 0) + SPEED.format("op")
@@ -80,6 +119,24 @@ CELLS = {
         ),
         ARM + '[[sources]]\nkind = "waypoints"\nrobot = "arm"\nfile = "w.toml"\n'
         "joint_speed = 0.5\njoint_acceleration = 2\njoint_jerk = 50\n",
+    ),
+    "excel": (spreadsheet, ARM + '[[sources]]\nkind = "excel"\nrobot = "arm"\nfile = "m.xlsx"\n'),
+    "robodk": (stations, ARM + '[[sources]]\nkind = "robodk"\nrobot = "arm"\nfile = "m.csv"\n'),
+    "kuka_log": (recorder, ARM + '[[sources]]\nkind = "kuka_log"\nrobot = "arm"\nfile = "m.log"\n'),
+    "ur_record": (controller, ARM + '[[sources]]\nkind = "ur_record"\nrobot = "arm"\nfile = "m.csv"\n'),
+    "c3d": (
+        reach(partial(made_recordings.c3d, markers=[*made_recordings.MARKERS, "RFIN", "LFIN"])),
+        STILL
+        + person("op")
+        + SPEED.format("op")
+        + '[[sources]]\nkind = "c3d"\nhuman = "op"\nfile = "r.c3d"\n',
+    ),
+    "bvh": (
+        reach(made_recordings.bvh),
+        STILL
+        + person("op")
+        + SPEED.format("op")
+        + '[[sources]]\nkind = "bvh"\nhuman = "op"\nfile = "r.bvh"\n',
     ),
     "signals_csv": (
         signals,

@@ -3,103 +3,29 @@
 import csv
 import json
 
-import ezc3d
 import made_pictures
-import numpy as np
 import openpyxl
 import pytest
+from made_recordings import bvh, c3d, reaching
 from mcap.reader import make_reader
 
 from seerob.app.cli import main
-from seerob.description.capture.mapping import conventions, plain
-from seerob.description.humans import keyframes, manikin, motion
-from seerob.description.humans.skeleton import BONES, JOINTS, bone_poses
+from seerob.description.humans.skeleton import JOINTS
 from seerob.recording.recording import Recording
 
-PERSON = manikin.build(name="person", stature=1.75, mass=75.0, sex="male")
-RATE, COUNT = 30.0, 24
-CENTRES = (
-    ("Hips", None, "pelvis"),
-    ("Chest", "Hips", "lumbar"),
-    ("Chest2", "Chest", "thorax"),
-    ("Neck", "Chest2", "neck"),
-    ("Head", "Neck", "head"),
-    *(
-        row
-        for s, side in (("Right", "right"), ("Left", "left"))
-        for row in (
-            (f"{s}Collar", "Chest2", f"{side}_clavicle"),
-            (f"{s}Shoulder", f"{s}Collar", f"{side}_upper_arm"),
-            (f"{s}Elbow", f"{s}Shoulder", f"{side}_forearm"),
-            (f"{s}Wrist", f"{s}Elbow", f"{side}_hand"),
-            (f"{s}Hip", "Hips", f"{side}_thigh"),
-            (f"{s}Knee", f"{s}Hip", f"{side}_shank"),
-            (f"{s}Ankle", f"{s}Knee", f"{side}_foot"),
-        )
-    ),
-)
-PAIRS = ("ASI", "PSI", "FHD", "BHD", "SHO", "ELB", "WRA", "KNE", "ANK", "HEE", "TOE")
-MARKERS = ["C7", "T10", "CLAV", "STRN", *(side + name for name in PAIRS for side in "RL")]
+COUNT = 24
 
 
 @pytest.fixture(scope="module")
 def moved():
     """Rotations and positions of the bones: somebody reaches."""
-    played = motion.sample(keyframes.read("library:reach", PERSON), PERSON, RATE)
-    return bone_poses(PERSON, played.q[:COUNT])
+    return reaching(COUNT)
 
 
 def bag(folder, moved):
     """A depth camera that loses the person for a sixth of a second."""
     given = made_pictures.pictures(count=COUNT, lost=range(10, 15))
     return "kinect_recording", made_pictures.bag(folder / "r.bag", given)
-
-
-def bvh(folder, moved):
-    """Joint centres by channels of position: nothing turns."""
-    _, p = moved
-    at = {name: 100 * p[:, BONES.index(bone)][:, [1, 2, 0]] for name, _, bone in CENTRES}  # y up
-    lines = ["HIERARCHY"]
-
-    def joint(name, parent):
-        offset = at[name][0] - (at[parent][0] if parent else 0)
-        lines.extend([f"{'JOINT' if parent else 'ROOT'} {name}", "{", "OFFSET " + " ".join(map(str, offset))])
-        lines.append("CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation")
-        order.append((name, parent))
-        children = [n for n, above, _ in CENTRES if above == name]
-        for child in children:
-            joint(child, name)
-        if not children:
-            lines.extend(["End Site", "{", "OFFSET 0 -5 0", "}"])
-        lines.append("}")
-
-    order: list[tuple[str, str | None]] = []
-    joint("Hips", None)
-    lines += ["MOTION", f"Frames: {COUNT}", f"Frame Time: {1 / RATE}"]
-    for k in range(COUNT):
-        rows = [[*(at[n][k] - (at[above][k] if above else 0)), 0, 0, 0] for n, above in order]
-        lines.append(" ".join(str(x) for row in rows for x in row))
-    (folder / "r.bvh").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return "bvh", folder / "r.bvh"
-
-
-def c3d(folder, moved):
-    """Markers on the skin, up to 2 cm from where they ought to be."""
-    R, p = moved
-    places = conventions()["markers"].places
-    random = np.random.default_rng(4)
-    file = ezc3d.c3d()
-    point = file["parameters"]["POINT"]
-    point["RATE"]["value"], point["LABELS"]["value"], point["UNITS"]["value"] = [RATE], MARKERS, ["mm"]
-    data = np.ones((4, len(MARKERS), COUNT))
-    for k, name in enumerate(MARKERS):
-        place = places[plain(name)]
-        bone = BONES.index(place.bone)
-        at = place.at * 1.75 + random.uniform(-0.02, 0.02, 3) / np.sqrt(3)
-        data[:3, k] = 1e3 * (p[:, bone] + R[:, bone] @ at).T
-    file["data"]["points"] = data
-    file.write(str(folder / "r.c3d"))
-    return "c3d", folder / "r.c3d"
 
 
 @pytest.mark.parametrize("record", [bag, bvh, c3d])

@@ -66,12 +66,15 @@ class Validity:
         self._owners_of: dict[tuple[int, ...], _Owners] = {}
         self._reasons: dict[tuple[str, str], str] = {}
         """By question and name, why something may not be relied on at this tick."""
+        self._bones: dict[tuple[str, str], tuple[str, ...]] = {}
+        """By question and person, bones that may not be relied on at this tick."""
         self._lost: dict[int, tuple[frozenset[str], tuple[int, ...]]] = {}
         self._relied_on: set[Hashable] = set()
 
     def heard(self) -> None:
         """Work every reason out again: what is known of robots, people and machines has changed."""
         self._reasons.clear()
+        self._bones.clear()
         self._lost.clear()
         self._relied_on.clear()
 
@@ -242,9 +245,11 @@ class Validity:
         return self._bones_in_doubt(name)
 
     def _bones_in_doubt(self, name: str) -> tuple[str, ...]:
-        turned = self.bones_turned_in_doubt(name)
-        unplaced = self._hearings[name].unplaced(self.t)
-        return tuple(dict.fromkeys((*turned, *unplaced))) if unplaced else turned
+        turned, key = self.bones_turned_in_doubt(name), ("placed", name)
+        if key not in self._bones:
+            unplaced = self._hearings[name].unplaced(self.t)
+            self._bones[key] = tuple(dict.fromkeys((*turned, *unplaced))) if unplaced else turned
+        return self._bones[key]
 
     def bones_turned_in_doubt(self, name: str) -> tuple[str, ...]:
         """Bones of a person that may not be turned as the twin shows them, when the others are.
@@ -258,9 +263,12 @@ class Validity:
         self.asked.add(name)
         if reason := self.heard_doubt(name):
             raise Undecided(reason)
-        hearing = self._hearings[name]
-        doubted = (bone for _, bones in hearing.doubted(self.t) for bone in bones)
-        return tuple(dict.fromkeys((*doubted, *hearing.unseen(self.t))))
+        key = "turned", name
+        if key not in self._bones:
+            hearing = self._hearings[name]
+            doubted = (bone for _, bones in hearing.doubted(self.t) for bone in bones)
+            self._bones[key] = tuple(dict.fromkeys((*doubted, *hearing.unseen(self.t))))
+        return self._bones[key]
 
     # -- of bodies ----------------------------------------------------------------------------
 

@@ -36,7 +36,7 @@ def measure(seconds: float) -> dict[str, float]:
     driven = {source.target(): source.timeout for source in station.workstation.sources}
     engine = Engine(station.model, driven=driven)
     judge = road.Judge(station.bound)
-    feed = road.pump(station.sources, period, endless=True)
+    feed = road.pump(station.sources, period, endless=True, ahead=road.looks_ahead(station.model))
     encoder = msgspec.msgpack.Encoder()
     stages: dict[str, list[float]] = {"engine": [], "criteria": [], "snapshot": []}
     whole, computed, worst_distance = [], [], np.inf

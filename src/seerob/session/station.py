@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 from numpy.typing import ArrayLike
@@ -26,15 +27,8 @@ from seerob.model.mounting.things import MadeArea
 from seerob.outputs.sink import Sink, Writer
 from seerob.recording.filing import source_files
 from seerob.recording.recording import Recording
-from seerob.session import batch
 from seerob.session import run as road
-from seerob.session.batch import Batch
-from seerob.session.explanation import Explanation
-from seerob.session.explanation import explain as explained
 from seerob.session.opening import open_sources, source_target
-from seerob.session.permissible import evaluation
-from seerob.session.permissible.evaluation import PermissibleSpeed, Say, Wish
-from seerob.session.permissible.joint_limits import Given, joint_limits
 from seerob.session.reading import read
 from seerob.session.run import Bound, Feed, Summary
 from seerob.session.scene import scene_of
@@ -42,6 +36,13 @@ from seerob.twin.given_states import motion_of
 from seerob.twin.own_words import said_by
 from seerob.workstation.source import Opened, Source
 from seerob.workstation.workstation import Workstation
+
+if TYPE_CHECKING:
+    from seerob.session.batch import Batch
+    from seerob.session.explanation import Explanation
+    from seerob.session.permissible import evaluation
+    from seerob.session.permissible.evaluation import PermissibleSpeed, Say, Wish
+    from seerob.session.permissible.joint_limits import Given
 
 
 class Station:
@@ -255,6 +256,8 @@ class Station:
         Raises:
             InputError: Arrays that do not fit, or a live source without them.
         """
+        from seerob.session import batch
+
         findings: list[Finding] = []
         if q is None:
             if qd is not None or t is not None:
@@ -275,6 +278,8 @@ class Station:
             InputError: No recorded source of that robot measures torques, or too little can be told.
             UnknownName: There is no such robot.
         """
+        from seerob.session.explanation import explain as explained
+
         name = self.model.robot(robot).name
         for source, opened in self.sources:
             if source.target() == name and not isinstance(source, LiveSource):
@@ -321,6 +326,9 @@ class Station:
             InputError: A limit that nobody gave, no criterion that limits the speed, a live source, or not
                 exactly one source of the robot's motion.
         """
+        from seerob.session.permissible import evaluation
+        from seerob.session.permissible.joint_limits import joint_limits
+
         if sources is None:
             require_recorded(self.workstation)
         names = [r.name for r in self.workstation.robots]

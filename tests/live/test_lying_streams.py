@@ -173,3 +173,62 @@ def test_nothing_rests_on_a_stream_that_lies(honest, monkeypatch, lie):
     since = LIES_AT + stream.source.timeout + SETTLED
     assert since < END - 0.1
     assert not [t for t, verdict, _ in stream.verdicts() if t > since and verdict == "within"]
+
+
+def standing(said):
+    """From some instant on what was said last, with new stamps."""
+    last = max((s for s in said if s.t < BEGIN + LIES_AT), key=lambda s: s.t)
+    return [s if s.t <= last.t else replace(last, t=s.t, t_device=s.t_device) for s in said]
+
+
+def again(said, *, among=False):
+    """From some instant on the last half second again and again, with or without what is live."""
+    before = [s for s in said if s.t < BEGIN + LIES_AT]
+    loop = [s for s in before if s.t >= BEGIN + LIES_AT - 0.5]
+    after = [replace(s, t=s.t + 0.5 * n) for n in (1, 2) for s in loop]
+    after += [s for s in said if s.t >= BEGIN + LIES_AT] if among else []
+    return before + sorted(after, key=lambda s: s.t)
+
+
+def shuffled(said):
+    """Each two in another order, when the latter of them comes."""
+    found = list(said)
+    for k in range(0, len(found) - 1, 2):
+        first, second = found[k : k + 2]
+        found[k : k + 2] = [second, replace(first, t=second.t)]
+    return found
+
+
+SPOILED = {
+    "stands": standing,
+    "plays again what it said": again,
+    "has what it said among what is live": lambda said: again(said, among=True),
+}
+
+
+@pytest.mark.parametrize(
+    ("honest", "what"),
+    [(kind, what) for what in SPOILED for kind in ("rtde", "kinect") if (kind, what) != ("kinect", "stands")],
+    indirect=["honest"],
+)
+def test_what_stands_or_is_played_again_is_not_within(honest, monkeypatch, what):
+    """Of robots and people; these stand where they never had any noise (`tests/human/test_frozen.py`).
+
+    A variable may stand, and has no time of its own.
+    """
+    station, said = honest
+    spoiled = SPOILED[what](said)
+    stream = Stream(station, spoiled, monkeypatch, None)
+    since = LIES_AT + stream.source.timeout + SETTLED
+    told = stream.verdicts()
+    assert "within" in {verdict for t, verdict, _ in told if t < LIES_AT}
+    assert not [t for t, verdict, _ in told if t > since and verdict == "within"]
+
+
+@pytest.mark.parametrize("honest", ["rtde", "kinect"], indirect=True)
+def test_in_another_order_nobody_seems_to_fly(honest, monkeypatch):
+    """Backward in time and forward again would be 5 m/s and more."""
+    station, said = honest
+    told = [verdict for _, verdict, _ in Stream(station, shuffled(said), monkeypatch, None).verdicts()]
+    assert "within" in told
+    assert "exceeded" not in told

@@ -386,24 +386,8 @@ mass = "{mass}"
 """
 
 
-@pytest.mark.parametrize(
-    ("seed", "mass", "more", "physics", "scale"),
-    [
-        (5, "larger", "", "false", 0.3),
-        (6, "projected", "person_speed = 0.2", "true", 1.0),
-        (7, "simplified", "", "false", 1.0),
-        (14, "larger", 'human = "op"', "false", 1.0),
-    ],
-)
-def test_no_contact_between_two_ticks_uses_more_than_its_bound(tmp_path, seed, mass, more, physics, scale):
-    """Of every surface against every region, whatever it may come near to, and clamps, meanwhile."""
-    rng = np.random.default_rng(seed)
-    x, y = rng.normal(size=2) * 0.8
-    cell = RANDOM[: RANDOM.index("[[safety]]")].replace("position = [0, 3, 0]", "position = [0.3, 0.9, 0]")
-    text = cell + CONTACT.replace("{excluded}", str(NOT_HEAD)).replace("{x}", f"{x}").replace(
-        "{y}", f"{y}"
-    ).replace("{mass}", mass).replace("{more}", more)
-    station = random_cell(tmp_path, rng, tick=0.01, physics=physics, rate=250, text=text, scale=scale)
+def contact_bounds(station):
+    """Margins of a criterion of contact, and its bound on them, of looks between every two ticks."""
     (bound,) = station.bound
     contacts, between = Contacts(bound.criterion, station.model), None
     told, known = [], contacts.in_regions
@@ -424,7 +408,28 @@ def test_no_contact_between_two_ticks_uses_more_than_its_bound(tmp_path, seed, m
     between._judge = watching
     for _ in ticks(engine_of(station.model), judge, pump(station.sources, 0.01), station.duration):
         pass
-    low, met = np.array(told).T
+    return np.array(told).T
+
+
+@pytest.mark.parametrize(
+    ("seed", "mass", "more", "physics", "scale"),
+    [
+        (5, "larger", "", "false", 0.3),
+        (6, "projected", "person_speed = 0.2", "true", 1.0),
+        (7, "simplified", "", "false", 1.0),
+        (14, "larger", 'human = "op"', "false", 1.0),
+    ],
+)
+def test_no_contact_between_two_ticks_uses_more_than_its_bound(tmp_path, seed, mass, more, physics, scale):
+    """Of every surface against every region, whatever it may come near to, and clamps, meanwhile."""
+    rng = np.random.default_rng(seed)
+    x, y = rng.normal(size=2) * 0.8
+    cell = RANDOM[: RANDOM.index("[[safety]]")].replace("position = [0, 3, 0]", "position = [0.3, 0.9, 0]")
+    text = cell + CONTACT.replace("{excluded}", str(NOT_HEAD)).replace("{x}", f"{x}").replace(
+        "{y}", f"{y}"
+    ).replace("{mass}", mass).replace("{more}", more)
+    station = random_cell(tmp_path, rng, tick=0.01, physics=physics, rate=250, text=text, scale=scale)
+    low, met = contact_bounds(station)
     assert (met >= low).all()
     assert np.isfinite(low).mean() > 0.9
     assert len(low) > 100
@@ -448,6 +453,64 @@ def touching(folder, motion, more="", things="", kind="power_and_force", told=No
         text = f'variables = "v.toml"\n{text}active = "door"\n{PLC}'
         files |= {"v.toml": DOOR, "s.csv": "t,x\n" + "".join(f"{t},{x}\n" for t, x in told)}
     return made(folder, text, files).run().results["c"]
+
+
+def contact(only="", **more):
+    excluded = [name for name in REGIONS if name != only] if only else NOT_HEAD
+    given = {"floor": "false", **more, "excluded": str(excluded), "contact_area": "{ arm = 1e-4 }"}
+    return 'robot = "arm"\n' + "".join(f"{key} = {value}\n" for key, value in given.items())
+
+
+HAND = "Hands and fingers"
+OTHER = """
+[[robots]]
+name = "other"
+model = "arm.urdf"
+base = {{ position = [0, {y}, 0] }}
+[[sources]]
+kind = "csv"
+robot = "other"
+file = "still.csv"
+"""
+SHAKEN = {
+    # How kinetic energy grows: at every tick there is none, and the tip is heavier than M/2 + m_L.
+    "energy": (contact(mass='"larger"'), (0.0, 0.0), (0.004, 0.0), ""),
+    # Two people, of whom the second comes within reach between ticks only.
+    "people": (
+        contact(human='"op"', horizon=0.1035),
+        (0.0, 0.0),
+        (0.004, 0.0),
+        person("two", 2.15, 0.25, -0.8),
+    ),
+    # The tip comes 20 mm down, at 6 m/s; within the tick that may follow it clamps a hand.
+    "floor": (contact(HAND, floor="true", floor_height=-0.2165), (0.0, 0.0), (0.01, 0.0), ""),
+    # An elbow that closes.
+    "elbow": (contact(mass='"simplified"'), (0.0, 2.9), (0.0, 0.01), ""),
+    # Two arms that stand at every tick, each as seen from the other.
+    "arms": (contact(mass='"simplified"'), (0.0, 0.0), (0.001, 0.0), OTHER.format(y=0.2)),
+}
+
+
+@pytest.mark.parametrize("what", SHAKEN)
+def test_no_contact_of_an_arm_that_moves_only_between_ticks_uses_more_than_its_bound(tmp_path, what):
+    options, place, size, more = SHAKEN[what]
+    text = f"engine = {{ physics = false, gravity = [0, 0, 0] }}\n{TWO_R}{person('op', 2.4, 0.5, 0)}{more}"
+    text += f'{SOURCE}[[safety]]\nkind = "power_and_force"\nname = "c"\n{options}'
+
+    def motion(t):
+        (way, _), (speed, _) = shaking(1.0)(t)
+        return np.add(place, np.multiply(size, way)), np.multiply(size, speed)
+
+    times = np.arange(0, 0.1001, 0.001).tolist()
+    urdf = two_r(masses=(0.1, 4.0))
+    if what == "floor":
+        urdf = urdf.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 1 0"/>')
+    files = {"arm.urdf": urdf, "motion.csv": rows(motion, times)}
+    files["still.csv"] = rows(lambda t: ((0.0, 0.0), (0.0, 0.0)), times)
+    low, met = contact_bounds(made(tmp_path, text, files))
+    assert (met >= np.minimum(low, 1.0)).all()  # of what stands still nothing is used
+    assert (low > -np.inf).all()
+    assert met.min() < 1.0
 
 
 @pytest.mark.parametrize(("since", "exceeds"), [(0.0752, True), (0.0801, False)])
@@ -582,12 +645,6 @@ def test_a_fixed_separation_remembers_what_s_p_was_between_two_ticks(tmp_path, k
     moved = found(0.2, speed)
     assert not moved.verdicts[:2].any()
     assert bool(moved.verdicts[7]) is (mode == "fixed")
-
-
-def contact(only="", **more):
-    excluded = [name for name in REGIONS if name != only] if only else NOT_HEAD
-    given = {"floor": "false", **more, "excluded": str(excluded), "contact_area": "{ arm = 1e-4 }"}
-    return 'robot = "arm"\n' + "".join(f"{key} = {value}\n" for key, value in given.items())
 
 
 def test_a_contact_between_two_ticks_decides_though_nothing_moves_at_any_tick(tmp_path):

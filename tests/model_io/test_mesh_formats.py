@@ -191,6 +191,31 @@ def test_obj_colours_objects_negative_indices_and_concave_polygons(tmp_path):
     np.testing.assert_array_equal(second.mesh.vertices, [[0, 0, 1], [1, 0, 1], [0, 1, 1]])
 
 
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+
+
+def test_obj_is_read_here_because_trimesh_changes_its_surface_without_a_word(tmp_path):
+    def by_trimesh(text):
+        return trimesh.load_scene(io.BytesIO(text.encode()), file_type="obj").to_mesh()
+
+    def by_us(text):
+        (tmp_path / "part.obj").write_text(text)
+        return load_meshes(tmp_path / "part.obj", units="m", up="z").meshes
+
+    arrow = "v 0 0 0\nv 2 -1 0\nv 0.5 0 0\nv 2 1 0\nf 4 1 2 3\n"
+    assert by_trimesh(arrow).area == pytest.approx(3.5)
+    (mesh,) = by_us(arrow)
+    a, b, c = np.moveaxis(mesh.mesh.vertices[mesh.mesh.faces], 1, 0)
+    assert np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2 == pytest.approx(0.5)
+    for broken, message in (("f 1 2 3\nf 1 2\n", "2 corners"), ("f 1 2 0\n", "names vertex")):
+        assert len(by_trimesh(TRIANGLE + broken).faces) == 1
+        with pytest.raises(InputError, match=message):
+            by_us(TRIANGLE + broken)
+    objects = f"o a\n{TRIANGLE}f 1 2 3\no b\n{TRIANGLE}f 4 5 6\n"
+    assert len(trimesh.load_scene(io.BytesIO(objects.encode()), file_type="obj").geometry) == 1
+    assert [m.name for m in by_us(objects)] == ["a", "b"]
+
+
 def test_gltf_colours_are_linear_in_the_file_and_srgb_here(tmp_path):
     scene = trimesh.Scene(trimesh.creation.box((1, 1, 1)))
     data = scene.export(file_type="gltf")

@@ -1,8 +1,10 @@
 """Wavefront OBJ with the colours of its material libraries; it knows neither unit nor axes.
 
-Read here and not by trimesh 5.2.0 for its messages: a face that names a missing vertex and a coordinate that
-is no number are told with vertex and count, where trimesh raises NumPy's IndexError and ValueError. Price:
-a sphere of 81 920 triangles takes 440 ms here and 168 ms there.
+Read here because trimesh 5.2.0 changes surfaces without a word: it cuts a concave face into a fan that leaves
+it (an arrow head of 0.5 m² becomes triangles of 2 m² and 1.5 m² the other way round), drops a face with too
+few corners behind good ones, reads index 0, which no file can mean, as a vertex, and joins objects of one
+material. `tests/model_io/test_mesh_formats.py` shows each. Price: a sphere of 81 920
+triangles took 440 ms here and 168 ms there.
 """
 
 from __future__ import annotations

@@ -2,6 +2,12 @@
 
 Encoding as in the public description of the format: a field is a tag, ``number << 3 | wire type``, and a
 value. Repeated numbers come one by one or packed in one field; a reader takes both.
+
+Read here and not by the library protobuf, which is a dependency, for two reasons. It reads a number that was
+sent as another type as 0.0, without a word (a link 0 m away); here that is refused. And it needs compiled
+schemas, which no package has of FRI's and Sparkplug's messages. Price, with Foxglove's schemas and equal
+results, one core under load: 20 transforms took 1.4 ms here and 0.14 ms there, six joint states 140 µs here
+and 3 µs there (`tests/protocols/test_foxglove_fields.py` has the first reason).
 """
 
 from __future__ import annotations

@@ -228,7 +228,7 @@ CALLS = {
     "criteria.contact.collision.energy_limit": {"F": 100.0, "k": 25e3, "printed": 1.0},
     "criteria.contact.collision.permissible_speed": {"v_F": 1.0, "v_P": 1.0, "v_E": 1.0},
     "criteria.contact.measured.peaks": {"t": TWO - 1, "force": TWO},
-    "criteria.contact.pushing.permissible_while_pushed": {"v": HALF, "mu": TWO, "k": TWO * 1e4, "F": 10.0},
+    "criteria.contact.tolerances.permissible_while_pushed": {"v": HALF, "mu": TWO, "k": TWO * 1e4, "F": 10.0},
     "criteria.contact.shape.round_shape": {"radius": 0.01},
     "description.norms.iso_13855.speed_at": {"distance": TWO},
 }
@@ -271,7 +271,7 @@ BELOW = {
     "criteria.contact.collision.spring_energy": "k",
     "criteria.contact.collision.speed_at_force": "k",
     "criteria.contact.collision.speed_at_pressure": "k",
-    "criteria.contact.pushing.permissible_while_pushed": "F",
+    "criteria.contact.tolerances.permissible_while_pushed": "F",
     "criteria.contact.shape.round_shape": "radius",
 }
 """What is refused below 0."""

@@ -13,7 +13,7 @@ from seerob.core.markers import Label, Segment
 from seerob.core.snapshot import Finding, Result, Row, Verdict
 from seerob.criteria.judging import Judge, undecided
 from seerob.session import batch
-from seerob.twin.given_states import motion_of
+from seerob.twin.states import motion_of
 
 WITHIN, EXCEEDED = Verdict.WITHIN, Verdict.EXCEEDED
 

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seerob.app import cli
+from seerob.app.commands.variables import skeleton
 from seerob.app.console.terminal import Exit
 from seerob.app.emulators.siemens_web import SiemensWeb
 from seerob.core.errors import InputError
 from seerob.devices.variables.live_source import Node
-from seerob.devices.variables.skeleton import skeleton
 from seerob.workstation.variables.dictionary import read
 
 STATION = """

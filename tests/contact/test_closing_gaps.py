@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from seerob.core.shapes.geometry import Mesh, Solid, capsule
+from seerob.criteria.contact.clamped_regions import ClosingGaps
 from seerob.criteria.contact.clamping import clamps, pinch_pairs
-from seerob.criteria.contact.closing_gaps import ClosingGaps
 from seerob.distance.least import Shapes
 
 THICKNESS = np.array([0.05, 0.1, 0.3])

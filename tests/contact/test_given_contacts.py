@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from made_cell import FLOATING, TWO_R, made, results_at, two_r
-from seerob.criteria.contact.given import given_contacts
+from seerob.criteria.contact.shape import given_contacts
 
 GRIP = '[[tools]]\nname = "grip"\non = "arm/tip"\nshape = { sphere = 0.02 }\nmass = 1\n'
 PFL = '[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\nmass = "simplified"\n'

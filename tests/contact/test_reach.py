@@ -10,8 +10,7 @@ import pytest
 from made_cell import FLOATING, TWO_R, heard, made, person, results_at, state_at, two_r
 from seerob.core.errors import SeerobError
 from seerob.core.snapshot import Origin, Result, RowState, Verdict
-from seerob.criteria.contact.reach import ANYWHERE, heights
-from seerob.criteria.contact.regions import REGIONS
+from seerob.criteria.contact.regions import ANYWHERE, REGIONS, heights
 from seerob.criteria.judging import Judge
 from seerob.description.humans import manikin
 from seerob.description.humans.posture import posture

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seerob.description.humans.skeleton import BONES, PARENTS
-from seerob.twin.validity.inferred_bones import told_between, told_bound, told_errors
+from seerob.twin.accuracy.tracking_error import told_between, told_bound, told_errors
 
 
 def elbow(P, C, a, b, angle, rng):

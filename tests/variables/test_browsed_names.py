@@ -5,8 +5,8 @@ import tomllib
 
 import msgspec
 
+from seerob.app.commands.variables import skeleton
 from seerob.devices.sources.mqtt import Metric, Plain, _nodes, address
-from seerob.devices.variables.skeleton import skeleton
 from seerob.protocols.plc import sparkplug
 from seerob.workstation.variables.dictionary import Variable
 

@@ -32,8 +32,8 @@ from seerob.session.opening import open_sources, source_target
 from seerob.session.reading import read
 from seerob.session.run import Bound, Feed, Summary
 from seerob.session.scene import scene_of
-from seerob.twin.given_states import motion_of
 from seerob.twin.own_words import said_by
+from seerob.twin.states import motion_of
 from seerob.workstation.source import Opened, Source
 from seerob.workstation.workstation import Workstation
 

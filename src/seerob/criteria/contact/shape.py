@@ -8,11 +8,14 @@ their centroids at distances :math:`c_1, c_2` from the edge, are chords of a cir
 exactly, when the vertices of a cylinder lie on its surface. Where a mesh turns by more than `SMOOTH`
 in one step it does not tell a rounding from a sharp edge: the radius there is unknown, between zero
 and what the mesh resolves. So it is at a vertex that is the apex of such a turn, and at open borders.
+
+The workstation file may say how parts of a robot touch instead of their meshes (`given_contacts`).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -20,8 +23,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seerob.core.domains import number
+from seerob.core.errors import UnknownName
 from seerob.core.shapes.geometry import Mesh, Solid
 from seerob.core.transforms import Array
+from seerob.model.model import Mechanism, Model
 
 SMOOTH = math.radians(30.0)
 """Largest turn between neighbouring facets that is taken as the sampling of a rounding [rad]."""
@@ -336,3 +341,43 @@ def _apexes(vertices: Array, faces: Indices, edges: _Edges, turn: Array, sharp: 
     used = np.bincount(faces.ravel(), minlength=len(vertices)) > 0
     pointed = 2 * math.pi - total > 2 * math.pi * (1 - math.cos(SMOOTH / 2)) + 1e-6
     return np.flatnonzero(used & pointed & ~dented & ~edged)
+
+
+def given_contacts(
+    model: Model, robot: Mechanism, radii: Mapping[str, float], areas: Mapping[str, float]
+) -> tuple[dict[int, float], dict[int, float], dict[int, str]]:
+    """Radii and areas by moving body: of several names that mean it, that of the fewest bodies counts.
+
+    Of names that mean as many an area counts before a radius, and the lesser one. The robot's name means the
+    links up to its flange here, for how an arm touches says nothing of its tool.
+
+    Args:
+        model: The compiled workstation.
+        robot: The robot.
+        radii: Of its sharpest edges, by name [m].
+        areas: Of its smallest contacts, by name [m²].
+
+    Returns:
+        Radii [m], areas [m²], and the name by which each is given.
+
+    Raises:
+        UnknownName: A part that the robot does not move.
+    """
+    meant: list[tuple[int, int, float, str, list[int]]] = []
+    arm = {i for i in robot.bodies if model.bodies[i].mj not in robot.load}
+    for kind, given in enumerate((radii, areas)):
+        for name, value in given.items():
+            named = {*model.select(name)}
+            bodies = [i for i in robot.moving if i in (arm if name == robot.name else named)]
+            if not bodies:
+                known = [model.bodies[i].name for i in robot.moving]
+                raise UnknownName(f"moving part of {robot.name}", name, known)
+            meant.append((-len(named.intersection(robot.moving)), kind, -value, name, bodies))
+    found: tuple[dict[int, float], dict[int, float]] = {}, {}
+    by: dict[int, str] = {}
+    for _, kind, value, name, bodies in sorted(meant):
+        for body in bodies:
+            found[1 - kind].pop(body, None)
+            found[kind][body] = -value
+            by[body] = name
+    return *found, by

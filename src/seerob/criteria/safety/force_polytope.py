@@ -22,7 +22,7 @@ from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge
 from seerob.criteria.polytope import Polytope, free_moment, torque_box, zero_moment
 from seerob.description.norms import body_limits
-from seerob.description.norms.force_limits import force_inputs, pushed_region
+from seerob.description.norms.limit_inputs import force_inputs, pushed_region
 from seerob.kernels.contact_forces import drawn_corners
 from seerob.kernels.polytope import largest
 from seerob.model import provenance

@@ -20,18 +20,15 @@ from seerob.core.transforms import Array
 from seerob.criteria.contact import collision
 from seerob.criteria.contact import limits as contact_limits
 from seerob.criteria.contact import shape as contact_shape
-from seerob.criteria.contact.areas import NOT_MODELLED, area_results, margin
 from seerob.criteria.contact.clamped_regions import Clamping, floor_input
 from seerob.criteria.contact.drawn import ContactMarkers
-from seerob.criteria.contact.given import given_contacts
 from seerob.criteria.contact.impact_mass import Behind, moving_masses, train
 from seerob.criteria.contact.limits import Judged
 from seerob.criteria.contact.measured import Measurements, with_measured
-from seerob.criteria.contact.pushing import NOT_GIVEN, pushed
-from seerob.criteria.contact.reach import HeightReach, reach_inputs
-from seerob.criteria.contact.regions import REGIONS, Person, without_limit
-from seerob.criteria.contact.rows import ContactRows
-from seerob.criteria.contact.tolerances import ContactEnds, ranks, robot_masses
+from seerob.criteria.contact.regions import REGIONS, HeightReach, Person, reach_inputs, without_limit
+from seerob.criteria.contact.rows import NOT_MODELLED, ContactRows, area_results, margin
+from seerob.criteria.contact.shape import given_contacts
+from seerob.criteria.contact.tolerances import NOT_GIVEN, ContactEnds, pushed, ranks, robot_masses
 from seerob.criteria.criterion import Criterion, Evaluate, Lowest, worst
 from seerob.criteria.partly_seen import seen_first
 from seerob.description.humans.anthropometry import STATURE_RANGE

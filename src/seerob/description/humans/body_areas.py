@@ -27,7 +27,7 @@ def words(bone: str, region: str | None, *, front: bool, dominant: bool, area: s
         region: Of ISO/TS 15066:2016 Table A.3; None where that has none.
         front: Whether in front.
         dominant: Whether on the side of the dominant hand.
-        area: Of Table A.2 (`seerob.description.humans.body_areas`); None where that has none.
+        area: Of Table A.2; None where that has none.
     """
     told = [FEET] if region is None else [region, "front" if front else "rear"]
     told += [area.partition(",")[0]] if area else []

@@ -130,7 +130,7 @@ _OWN_UNIT = ("worst value", "limit", "value")
 
 @contextmanager
 def workbook(file: IO[bytes] | Path) -> Iterator[Sheets]:
-    """A workbook to add sheets to; see `seerob.outputs.workbook.sheets.book`.
+    """A workbook to add sheets to, as `book` opens it.
 
     Raises:
         OSError: The disk refuses.

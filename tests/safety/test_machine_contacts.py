@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from made_cell import FLOATING, TWO_R, judged, made, state_at, two_r
+from made_cell import FLOATING, TWO_R, judged, made, results_at, state_at, two_r
 from seerob.core.errors import InputError
 from seerob.core.verdict import Verdict
 from seerob.criteria.contact.tolerances import permissible_while_pushed
@@ -117,3 +117,31 @@ def test_a_robot_that_nothing_carries_takes_no_drive_force(tmp_path):
     text = TWO_R + ARM_TOO + "drive_force = 10\n"
     with pytest.raises(InputError, match="drive_force"):
         _ = made(tmp_path, FLOATING + text, {"arm.urdf": two_r()}).bound
+
+
+@pytest.mark.parametrize(
+    ("drive", "verdict"),
+    [
+        ("", Verdict.UNDECIDED),
+        ("drive_force = 50\n", Verdict.WITHIN),
+        ("drive_force = 400\n", Verdict.EXCEEDED),
+    ],
+)
+def test_fingers_that_close_press_as_hard_as_their_gripper(tmp_path, drive, verdict):
+    """140 N is what a hand may be pressed with; the fingers alone, 0.15 kg at 20 mm/s, press with 2 N."""
+    excluded = '["Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"]'
+    text = (
+        'engine = { physics = false }\n[[robots]]\nname = "arm"\nmodel = "library:ur10"\n'
+        "base = { position = [0, 0, 1] }\n"
+        '[[machines]]\nname = "hand"\non = "arm/tool0"\nshape = { box = [0.02, 0.02, 0.08] }\nmass = 0.15\n'
+        "at = { position = [0, 0, 0.05] }\ngrip = { upper = 0.1 }\n"
+        '[[safety]]\nkind = "power_and_force"\nname = "pfl"\nrobot = "arm"\nmass = "simplified"\n'
+        'contact_area = { arm = 1e-4, "hand/left" = 1e-4, "hand/right" = 1e-4 }\n'
+        f"excluded = {excluded}\n{drive}"
+    )
+    station = made(tmp_path, text)
+    arm = (np.radians([0, -90, 90, -90, -90, 0]), np.zeros(6))
+    for speed in (-0.02, 0.0):
+        found = results_at(station, arm=arm, hand=([0.05], [speed]))["pfl"]
+        assert found.verdict is (verdict if speed else None), found.reason
+        assert not speed or "hand" in found.reason

@@ -77,7 +77,8 @@ class Behind:
     def __init__(self, model: Model, robot: Mechanism) -> None:
         self._robot, self._alone = robot, simplified_mass(model, robot)
         self._carriers = [model.mechanisms[name] for name in reversed(model.carriers_of(robot.name))]
-        self.pushed = robot.role == "machine" or bool(self._carriers)
+        self._riders = [model.mechanisms[name] for name in robot.riders]
+        self.pushed = robot.role == "machine" or bool(self._carriers or self._riders)
         """Whether a drive may push it that has more behind it than the joints of a robot."""
         roots = [*self._carriers, *([robot] if robot.role == "machine" else [])]
         self._trains = {root.name: train(model, root) for root in roots}
@@ -93,6 +94,10 @@ class Behind:
         if moving is None:
             return self._robot if self._robot.role == "machine" else None
         return next(carrier for carrier in self._carriers if carrier.name == moving)
+
+    def riding(self, state: State, *, standstill: float) -> tuple[Mechanism, ...]:
+        """Grippers and other machines on it that move by drives of their own."""
+        return tuple(m for m in self._riders if float(np.abs(state.qd(m)).max(initial=0.0)) > standstill)
 
     def simplified(self, mover: Mechanism | None) -> float:
         """M/2 + m_L, or the whole mass of what moves as one [kg]."""

@@ -157,6 +157,8 @@ class Judged:
     """Mass behind the surfaces by the norm, or the whole mass of what moves them as one [kg]."""
     pushed: str = ""
     """Which drive may press on after the impact, in words; empty where joints of a robot alone move."""
+    whole: bool = False
+    """Whether all of the mass of what moves as one is behind it."""
 
     @property
     def least(self) -> Array:

@@ -178,6 +178,8 @@ def pushed(
     force: Array,
     clamped: NDArray[np.bool_],
     drive: float | None,
+    *,
+    where: NDArray[np.bool_] | None = None,
 ) -> Spread:
     """Ends of the permissible speeds with a drive that keeps pushing.
 
@@ -188,12 +190,16 @@ def pushed(
         force: Quasi-static limit of each region [N], shape (r,).
         clamped: Whether the body part cannot recoil, shape (b, r).
         drive: Largest force of the drive [N]; None: nobody knows, and no speed is known to be permitted.
+        where: It pushes, shape (b, r); everywhere when not given.
     """
-    low, high = (speeds.permissible,) * 2 if ends is None else (ends.low, ends.high)
+    low, high = alone = (speeds.permissible,) * 2 if ends is None else (ends.low, ends.high)
     if drive is None:
         low = np.zeros_like(low)
     else:
         low = permissible_while_pushed(low, speeds.mu, k, drive)
         high = np.where(clamped & (drive > force), 0.0, high)
     widths = np.zeros((0, *low.shape)) if ends is None else lambda: ends.widths
-    return Spread(np.minimum(low, high), high, widths)
+    low = np.minimum(low, high)
+    if where is not None:
+        low, high = (np.where(where, end, other) for end, other in zip((low, high), alone, strict=True))
+    return Spread(low, high, widths)

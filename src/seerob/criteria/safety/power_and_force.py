@@ -438,11 +438,22 @@ class Contacts:
                     f" ({mover.name} moves" + ("" if mover is robot else f" and carries {robot.name}") + ")"
                 )
             ends = pushed(speeds, ends, k, self.arrays.force, clamped, F_d)
+        elif riders := self.behind.riding(state, standstill=STANDSTILL):
+            # Fingers press as hard as their drive, whatever they weigh.
+            own = {body for rider in riders for body in rider.moving}
+            pressed = clamped & np.isin(self.moving, sorted(own))[:, None]
+            if pressed.any():
+                names, F_d = ", ".join(rider.name for rider in riders), spec.drive_force
+                doubt = NOT_GIVEN if F_d is None else f"the drive keeps pushing with {F_d:g} N"
+                doubt += f" ({names} moves)"
+                k = self.arrays.stiffness * (1 - spec.stiffness_tolerance)
+                ends = pushed(speeds, ends, k, self.arrays.force, clamped, F_d, where=pressed)
         v = contact_limits.relative(v_r, v_h, closing)
         governing = self._governing(v, near, speeds, ends)
         return Judged(
-            v_r, v_h, near, projected, speeds, clamped, *governing, ends, on_floor, closing, simplified, doubt
-        )
+            v_r, v_h, near, projected, speeds, clamped, *governing, ends, on_floor, closing, simplified,
+            doubt, mover is not None,
+        )  # fmt: skip
 
     def lowest(self, points: Points) -> Lowest | None:
         r"""Least margin in a span, a share of what is permitted; none of tolerances, carriers, measurements.
@@ -552,7 +563,7 @@ class Contacts:
         known = projected[np.isfinite(projected)]
         heaviest, still = (float(known.max()), "") if len(known) else (None, "no part moves")
         mass_parts: tuple[Result, ...] = (
-            Result(name="whole mass" if judged.pushed else "M/2 + m_L", value=judged.simplified, unit="kg"),
+            Result(name="whole mass" if judged.whole else "M/2 + m_L", value=judged.simplified, unit="kg"),
             Result(name="m_u along the motion, heaviest part", value=heaviest, unit="kg", reason=still),
         )
         if people is not None and found:

@@ -245,32 +245,34 @@ class Survey:
         order = sorted(range(len(self.questions)), key=lambda k: self.questions[k][1] in late)
         members = [self.questions[k][0].members(self.questions[k][1]) for k in order]
         rows = np.concatenate([found.rows for found in members])
-        self._pair, pair = np.unique(rows[:, :2], axis=0, return_inverse=True)
-        self._members = np.column_stack([pair.ravel(), rows[:, 2]])
-        self._bodies = np.concatenate([*(found.bodies for found in members), [[-1, -1]]])
+        pair_of, pair = np.unique(rows[:, :2], axis=0, return_inverse=True)
+        members_of = np.column_stack([pair.ravel(), rows[:, 2]])
+        bodies_of = np.concatenate([*(found.bodies for found in members), [[-1, -1]]])
         offsets = np.cumsum([0, *(len(found.rows) for found in members)])
         starts = [found.start[:-1] + offset for found, offset in zip(members, offsets, strict=False)]
-        self._start = np.concatenate([*starts, offsets[-1:]]).astype(np.int64)
+        starts_of = np.concatenate([*starts, offsets[-1:]]).astype(np.int64)
         sizes = [len(found.start) - 1 for found in members]
         self._caps = np.repeat([self.questions[k][0].cap for k in order], sizes)
-        self._whether = np.repeat([self.questions[k][1] is Per.WHETHER for k in order], sizes)
+        whether = np.repeat([self.questions[k][1] is Per.WHETHER for k in order], sizes)
         ends = np.cumsum([0, *sizes]).tolist()
         columns = {k: slice(ends[i], ends[i + 1]) for i, k in enumerate(order)}
+        self.columns = {self.questions[k]: columns[k] for k in range(len(order))}
+        """Where the answers to each question are among all of them."""
         self._columns = [columns[k] for k in range(len(order))]
         self._in_turn = np.concatenate([np.arange(len(self._caps))[part] for part in self._columns])
-        self._bound = (
-            shapes.which, shapes.local, shapes.ball, shapes.corners, shapes.radius, shapes.nodes,
-            shapes.links, shapes.triangles, shapes.boxes, shapes.kids, shapes.probes,
-            np.unique(self._pair), self._pair, self._start, self._members, self._bodies,
-        )  # fmt: skip
+        self._asked = kernel.Questions(np.unique(pair_of), pair_of, starts_of, members_of, bodies_of, whether)
         self._memory = self._forget()
 
     def ask(self, rotations: ArrayLike, positions: ArrayLike) -> list[Closests]:
         """Answers for one set of poses, in the order of the questions; see `Query.minimum`."""
-        found = self._run(rotations, positions, (), self._memory, self._caps)
+        found = self.together(rotations, positions)
         if len(self._columns) == 1:
             return [found]
         return [found.of(columns) for columns in self._columns]
+
+    def together(self, rotations: ArrayLike, positions: ArrayLike) -> Closests:
+        """All answers for one set of poses, those to each question in its `columns`."""
+        return self._run(rotations, positions, (), self._memory, self._caps)
 
     def within(self, rotations: ArrayLike, positions: ArrayLike, caps: Array) -> Closests:
         """Answers for one set of poses up to other caps, one after the other in the order of the questions.
@@ -289,18 +291,16 @@ class Survey:
         found = self._run(rotations, positions, (len(np.asarray(rotations)),), self._forget(), self._caps)
         return [found.of(slice(None), columns) for columns in self._columns]
 
-    def _forget(self) -> Memory:
-        solids, pairs = len(self.shapes.which), len(self._pair)
-        return Memory(
-            np.full((solids, 8, 3), np.inf),
-            np.full(pairs, -np.inf),
-            np.full(pairs, np.inf),
-            np.full((pairs, 2), -1, np.int64),
-            np.full(len(self._caps), -1, np.int64),
-        )
+    def _forget(self) -> kernel.Bound:
+        return kernel.Bound(self.shapes.arrays(), self._asked)
 
     def _run(
-        self, rotations: ArrayLike, positions: ArrayLike, many: tuple[int, ...], memory: Memory, caps: Array
+        self,
+        rotations: ArrayLike,
+        positions: ArrayLike,
+        many: tuple[int, ...],
+        bound: kernel.Bound,
+        caps: Array,
     ) -> Closests:
         """Answers of shape (*many, g), of poses with such leading dimensions.
 
@@ -314,33 +314,20 @@ class Survey:
         if many:
             R, x = R.reshape(-1, 3, 3), x.reshape(-1, 3)
         count = len(caps) * many[0] if many else len(caps)
-        distance, point_a, point_b = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
-        body_a, body_b, reach = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int8)
-        bad, body = kernel.nearest(
-            R, x, n, *self._bound, caps, self._whether, *memory, distance, point_a, point_b, body_a, body_b,
-            reach,
-        )  # fmt: skip
+        # Not bound like the rest: whoever keeps an answer must never see that of a later tick in it.
+        figures, winners, reach = (
+            np.empty((7, count)),
+            np.empty((2, count), np.int64),
+            np.empty(count, np.int8),
+        )
+        bad, body = kernel.nearest(R, x, n, bound.table, caps, figures, winners, reach)
         if bad >= 0:
             self._memory = self._forget()
             sample = f" of sample {bad}" if many and many[0] > 1 else ""
             raise SimulationDiverged(f"the pose of {self.shapes.names[body]!r}{sample} is not finite")
-        found = Closests(distance, point_a, point_b, body_a, body_b, reach)
+        points = figures[1:].reshape(2, count, 3)
+        found = Closests(figures[0], points[0], points[1], winners[0], winners[1], reach)
         return found.shaped((*many, len(caps))) if many else found
-
-
-class Memory(NamedTuple):
-    """What a query remembers of the last poses, to be fast; of one never asked at first."""
-
-    corners: Array
-    """Then, in the world [m], infinity before."""
-    low: Array
-    """Lower bound of each pair's distance then [m]."""
-    high: Array
-    """Upper bound likewise."""
-    first: Indices
-    """Triangles that were nearest, -1 before."""
-    last: Indices
-    """What won each group, -1 before."""
 
 
 class Members(NamedTuple):

@@ -33,10 +33,13 @@ class Surveyor:
         self._before: dict[Question, None] = {}
         self._tick = 0
         self._answers: dict[Question, Closests] = {}
+        self._found: Closests | None = None
+        """All answers of this tick that were asked together."""
 
     def forget(self) -> None:
         """The poses are others now."""
         self._answers.clear()
+        self._found = None
         self._tick += 1
         new = [question for question in self._asked if question in self._before]
         idle = self._tick % PATIENCE == 0 and any(
@@ -58,9 +61,11 @@ class Surveyor:
         if question in self._together:
             self._together[question] = self._tick
             if found is None and self._survey is not None:
-                answers = self._survey.ask(rotations, positions)
-                self._answers.update(zip(self._survey.questions, answers, strict=True))
-                return self._answers[question]
+                if self._found is None:
+                    self._found = self._survey.together(rotations, positions)
+                found = self._found.of(self._survey.columns[question])
+                self._answers[question] = found
+                return found
         else:
             self._asked[question] = None
         if found is None:

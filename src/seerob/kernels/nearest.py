@@ -18,23 +18,124 @@ of a pair holds for every group that it is in.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.kernels.lanes import WIDTH
-from seerob.kernels.pairs import CLOSED, VOLUME, core_distance, inside, place, root_bound
-from seerob.kernels.wide import STACK
+from seerob.kernels.bound import Layout
+from seerob.kernels.pairs import (
+    CLOSED,
+    SCRATCH,
+    SOLIDS,
+    VOLUME,
+    Scratch,
+    Solids,
+    core_distance,
+    inside,
+    place,
+    root_bound,
+    scratch,
+)
 
-Boxes = NDArray[np.float32]
-Links = NDArray[np.int32]
 Indices = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 MARGIN = 1e-9
 """What bounds give away against rounding [m]."""
 EXACT, DEPTH_AT_LEAST, BEYOND_CAP, WITHIN_CAP = 0, 1, 2, 3
+
+
+class Questions(NamedTuple):
+    """What is asked: groups of pairs of solids."""
+
+    used: Indices
+    """Solids in any pair."""
+    pair: Indices
+    """Solids of each pair, meshes first, shape (m, 2)."""
+    start: Indices
+    """Where the pairs of each group begin in ``members``, shape (g + 1,)."""
+    members: Indices
+    """By group, a pair, and 1 where its first solid belongs to the second set, shape (k, 2)."""
+    bodies: Indices
+    """Of the first and of the second set, of each member and of none, shape (k + 1, 2)."""
+    whether: Flags
+    """Of which groups only that is asked: whether anything is nearer than the cap, shape (g,)."""
+
+
+class Memory(NamedTuple):
+    """What is remembered of the last poses, to be fast, and where one call works."""
+
+    at: Array
+    """World corners at the last call [m], infinity before the first, shape (ns, 8, 3)."""
+    low: Array
+    """Lower bound of each pair's distance then [m], -infinity before the first, shape (m,)."""
+    high: Array
+    """Upper bound likewise, infinity before the first."""
+    first: Indices
+    """Triangles that were nearest, -1 before the first, shape (m, 2)."""
+    last: Indices
+    """Member that won each group, -1 before the first, shape (g,)."""
+    world: Array
+    """Work: world_from_solid, shape (ns, 12)."""
+    centre: Array
+    """Work: of the balls [m], shape (ns, 3)."""
+    moved: Array
+    """Work: how far each solid has moved [m], shape (ns,)."""
+    state: NDArray[np.int8]
+    """Work: of each pair 0 ball bound, 1 root box bound, 2 value known."""
+    beyond: Indices
+    """Work: the last group whose best each pair was found to be farther than."""
+    within: Flags
+    """Work: whether a core of each pair lies inside the other."""
+    value: Array
+    """Work: distance of each pair [m]."""
+    found: Array
+    """Work: its points [m], shape (m, 6)."""
+    deep: Flags
+    """Work: whether the overlap is at least as deep as the value."""
+    asked: Flags
+    """Work: whether any group asks for the pair."""
+
+
+_FLOAT, _WHOLE, _FLAG = np.float64, np.int64, np.bool_
+QUESTIONS = Layout(Questions, [(_WHOLE, 1), (_WHOLE, 2), (_WHOLE, 1), (_WHOLE, 2), (_WHOLE, 2), (_FLAG, 1)])
+MEMORY = Layout(
+    Memory,
+    [
+        (_FLOAT, 3), (_FLOAT, 1), (_FLOAT, 1), (_WHOLE, 2), (_WHOLE, 1),
+        (_FLOAT, 2), (_FLOAT, 2), (_FLOAT, 1), (np.int8, 1), (_WHOLE, 1), (_FLAG, 1), (_FLOAT, 1),
+        (_FLOAT, 2), (_FLAG, 1), (_FLAG, 1),
+    ],
+)  # fmt: skip
+LAYOUTS = SOLIDS, QUESTIONS, MEMORY, SCRATCH
+_QUESTIONS_AT = len(SOLIDS.arrays)
+_MEMORY_AT = _QUESTIONS_AT + len(QUESTIONS.arrays)
+_SCRATCH_AT = _MEMORY_AT + len(MEMORY.arrays)
+_solids_in, _questions_in, _memory_in, _scratch_in = (layout.read for layout in LAYOUTS)
+
+
+class Bound:
+    """Solids, questions and a memory of one's own, bound for many calls; keeps their arrays."""
+
+    def __init__(self, solids: Solids, questions: Questions) -> None:
+        ns, m, g = len(solids.which), len(questions.pair), len(questions.whether)
+        memory = Memory(
+            np.full((ns, 8, 3), np.inf), np.full(m, -np.inf), np.full(m, np.inf),
+            np.full((m, 2), -1, np.int64), np.full(g, -1, np.int64),
+            np.zeros((ns, 12)), np.zeros((ns, 3)), np.zeros(ns), np.zeros(m, np.int8), np.empty(m, np.int64),
+            np.zeros(m, bool), np.empty(m), np.empty((m, 6)), np.zeros(m, bool), np.zeros(m, bool),
+        )  # fmt: skip
+        self._kept: tuple[Solids, Questions, Memory, Scratch] = solids, questions, memory, scratch()
+        rows = [layout.rows(given) for layout, given in zip(LAYOUTS, self._kept, strict=True)]
+        self.table = np.concatenate(rows)
+        """What `nearest` is given, shape (k, 4); valid as long as this object is there."""
+
+    def __reduce__(self) -> tuple[type[Bound], tuple[Solids, Questions]]:
+        # A copy has arrays of its own, at addresses of their own.
+        return Bound, self._kept[:2]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -42,34 +143,10 @@ def nearest(
     rotations: Array,
     positions: Array,
     step: int,
-    which: Indices,
-    local: Array,
-    ball: Array,
-    corners: Array,
-    radius: Array,
-    nodes: Array,
-    links: Links,
-    T: Array,
-    boxes: Boxes,
-    kids: Links,
-    probes: Array,
-    used: Indices,
-    pair: Indices,
-    start: Indices,
-    members: Indices,
-    bodies: Indices,
+    table: Indices,
     cap: Array,
-    whether: NDArray[np.bool_],
-    at: Array,
-    low: Array,
-    high: Array,
-    first: Indices,
-    last: Indices,
-    distance: Array,
-    point_a: Array,
-    point_b: Array,
-    body_a: Indices,
-    body_b: Indices,
+    figures: Array,
+    winners: Indices,
     status: NDArray[np.int8],
 ) -> tuple[int, int]:
     """Least distance of each group of pairs, for each sample.
@@ -78,68 +155,37 @@ def nearest(
         rotations: world_from_body, one sample after the other, shape (N·n, 3, 3).
         positions: Likewise [m], shape (N·n, 3).
         step: Bodies of a sample, n.
-        which: See `seerob.kernels.pairs`, shape (ns, 12).
-        local: body_from_solid, nine of the rotation and three of the position, shape (ns, 12).
-        ball: Bounding ball of each core in its own frame: centre and radius [m], shape (ns, 4).
-        corners: Points whose hull contains the core, in its own frame, shape (ns, 8, 3).
-        radius: [m], shape (ns,).
-        nodes: Trees of all meshes, one after the other.
-        links: Likewise.
-        T: Likewise.
-        boxes: See `seerob.kernels.wide`, of all meshes.
-        kids: Likewise, in numbers of all nodes and triangles.
-        probes: A vertex of each connected piece of each core, shape (np, 3).
-        used: Solids in any pair.
-        pair: Solids of each pair, meshes first, shape (m, 2).
-        start: Where the pairs of each group begin in ``members``, shape (g + 1,).
-        members: By group, a pair, and 1 where its first solid belongs to the second set, shape (k, 2).
-        bodies: Of the first and of the second set, of each member and of none, shape (k + 1, 2).
+        table: Of a `Bound`, which one call uses at a time.
         cap: Distance above which the answer does not matter, of each group [m], shape (g,); -infinity
             where there is no question.
-        whether: Of which groups only that is asked: whether anything is nearer than the cap, shape (g,).
-        at: State: world corners at the last call, infinity before the first, shape (ns, 8, 3).
-        low: State: lower bound of each pair's distance then, -infinity before the first.
-        high: State: upper bound of each pair's distance then, infinity before the first.
-        first: State: triangles that were nearest, -1 before the first, shape (m, 2).
-        last: State: member that won each group, -1 before the first.
-        distance: Result [m], of one sample after the other, shape (N·g,).
-        point_a: Result: point on the solid of the first set [m], shape (N·g, 3).
-        point_b: Result: on that of the second.
-        body_a: Result: body of the first set, -1 beyond ``cap``, shape (N·g,).
-        body_b: Result: of the second.
+        figures: Result [m], shape (7, N·g): distances, of one sample after the other; then the points on the
+            solids of the first set, three numbers each; then those on the solids of the second.
+        winners: Result: bodies of the first and of the second set, -1 beyond ``cap``, shape (2, N·g).
         status: Result, shape (N·g,).
 
     Returns:
         Sample and body of a pose that is not finite, or -1, -1.
     """
-    ns = len(which)
+    solids = _solids_in(table, 0)
+    work = _scratch_in(table, _SCRATCH_AT)
+    used, pair, start, members, bodies, whether = _questions_in(table, _QUESTIONS_AT)
+    (
+        at, low, high, first, last, world, centre, moved, state, beyond, within, value, found, deep, asked
+    ) = _memory_in(table, _MEMORY_AT)  # fmt: skip
+    which, ball, radius, W = solids.which, solids.ball, solids.radius, work.W
     m = len(pair)
-    world = np.zeros((ns, 12))
-    centre = np.zeros((ns, 3))
-    moved = np.zeros(ns)
-    state = np.zeros(m, np.int8)  # 0 ball bound, 1 root box bound, 2 value known
-    beyond = np.full(m, -1, np.int64)  # the last group whose best it was found to be farther than
-    within = np.zeros(m, np.bool_)
-    value = np.empty(m)
-    found = np.empty((m, 6))
-    deep = np.zeros(m, np.bool_)
-    asked = np.zeros(m, np.bool_)
-    for g in range(len(start) - 1):
+    groups = len(whether)
+    samples = len(rotations) // step
+    point_a = figures[1:4].reshape((samples * groups, 3))
+    point_b = figures[4:7].reshape((samples * groups, 3))
+    for p in range(m):
+        asked[p] = False
+    for g in range(groups):
         if cap[g] > -np.inf:
             for e in range(start[g], start[g + 1]):
                 asked[members[e, 0]] = True
-    stack = np.empty((STACK, 2), np.int32)
-    bounds = np.empty(STACK, np.float32)
-    given = np.empty(16, np.float32)
-    box_low = np.empty(WIDTH, np.float32)
-    R = np.empty(9)
-    t = np.empty(3)
-    W = np.empty(12)
-    groups = len(start) - 1
-    for n in range(len(rotations) // step):
-        body = place(
-            rotations, positions, n * step, which, local, ball, corners, used, world, centre, at, moved
-        )
+    for n in range(samples):
+        body = place(rotations, positions, n * step, solids, used, world, centre, at, moved)
         if body >= 0:
             return n, body
         for p in range(m):
@@ -165,9 +211,9 @@ def nearest(
             if gap <= 0.0 and (which[i, VOLUME] or which[j, VOLUME]):
                 proven = which[i, CLOSED] and which[j, CLOSED] and bound + r > MARGIN
                 if not proven:
-                    within[p] = (
-                        which[i, VOLUME] and inside(j, i, which, nodes, links, T, probes, world)
-                    ) or (which[j, VOLUME] and inside(i, j, which, nodes, links, T, probes, world))
+                    within[p] = (which[i, VOLUME] and inside(j, i, solids, world)) or (
+                        which[j, VOLUME] and inside(i, j, solids, world)
+                    )
             low[p] = -np.inf if within[p] else max(bound, max(gap, 0.0) - r)
         for g in range(groups):
             best = cap[g]
@@ -177,7 +223,7 @@ def nearest(
             for c in range(3):
                 point_a[k, c] = point_b[k, c] = np.nan
             if best == -np.inf:
-                distance[k], body_a[k], body_b[k] = best, -1, -1
+                figures[0, k], winners[0, k], winners[1, k] = best, -1, -1
                 continue
             for e in range(start[g], start[g + 1]):
                 q = members[e, 0]
@@ -208,13 +254,10 @@ def nearest(
                 r = radius[i] + radius[j]
                 if state[p] == 0 and not within[p]:
                     state[p] = 1
-                    low[p] = max(low[p], root_bound(i, j, which, nodes, world, at, R, t) - r)
+                    low[p] = max(low[p], root_bound(i, j, solids, world, at, work) - r)
                     continue
                 reach = np.inf if within[p] else max(best + r + MARGIN, 0.0)
-                d2 = core_distance(
-                    i, j, reach * reach, which, nodes, links, T, boxes, kids, world, at, first[p], stack,
-                    bounds, given, box_low, R, t, W,
-                )  # fmt: skip
+                d2 = core_distance(i, j, reach * reach, solids, world, at, first[p], work)
                 if not d2 < np.inf:
                     low[p] = max(low[p], best)
                     beyond[p] = g
@@ -236,9 +279,9 @@ def nearest(
                     best = value[p]
                     winning = chosen
             last[g] = winning
-            distance[k] = best
+            figures[0, k] = best
             if whether[g]:
-                distance[k] = cap[g]
+                figures[0, k] = cap[g]
                 if winning >= 0:
                     status[k] = WITHIN_CAP
                     winning = -1  # by which pair depends on what was asked before
@@ -249,5 +292,5 @@ def nearest(
                 for c in range(3):
                     point_a[k, c] = found[p, c + swap]
                     point_b[k, c] = found[p, 3 + c - swap]
-            body_a[k], body_b[k] = bodies[winning, 0], bodies[winning, 1]
+            winners[0, k], winners[1, k] = bodies[winning, 0], bodies[winning, 1]
     return -1, -1

@@ -8,17 +8,20 @@ and last triangle, first and last probe (a vertex of each connected piece), numb
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
+from seerob.kernels.bound import Layout
 from seerob.kernels.boxes import box_box, segment_box
 from seerob.kernels.crossings import encloses
+from seerob.kernels.lanes import WIDTH
 from seerob.kernels.primitives import segment_segment
 from seerob.kernels.search import first_crossing
-from seerob.kernels.wide import nearest_of_meshes, nearest_to_segment
+from seerob.kernels.wide import STACK, nearest_of_meshes, nearest_to_segment
 
 Boxes = NDArray[np.float32]
 Links = NDArray[np.int32]
@@ -30,15 +33,71 @@ BODY, MESH, VOLUME, CLOSED, NODE, NODE_END, TRIANGLE, TRIANGLE_END, PROBE, PROBE
 COLUMNS = 12
 
 
+class Solids(NamedTuple):
+    """The solids of a model."""
+
+    which: Indices
+    """One row per solid, shape (ns, 12)."""
+    local: Array
+    """body_from_solid, nine of the rotation and three of the position [m], shape (ns, 12)."""
+    ball: Array
+    """Bounding ball of each core in its own frame: centre and radius [m], shape (ns, 4)."""
+    corners: Array
+    """Points whose hull contains the core, in its own frame [m], shape (ns, 8, 3)."""
+    radius: Array
+    """[m], shape (ns,)."""
+    nodes: Array
+    """Trees of all meshes, one after the other, as `seerob.kernels.tree` lays them out; links and T too."""
+    links: Links
+    T: Array
+    boxes: Boxes
+    """Trees of `seerob.kernels.wide`, of all meshes; kids in numbers of all nodes and triangles."""
+    kids: Links
+    probes: Array
+    """A vertex of each connected piece of each core [m], shape (np, 3)."""
+
+
+class Scratch(NamedTuple):
+    """Where one search works."""
+
+    stack: Links
+    bounds: Boxes
+    given: Boxes
+    low: Boxes
+    R: Array
+    t: Array
+    W: Array
+    """Receives the points on both, shape (12,)."""
+
+
+_FLOAT, _SINGLE, _INT, _WHOLE = np.float64, np.float32, np.int32, np.int64
+SOLIDS = Layout(
+    Solids,
+    [
+        (_WHOLE, 2), (_FLOAT, 2), (_FLOAT, 2), (_FLOAT, 3), (_FLOAT, 1), (_FLOAT, 2), (_INT, 2), (_FLOAT, 2),
+        (_SINGLE, 2), (_INT, 2), (_FLOAT, 2),
+    ],
+)  # fmt: skip
+SCRATCH = Layout(
+    Scratch,
+    [(_INT, 2), (_SINGLE, 1), (_SINGLE, 1), (_SINGLE, 1), (_FLOAT, 1), (_FLOAT, 1), (_FLOAT, 1)],
+)
+
+
+def scratch() -> Scratch:
+    """Room for one search at a time."""
+    return Scratch(
+        np.empty((STACK, 2), np.int32), np.empty(STACK, np.float32), np.empty(16, np.float32),
+        np.empty(WIDTH, np.float32), np.empty(9), np.empty(3), np.empty(12),
+    )  # fmt: skip
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def place(
     rotation: Array,
     position: Array,
     begin: int,
-    which: Indices,
-    local: Array,
-    ball: Array,
-    corners: Array,
+    solids: Solids,
     used: Indices,
     world: Array,
     centre: Array,
@@ -51,6 +110,7 @@ def place(
 
     Returns the body of a pose that is not finite, or -1.
     """
+    which, local, ball, corners = solids.which, solids.local, solids.ball, solids.corners
     for s in used:
         body = which[s, BODY]
         R = rotation[begin + body]
@@ -104,10 +164,9 @@ def _into(world: Array, s: int, x: float, y: float, z: float) -> tuple[float, fl
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def inside(
-    i: int, j: int, which: Indices, nodes: Array, links: Links, T: Array, probes: Array, world: Array
-) -> bool:
+def inside(i: int, j: int, solids: Solids, world: Array) -> bool:
     """Whether a connected piece of core i begins inside the mesh of solid j."""
+    which, probes = solids.which, solids.probes
     for k in range(which[i, PROBE], which[i, PROBE_END]):
         x = world[i, 0] * probes[k, 0] + world[i, 1] * probes[k, 1] + world[i, 2] * probes[k, 2] + world[i, 9]
         y = (
@@ -124,9 +183,9 @@ def inside(
         )
         x, y, z = _into(world, j, x, y, z)
         if encloses(
-            nodes[which[j, NODE] : which[j, NODE_END]],
-            links[which[j, NODE] : which[j, NODE_END]],
-            T[which[j, TRIANGLE] : which[j, TRIANGLE_END]],
+            solids.nodes[which[j, NODE] : which[j, NODE_END]],
+            solids.links[which[j, NODE] : which[j, NODE_END]],
+            solids.T[which[j, TRIANGLE] : which[j, TRIANGLE_END]],
             which[j, CLOSED] == 1,
             x,
             y,
@@ -150,10 +209,9 @@ def _relative(world: Array, i: int, j: int, R: Array, t: Array) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def root_bound(
-    i: int, j: int, which: Indices, nodes: Array, world: Array, at: Array, R: Array, t: Array
-) -> float:
+def root_bound(i: int, j: int, solids: Solids, world: Array, at: Array, scratch: Scratch) -> float:
     """Lower bound of the distance of cores i (a mesh where one is) and j, from their root boxes [m]."""
+    which, nodes, R, t = solids.which, solids.nodes, scratch.R, scratch.t
     if not which[i, MESH]:
         return 0.0
     root = which[i, NODE]
@@ -170,27 +228,13 @@ def root_bound(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def core_distance(
-    i: int,
-    j: int,
-    limit: float,
-    which: Indices,
-    nodes: Array,
-    links: Links,
-    T: Array,
-    boxes: Boxes,
-    kids: Links,
-    world: Array,
-    at: Array,
-    first: Indices,
-    stack: Links,
-    bounds: Boxes,
-    given: Boxes,
-    low: Boxes,
-    R: Array,
-    t: Array,
-    W: Array,
+    i: int, j: int, limit: float, solids: Solids, world: Array, at: Array, first: Indices, scratch: Scratch
 ) -> float:
     """Squared distance of two cores, with world points on i and j in ``W[:6]``; i is a mesh where one is."""
+    which, nodes, links, T, boxes, kids = (
+        solids.which, solids.nodes, solids.links, solids.T, solids.boxes, solids.kids,
+    )  # fmt: skip
+    stack, bounds, given, low, R, t, W = scratch
     if not which[i, MESH]:
         a = at[i]
         b = at[j]

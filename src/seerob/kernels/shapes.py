@@ -13,7 +13,7 @@ from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.shapes.geometry import Solid
 from seerob.core.transforms import Array
 from seerob.kernels.lanes import WIDTH
-from seerob.kernels.pairs import COLUMNS
+from seerob.kernels.pairs import COLUMNS, Solids
 from seerob.kernels.tree_file import Tree, tree_of
 from seerob.kernels.wide import NONE
 
@@ -92,6 +92,13 @@ class Shapes:
             probes=np.concatenate([np.zeros((0, 3)), *(m.probes for m in made)]),
         )
         return shapes
+
+    def arrays(self) -> Solids:
+        """The arrays as kernels take them."""
+        return Solids(
+            self.which, self.local, self.ball, self.corners, self.radius, self.nodes, self.links,
+            self.triangles, self.boxes, self.kids, self.probes,
+        )  # fmt: skip
 
     def index(self, name: str) -> int:
         """Index of a body.

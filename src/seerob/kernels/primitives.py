@@ -17,12 +17,16 @@ product, and how far its plane can be trusted (`FLAT`, `THIN`, `LINE`).
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
 from seerob.core.transforms import Array
 from seerob.kernels.edges import nearest_in_lanes
 
+index: Any = np.int64
+"""An index of 64 bits that is no constant: for each constant a kernel would be compiled once more."""
 TOUCH = 1e-24
 """Squared distance below which two primitives touch [m²]."""
 FLAT = 2.0
@@ -248,11 +252,11 @@ def segment_triangle(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _edges_through(A: Array, i: int, B: Array, j: int, cut: float, swapped: bool, W: Array) -> float:
+def _edges_through(A: Array, i: int, B: Array, j: int, cut: float, on_a: int, W: Array) -> float:
     """Corners of ``B[j]`` over the face of ``A[i]`` and edges of ``B[j]`` through it.
 
     Returns the least squared distance, or -1 when the plane of ``A[i]`` shows that it exceeds
-    ``cut``; writes the points on A and B (B and A when ``swapped``) to ``W``.
+    ``cut``; writes the point on A to ``W`` from ``on_a`` on, 0 or 3, and that on B beside it.
     """
     best = np.inf
     if A[i, 12] == LINE:
@@ -307,7 +311,6 @@ def _edges_through(A: Array, i: int, B: Array, j: int, cut: float, swapped: bool
             g = (x - fx) ** 2 + (y - fy) ** 2 + (z - fz) ** 2
             if g < best:
                 best = g
-                on_a = 3 if swapped else 0
                 on_b = 3 - on_a
                 W[on_a] = A[i, 0] + fx
                 W[on_a + 1] = A[i, 1] + fy
@@ -324,16 +327,17 @@ def triangle_triangle(A: Array, i: int, B: Array, j: int, cut: float, W: Array) 
 
     Infinity when it is found to exceed ``cut``. ``W[6:]`` is scratch.
     """
-    best = _edges_through(A, i, B, j, cut, False, W)
+    best = _edges_through(A, i, B, j, cut, index(0), W)
     if best < 0.0:
         return np.inf
     other = W[6:]
-    g = _edges_through(B, j, A, i, cut, True, other)
+    g = _edges_through(B, j, A, i, cut, index(3), other)
     if g < 0.0:
         return np.inf
     if g < best:
         best = g
-        W[:6] = other
+        for c in range(6):
+            W[c] = other[c]
     for a in range(3):
         ax, ay, az, dx, dy, dz = _edge(A, i, a)
         g, s, t, c = nearest_edge(ax, ay, az, dx, dy, dz, B, j)

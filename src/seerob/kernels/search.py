@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.boxes import box_box, segment_box
-from seerob.kernels.primitives import segment_triangle, triangle_triangle
+from seerob.kernels.primitives import index, segment_triangle, triangle_triangle
 
 Links = NDArray[np.int32]
 
@@ -143,19 +143,19 @@ def first_crossing(
     depth = 1
     while depth > 0:
         depth -= 1
-        i = int(pairs[depth, 0])
-        j = int(pairs[depth, 1])
+        i = index(pairs[depth, 0])
+        j = index(pairs[depth, 1])
         if LA[i, 1] > 0 and LB[j, 1] > 0:
             for a in range(LA[i, 0], LA[i, 0] + LA[i, 1]):
                 for b in range(LB[j, 0], LB[j, 0] + LB[j, 1]):
                     row_in(TB, b, R, t, row)
-                    if triangle_triangle(TA, a, row, 0, cut, W) == 0.0:
+                    if triangle_triangle(TA, a, row, index(0), cut, W) == 0.0:
                         return a, b
             continue
         if LB[j, 1] > 0 or (LA[i, 1] == 0 and A[i, 19] > B[j, 19]):
-            i1, j1, i2, j2 = i + 1, j, int(LA[i, 0]), j
+            i1, j1, i2, j2 = i + 1, j, index(LA[i, 0]), j
         else:
-            i1, j1, i2, j2 = i, j + 1, i, int(LB[j, 0])
+            i1, j1, i2, j2 = i, j + 1, i, index(LB[j, 0])
         low1 = box_box(A, i1, B, j1, R, t, cut)
         low2 = box_box(A, i2, B, j2, R, t, cut)
         if low1 < low2:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
 from seerob.kernels.boxes import fit_box
-from seerob.kernels.primitives import FLAT, LINE, THIN
+from seerob.kernels.primitives import FLAT, LINE, THIN, index
 
 Links = NDArray[np.int32]
 Indices = NDArray[np.int64]
@@ -93,7 +93,7 @@ def _split(order: Indices, start: int, stop: int, centre: Array, low: Array, hig
         for c in range(3):
             least[c] = min(least[c], centre[order[q], c])
             most[c] = max(most[c], centre[order[q], c])
-    axis = 0
+    axis = index(0)
     for c in range(1, 3):
         if most[c] - least[c] > most[axis] - least[axis]:
             axis = c
@@ -192,12 +192,12 @@ def build_tree(vertices: Array, faces: Links) -> tuple[Array, Links, Array]:
     links = np.zeros((2 * m, 2), np.int32)
     # Entries: first, end, parent whose right child this is (or -1), level.
     stack = np.empty((256, 4), np.int64)
-    stack[0] = 0, m, -1, 0
+    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, m, -1, 0
     depth = 1
     made = 0
     while depth > 0:
         depth -= 1
-        start, stop, parent, level = stack[depth]
+        start, stop, parent, level = stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3]
         i = made
         made += 1
         if parent >= 0:
@@ -215,9 +215,14 @@ def build_tree(vertices: Array, faces: Links) -> tuple[Array, Links, Array]:
             links[i, 1] = stop - start
             continue
         middle = _split(order, start, stop, centre, low, high, level)
-        stack[depth] = middle, stop, i, level + 1
-        stack[depth + 1] = start, middle, -1, level + 1
-        depth += 2
+        for begin, end, right_of in ((middle, stop, i), (start, middle, -1)):
+            stack[depth, 0], stack[depth, 1], stack[depth, 2], stack[depth, 3] = (
+                begin,
+                end,
+                right_of,
+                level + 1,
+            )
+            depth += 1
     return nodes[:made].copy(), links[:made].copy(), T[order]
 
 

@@ -207,7 +207,7 @@ def live(made: Station, samples: list[JointSample]) -> list[str]:
     engine, found = Engine(made.model, driven={"arm": 0.2}, live={"arm"}), []
     for sample in samples:
         engine.take([sample])
-        found.append(engine.state.hearings["arm"].heard[-1][1])
+        found.append(engine.state.hearings["arm"].heard[-1].reason)
     return found
 
 

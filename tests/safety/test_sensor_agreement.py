@@ -8,6 +8,7 @@ from made_cell import made, state_at
 from seerob.core.errors import InputError
 from seerob.core.samples import SignalSample
 from seerob.criteria.judging import Judge
+from seerob.twin.validity.hearing import Heard
 
 STATION = """
 variables = "v.toml"
@@ -41,7 +42,7 @@ def story(folder, *instants, station=STATION):
     state = state_at(cell, hand=((1.0,), (0.0,)))
     for t, x, clear in instants:
         state.data.qpos[:] = x
-        state.hearings["hand"].heard = [(t, "")]
+        state.hearings["hand"].heard = [Heard(t)]
         if clear is not None:
             state.signals.take(SignalSample(source="plc", seq=0, t=t, values={"clear": clear}))
         state.refresh(t)

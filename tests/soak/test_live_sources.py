@@ -21,7 +21,7 @@ from seerob.core.samples import Quality, SignalSample
 from seerob.devices import sources
 from seerob.devices.live.listening import Listener, LiveSource
 from seerob.devices.sources.opcua_robot import OpcuaRobot
-from seerob.twin.validity.hearing import Hearing
+from seerob.twin.validity.hearing import Heard, Hearing
 from soak.device_kinds import FOREIGN, KINDS, OWN
 from soak.elsewhere import Elsewhere
 
@@ -113,7 +113,7 @@ def kill_and_restart(monkeypatch, ears, kind, kills):
             wait_for(lambda: heard.said[-1:] == ["lost"])
             # Nothing is said for a device that is gone, so that its time-out begins with its last word.
             assert heard.newest <= stopped + 0.5 * source.timeout
-            last = Hearing(given=False, driven=True, timeout=source.timeout, heard=[(heard.newest, "")])
+            last = Hearing(given=False, driven=True, timeout=source.timeout, heard=[Heard(heard.newest)])
             assert "not heard for" in last.doubt(stopped + 1.6 * source.timeout)
             server.start()
         known = heard.known

@@ -11,7 +11,7 @@ from seerob.core.samples import Quality
 from seerob.devices.live.device_clock import AFTER
 from seerob.session.run import Judge, bind, pump, ticks
 from seerob.twin.engine import Engine
-from seerob.twin.validity.hearing import Hearing
+from seerob.twin.validity.hearing import Heard, Hearing
 from seerob.workstation.source import Opened, Source
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
@@ -200,9 +200,9 @@ def test_jump_of_a_robot_is_undecided_while_it_happens_and_decided_after(arm):
 
 def test_a_doubt_about_what_was_said_before_counts_where_that_lies_ahead_too():
     """After a pause of the run the newest sample is repeated as late, and may lie ahead of the tick."""
-    good = [(0.99, ""), (1.005, "")]
+    good = [Heard(0.99), Heard(1.005)]
     assert not Hearing(given=False, driven=True, heard=good).doubt(1.0)
-    repeated = Hearing(given=False, driven=True, heard=[*good, (1.005 + AFTER, "run time fell behind")])
+    repeated = Hearing(given=False, driven=True, heard=[*good, Heard(1.005 + AFTER, "run time fell behind")])
     assert repeated.doubt(1.0) == repeated.doubt(1.005) == "run time fell behind"
-    later = Hearing(given=False, driven=True, heard=[*good, (1.013, "robot off")])
+    later = Hearing(given=False, driven=True, heard=[*good, Heard(1.013, "robot off")])
     assert not later.doubt(1.0)

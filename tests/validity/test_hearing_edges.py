@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from seerob.description.humans.skeleton import BONES
-from seerob.twin.validity.hearing import SLACK, Hearing
+from seerob.twin.validity.hearing import SLACK, Heard, Hearing
 
 
 def heard(*instants: float, timeout: float = 0.5) -> Hearing:
     hearing = Hearing(given=False, driven=True, timeout=timeout)
-    hearing.heard += [(t, "") for t in instants]
-    hearing.torques += [np.array([t]) for t in instants]
+    hearing.heard += [Heard(t, torques=np.array([t])) for t in instants]
     return hearing
 
 
@@ -33,8 +32,7 @@ def test_what_is_older_than_the_last_sample_is_forgotten(t: float, kept: list[fl
     for instants in told:
         instants += [(float(k), ()) for k in range(3)]  # type: ignore[arg-type]
     hearing.forget(t)
-    assert [instant for instant, _ in hearing.heard] == kept
-    assert [float(tau[0]) for tau in hearing.torques if tau is not None] == kept
+    assert [said.t for said in hearing.heard] == kept
     assert [[instant for instant, _ in instants] for instants in told] == [kept] * 5
 
 

@@ -30,7 +30,7 @@ from seerob.session.run import Bound, Feed, engine_of, settled
 from seerob.twin.spans import Path
 from seerob.twin.state import Hearing, State
 from seerob.twin.states import Bench, Motion, Questions, Reasons, States
-from seerob.twin.validity.hearing import SLACK, STANDS
+from seerob.twin.validity.hearing import SLACK, STANDS, Heard
 
 STRETCH = 256
 """Instants that are placed together: enough for the arrays to pay, few enough for the processor's cache."""
@@ -451,10 +451,11 @@ def _walked(
             since = max(k - 1, 0)
             for name, hearing in hearings.items():
                 said = [motion.doubts[name][i].removeprefix(f"{name}: ") for i in range(since, k + 1)]
-                hearing.heard = list(zip(motion.t[since : k + 1].tolist(), said, strict=True))
-                hearing.torques = [None] * len(said)
                 errors = motion.speed_errors.get(name)
-                hearing.speed_errors = [None if errors is None else errors[i] for i in range(since, k + 1)]
+                hearing.heard = [
+                    Heard(float(motion.t[i]), why, speed_error=None if errors is None else errors[i])
+                    for i, why in zip(range(since, k + 1), said, strict=True)
+                ]
             state.path = motion.ways[k - 1] if motion.ways and k and rows[-1] else None
             state.refresh(t)
             rows.append(judge(state))

@@ -39,7 +39,7 @@ from seerob.twin.moving_base import moved_by_poses
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Path
 from seerob.twin.state import Hearing, State
-from seerob.twin.validity.hearing import NOWHERE
+from seerob.twin.validity.hearing import NOWHERE, Heard
 
 DEFAULT_TIMEOUT = 0.2
 """Time-out [s] of what is heard without a source that states one."""
@@ -288,17 +288,17 @@ class Engine:
         """Note that a robot, a person or a machine was heard, and why that may not be relied on."""
         hearing = self._hearings[name]
         hearing.driven = self.controllers
-        if taken and (not hearing.heard or t > hearing.heard[-1][0]):
+        if taken and (not hearing.heard or t > hearing.heard[-1].t):
             jump = f"its samples jump at {t:.3f} s" if self._references[name].jumped else ""
             if name in self._leapt:
                 if jump:
                     self._leapt[name] = t + HOLD, jump
                 until, said = self._leapt[name]
                 jump = said if t <= until else ""
-            hearing.heard.append((t, reason or jump))
-            hearing.torques.append(None if sample is None else torques_of(sample))
             error = sample.qd_error if isinstance(sample, JointSample) else None
-            hearing.speed_errors.append(None if error is None else np.array(error))
+            torques = None if sample is None else torques_of(sample)
+            off = None if error is None else np.array(error)
+            hearing.heard.append(Heard(t, reason or jump, torques, off))
             hearing.leaves_at = self._references[name].leaves_at if name in self._stands else 0.0
 
     def _following(self, name: str) -> Following:

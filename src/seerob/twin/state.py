@@ -440,21 +440,21 @@ class State(Validity):
         hearing = self._hearings[mechanism.name]
         if hearing.coarse:
             raise Undecided(f"{mechanism.name}: {hearing.coarse}")
-        inside = [(t, why) for t, why in hearing.heard if begin + SLACK < t < end - SLACK]
-        if reason := next((why for _, why in inside if why), ""):
+        inside = [said for said in hearing.heard if begin + SLACK < said.t < end - SLACK]
+        if reason := next((said.reason for said in inside if said.reason), ""):
             raise Undecided(f"{mechanism.name}: {reason}")
-        return np.array([self._torques_at(mechanism, t) for t in (begin, *(t for t, _ in inside), end)])
+        return np.array([self._torques_at(mechanism, t) for t in (begin, *(said.t for said in inside), end)])
 
     def _torques_at(self, mechanism: Mechanism, t: float) -> Array:
         hearing = self._hearings[mechanism.name]
-        k = sum(1 for instant, _ in hearing.heard if instant <= t + SLACK)
-        times = [instant for instant, _ in hearing.heard[max(k - 1, 0) : k + 1]]
-        around = [torques for torques in hearing.torques[max(k - 1, 0) : k + 1] if torques is not None]
-        if not around or len(around) < len(times):
+        heard = hearing.around(t)
+        around = [said.torques for said in heard if said.torques is not None]
+        if not around or len(around) < len(heard):
             raise Undecided(f"{mechanism.name}: its source measures no joint torques")
         if hearing.torque_doubt:
             raise Undecided(f"{mechanism.name}: {hearing.torque_doubt}")
         # Outside its range np.interp holds the last value, as the reference does.
+        times = [said.t for said in heard]
         return np.array([np.interp(t, times, joint) for joint in np.transpose(around)])
 
     # -- dynamics ---------------------------------------------------------------------------

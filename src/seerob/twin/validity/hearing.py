@@ -42,6 +42,20 @@ NOWHERE = Places(frozenset(BONES), frozenset(BONES), {})
 """What is left open of a person whose posture is told, and the place of no bone."""
 
 
+class Heard(NamedTuple):
+    """What one sample said of a robot, a machine or a person, besides where it is."""
+
+    t: float
+    """Its instant [s]."""
+    reason: str = ""
+    """Why it may not be relied on; empty when it may."""
+    torques: Array | None = None
+    """Measured joint torques [N·m or N], shape (n,); None where there were none."""
+    speed_error: Array | None = None
+    """How far its speeds may be off, derived from noisy positions [rad/s or m/s], shape (n,); None where
+    nobody says so."""
+
+
 @dataclass
 class Hearing:
     """What is known of where a robot or human really is."""
@@ -52,14 +66,8 @@ class Hearing:
     """A source drives it."""
     timeout: float = 0.2
     """[s]"""
-    heard: list[tuple[float, str]] = field(default_factory=list)
-    """Instant [s] of the newest samples and why one may not be relied on (empty: it may), oldest first;
-    some may lie ahead of the tick."""
-    torques: list[Array | None] = field(default_factory=list)
-    """Measured joint torques of the same samples [N·m or N], each (n,); None where there were none."""
-    speed_errors: list[Array | None] = field(default_factory=list)
-    """How far the speeds of the same samples may be off, derived from noisy positions [rad/s or m/s], each
-    (n,); None where nobody says so."""
+    heard: list[Heard] = field(default_factory=list)
+    """The newest samples, oldest first; some may lie ahead of the tick."""
     torque_doubt: str = ""
     """Why those torques may not be relied on; empty when they may."""
     error: float = 0.0
@@ -102,22 +110,18 @@ class Hearing:
 
     def follow(self, found: Followed) -> None:
         """Take what devices told of a person at one instant."""
-        self.heard.append((found.t, found.reason))
+        self.heard.append(Heard(found.t, found.reason))
         self.parts.append((found.t, found.parts))
         self.observed.append((found.t, found.observed))
         self.bare.append((found.t, found.bare))
         self.aims.append((found.t, found.unaimed))
         self.untold.append((found.t, found.untold))
         self.places.append((found.t, Places(found.unplaced, found.displaced, found.slack)))
-        self.torques.append(None)
-        self.speed_errors.append(None)
 
     def forget(self, t: float) -> None:
         """Drop what is older than the last sample at or before ``t`` [s]."""
-        while len(self.heard) > 1 and self.heard[1][0] <= t:
+        while len(self.heard) > 1 and self.heard[1].t <= t:
             del self.heard[0]
-            del self.torques[:1]
-            del self.speed_errors[:1]
         for told in (self.parts, self.observed, self.bare, self.aims, self.untold, self.places):
             while len(told) > 1 and told[1][0] <= t:
                 del told[0]
@@ -130,40 +134,45 @@ class Hearing:
         """
         if not self.driven:
             return "" if self.given else "no source drives it and the file gives no position (q)"
-        k = sum(1 for instant, _ in self.heard if instant <= t + SLACK)
+        k = sum(1 for said in self.heard if said.t <= t + SLACK)
         if k == 0:
             return "nothing heard yet"
-        last = self.heard[k - 1][0]
+        last = self.heard[k - 1].t
         age = t - last + self.older
         if age > self.timeout + SLACK:
-            why = self.heard[k - 1][1]
+            why = self.heard[k - 1].reason
             return f"not heard for {age:.2f} s (time-out {self.timeout:.3g} s)" + (why and f": {why}")
-        silence = self.heard[k][0] - last if k < len(self.heard) else 0.0
+        silence = self.heard[k].t - last if k < len(self.heard) else 0.0
         if silence > self.timeout + SLACK and t - last > SLACK:
             return f"not heard for {silence:.2f} s from {last:.3f} s on (time-out {self.timeout:.3g} s)"
         if k == len(self.heard) and t - last > self.grace + SLACK and self.leaves_at > STANDS:
             speed = f"{self.leaves_at:.3g} rad/s or m/s"
             return f"what drives it ends in motion, with {speed} at {last:.3f} s: nobody says that it stopped"
         until = k + 1
-        while until < len(self.heard) and self.heard[until][0] - self.heard[until - 1][0] < REPEATED:
+        while until < len(self.heard) and self.heard[until].t - self.heard[until - 1].t < REPEATED:
             until += 1
-        return next((reason for _, reason in self.heard[k - 1 : until] if reason), "")
+        return next((said.reason for said in self.heard[k - 1 : until] if said.reason), "")
+
+    def around(self, t: float) -> list[Heard]:
+        """Return the last sample at or before ``t`` [s] and the next one, where there are such."""
+        k = sum(1 for said in self.heard if said.t <= t + SLACK)
+        return self.heard[max(k - 1, 0) : k + 1]
 
     def speed_error(self, t: float) -> Array | None:
         """How far joint velocities may be off at ``t`` [s], shape (n,): the worse of two samples."""
-        k = sum(1 for instant, _ in self.heard if instant <= t + SLACK)
-        around = [error for error in self.speed_errors[max(k - 1, 0) : k + 1] if error is not None]
+        around = [said.speed_error for said in self.around(t) if said.speed_error is not None]
         return np.max(around, axis=0) if around else None
 
     def doubt_ahead(self, t: float, until: float) -> str:
         """Why what was heard does not tell what it does from ``t`` to ``until`` [s]; empty when it does."""
-        for (a, _), (b, reason) in pairwise(self.heard):
+        for before, (b, reason, *_) in pairwise(self.heard):
+            a = before.t
             if t + SLACK < b and a < until - SLACK:
                 if reason:
                     return reason
                 if b - a > self.timeout + SLACK:
                     return f"nothing is heard from {a:.3f} s to {b:.3f} s"
-        last = self.heard[-1][0] if self.heard else -np.inf
+        last = self.heard[-1].t if self.heard else -np.inf
         if last < until - SLACK and self.leaves_at > STANDS:
             return f"its motion ends at {last:.3f} s, and what it does after is not known"
         return ""

@@ -521,7 +521,7 @@ def test_what_is_too_near_just_when_a_criterion_begins_to_apply_is_exceeded(tmp_
     told = [(0, 0), (since, 1), (0.1, 1)]
     found = touching(tmp_path, shaking(0.01), separation, kind="separation", told=told)
     assert (found.verdict is Verdict.EXCEEDED) is exceeds
-    assert (found.worst().t == pytest.approx(0.0775, abs=2e-3)) is exceeds
+    assert (found.worst().t == pytest.approx(0.0775, abs=3e-3)) is exceeds
 
 
 # -- torques that a source measures ---------------------------------------------------------------
@@ -643,7 +643,8 @@ def test_a_fixed_separation_remembers_what_s_p_was_between_two_ticks(tmp_path, k
     # What comes when the log has ended, nobody knows, and up to then it comes nearer.
     speed = 1.6 + (float((steady.values - steady.limits)[7]) - 0.005) / 0.11
     moved = found(0.2, speed)
-    assert not moved.verdicts[:2].any()
+    # Where the motion is known ahead, the moment counts from the reaction time before it on.
+    assert bool(moved.verdicts[:2].any()) is not ahead.endswith("= 0")
     assert bool(moved.verdicts[7]) is (mode == "fixed")
 
 

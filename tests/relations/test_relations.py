@@ -171,6 +171,23 @@ def test_wider_tolerances_never_relieve(seed, tmp_path):
         assert not (other[name].verdict is Verdict.WITHIN and one[name].verdict is not Verdict.WITHIN), name
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_finer_tick_never_finds_a_larger_separation(seed, tmp_path):
+    """What a tick says of a motion that is known ahead holds until the next one."""
+    others = {"speed", "fastest", "energy", "distance", "area", "felt", "contact", "posture"}
+    cell = replace(random_cell(seed), walks=False, left_out=frozenset(others))
+    coarse, fine = (each["separation"] for each in pair(tmp_path, cell, replace(cell, tick=0.002)))
+    said = {round(t, 6): m for t, m in zip(coarse.t.tolist(), coarse.values - coarse.limits, strict=True)}
+    compared = 0
+    for t, margin in zip(fine.t.tolist(), fine.values - fine.limits, strict=True):
+        if t > cell.duration - 0.1 - cell.tick:
+            break  # what it does after the log nobody knows, and S_p is at least what is shown
+        if round(t, 6) in said and np.isfinite(margin) and np.isfinite(said[round(t, 6)]):
+            assert margin >= said[round(t, 6)] - 1e-6, t
+            compared += 1
+    assert compared > 10
+
+
 # -- less is known ------------------------------------------------------------------------------
 
 

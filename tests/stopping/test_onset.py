@@ -89,7 +89,8 @@ def test_a_recorded_motion_that_gets_slower_counts_with_its_present_speed(tmp_pa
     found = recorded(station(tmp_path / "a", OPEN, WALKS), slower, 0.5)
     plain = recorded(station(tmp_path / "b", GIVEN + "0", WALKS), slower, 0.5)
     for with_future, without in zip(found, plain, strict=True):
-        assert with_future.limit == pytest.approx(without.limit, rel=1e-6)
+        # What it does between two instants is bounded, not known.
+        assert without.limit * (1 - 1e-6) <= with_future.limit <= without.limit + 1e-3
         assert with_future.verdict is without.verdict
 
 

@@ -381,7 +381,7 @@ class BetweenTicks:
         if span is None:
             span = watch.points.span(path, a.t, b.t, self._ids, state.model.mj)
             span.between_speeds(a.speeds, b.speeds)
-            span.foresee = state.foresee
+            span.foresee, span.knots = state.foresee, state.knots
             if state.speed_errors:
                 span.derived(state.speed_noise(tuple(range(len(a.speeds)))), state.joint_noise())
             self._whole = span if whole else self._whole
@@ -477,7 +477,7 @@ class BetweenTicks:
             self._shadow = State(state.model, data, state.hearings, state.signals)
             self._shadow.attachments = state.attachments
         shadow = self._shadow
-        shadow.columns, shadow.foresee = state.columns, state.foresee
+        shadow.columns, shadow.foresee, shadow.knots = state.columns, state.foresee, state.knots
         shadow.data.qpos[:], shadow.data.qvel[:] = path.at(t)
         shadow.captured_qpos = path.captured_at(t)
         shadow.refresh(t)

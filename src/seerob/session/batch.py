@@ -440,7 +440,7 @@ def _walked(
     ]
     judge = Judge(fresh, findings)
     if motion.foreseen:
-        state.foresee = partial(_foresee, model, motion, state)
+        state.foresee, state.knots = partial(_foresee, model, motion, state), partial(_knots, motion)
     rows: list[tuple[Result, ...]] = []
     with settled():
         for k, t in enumerate(motion.t.tolist()):
@@ -472,10 +472,21 @@ def _foresee(
     beyond, rows = bool(len(rows)) and rows[-1] >= len(motion.t), np.minimum(rows, len(motion.t) - 1)
     columns = state.columns[name]
     q, qd = motion.q[rows][:, columns.own_q], motion.v[rows][:, columns.own_v]
+    for i, row in enumerate(rows.tolist() if motion.ways is not None else ()):
+        if motion.ways is not None and row > 0 and motion.t[row - 1] + SLACK < t[i] < motion.t[row] - SLACK:
+            every = motion.ways[row - 1].at(float(t[i]))
+            q[i], qd[i] = every[0][columns.own_q], every[1][columns.own_v]
     why = next(filter(None, motion.doubts[name][rows].tolist()), "")
     if beyond and np.abs(motion.v[-1][columns.own_v]).max(initial=0.0) > STANDS:
         why = why or "the motion ends, and what it does after is not known"
     return q, qd, why
+
+
+def _knots(motion: Motion, name: str, begin: float, end: float) -> list[float]:
+    """Tell between which instants of a motion a robot moves along one cubic (`seerob.twin.spans.Knots`)."""
+    first, last = (int(np.searchsorted(motion.t, t)) for t in (begin, end))
+    ways = (motion.ways or ())[max(first - 1, 0) : last]
+    return [t for way in ways for t in way.t[1:-1].tolist() if begin + SLACK < t < end - SLACK]
 
 
 def _of_results(results: Sequence[Result]) -> tuple[Answers, Reasons]:

@@ -178,7 +178,7 @@ class Engine:
         self.signals = Signals(model.dictionary, signals or {}, untimed)
         self._machines = Machines(model.workstation.machines, self.signals)
         self.state = State(model, self._shown, self._hearings, self.signals)
-        self.state.foresee = self._foresee
+        self.state.foresee, self.state.knots = self._foresee, self._knots_of
         self._grips = Grips(self.state, self._mj)
         self._tick = 0
         self._now = 0.0
@@ -359,6 +359,12 @@ class Engine:
             return None
         q, qd, _ = self._references[name].course(t)
         return q, qd, hearing.doubt_ahead(self.state.t, float(t[-1]) if len(t) else self.state.t)
+
+    def _knots_of(self, name: str, begin: float, end: float) -> list[float]:
+        """Tell between which instants that is one cubic (`seerob.twin.spans.Knots`)."""
+        if name not in self._ahead:
+            return []
+        return [t for t in self._references[name].instants if begin + kernel.SLACK < t < end - kernel.SLACK]
 
     # -- time -------------------------------------------------------------------------------
 

@@ -30,6 +30,9 @@ Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]
 """Asks what a robot does at instants to come [s]: positions and velocities of its joints [rad or m], shape
 (k, n), and why they are not known so; None where nothing is."""
 
+Knots = Callable[[str, float, float], Iterable[float]]
+"""Asks of a robot, and from when to when [s], between which instants what it is known to do is one cubic."""
+
 Coupling = Mapping[int, Array]
 
 ROUNDING = 1e-9
@@ -256,6 +259,8 @@ class Span:
         """Where all joints are, and the `mujoco.MjModel` that moves them."""
         self.foresee: Foresee = lambda name, t: None
         """What robots are known to do after the tick at which the path ends."""
+        self.knots: Knots = lambda name, begin, end: ()
+        """Between which instants that is one cubic."""
         self.T = end - begin
         """Its length [s]."""
         self._captured = captured

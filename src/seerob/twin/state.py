@@ -28,7 +28,7 @@ from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
 from seerob.model.model import Frame, Gap, Mechanism, Model
 from seerob.twin.joint_columns import Columns
 from seerob.twin.signals import Signals
-from seerob.twin.spans import Path
+from seerob.twin.spans import Knots, Path
 from seerob.twin.speed_noise import SpeedNoise
 from seerob.twin.validity.hearing import SLACK
 from seerob.twin.validity.hearing import Hearing as Hearing  # noqa: PLC0414
@@ -58,6 +58,8 @@ class State(Validity):
         self._at_least = False
         self._path: Path | None = None
         self._ahead: Foresee = lambda name, t: None
+        self.knots: Knots = lambda name, begin, end: ()
+        """Instants between which what `foresee` tells is one cubic, besides the ticks."""
         self.touches: list[tuple[int, int, float]] | None = None
         """Of every contact two of MuJoCo's bodies and the normal force [N]; None where none is calculated."""
         self._quicker: dict[str, Array] = {}

@@ -20,7 +20,15 @@ import mujoco
 import numpy as np
 
 from seerob.core.transforms import Array
-from seerob.criteria.stopping.onset import LARGEST_WINDOW, Chain, Levers, Onset, by_joints
+from seerob.criteria.stopping.onset import (
+    LARGEST_WINDOW,
+    Chain,
+    Levers,
+    Onset,
+    by_joints,
+    largest_between,
+    with_knots,
+)
 from seerob.criteria.stopping.terms import Course, travel
 from seerob.model.model import Gap, Mechanism, Model
 from seerob.twin.spans import ROUNDING, Indices, Points, Span, rows_of
@@ -138,17 +146,19 @@ def _known(
     path, lead = span.path, period
     b = float(path.t[-1])
     k, end = math.floor(b / period + 1e-6), span.end + T_r + lead
-    foreseen = span.foresee(name, np.asarray(period * np.arange(k + 1, math.ceil(end / period - 1e-6) + 1)))
+    ticks = np.concatenate([[b], period * np.arange(k + 1, math.ceil(end / period - 1e-6) + 1)])
+    t = with_knots(span.knots, name, ticks)
+    foreseen = span.foresee(name, t)
     if foreseen is None or foreseen[2]:
         return None
     q, qd, _ = foreseen
     now, least = span.qd[own_v], np.abs(path.at(b)[1][own_v])
-    told = np.vstack([least, np.abs(qd)])
-    t = np.concatenate([[span.begin, b], period * np.arange(k + 1, k + 1 + len(qd))])
-    t = np.minimum(t, end)
-    most = np.vstack([np.maximum(now, least), np.maximum(told[:-1], told[1:])])
+    between = largest_between(t, q, qd)
+    between[0] = np.maximum(between[0], least)
+    t = np.minimum(np.concatenate([[span.begin], t]), end)
+    most = np.vstack([np.maximum(now, least), between])
     whole = np.diff(t) @ most
     most[0] = least
     ends = most[(t[:-1] < span.end + lead - SLACK) | (t[1:] > span.begin + T_r + SLACK)].min(axis=0)
     ways = np.maximum(whole - lead * ends, now * T_r)
-    return np.maximum(now, told.max(axis=0)), ways, whole, q
+    return np.maximum(now, between.max(axis=0)), ways, whole, q

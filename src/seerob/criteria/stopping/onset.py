@@ -23,6 +23,7 @@ import math
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import mujoco
@@ -35,6 +36,7 @@ from seerob.core.transforms import Array
 from seerob.kernels.speed import fastest, placed, stacked, velocities
 from seerob.model.model import Body, Gap, Mechanism, Model
 from seerob.twin.attachments import Attachments
+from seerob.twin.spans import ROUNDING, Knots, Path, Points, rows_of
 from seerob.twin.speed_noise import levers as levers_of
 from seerob.twin.state import State
 from seerob.twin.validity.hearing import SLACK
@@ -127,11 +129,12 @@ def constant(robot: Mechanism, gap: Gap, T_r: float, a: float, doubt: str = "") 
 
 
 class Foreseen:
-    """Speeds of the parts along the motion that a robot is known to make, at the ticks of the run.
+    """Speeds of the parts along the motion that a robot is known to make, bounded from tick to tick.
 
-    Between two ticks the larger of both counts, and a reaction that begins until the next tick counts like
-    one that begins now, so that S_p of a tick holds until the next. What others do that carry it or that it
-    carries is not known ahead: they go on as they do.
+    Between two instants, ticks and knots of its interpolation, it moves along a cubic, on which the largest
+    speed of a joint is known and that of a point is bounded (`seerob.kernels.spans`). A reaction that begins
+    until the next tick counts like one that begins now, so that S_p of a tick holds until the next. What
+    others do that carry it or that it carries is not known ahead: they go on as they do.
     """
 
     def __init__(self, model: Model, robot: Mechanism, gap: Gap, T_r: float) -> None:
@@ -151,8 +154,9 @@ class Foreseen:
         self._corners = stacked([body.corners for body in self._bodies])
         self._reach = np.array([body.radius + body.deviation for body in self._bodies])
         self._run: Callable[[], State | None] = lambda: None
-        self._known: dict[int, tuple[Array, Array, Array]] = {}
+        self._known: dict[int, _Stretch] = {}
         self._last = -1
+        self._points, self._parts = Points(model), rows_of(gap.b)
 
     def at(self, state: State) -> At | None:
         """None where nobody knows what it will do."""
@@ -160,7 +164,8 @@ class Foreseen:
         k, end = math.floor(state.t / period + 1e-6), state.t + T_r + period
         last = math.ceil(end / period - 1e-6)
         # The same instants whenever they are asked for.
-        instants = np.asarray(period * np.arange(k + 1, last + 1), float)
+        ticks = np.concatenate([[state.t], period * np.arange(k + 1, last + 1)])
+        instants = with_knots(state.knots, self._robot.name, ticks)
         foreseen = state.foresee(self._robot.name, instants)
         if foreseen is None:
             return None
@@ -170,21 +175,33 @@ class Foreseen:
         if self._run() is not state or k < self._last:
             self._run, self._known = weakref.ref(state), {}
         self._last = k
-        for old in [i for i in self._known if i <= k]:
+        for old in [i for i in self._known if i < k - 1]:
             del self._known[old]
-        v_now, qd_now = state.fastest_points(self._gap.b)[0], state.qd(self._robot)
+        v_now, qd_now = state.fastest_points(self._gap.b)[0], np.abs(state.qd(self._robot))
+        rows = np.searchsorted(instants, ticks)
         told: list[Array] = []
-        for i in range(len(instants)):
-            known = self._known.get(k + 1 + i)
-            if known is None or not (np.array_equal(known[0], q[i]) and np.array_equal(known[1], qd[i])):
-                known = self._known[k + 1 + i] = q[i], qd[i], self._speeds(state, q[i], qd[i])
-            told.append(known[2])
-        v = np.array([v_now, *told])
-        joints: Array = np.abs(np.vstack([qd_now, qd])).astype(float)
-        knots = np.minimum(np.concatenate([[state.t], instants]) - state.t, T_r + period)
-        S_r, ways = (farthest(knots, speeds, self._T_r, period) for speeds in (v, joints))
+        for i, (a, b) in enumerate(pairwise(rows.tolist())):
+            t, at_q, at_qd = (each[a : b + 1] for each in (instants, q, qd))
+            known = self._known.get(k + i)
+            if known is None or not known.same(at_q, at_qd):
+                before = self._known.get(k + i - 1)
+                known = self._known[k + i] = self._stretch(state, t, at_q, at_qd, before)
+            # Of a motion that may be another one, or jumps, nothing is known between instants.
+            told.append(known.ends if doubt else known.most)
+        v = np.vstack(told)
+        ends = np.maximum(np.abs(qd[:-1]), np.abs(qd[1:]))
+        joints = ends if doubt else largest_between(instants, q, qd)
+        # A twin that does not stand exactly where the motion has it may be faster now.
+        v[0], joints[0] = np.maximum(v[0], v_now), np.maximum(joints[0], qd_now)
+        left = np.minimum(instants - state.t, T_r + period)
+        S_r, ways = (
+            np.maximum(farthest(left, each, self._T_r, period), now * self._T_r)
+            for each, now in ((v, v_now), (joints, qd_now))
+        )
         v_s, speeds = v.max(axis=0), joints.max(axis=0)
+        # A simulated stop goes by the ticks.
         m = math.ceil(T_r / period - 1e-6)
+        q, qd = q[rows[1:]], qd[rows[1:]]
 
         def at(scale: float) -> Onset:
             return Onset(
@@ -200,6 +217,37 @@ class Foreseen:
 
         return at
 
+    def _stretch(self, state: State, t: Array, q: Array, qd: Array, before: _Stretch | None) -> _Stretch:
+        """What bounds it from tick to tick, with the robot elsewhere than now and all others as they are.
+
+        Args:
+            state: The twin.
+            t: Both ticks and the knots between them [s], shape (m,).
+            q: Positions of its joints there [rad or m], shape (m, j).
+            qd: Velocities there, shape (m, j).
+            before: What bounds it until then, when that is known.
+        """
+        first = before is not None and before.same(q[:1], qd[:1], last=True)
+        speeds = [before.last if before is not None and first else self._speeds(state, q[0], qd[0])]
+        speeds += [self._speeds(state, *each) for each in zip(q[1:], qd[1:], strict=True)]
+        robot, now = self._robot, state.data_of(*self._with)
+        every_v = np.tile(now.qvel, (len(t), 1))
+        every_q = np.tile(now.qpos, (len(t), 1))
+        for mechanism in state.model.mechanisms.values():
+            # Who goes on as they do is where that brings them: all of their joints turn or slide.
+            at = mechanism.q_address
+            every_q[:, at] = now.qpos[at] + (t - t[0])[:, None] * now.qvel[mechanism.v_address]
+        every_q[:, robot.q_address] = q @ robot.coupling.T + robot.offset
+        every_v[:, robot.v_address] = qd @ robot.coupling.T
+        ends = np.maximum(speeds[:-1], speeds[1:])
+        path, most = Path(t, every_q, every_v), []
+        for i, (a, b) in enumerate(pairwise(t.tolist())):
+            span = self._points.span(path, a, b, state.attachments.ids, state.model.mj)
+            # Along the straight line between two velocities no speed is larger than at both ends.
+            bound = np.minimum(span.fast[self._parts], ends[i] + span.bend[self._parts]) + ROUNDING
+            most.append(np.maximum(bound, ends[i]))
+        return _Stretch(q, qd, np.array(most), ends, speeds[-1])
+
     def _speeds(self, state: State, q: Array, qd: Array) -> Array:
         """Of the parts [m/s], shape (n,), with the robot elsewhere than now and all others as they are."""
         mj, data, robot = state.model.mj, self._data, self._robot
@@ -213,22 +261,64 @@ class Foreseen:
         return speeds_of(data, state.attachments, self._gap.b, self._corners, self._reach)
 
 
-def farthest(t: Array, speeds: Array, T_r: float, lead: float) -> Array:
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """From tick to tick of a motion that is known; m instants, n parts, j joints."""
+
+    q: Array
+    """Shape (m, j)."""
+    qd: Array
+    most: Array
+    """Largest speed of each part from instant to instant [m/s], shape (m - 1, n)."""
+    ends: Array
+    """The larger of its speeds at both [m/s], shape (m - 1, n)."""
+    last: Array
+    """Speed of each part at the last instant [m/s], shape (n,)."""
+
+    def same(self, q: Array, qd: Array, *, last: bool = False) -> bool:
+        """Whether it is of these joint positions and velocities; its ``last`` alone when so asked."""
+        own = (self.q[-1:], self.qd[-1:]) if last else (self.q, self.qd)
+        return np.array_equal(own[0], q) and np.array_equal(own[1], qd)
+
+
+def with_knots(knots: Knots, name: str, ticks: Array) -> Array:
+    """Ticks, and the knots between them of what a robot is known to do [s], increasing."""
+    between = np.array([*knots(name, float(ticks[0]), float(ticks[-1]))], float)
+    own = np.abs(between[:, None] - ticks).min(axis=1) > SLACK
+    return np.unique(np.concatenate([ticks, between[own]]))
+
+
+def largest_between(t: Array, q: Array, qd: Array) -> Array:
+    """Largest speed of joints on each cubic from instant to instant [rad/s or m/s], shape (k - 1, j).
+
+    Args:
+        t: Instants, increasing [s], shape (k,).
+        q: Positions there [rad or m], shape (k, j).
+        qd: Velocities there, shape (k, j).
+    """
+    T, chord = np.diff(t)[:, None], np.diff(q, axis=0)
+    c_1, last = T * qd[:-1], T * qd[1:]
+    c_2, c_3 = 3 * chord - 2 * c_1 - last, c_1 + last - 2 * chord
+    x = np.clip(-c_2 / np.where(c_3 == 0.0, np.inf, 3 * c_3), 0.0, 1.0)
+    peak = np.abs(c_1 + x * (2 * c_2 + x * 3 * c_3)) / T
+    return np.asarray(np.maximum(peak, np.maximum(np.abs(qd[:-1]), np.abs(qd[1:]))))
+
+
+def farthest(t: Array, most: Array, T_r: float, lead: float) -> Array:
     """Bound on the way in any stretch of T_r that begins within ``lead`` [m or rad], shape (...).
 
     Args:
         t: Instants from now to ``T_r + lead`` [s], shape (k,).
-        speeds: There, of which between two the larger counts, shape (k, ...).
+        most: Largest speeds from instant to instant, shape (k - 1, ...).
         T_r: [s]
         lead: [s]
     """
     number("T_r", T_r, 0.0, unit="s")
     number("lead", lead, 0.0, unit="s")
-    steps, most = np.diff(t), np.maximum(speeds[:-1], speeds[1:])
+    steps = np.diff(t)
     # What lies outside of the stretch is at its ends.
     ends = most[(t[:-1] < lead - SLACK) | (t[1:] > T_r + SLACK)].min(axis=0)
-    moved = np.tensordot(steps, most, axes=1) - lead * ends
-    return np.asarray(np.maximum(moved, speeds[0] * T_r), float)
+    return np.asarray(np.maximum(np.tensordot(steps, most, axes=1) - lead * ends, 0.0), float)
 
 
 def speeds_of(

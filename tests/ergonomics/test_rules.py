@@ -201,10 +201,12 @@ def test_the_profile_decides_above_ten_kilograms(tmp_path):
     tables = "".join(
         table("rula", phases=entered, more=f'profile = "{p}"', name=p) for p in ("original1993", "worksheet")
     )
-    found = results_at(station(tmp_path, tables))
+    stage = station(tmp_path, tables)
+    found = results_at(stage)
     force = [parts(found[p])["force of the body"].value for p in ("original1993", "worksheet")]
     assert force == [2, 3]
-    assert {i.name: i.value for i in found["worksheet"].basis.inputs}["profile"] == "worksheet"
+    _, worksheet = stage.bound
+    assert {i.name: i.value for i in worksheet.basis.inputs}["profile"] == "worksheet"
 
 
 def test_a_person_who_is_not_heard_is_not_scored(tmp_path):

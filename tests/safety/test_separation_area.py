@@ -49,6 +49,19 @@ def test_the_room_of_a_person_is_the_least_margin_of_the_separation_criterion(tm
     assert area.verdict == ssm.verdict
 
 
+@pytest.mark.parametrize(("share", "verdict"), [(0.9, "within"), (1.1, "undecided")])
+def test_what_tolerances_may_add_to_s_p_is_as_much_less_room(tmp_path, share, verdict):
+    """Somebody faster by 0.4 s of margin reaches the arm: the area says so as its separation does."""
+    text = CELL + AREA.format(of="operator")
+    margin = results(tmp_path / "known", text, 0.0)["operator"].value
+    assert margin > 0
+    off = f"human_speed = 1.6\nhuman_speed_tolerance = {share * margin / 0.4}"
+    found = results(tmp_path / "off", text.replace("human_speed = 1.6", off), 0.0)
+    assert found["ssm"].verdict == found["operator"].verdict == verdict
+    low, high = found["operator"].interval
+    assert (low, high) == pytest.approx((margin * (1 - share), margin), abs=1e-9)
+
+
 def test_a_part_beside_the_arm_is_judged_by_closed_form(tmp_path):
     """Link 1 turns at 1 rad/s: S_p = (v + 1.6) 0.4 + 0.16 with v of its fastest corner."""
     found = results(tmp_path, CELL + AREA.format(of="post"))

@@ -81,9 +81,11 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
     def _bind(self, model: Model, criterion: Any) -> Evaluate:
         moving, outside = self._sides(model)
         required = criterion.required(model)
+        worst = criterion.at_worst(model)
+        largest = None if worst is criterion else worst.required(model)
 
         def bound(outside: tuple[int, ...]) -> Evaluate:
-            return self._bound(model, moving, outside, required, criterion.unknown(model))
+            return self._bound(model, moving, outside, (required, largest), criterion.unknown(model))
 
         def without(lost: tuple[int, ...]) -> Evaluate | None:
             rest = tuple(i for i in outside if i not in lost)
@@ -96,7 +98,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
         model: Model,
         moving: tuple[int, ...],
         outside: tuple[int, ...],
-        required: Callable[[State], Any],
+        required: tuple[Callable[[State], Any], Callable[[State], Any] | None],
         unknown_ever: str,
     ) -> Evaluate:
         gap = model.gap(moving, outside)
@@ -105,13 +107,15 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
 
         def evaluate(state: State) -> Result:
             state.require_bodies((*moving, *outside))
-            S_p, most, more = required(state)
+            S_p, most, more = required[0](state)
+            if required[1] is not None:
+                most = np.maximum(most, required[1](state).most)  # with its tolerances
             unknown = "; ".join(filter(None, (unknown_ever, more)))
             found = state.distances(gap.query, Per.PAIR)
             room = found.distance.reshape(len(moving), len(outside)) - S_p[:, None]
             nearest = room.argmin(axis=0)
             least = room[nearest, np.arange(len(outside))]
-            # What the robot's acceleration may add to S_p is as much less room.
+            # What the robot's acceleration and tolerances may add to S_p is as much less room.
             may = off.at(state) + gap.deviation + float((most - S_p).max())
             surely = float((least - may).min())
             k, perhaps = int(least.argmin()), int((least - may).argmin())
@@ -167,7 +171,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
             return f"{unknown}; the area is at least what is drawn"
         if not keeps(room - deviation, 0.0, at_most=False):
             name = model.bodies[body].name
-            return f"{name} is within {deviation * 1e3:.1f} mm, what shapes and places may be off by"
+            return f"{name} is within {deviation * 1e3:.1f} mm, what shapes, places and S_p may be off by"
         return ""
 
     def remembers(self, model: Model) -> bool:

@@ -41,6 +41,7 @@ def test_bones_that_no_device_sees_are_named_with_what_the_person_holds(tmp_path
     state.hearings["op"].bones = dict.fromkeys(BONES, (0.0, 0.0))
     seen = frozenset(bone for bone in BONES if not bone.startswith("right_"))
     state.hearings["op"].observed[:] = [(0.0, seen)]
+    state.heard()
     doubts = in_doubt(state)
     assert "op" not in doubts
     assert "op/right_hand" in doubts

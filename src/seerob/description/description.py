@@ -123,6 +123,8 @@ class Description:
     """File, library entry and revision it was read from."""
     findings: tuple[Finding, ...] = ()
     """Everything that was repaired, guessed, dropped or is implausible."""
+    left_out: tuple[str, ...] = ()
+    """Constraints between links that a tree of joints has no place for, a closed loop among them."""
     files: dict[str, bytes] = field(default_factory=dict)
     """Every file that was read (name → content), for hashes and for recordings that travel."""
 

@@ -237,10 +237,18 @@ def read_mjcf(path: Path, *, resolver: Resolver, name: str = "robot") -> Descrip
     links = _without_empty_world(links)
     links += _sites(model, names, {link.name for link in links})
     reader.raise_problems()
-    made = flattened(reader, tuple(_mimicking(reader, model, links)))
+    left_out: list[str] = []
+    made = flattened(reader, tuple(_mimicking(model, links, left_out)))
+    for each in left_out:
+        reader.finding("warning", "", f"{each} cannot be carried over: left out")
     reader.raise_problems()
     description = Description(
-        name=name, links=made, tip=lint.guessed_tip(made), source=resolver.file, files=files
+        name=name,
+        links=made,
+        tip=lint.guessed_tip(made),
+        source=resolver.file,
+        left_out=tuple(left_out),
+        files=files,
     )
     return lint.checked(description, reader)
 
@@ -453,8 +461,8 @@ def _sites(model: Any, names: list[str], taken: set[str]) -> list[Link]:
     return sites
 
 
-def _mimicking(reader: Reader, model: Any, links: list[Link]) -> Iterator[Link]:
-    """Joint equalities as mimic joints; other equalities are reported."""
+def _mimicking(model: Any, links: list[Link], left_out: list[str]) -> Iterator[Link]:
+    """Joint equalities as mimic joints; what other equalities there are is appended to ``left_out``."""
     import mujoco
 
     mimics: dict[str, Mimic] = {}
@@ -462,9 +470,11 @@ def _mimicking(reader: Reader, model: Any, links: list[Link]) -> Iterator[Link]:
         first, second = int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])
         a0, a1, *higher = model.eq_data[equality, :5].astype(float)
         joint = int(model.eq_type[equality]) == int(mujoco.mjtEq.mjEQ_JOINT)
-        if not joint or second < 0 or any(higher) or not model.eq_active0[equality]:
+        if not model.eq_active0[equality]:
+            continue
+        if not joint or second < 0 or any(higher):
             kind = mujoco.mjtEq(int(model.eq_type[equality])).name.removeprefix("mjEQ_").lower()
-            reader.finding("warning", "", f"an equality of kind {kind} cannot be carried over: left out")
+            left_out.append(f"an equality of kind {kind}")
             continue
         y0, x0 = (float(model.qpos0[model.jnt_qposadr[j]]) for j in (first, second))
         driven, driver = (model.joint(j).name or f"joint_{j}" for j in (first, second))

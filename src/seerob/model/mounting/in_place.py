@@ -52,6 +52,7 @@ def _following(model: Model) -> Iterator[Quantity]:
     yield from _links(model)
     yield from _payloads(model)
     yield from _published(model)
+    yield from _left_out(model)
     yield from _people(model)
     place = _Home(model)
     yield from _feet(model, place, place.still)
@@ -149,6 +150,14 @@ def _payloads(model: Model) -> Iterator[Quantity]:
             f"{', '.join(f'{name} {m:.4g} kg' for name, m in masses.items())} of {row.kg:g} kg: {row.source}"
         )
         yield Quantity(f"robots[{i}].payload", "robots.payload", "", (total / row.kg,), (robot.name,), said)
+
+
+def _left_out(model: Model) -> Iterator[Quantity]:
+    """How many constraints between the links of each robot are not in the twin."""
+    for i, robot in enumerate(model.workstation.robots):
+        left_out = model.mechanisms[robot.name].description.left_out
+        said, name = ", ".join(left_out), "constraints_left_out"
+        yield Quantity(f"robots[{i}].{name}", f"robots.{name}", "", (len(left_out),), (robot.name,), said)
 
 
 def _published(model: Model) -> Iterator[Quantity]:

@@ -29,7 +29,7 @@ Entries = Mapping[str, Mapping[int, Any]]
 LISTS = ("robots", "tools", "workpieces", "parts", "machines", "areas", "sensors", "humans", "phases")
 PLUGINS = ("sources", "safety", "ergonomics")
 FOLLOWS: dict[str, tuple[str, ...]] = {
-    "robots": ("payload", "published_mass.share", "nobody_within", "inside."),
+    "robots": ("payload", "published_mass.share", "constraints_left_out", "nobody_within", "inside."),
     "tools": ("mass", "extent", "bulk_density"),
     "workpieces": ("mass", "extent", "bulk_density"),
     "parts": ("extent", "bulk_density", "inside."),

@@ -180,6 +180,7 @@ class Foreseen:
         v_now, qd_now = state.fastest_points(self._gap.b)[0], np.abs(state.qd(self._robot))
         rows = np.searchsorted(instants, ticks)
         told: list[Array] = []
+        turning: list[Array] = []
         for i, (a, b) in enumerate(pairwise(rows.tolist())):
             t, at_q, at_qd = (each[a : b + 1] for each in (instants, q, qd))
             known = self._known.get(k + i)
@@ -188,9 +189,8 @@ class Foreseen:
                 known = self._known[k + i] = self._stretch(state, t, at_q, at_qd, before)
             # Of a motion that may be another one, or jumps, nothing is known between instants.
             told.append(known.ends if doubt else known.most)
-        v = np.vstack(told)
-        ends = np.maximum(np.abs(qd[:-1]), np.abs(qd[1:]))
-        joints = ends if doubt else largest_between(instants, q, qd)
+            turning.append(known.joint_ends if doubt else known.joints)
+        v, joints = np.concatenate(told), np.concatenate(turning)
         # A twin that does not stand exactly where the motion has it may be faster now.
         v[0], joints[0] = np.maximum(v[0], v_now), np.maximum(joints[0], qd_now)
         left = np.minimum(instants - state.t, T_r + period)
@@ -246,7 +246,10 @@ class Foreseen:
             # Along the straight line between two velocities no speed is larger than at both ends.
             bound = np.minimum(span.fast[self._parts], ends[i] + span.bend[self._parts]) + ROUNDING
             most.append(np.maximum(bound, ends[i]))
-        return _Stretch(q, qd, np.array(most), ends, speeds[-1])
+        joint_ends = np.maximum(np.abs(qd[:-1]), np.abs(qd[1:]))
+        return _Stretch(
+            q, qd, np.array(most), ends, speeds[-1], largest_between(t, q, qd), joint_ends, _bits(q, qd)
+        )
 
     def _speeds(self, state: State, q: Array, qd: Array) -> Array:
         """Of the parts [m/s], shape (n,), with the robot elsewhere than now and all others as they are."""
@@ -274,11 +277,21 @@ class _Stretch:
     """The larger of its speeds at both [m/s], shape (m - 1, n)."""
     last: Array
     """Speed of each part at the last instant [m/s], shape (n,)."""
+    joints: Array
+    """Largest speed of each joint from instant to instant [rad/s or m/s], shape (m - 1, j)."""
+    joint_ends: Array
+    """The larger of its speeds at both, likewise."""
+    bits: bytes
+    """Of ``q`` and ``qd``."""
 
     def same(self, q: Array, qd: Array, *, last: bool = False) -> bool:
         """Whether it is of these joint positions and velocities; its ``last`` alone when so asked."""
-        own = (self.q[-1:], self.qd[-1:]) if last else (self.q, self.qd)
-        return np.array_equal(own[0], q) and np.array_equal(own[1], qd)
+        own = _bits(self.q[-1:], self.qd[-1:]) if last else self.bits
+        return own == _bits(q, qd)
+
+
+def _bits(q: Array, qd: Array) -> bytes:
+    return bytes(q.tobytes() + qd.tobytes())
 
 
 def with_knots(knots: Knots, name: str, ticks: Array) -> Array:
@@ -318,7 +331,7 @@ def farthest(t: Array, most: Array, T_r: float, lead: float) -> Array:
     steps = np.diff(t)
     # What lies outside of the stretch is at its ends.
     ends = most[(t[:-1] < lead - SLACK) | (t[1:] > T_r + SLACK)].min(axis=0)
-    return np.asarray(np.maximum(np.tensordot(steps, most, axes=1) - lead * ends, 0.0), float)
+    return np.asarray(np.maximum(steps @ most - lead * ends, 0.0), float)
 
 
 def speeds_of(

@@ -6,6 +6,8 @@ centre of mass of its whole tree.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -158,3 +160,197 @@ def held_many(
     """`held` at many instants: arrays that move have one more dimension in front."""
     for k in range(len(found)):
         held(subtree_com[k], anchors[k], axes[k], bodies, joints, turns, masses, gravity, found[k])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def followed(
+    q: Array,
+    parents: Indices,
+    turns: NDArray[np.bool_],
+    fixed: Array,
+    axes: Array,
+    anchors: Array,
+    reference: Array,
+    rotations: Array,
+    positions: Array,
+    twists: Array,
+) -> None:
+    """Where the links of a tree are at many instants, and the twist that each joint causes.
+
+    A link is one joint with all that is fixed to it. The first, which no joint moves, is the world.
+
+    Args:
+        q: Of the joints from where they are drawn [rad or m], shape (N, n).
+        parents: Link that carries each joint, shape (n,); joints are in order from the root outward.
+        turns: Whether each turns; otherwise it slides, shape (n,).
+        fixed: Where the link is in its parent at 0, rotation and last column position [m], shape (n, 3, 4).
+        axes: In the link, shape (n, 3).
+        anchors: A point of each axis in the link [m], shape (n, 3).
+        reference: Where twists are said, in the world [m], shape (3,).
+        rotations: Receives world from link, shape (N, n + 1, 3, 3).
+        positions: Receives their origins in the world [m], shape (N, n + 1, 3).
+        twists: Receives them, rotation first, shape (N, n, 6).
+    """
+    turn = np.empty((3, 3))
+    for k in range(len(q)):
+        for r in range(3):
+            positions[k, 0, r] = 0.0
+            for c in range(3):
+                rotations[k, 0, r, c] = 1.0 if r == c else 0.0
+        for j in range(len(parents)):
+            P, p = rotations[k, parents[j]], positions[k, parents[j]]
+            R, x = rotations[k, j + 1], positions[k, j + 1]
+            F, a, h = fixed[j], axes[j], anchors[j]
+            for r in range(3):
+                x[r] = p[r] + P[r, 0] * F[0, 3] + P[r, 1] * F[1, 3] + P[r, 2] * F[2, 3]
+                for c in range(3):
+                    turn[r, c] = P[r, 0] * F[0, c] + P[r, 1] * F[1, c] + P[r, 2] * F[2, c]
+            wx = turn[0, 0] * a[0] + turn[0, 1] * a[1] + turn[0, 2] * a[2]
+            wy = turn[1, 0] * a[0] + turn[1, 1] * a[1] + turn[1, 2] * a[2]
+            wz = turn[2, 0] * a[0] + turn[2, 1] * a[1] + turn[2, 2] * a[2]
+            twist = twists[k, j]
+            if not turns[j]:
+                for c in range(3):
+                    twist[c] = 0.0
+                twist[3], twist[4], twist[5] = wx, wy, wz
+                for r in range(3):
+                    x[r] += twist[3 + r] * q[k, j]
+                    for c in range(3):
+                        R[r, c] = turn[r, c]
+                continue
+            # Rodrigues' formula about the axis in the link.
+            s, v = math.sin(q[k, j]), math.cos(q[k, j])
+            u = 1.0 - v
+            for r in range(3):
+                T = turn[r]
+                along_axis = (T[0] * a[0] + T[1] * a[1] + T[2] * a[2]) * u
+                R[r, 0] = v * T[0] + s * (T[1] * a[2] - T[2] * a[1]) + along_axis * a[0]
+                R[r, 1] = v * T[1] + s * (T[2] * a[0] - T[0] * a[2]) + along_axis * a[1]
+                R[r, 2] = v * T[2] + s * (T[0] * a[1] - T[1] * a[0]) + along_axis * a[2]
+                held_point = x[r] + T[0] * h[0] + T[1] * h[1] + T[2] * h[2]
+                x[r] = held_point - (R[r, 0] * h[0] + R[r, 1] * h[1] + R[r, 2] * h[2])
+                twist[3 + r] = reference[r] - held_point
+            bx, by, bz = twist[3], twist[4], twist[5]
+            twist[0], twist[1], twist[2] = wx, wy, wz
+            twist[3], twist[4], twist[5] = wy * bz - wz * by, wz * bx - wx * bz, wx * by - wy * bx
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def weighed(
+    rotations: Array,
+    positions: Array,
+    twists: Array,
+    parents: Indices,
+    masses: Array,
+    centers: Array,
+    inertias: Array,
+    armature: Array,
+    reference: Array,
+    places: Indices,
+    found: Array,
+) -> None:
+    """Joint-space mass matrices at many instants, by the composite-rigid-body algorithm [Featherstone2008]_.
+
+    Args:
+        rotations: Of `followed`.
+        positions: Of `followed`.
+        twists: Of `followed`.
+        parents: Of `followed`.
+        masses: Of the links, all that is fixed to them included [kg], shape (n,).
+        centers: Their centres of mass in the link [m], shape (n, 3).
+        inertias: About these, in the link [kg·m²], shape (n, 3, 3).
+        armature: Inertia of each rotor, seen by its joint, shape (n,).
+        reference: Of `followed`.
+        places: Row and column of each joint in what is found, -1 for those that are not asked, shape (n,).
+        found: Receives them, shape (N, m, m).
+    """
+    n = len(parents)
+    sums = np.empty((n, 10))
+    A, d, f = np.empty((3, 3)), np.empty(3), np.empty(6)
+    for k in range(len(found)):
+        for j in range(n):
+            R, x, c, local, m = rotations[k, j + 1], positions[k, j + 1], centers[j], inertias[j], masses[j]
+            for r in range(3):
+                d[r] = x[r] + R[r, 0] * c[0] + R[r, 1] * c[1] + R[r, 2] * c[2] - reference[r]
+                for e in range(3):
+                    A[r, e] = R[r, 0] * local[0, e] + R[r, 1] * local[1, e] + R[r, 2] * local[2, e]
+            own = sums[j]
+            dx, dy, dz = d[0], d[1], d[2]
+            own[0] = A[0, 0] * R[0, 0] + A[0, 1] * R[0, 1] + A[0, 2] * R[0, 2] + m * (dy * dy + dz * dz)
+            own[1] = A[1, 0] * R[1, 0] + A[1, 1] * R[1, 1] + A[1, 2] * R[1, 2] + m * (dx * dx + dz * dz)
+            own[2] = A[2, 0] * R[2, 0] + A[2, 1] * R[2, 1] + A[2, 2] * R[2, 2] + m * (dx * dx + dy * dy)
+            own[3] = A[0, 0] * R[1, 0] + A[0, 1] * R[1, 1] + A[0, 2] * R[1, 2] - m * dx * dy
+            own[4] = A[0, 0] * R[2, 0] + A[0, 1] * R[2, 1] + A[0, 2] * R[2, 2] - m * dx * dz
+            own[5] = A[1, 0] * R[2, 0] + A[1, 1] * R[2, 1] + A[1, 2] * R[2, 2] - m * dy * dz
+            own[6], own[7], own[8], own[9] = m * dx, m * dy, m * dz, m
+        found[k, :, :] = 0.0
+        for j in range(n - 1, -1, -1):
+            own, s = sums[j], twists[k, j]
+            if parents[j] > 0:
+                carrier = sums[parents[j] - 1]
+                for i in range(10):
+                    carrier[i] += own[i]
+            row = places[j]
+            if row < 0:
+                continue
+            # What a motion along this joint has of angular and linear momentum.
+            f[0] = own[0] * s[0] + own[3] * s[1] + own[4] * s[2] - own[8] * s[4] + own[7] * s[5]
+            f[1] = own[3] * s[0] + own[1] * s[1] + own[5] * s[2] + own[8] * s[3] - own[6] * s[5]
+            f[2] = own[4] * s[0] + own[5] * s[1] + own[2] * s[2] - own[7] * s[3] + own[6] * s[4]
+            f[3] = own[8] * s[1] - own[7] * s[2] + own[9] * s[3]
+            f[4] = own[6] * s[2] - own[8] * s[0] + own[9] * s[4]
+            f[5] = own[7] * s[0] - own[6] * s[1] + own[9] * s[5]
+            found[k, row, row] = armature[j]
+            i = j
+            while i >= 0:
+                column = places[i]
+                if column >= 0:
+                    w = twists[k, i]
+                    total = w[0] * f[0] + w[1] * f[1] + w[2] * f[2] + w[3] * f[3] + w[4] * f[4] + w[5] * f[5]
+                    if i == j:
+                        found[k, row, row] += total
+                    else:
+                        found[k, row, column] = found[k, column, row] = total
+                i = parents[i] - 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def columns_of(
+    twists: Array,
+    reference: Array,
+    moves: NDArray[np.bool_],
+    places: Indices,
+    rotations: Array,
+    positions: Array,
+    link: int,
+    local: Array,
+    found: Array,
+) -> None:
+    """Jacobians of a point of a link at many instants, linear rows first, world axes.
+
+    Args:
+        twists: Of `followed`.
+        reference: Of `followed`.
+        moves: Which joints move the link, shape (n,).
+        places: Column of each joint in what is found, -1 for those that are not asked, shape (n,).
+        rotations: Of `followed`.
+        positions: Of `followed`.
+        link: Which.
+        local: The point in it [m], shape (3,).
+        found: Receives them, shape (N, 6, m).
+    """
+    found[:] = 0.0
+    for k in range(len(found)):
+        R, x = rotations[k, link], positions[k, link]
+        px = x[0] + R[0, 0] * local[0] + R[0, 1] * local[1] + R[0, 2] * local[2] - reference[0]
+        py = x[1] + R[1, 0] * local[0] + R[1, 1] * local[1] + R[1, 2] * local[2] - reference[1]
+        pz = x[2] + R[2, 0] * local[0] + R[2, 1] * local[1] + R[2, 2] * local[2] - reference[2]
+        for j in range(len(moves)):
+            c = places[j]
+            if c < 0 or not moves[j]:
+                continue
+            s = twists[k, j]
+            found[k, 0, c] = s[3] + (s[1] * pz - s[2] * py)
+            found[k, 1, c] = s[4] + (s[2] * px - s[0] * pz)
+            found[k, 2, c] = s[5] + (s[0] * py - s[1] * px)
+            found[k, 3, c], found[k, 4, c], found[k, 5, c] = s[0], s[1], s[2]

@@ -74,6 +74,10 @@ class Answers:
         kept = keep_many(ends, self.limit, at_most=at_most).all(axis=0) & np.isfinite(self.value)
         nothing = np.zeros(len(self.value), bool) if self.nothing is None else self.nothing
         within, silent = self.verdict == WITHIN, (self.verdict == NO_VERDICT) & ~nothing
+        if not (
+            (within & (nothing | ~kept)) | (silent & (np.isnan(self.value) | ~np.isnan(self.limit)))
+        ).any():
+            return np.full(len(self.value), "", object)
         told = np.where(
             np.isnan(self.limit), "it is within, and has no limit", "it is within, beyond its limit"
         )

@@ -32,7 +32,7 @@ from seerob.twin.state import Hearing, State
 from seerob.twin.states import Bench, Motion, Questions, Reasons, States
 from seerob.twin.validity.hearing import SLACK, STANDS, Heard
 
-STRETCH = 256
+STRETCH = 512
 """Instants that are placed together: enough for the arrays to pay, few enough for the processor's cache."""
 
 
@@ -326,14 +326,18 @@ def _stretch(bench: Bench, asked: dict[str, _Able], motion: Motion) -> tuple[Str
         if not motion.speed_errors.keys().isdisjoint(with_carriers | states.speeds_asked):
             noisy.add(name)
         for who in sorted(states.asked):
-            reasons = np.where(motion.doubts[who] != "", motion.doubts[who], reasons)
+            if motion.doubts[who].any():
+                reasons = np.where(motion.doubts[who] != "", motion.doubts[who], reasons)
         answers = _doubted(answers, one.criterion, reasons)
         if texts := [text for held_name, text in one.held.items() if held_name in states.asked]:
             reasons = np.where(answers.verdict == WITHIN, "; ".join(dict.fromkeys(texts)), reasons)
             answers = answers.open()
         found[name] = answers, reasons
-    speeds = states.largest_speeds() if motion.ways is not None else np.zeros((len(states), 0))
-    return found, speeds, noisy
+    # Only what is within, and so has a limit, is to stay so on the way.
+    kept = any((answers.verdict == WITHIN).any() for answers, _ in found.values())
+    if motion.ways is not None and kept:
+        return found, states.largest_speeds(), noisy
+    return found, np.full((len(states), len(bench.ids)), np.nan), noisy
 
 
 def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:
@@ -353,6 +357,8 @@ def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:
         reasons[:] = why
         return _nothing(criterion, n), reasons
     found = answers.contradictions(at_most=criterion.at_most)
+    if not found.any():
+        return replace(answers, verdict=answers.verdict.astype(np.uint8)), reasons
     reasons = np.where(found == "", reasons, f"{criterion.name}: " + found)
     verdict = np.where(found == "", answers.verdict, UNDECIDED).astype(np.uint8)
     return replace(answers, verdict=verdict), reasons
@@ -366,16 +372,16 @@ def _misshapen(answers: Answers, n: int) -> str:
     shapes = {np.shape(column) for column in (answers.value, answers.limit, answers.verdict, *ends)}
     if shapes != {(n,)}:
         return f"it returns shapes {sorted(shapes)} of {n} instants, not ({n},) each"
-    if unknown := set(np.unique(answers.verdict).tolist()) - set(CODES.values()):
+    if unknown := set(answers.verdict.tolist()) - set(CODES.values()):
         return f"its verdicts {sorted(unknown)} are none of seerob.recording.series.CODES"
     return ""
 
 
 def _doubted(answers: Answers, criterion: Criterion, reasons: Reasons) -> Answers:
     """Make answers undecided, without a figure, at the instants that are in doubt."""
-    doubted = reasons != ""
-    if not doubted.any():
+    if not reasons.any():
         return answers
+    doubted = reasons != ""
     nothing = _nothing(criterion, len(reasons))
     return Answers(
         np.where(doubted, nothing.value, answers.value),

@@ -12,6 +12,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import mujoco
@@ -28,6 +29,7 @@ from seerob.recording.answers import Flags
 from seerob.twin.attachments import untold
 from seerob.twin.joint_columns import Columns, moving_dofs
 from seerob.twin.spans import Path
+from seerob.twin.trees import Followed, Tree
 
 Reasons = NDArray[np.object_]
 """Why something is not known at each instant, empty where it is; shape (N,)."""
@@ -97,13 +99,21 @@ class Bench:
         self.corners = stacked([body.corners for body in model.bodies])
         self.reach = np.array([body.radius + body.deviation for body in model.bodies])
         self.columns = {m.name: Columns.of(m, mj) for m in model.mechanisms.values()}
-        # A mass that nobody gave may be none at all, and is never asked for.
-        self.weighed = tuple(
-            m for m in model.mechanisms.values() if m.role != "human" and not m.unknown_masses
-        )
+        self._trees: dict[int, Tree | None] = {}
+
+    def tree(self, body: int) -> Tree | None:
+        """The tree of one of MuJoCo's bodies; None where only MuJoCo follows it."""
+        root = int(self.mj.body_rootid[body])
+        if root not in self._trees:
+            self._trees[root] = Tree.of(self.mj, root) if root else None
+        return self._trees[root]
 
     def place(self, motion: Motion) -> States:
         """The twin at instants."""
+        return States(self, motion)
+
+    def moved(self, motion: Motion) -> dict[str, Array]:
+        """What MuJoCo makes of positions and velocities, for all bodies, instants in front."""
         mj, data, n = self.mj, self.data, len(motion.t)
         moved = {
             name: np.empty((n, *getattr(data, name).shape))
@@ -112,8 +122,6 @@ class Bench:
         # Views that MuJoCo writes through.
         views = [(found, getattr(data, name)) for name, found in moved.items()]
         qpos, qvel = data.qpos, data.qvel
-        M = np.zeros((mj.nv, mj.nv))
-        masses = {m.name: np.empty((n, len(m.own), len(m.own))) for m in self.weighed}
         for k in range(n):
             qpos[:], qvel[:] = motion.q[k], motion.v[k]
             mujoco.mj_kinematics(mj, data)
@@ -121,36 +129,64 @@ class Bench:
             mujoco.mj_comVel(mj, data)
             for found, view in views:
                 found[k] = view
-            if masses:
-                mujoco.mj_makeM(mj, data)
-                mujoco.mj_fullM(mj, data, M)
-                for name, blocks in masses.items():
-                    blocks[k] = self.columns[name].of_matrix(M)
-        return States(self, motion, moved, masses)
+        return moved
+
+    def masses(self, motion: Motion, mechanism: Mechanism) -> Array:
+        """Joint-space mass matrices as MuJoCo has them, shape (N, n, n)."""
+        mj, data, columns = self.mj, self.data, self.columns[mechanism.name]
+        M, found = np.zeros((mj.nv, mj.nv)), np.empty((len(motion.t), len(mechanism.own), len(mechanism.own)))
+        for k in range(len(found)):
+            data.qpos[:] = motion.q[k]
+            mujoco.mj_kinematics(mj, data)
+            mujoco.mj_comPos(mj, data)
+            mujoco.mj_makeM(mj, data)
+            mujoco.mj_fullM(mj, data, M)
+            found[k] = columns.of_matrix(M)
+        return found
 
 
 class States:
     """The twin at N instants."""
 
-    def __init__(
-        self, bench: Bench, motion: Motion, moved: dict[str, Array], masses: dict[str, Array]
-    ) -> None:
+    def __init__(self, bench: Bench, motion: Motion) -> None:
         self.model, self._motion, self.doubts = bench.model, motion, motion.doubts
         self.asked: set[str] = set()
         """Robots and humans that answers have depended on since the set was last cleared."""
         self.speeds_asked: set[str] = set()
         """Those of which speeds were asked since it was last cleared."""
-        self._bench, self._moved, self._masses = bench, moved, masses
-        n = len(motion.t)
-        self._rotations = np.ascontiguousarray(moved["xmat"][:, bench.ids]).reshape(n, -1, 3, 3)
-        """World from body, in the order of `Model.bodies`, shape (N, n, 3, 3)."""
-        self._positions = np.ascontiguousarray(moved["xpos"][:, bench.ids])
-        """World position of the bodies' origins [m], shape (N, n, 3)."""
+        self._bench = bench
         self._cache: dict[Any, Any] = {}
         self._answers: dict[tuple[Query, Per], Closests] = {}
 
     def __len__(self) -> int:
         return len(self._motion.t)
+
+    # Each is found when it is asked first: what only a robot's own tree says does not follow the others.
+
+    @cached_property
+    def _moved(self) -> dict[str, Array]:
+        return self._bench.moved(self._motion)
+
+    @cached_property
+    def _rotations(self) -> Array:
+        """World from body, in the order of `Model.bodies`, shape (N, n, 3, 3)."""
+        return np.ascontiguousarray(self._moved["xmat"][:, self._bench.ids]).reshape(len(self), -1, 3, 3)
+
+    @cached_property
+    def _positions(self) -> Array:
+        """World position of the bodies' origins [m], shape (N, n, 3)."""
+        return np.ascontiguousarray(self._moved["xpos"][:, self._bench.ids])
+
+    def _followed(self, body: int) -> Followed | None:
+        """The tree of one of MuJoCo's bodies; None where only MuJoCo follows it."""
+        tree = self._bench.tree(body)
+        if tree is None:
+            return None
+        key = "tree", int(self._bench.mj.body_rootid[body])
+        if key not in self._cache:
+            self._cache[key] = tree.follow(self._motion.q)
+        found: Followed = self._cache[key]
+        return found
 
     def require(self, *names: str) -> None:
         """Say that what follows depends on robots or humans."""
@@ -182,7 +218,17 @@ class States:
             Undecided: A mass that nobody gave.
         """
         self._weigh(mechanism)
-        return self._masses[mechanism.name]
+        key = "M", mechanism.name
+        if key not in self._cache:
+            columns = self._bench.columns[mechanism.name]
+            tree = self._followed(int(columns.bodies[0])) if len(columns.bodies) else None
+            if tree is None:
+                self._cache[key] = self._bench.masses(self._motion, mechanism)
+            else:
+                M = tree.mass_matrix(mechanism.v_address)
+                C = columns.coupling
+                self._cache[key] = M if C is None else C.T @ M @ C
+        return np.asarray(self._cache[key])
 
     def held(self, mechanism: Mechanism) -> Array:
         """Torques that hold its joints against gravity [N·m or N], shape (N, n).
@@ -214,16 +260,20 @@ class States:
         self.require(mechanism.name)
         key = id(frame), mechanism.name, None if offset is None else offset.tobytes()
         if key not in self._cache:
-            bench, moved = self._bench, self._moved
+            bench, columns = self._bench, self._bench.columns[mechanism.name]
             at = frame.body_from_frame[:3, 3]
             if offset is not None:
                 at = at + frame.body_from_frame[:3, :3] @ offset
-            points = moved["xpos"][:, frame.mj] + moved["xmat"][:, frame.mj].reshape(-1, 3, 3) @ at
-            columns = bench.columns[mechanism.name]
             dofs = np.arange(bench.mj.nv)[columns.all_v]
-            found = np.empty((len(self), 6, len(dofs)))
-            root, moves = int(bench.mj.body_rootid[frame.mj]), moving_dofs(bench.mj, frame.mj)
-            jacobians(moved["cdof"], moved["subtree_com"], root, dofs, moves, points, found)
+            tree = self._followed(frame.mj)
+            if tree is not None:
+                found = tree.jacobian(frame.mj, at, dofs)
+            else:
+                moved = self._moved
+                points = moved["xpos"][:, frame.mj] + moved["xmat"][:, frame.mj].reshape(-1, 3, 3) @ at
+                found = np.empty((len(self), 6, len(dofs)))
+                root, moves = int(bench.mj.body_rootid[frame.mj]), moving_dofs(bench.mj, frame.mj)
+                jacobians(moved["cdof"], moved["subtree_com"], root, dofs, moves, points, found)
             # With the frame itself: another one may get the id of one that is forgotten.
             self._cache[key] = frame, found if columns.coupling is None else found @ columns.coupling
         return np.asarray(self._cache[key][1])

@@ -124,3 +124,65 @@ def reciprocals(values: Array) -> Array:
     for i in range(len(values)):
         found[i] = np.inf if values[i] <= 0.0 else 1.0 / values[i]
     return found
+
+
+@njit("void(f8[:,::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
+def quaternion(R: Array, found: Array) -> None:
+    """Write the unit quaternion with w >= 0 of a rotation, as `seerob.core.transforms.wxyz_from_rotation`.
+
+    Args:
+        R: Rotation matrix, shape (3, 3).
+        found: Written: w, x, y, z, shape (4,).
+    """
+    # Shepperd's method: divide by the largest of the four, so that nothing cancels.
+    trace = R[0, 0] + R[1, 1] + R[2, 2]
+    largest, square = 0, trace
+    for i in range(3):
+        if R[i, i] > square:
+            largest, square = i + 1, R[i, i]
+    found[0] = 1.0 + trace
+    found[1], found[2], found[3] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    if largest > 0:
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        found[0] = R[k, j] - R[j, k]
+        found[1 + i] = 1.0 + R[i, i] - R[j, j] - R[k, k]
+        found[1 + j] = R[j, i] + R[i, j]
+        found[1 + k] = R[k, i] + R[i, k]
+    length = 0.0
+    for i in range(4):
+        length += found[i] * found[i]
+    length = math.sqrt(length)
+    if found[0] < 0.0:
+        length = -length
+    for i in range(4):
+        found[i] /= length
+
+
+@njit("b1(f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1])", cache=True, nogil=True, error_model="numpy")
+def felt(J: Array, M: Array, inverse: Array, axes: Array, figures: Array) -> bool:
+    """Effective mass matrix of one point, its principal masses and axes, in one call.
+
+    Args:
+        J: Jacobian, linear rows first, shape (6, n).
+        M: Symmetric, shape (n, n).
+        inverse: Written: see `mobility`, shape (3, 3).
+        axes: Written: see `principal_axes`, shape (3, 3).
+        figures: Written: principal masses, smallest first [kg], and the quaternion of the axes, shape (7,).
+
+    Returns:
+        Whether M is positive definite.
+    """
+    n = J.shape[1]
+    rows, found = J[:3].copy().reshape(1, 3, n), np.empty((1, 3, 3))
+    if not mobility(rows, M.reshape(1, n, n), found):
+        return False
+    inverse[:] = found[0]
+    values, turned = np.empty((1, 3)), np.empty((1, 3, 3))
+    principal_axes(found, values, turned)
+    axes[:] = turned[0]
+    lost = np.isnan(values).any()
+    for i in range(3):
+        figures[i] = np.nan if lost else np.inf if values[0, i] <= 0.0 else 1.0 / values[0, i]
+    quaternion(axes, figures[3:])
+    return True

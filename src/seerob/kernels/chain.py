@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
+from seerob.kernels.axes import principal_axes, quaternion
 
 Indices = NDArray[np.int64]
 
@@ -354,3 +355,63 @@ def columns_of(
             found[k, 1, c] = s[4] + (s[2] * px - s[0] * pz)
             found[k, 2, c] = s[5] + (s[0] * py - s[1] * px)
             found[k, 3, c], found[k, 4, c], found[k, 5, c] = s[0], s[1], s[2]
+
+
+@njit(
+    "void(f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], i8, i8, i8[::1], b1[::1], f8[::1],"
+    " f8[:,::1], f8[:,::1], f8[::1])",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def at_point(
+    xmat: Array,
+    xpos: Array,
+    cdof: Array,
+    subtree_com: Array,
+    body: int,
+    root: int,
+    dofs: Indices,
+    moves: NDArray[np.bool_],
+    local: Array,
+    jacobian: Array,
+    axes: Array,
+    figures: Array,
+) -> None:
+    """What joints do to one point now: its Jacobian and ellipsoid of velocity, in one call.
+
+    Args:
+        xmat: MuJoCo's, world from body, row by row, shape (m, 9).
+        xpos: MuJoCo's [m], shape (m, 3).
+        cdof: MuJoCo's, shape (nv, 6).
+        subtree_com: MuJoCo's [m], shape (m, 3).
+        body: MuJoCo's, of the point.
+        root: First body of its tree.
+        dofs: Degrees of freedom that are columns, shape (n,).
+        moves: Which of them move the point, shape (n,).
+        local: The point in the body [m], shape (3,).
+        jacobian: Written: linear rows first, world axes, shape (6, n).
+        axes: Written: directions of the singular values of the linear rows, shape (3, 3).
+        figures: Written: singular values, and the quaternion of the axes, shape (7,).
+    """
+    R, n = xmat[body], len(dofs)
+    x = xpos[body, 0] + (R[0] * local[0] + R[1] * local[1] + R[2] * local[2]) - subtree_com[root, 0]
+    y = xpos[body, 1] + (R[3] * local[0] + R[4] * local[1] + R[5] * local[2]) - subtree_com[root, 1]
+    z = xpos[body, 2] + (R[6] * local[0] + R[7] * local[1] + R[8] * local[2]) - subtree_com[root, 2]
+    for c in range(n):
+        i = dofs[c]
+        if not moves[c]:
+            jacobian[:, c] = 0.0
+            continue
+        wx, wy, wz = cdof[i, 0], cdof[i, 1], cdof[i, 2]
+        jacobian[0, c] = cdof[i, 3] + (wy * z - wz * y)
+        jacobian[1, c] = cdof[i, 4] + (wz * x - wx * z)
+        jacobian[2, c] = cdof[i, 5] + (wx * y - wy * x)
+        jacobian[3, c], jacobian[4, c], jacobian[5, c] = wx, wy, wz
+    values, directions = np.empty((1, 3)), np.empty((1, 3, 3))
+    principal_axes(jacobian[:3].copy().reshape(1, 3, n), values, directions)
+    axes[:] = directions[0]
+    lost = np.isnan(values).any()
+    for r in range(3):
+        figures[r] = np.nan if lost else values[0, r]
+    quaternion(axes, figures[3:])

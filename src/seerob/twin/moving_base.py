@@ -45,7 +45,7 @@ def velocity_of(state: State, frame: Frame, mechanism: Mechanism, offset: Array)
         Undecided: Whoever moves it was not heard.
     """
     if mechanism.alone:
-        return np.asarray(state.jacobian(frame, mechanism, offset) @ state.qd(mechanism))
+        return state.velocity(frame, mechanism, offset)
     data = state.data_of(*_movers(state, frame, mechanism))
     rotation, position = state.pose(frame)
     twist = data.cvel[frame.mj]

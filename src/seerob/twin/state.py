@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -23,10 +23,11 @@ from seerob.core.errors import Undecided, Unweighed
 from seerob.core.transforms import Array
 from seerob.distance.least import Closest, Closests, Per, Query
 from seerob.distance.surveying import Surveyor
-from seerob.kernels.chain import along
+from seerob.kernels.axes import felt, principal_axes, quaternion
+from seerob.kernels.chain import along, at_point
 from seerob.kernels.speed import carried, fastest, placed, stacked, velocities
 from seerob.model.model import Frame, Gap, Mechanism, Model
-from seerob.twin.joint_columns import Columns
+from seerob.twin.joint_columns import Columns, moving_dofs
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Knots, Path
 from seerob.twin.speed_noise import SpeedNoise
@@ -45,6 +46,27 @@ MOST_PLACES = 512
 """Sets of bodies of which places are kept from tick to tick."""
 WRITTEN = ("placed", "velocities of")
 """What is kept of them lies in buffers."""
+
+
+class MassEllipsoid(NamedTuple):
+    """Effective masses of a point, [Khatib1995]_."""
+
+    inverse: Array
+    """Inverse of the effective mass matrix [1/kg], shape (3, 3)."""
+    axes: Array
+    """Its principal axes as columns of a right-handed frame, shape (3, 3)."""
+    masses: Array
+    """Along them, smallest first [kg], shape (3,); infinite where the point cannot be pushed."""
+    wxyz: list[float]
+    """Quaternion of the axes, w first."""
+
+
+class _Point(NamedTuple):
+    """What joints do to a point at this tick."""
+
+    jacobian: Array
+    sigma: list[float]
+    wxyz: list[float]
 
 
 class State(Validity):
@@ -76,13 +98,14 @@ class State(Validity):
         self._wanted: Any = None
         """Where people were captured; made when somebody asks."""
         self._full_mass_matrix = np.zeros((model.mj.nv, model.mj.nv))
-        self._jacobian = np.zeros((6, model.mj.nv))
+        self._points: dict[tuple[Any, ...], tuple[Frame, int, Indices, NDArray[np.bool_], Array]] = {}
+        """Points of which Jacobians are asked: what of them is the same at all ticks."""
         self.columns = {m.name: Columns.of(m, model.mj) for m in model.mechanisms.values()}
         """Where the joints of each robot and human are among all."""
         # Views that MuJoCo writes through; to ask the data for them takes longer than to use them.
         self._xmat, self._xpos, self._xquat = data.xmat, data.xpos, data.xquat
         self._surveyor = Surveyor(model.shapes)
-        self._cdof, self._com = data.cdof, data.subtree_com
+        self._cdof, self._com, self._qvel = data.cdof, data.subtree_com, data.qvel
         self._rows: dict[tuple[int, ...], Indices] = {}
         self._corners = stacked([body.corners for body in model.bodies])
         self._reach = np.array([body.radius + body.deviation for body in model.bodies])
@@ -560,16 +583,81 @@ class State(Validity):
             offset: The point in the frame [m], shape (3,); its origin when not given.
         """
         self.require(mechanism.name)
-        # Not its name: a tool's working point is called like the tool.
-        key = ("J", id(frame), mechanism.name, None if offset is None else offset.tobytes())
+        return self._point(frame, mechanism, offset).jacobian
+
+    def velocity(self, frame: Frame, mechanism: Mechanism, offset: Array | None = None) -> Array:
+        """Velocity that the joints of a mechanism give a point, linear before angular, (6,) [m/s, rad/s].
+
+        Arguments as of `jacobian`.
+        """
+        self.require(mechanism.name)
+        self.speeds_asked.add(mechanism.name)
+        qd = self._qvel[self.columns[mechanism.name].own_v]
+        return np.asarray(self._point(frame, mechanism, offset).jacobian @ qd)
+
+    def velocity_ellipsoid(
+        self, frame: Frame, mechanism: Mechanism, offset: Array | None = None
+    ) -> tuple[list[float], list[float]]:
+        """Singular values of the linear rows of `jacobian`, largest first, and their axes as a quaternion."""
+        self.require(mechanism.name)
+        point = self._point(frame, mechanism, offset)
+        return point.sigma, point.wxyz
+
+    def mass_ellipsoid(
+        self, frame: Frame, mechanism: Mechanism, offset: Array | None = None
+    ) -> MassEllipsoid:
+        """What somebody feels of a mechanism who is hit by a point of it; arguments as of `jacobian`.
+
+        Raises:
+            Undecided: As `mass_matrix`.
+        """
+        M, J = self.mass_matrix(mechanism), self.jacobian(frame, mechanism, offset)
+        key = ("Λ", id(frame), mechanism.name, None if offset is None else offset.tobytes())
         if key not in self._cache:
-            rotation, position = self._pose(frame)
+            inverse, axes, figures = np.empty((3, 3)), np.empty((3, 3)), np.empty(7)
+            if not felt(J, M, inverse, axes, figures):
+                raise np.linalg.LinAlgError("M, a mass matrix, is not positive definite")
+            self._cache[key] = frame, MassEllipsoid(inverse, axes, figures[:3], figures[3:].tolist())
+        found: MassEllipsoid = self._cache[key][1]
+        return found
+
+    def _point(self, frame: Frame, mechanism: Mechanism, offset: Array | None) -> _Point:
+        # Not its name: a tool's working point is called like the tool.
+        key = ("point", id(frame), mechanism.name, None if offset is None else offset.tobytes())
+        if key not in self._cache:
+            # With the frame itself: another one may get the id of one that is forgotten.
+            self._cache[key] = frame, self._moving_point(key, frame, mechanism, offset)
+        found: _Point = self._cache[key][1]
+        return found
+
+    def _moving_point(
+        self, key: tuple[Any, ...], frame: Frame, mechanism: Mechanism, offset: Array | None
+    ) -> _Point:
+        mj, columns = self.model.mj, self.columns[mechanism.name]
+        bound = self._points.get(key)
+        if bound is None or bound[0] is not frame:
+            local = frame.body_from_frame[:3, 3]
             if offset is not None:
-                position = position + rotation @ offset
-            every = self._jacobian
-            mujoco.mj_jac(self.model.mj, self._data, every[:3], every[3:], position, frame.mj)
-            self._cache[key] = self.columns[mechanism.name].of_rows(every)
-        return np.asarray(self._cache[key])
+                local = local + frame.body_from_frame[:3, :3] @ offset
+            dofs = np.arange(mj.nv)[columns.all_v]
+            moves, root = moving_dofs(mj, frame.mj)[dofs], int(mj.body_rootid[frame.mj])
+            if len(self._points) == MOST_PLACES:
+                self._points.clear()
+            bound = self._points[key] = frame, root, dofs, moves, np.ascontiguousarray(local)
+        _, root, dofs, moves, local = bound
+        J, axes, figures = np.empty((6, len(dofs))), np.empty((3, 3)), np.empty(7)
+        at_point(
+            self._xmat, self._xpos, self._cdof, self._com, frame.mj, root, dofs, moves, local,
+            J, axes, figures,
+        )  # fmt: skip
+        if columns.coupling is not None:
+            # Joints that others follow: the ellipsoid is that of the commanded ones.
+            J = J @ columns.coupling
+            values, directions = np.empty((1, 3)), np.empty((1, 3, 3))
+            principal_axes(J[None, :3].copy(), values, directions)
+            figures[:3] = np.nan if np.isnan(values).any() else values[0]
+            quaternion(directions[0], figures[3:])
+        return _Point(J, figures[:3].tolist(), figures[3:].tolist())
 
     def along(self, bodies: tuple[int, ...], mechanism: Mechanism, points: Array, directions: Array) -> Array:
         r"""Rows :math:`u^T J_v` of points of several bodies, shape (b, n); see `jacobian`.

@@ -12,7 +12,7 @@ from seerob.core import figures
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Arrow, Basis, Ellipsoid, Result, Verdict
 from seerob.core.tolerances import Shifts, Spread, deciding, spread
-from seerob.core.transforms import Array, wxyz_from_rotation
+from seerob.core.transforms import Array
 from seerob.criteria.contact.impact_mass import simplified_mass
 from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge, judge_interval
 from seerob.kernels.axes import mobility, principal_axes, reciprocals
@@ -29,6 +29,8 @@ DRAWN = 0.02
 LARGEST_DRAWN = 0.6
 TOUCHING = 1e-9
 """Length below which a line to a person has no direction [m]."""
+NAMES = "m1", "m2", "m3"
+"""Of the principal masses."""
 STANDSTILL = 1e-3
 """Speed below which a motion has no direction [m/s]."""
 
@@ -118,7 +120,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         tolerances = MassTolerances(model, robot)
         simplified = self._simplified(model, robot, tolerances)
 
-        def direction(state: State, J_v: Array, masses: Array, axes: Array) -> tuple[Array | None, str]:
+        def direction(state: State, axes: Array) -> tuple[Array | None, str]:
             if gap is not None:
                 closest = state.closest(gap)
                 line = closest.point_b - closest.point_a
@@ -133,15 +135,14 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
             return (v / speed, "") if speed > STANDSTILL else (None, "stands still: no direction of motion")
 
         def evaluate(state: State) -> Result:
-            M = state.mass_matrix(robot)
-            J_v = state.jacobian(frame, robot, offset)[:3]
-            inverse = inverse_effective_mass(J_v, M)
-            masses, axes = principal_masses(inverse)
-            u, reason = direction(state, J_v, masses, axes)
+            inverse, axes, masses, wxyz = state.mass_ellipsoid(frame, robot, offset)
+            u, reason = direction(state, axes)
             mass = None if u is None else float(projected_mass(inverse, u))
             verdict, interval, open_ = self._verdict(mass), None, ""
-            if len(tolerances) and u is not None and mass is not None and np.isfinite(mass):
-                ends = self._ends(tolerances.matrices(state), len(tolerances), J_v, u)
+            if len(tolerances) and u is not None and mass is not None and math.isfinite(mass):
+                ends = self._ends(
+                    tolerances.matrices(state), len(tolerances), state.jacobian(frame, robot, offset)[:3], u
+                )
                 interval = float(ends.low), float(ends.high)
                 verdict = judge_interval(interval, self.limit)
                 open_ = deciding(tolerances.tolerances, ends.widths) if verdict is Verdict.UNDECIDED else ""
@@ -151,7 +152,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
             center = position + rotation @ offset
             ellipsoid = Ellipsoid(
                 center=tuple(center.tolist()),
-                wxyz=tuple(wxyz_from_rotation(axes).tolist()),
+                wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
                 radii=tuple(np.minimum(DRAWN * masses, LARGEST_DRAWN).tolist()),
                 verdict=verdict,
             )
@@ -168,19 +169,19 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                 )
             return Result(
                 name=self.name,
-                value=mass if mass is not None and np.isfinite(mass) else None,
+                value=mass if mass is not None and math.isfinite(mass) else None,
                 unit=self.unit,
                 limit=self.limit,
                 verdict=verdict,
-                nothing=verdict is None and (mass is None or not np.isfinite(mass)),
+                nothing=verdict is None and (mass is None or not math.isfinite(mass)),
                 interval=interval,
                 reason=reason
                 or open_
-                or ("" if mass is None or np.isfinite(mass) else "cannot be pushed that way: infinite"),
+                or ("" if mass is None or math.isfinite(mass) else "cannot be pushed that way: infinite"),
                 parts=(
                     *(
-                        Result(name=f"m{i + 1}", value=float(m) if np.isfinite(m) else None, unit="kg")
-                        for i, m in enumerate(masses)
+                        Result(name=name, value=m if math.isfinite(m) else None, unit="kg")
+                        for name, m in zip(NAMES, masses.tolist(), strict=True)
                     ),
                     simplified,
                 ),

@@ -11,7 +11,7 @@ from msgspec import Meta
 from seerob.core import figures
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Basis, Ellipsoid, Result, Verdict
-from seerob.core.transforms import Array, wxyz_from_rotation
+from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge
 from seerob.kernels.axes import principal_axes
 from seerob.model import provenance
@@ -107,13 +107,12 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
 
         def evaluate(state: State) -> Result:
             state.require(mechanism.name)
-            J = state.jacobian(frame, mechanism, offset)
-            sigma, axes = singular_values(J[:3])
-            smallest = float(sigma[2])
+            sigma, wxyz = state.velocity_ellipsoid(frame, mechanism, offset)
+            smallest = sigma[2]
             verdict = judge(smallest, self.limit, at_most=False)
             reason = ""
             if verdict is Verdict.EXCEEDED and len(names) >= 3:
-                after = least_value_after(J).max(axis=1)
+                after = least_value_after(state.jacobian(frame, mechanism, offset)).max(axis=1)
                 joint = names[int(after.argmax())]
                 reason = f"near a singularity: {joint} leads out of it the soonest"
                 if after.max() <= smallest + NOTHING:
@@ -121,15 +120,15 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
             rotation, position = state.pose(frame)
             ellipsoid = Ellipsoid(
                 center=tuple((position + rotation @ offset).tolist()),
-                wxyz=tuple(wxyz_from_rotation(axes).tolist()),
-                radii=tuple((DRAWN * sigma).tolist()),
+                wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
+                radii=(DRAWN * sigma[0], DRAWN * sigma[1], DRAWN * sigma[2]),
                 label=f"σ₃ {figures.told(smallest, self.limit, self.unit, at_most=False)}",
                 verdict=verdict,
             )
             parts = (
-                Result(name="σ₁", value=float(sigma[0]), unit="m/rad"),
-                Result(name="σ₂", value=float(sigma[1]), unit="m/rad"),
-                Result(name="√det J_v J_vᵀ", value=math.prod(sigma.tolist()), unit="m³/rad³"),
+                Result(name="σ₁", value=sigma[0], unit="m/rad"),
+                Result(name="σ₂", value=sigma[1], unit="m/rad"),
+                Result(name="√det J_v J_vᵀ", value=math.prod(sigma), unit="m³/rad³"),
             )
             return Result(
                 name=self.name,

@@ -69,14 +69,15 @@ class Answers:
 
     def contradictions(self, *, at_most: bool) -> NDArray[np.object_]:
         """Why each instant cannot be what it says, or says nothing, shape (N,); empty where it can."""
+        nothing = np.zeros(len(self.value), bool) if self.nothing is None else self.nothing
+        within, silent = self.verdict == WITHIN, (self.verdict == NO_VERDICT) & ~nothing
+        wordless = (silent & (np.isnan(self.value) | ~np.isnan(self.limit))).any()
+        if not (wordless or within.any()):
+            return np.full(len(self.value), "", object)
         low, high = (self.value, self.value) if self.interval is None else self.interval
         ends = np.array([self.value, low, high], float)
         kept = keep_many(ends, self.limit, at_most=at_most).all(axis=0) & np.isfinite(self.value)
-        nothing = np.zeros(len(self.value), bool) if self.nothing is None else self.nothing
-        within, silent = self.verdict == WITHIN, (self.verdict == NO_VERDICT) & ~nothing
-        if not (
-            (within & (nothing | ~kept)) | (silent & (np.isnan(self.value) | ~np.isnan(self.limit)))
-        ).any():
+        if not (wordless or (within & (nothing | ~kept)).any()):
             return np.full(len(self.value), "", object)
         told = np.where(
             np.isnan(self.limit), "it is within, and has no limit", "it is within, beyond its limit"

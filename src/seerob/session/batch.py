@@ -32,8 +32,11 @@ from seerob.twin.state import Hearing, State
 from seerob.twin.states import Bench, Motion, Questions, Reasons, States
 from seerob.twin.validity.hearing import SLACK, STANDS, Heard
 
-STRETCH = 512
-"""Instants that are placed together: enough for the arrays to pay, few enough for the processor's cache."""
+STRETCH, LONGEST = 256, 1024
+"""Instants that are placed together, at least and at most: enough for the arrays to pay, few enough for the
+processor's cache."""
+SHARES = 8
+"""Parts that a motion has between the two, so that threads end together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +158,8 @@ def judged(
     n = len(motion.t)
     findings = tuple(dict.fromkeys((*model.findings, *findings)))
     asked, notes = _able(model, bound, findings)
-    parts = [motion.part(begin, end) for begin, end in pairwise([*range(0, n, STRETCH), n]) if begin < end]
+    length = min(max(STRETCH, -(-n // SHARES)), LONGEST)
+    parts = [motion.part(begin, end) for begin, end in pairwise([*range(0, n, length), n]) if begin < end]
     questions = Questions(model)
     found: dict[str, list[tuple[Answers, Reasons]]] = {name: [] for name in asked}
     speeds: list[Array] = []

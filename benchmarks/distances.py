@@ -26,7 +26,7 @@ from defusedxml import ElementTree
 
 from seerob.core.shapes.geometry import Mesh, Solid, capsule
 from seerob.core.transforms import Array, rotation_from_rpy
-from seerob.distance.least import Per, Query, Reach, Shapes
+from seerob.distance.least import DistanceKind, Per, Query, Shapes
 
 ROBOTS = Path(coal.__file__).parents[4] / "share" / "example-robot-data" / "robots"
 UR10 = ROBOTS / "ur_description" / "urdf" / "ur10_robot.urdf"
@@ -235,7 +235,7 @@ def person(kind: str, ticks: int) -> tuple[float, float]:
         ours = clock(times, "seerob, 25 parts", parts.per_body, R[k], x[k])
         pairs = clock(times, f"seerob, {n * len(PARTS)} pairs", all_pairs.per_pair, R[k], x[k])
         one = clock(times, "seerob, least of all", least.minimum, R[k], x[k])
-        exact = ours.reach == Reach.EXACT  # Coal knows no depth and no inside.
+        exact = ours.kind == DistanceKind.EXACT  # Coal knows no depth and no inside.
         worst = max(worst, np.abs(ours.distance - theirs)[exact].max())
         assert (ours.distance <= theirs + 1e-9).all()
         nearest, farthest = min(nearest, ours.distance.min()), max(farthest, ours.distance.min())

@@ -90,7 +90,7 @@ def tracked(made: Station, heard: list[BodySample], seconds: float) -> tuple[flo
         engine.take(due)
         state = engine.tick()
         away += [error[0] for error in state.hearings["operator"].bones.values() if error[0] is not None]
-        doubts.append(state.doubt("operator"))
+        doubts.append(state.invalid_reason("operator"))
     return time.process_time() - begun, away, doubts
 
 

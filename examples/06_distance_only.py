@@ -4,7 +4,7 @@ import numpy as np
 
 from seerob.core.shapes.geometry import Mesh, Solid, capsule
 from seerob.description.shapes.shapes import box_mesh
-from seerob.distance.least import Query, Reach, Shapes
+from seerob.distance.least import DistanceKind, Query, Shapes
 
 
 def channel() -> Mesh:
@@ -35,5 +35,5 @@ for height, distance in zip(heights, found.distance[:, 0], strict=True):
 
 # Inside the channel, the walls are 0.10 m from its middle and the finger is 0.03 m thick.
 assert np.isclose(found.distance[-1, 0], 0.07, atol=1e-12)
-assert (found.reach == Reach.EXACT).all()
+assert (found.kind == DistanceKind.EXACT).all()
 assert np.isclose(query.minimum(np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3))).distance, -0.03)

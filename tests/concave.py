@@ -84,4 +84,4 @@ def made_crowd() -> Shapes:
 
 def said(found) -> list[np.ndarray]:
     """All that an answer says."""
-    return [found.distance, found.point_a, found.point_b, found.body_a, found.body_b, found.reach]
+    return [found.distance, found.point_a, found.point_b, found.body_a, found.body_b, found.kind]

@@ -36,7 +36,7 @@ def run(model, samples, until, *, live=()):
     for k in range(round(until / TICK) + 1):
         engine.take(list(pump.until(k * TICK)))
         state = engine.tick() if k else engine.start()
-        found.append(None if state.doubt("arm") else float(state.qd(model.robot("arm"))[0]))
+        found.append(None if state.invalid_reason("arm") else float(state.qd(model.robot("arm"))[0]))
     return found
 
 

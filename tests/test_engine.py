@@ -243,6 +243,6 @@ def test_after_a_silence_it_moves_as_fast_as_is_heard_from_the_instant_of_the_sa
             sample = heard("arm", k * 0.01, [k * 0.01, 0.0], [1.0, 0.0])
             engine.take([replace(sample, q=(whole(k > 19), whole(0)), qd=(whole(1), whole(0)))])
         state = engine.tick() if k else engine.start()
-        speeds[k] = state.qd(arm)[0] if state.doubt("arm") == "" else None
+        speeds[k] = state.qd(arm)[0] if state.invalid_reason("arm") == "" else None
     assert speeds[15] is None
     assert speeds[20] == pytest.approx(1.0, abs=1e-9)

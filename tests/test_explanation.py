@@ -111,7 +111,7 @@ def test_the_truth_lies_in_95_of_100_intervals() -> None:
             noise = lfilter([np.sqrt(1 - alike**2)], [1, -alike], noise, axis=0)
             found = fit(both, clean + noise * NOISE, used)
             half = NORMAL_95 * np.sqrt(np.diag(found.covariance))
-            assert found.told[asked].all()
+            assert found.determined[asked].all()
             inside.append(np.abs(found.values[asked] - truth) <= half[asked])
         assert 0.93 <= np.mean(inside) <= 0.99, alike
 
@@ -120,10 +120,10 @@ def test_what_a_motion_does_not_tell_is_not_told() -> None:
     # About the vertical axis of the base nothing is lifted: the weight of a payload does not show.
     found = explain(cell()[0], "arm", said(2, joints="100000"))
     assert found.explains is not True
-    assert not found.payload.told
-    assert not any(figure.told for figure in found.com)
+    assert not found.payload.determined
+    assert not any(figure.determined for figure in found.com)
     assert [joint.moves for joint in found.joints] == [True] + [False] * 5
-    assert found.joints[0].coulomb.told
+    assert found.joints[0].coulomb.determined
 
 
 def test_a_log_of_another_arm_is_not_explained() -> None:

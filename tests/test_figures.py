@@ -6,7 +6,7 @@ from decimal import Context, Decimal
 import numpy as np
 import pytest
 
-from seerob.core.figures import DECIMALS, against, between, figure, margin, told, with_unit
+from seerob.core.figures import DECIMALS, against, between, figure, margin, with_unit, worded
 
 
 def back(text):
@@ -67,10 +67,10 @@ def test_what_exceeds_by_a_hair_looks_exceeded_and_what_equals_looks_equal():
 
 
 def test_a_label_is_not_kinder_than_the_verdict_and_has_its_unit():
-    assert told(0.14996, 0.15, "m", at_most=False) == "0.1499 m"
-    assert told(0.9996, 1.0, "m/s", at_most=True) == "1 m/s"
-    assert told(1.00001, 1.0, "m/s", at_most=True) == "1.001 m/s"
-    assert told(0.055751, None, "m", at_most=False) == figure(0.055751, "m")
+    assert worded(0.14996, 0.15, "m", at_most=False) == "0.1499 m"
+    assert worded(0.9996, 1.0, "m/s", at_most=True) == "1 m/s"
+    assert worded(1.00001, 1.0, "m/s", at_most=True) == "1.001 m/s"
+    assert worded(0.055751, None, "m", at_most=False) == figure(0.055751, "m")
 
 
 @pytest.mark.parametrize("unit", ["m", "m/s", "N", ""])
@@ -83,7 +83,7 @@ def test_a_label_is_the_text_of_the_pair_and_a_figure_that_of_decimal_arithmetic
         for value, limit in zip(near.tolist(), limits.tolist(), strict=True):
             for at_most in (True, False):
                 shown = with_unit(against(value, limit, unit, at_most=at_most).value, unit)
-                assert told(value, limit, unit, at_most=at_most) == shown
+                assert worded(value, limit, unit, at_most=at_most) == shown
             if unit and 1e-3 < abs(value) < 1e6:
                 exact = Decimal(f"{value:.11e}").quantize(Decimal(1).scaleb(-DECIMALS[unit]), context=ten)
                 assert back(figure(value, unit)) == float(exact)

@@ -31,7 +31,7 @@ def lived(station, said, *, live=True):
         numbers = {name: tuple(row) for name, row in values.items()}
         engine.take([JointSample(source="s", target="arm", seq=k, t=k * 0.01, **numbers)])
         state = engine.start() if k == 0 else engine.tick()
-        doubts.append(state.doubt("arm"))
+        doubts.append(state.invalid_reason("arm"))
         assert np.abs(engine._data.qpos).max() < 100
     return doubts[11], doubts[-1]
 

@@ -72,7 +72,7 @@ def test_threads_never_lose_the_newest_nor_see_one_twice():
 
 
 def test_whose_fault_a_doubt_is():
-    assert [quality.doubt("plc") for quality in Quality] == [
+    assert [quality.invalid_reason("plc") for quality in Quality] == [
         "",
         "plc says degraded",
         "plc says invalid",

@@ -89,7 +89,7 @@ def answering(verdict, reason):
 
 def losing(*lost):
     bodies = [SimpleNamespace(name=f"b{i}") for i in range(20)]
-    return SimpleNamespace(lost_bodies=lambda _: lost, model=SimpleNamespace(bodies=bodies))
+    return SimpleNamespace(invalid_bodies=lambda _: lost, model=SimpleNamespace(bodies=bodies))
 
 
 @pytest.mark.parametrize(

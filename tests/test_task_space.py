@@ -42,7 +42,7 @@ def test_poses_drive_the_robot_exactly(ur10, target, frame):
     for k, (position, wxyz) in enumerate(poses):
         engine.take([PoseSample(source="p", seq=k, t=0.01 * k, target=target, position=position, wxyz=wxyz)])
         state = engine.tick() if k else engine.start()
-    assert not state.doubt("arm")
+    assert not state.invalid_reason("arm")
     assert np.linalg.norm(state.pose(frames)[1] - poses[-1][0]) < 2e-5
     reached = engine._references["arm"].newest
     made_by._put(model.robot("arm"), reached, np.zeros(6), np.zeros(6))
@@ -58,7 +58,7 @@ def test_pose_out_of_reach_is_undecided(ur10):
         [PoseSample(source="p", seq=0, t=0.0, target="arm", position=(9.0, 0.0, 0.0), wxyz=(1.0, 0, 0, 0))]
     )
     state = engine.start()
-    found = re.search(r"the nearest that was found is ([0-9.]+) m and", state.doubt("arm"))
+    found = re.search(r"the nearest that was found is ([0-9.]+) m and", state.invalid_reason("arm"))
     # The UR10 reaches 1.3 m.
     assert 7.5 < float(found[1]) < 9.5
     with pytest.raises(Undecided, match="cannot reach"):

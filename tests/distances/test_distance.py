@@ -8,7 +8,7 @@ import trimesh
 from concave import IDENTITY, SLOT, SOLIDS, bumpy_ball, poses
 from seerob.core.errors import InputError
 from seerob.core.shapes.geometry import Mesh, Solid, capsule
-from seerob.distance.least import Query, Reach, Shapes
+from seerob.distance.least import DistanceKind, Query, Shapes
 
 
 def coal_distance(a: Mesh, b: Mesh, R, x) -> float:
@@ -49,7 +49,7 @@ def test_apart_it_is_what_coal_says_of_the_cores_less_the_radii(first, second):
     R, x = poses(60, 2, 1.0)
     found = query.batch(R, x)
     theirs = coal_distance(as_mesh(a), as_mesh(b), R, x)
-    apart = found.reach[:, 0] == Reach.EXACT
+    apart = found.kind[:, 0] == DistanceKind.EXACT
     assert apart.sum() > 20
     np.testing.assert_allclose(found.distance[apart, 0], theirs[apart] - a.radius - b.radius, atol=1e-9)
     assert (found.distance[~apart, 0] <= -a.radius - b.radius + 1e-12).all()
@@ -62,7 +62,7 @@ def test_points_lie_on_the_surfaces():
     shapes = Shapes.build([("a", [SOLIDS["dilated mesh"]]), ("b", [SOLIDS["capsule"]])])
     R, x = poses(100, 2, 1.0, 1)
     found = Query(shapes, [0], [1]).batch(R, x)
-    for k in np.flatnonzero(found.reach[:, 0] == Reach.EXACT):
+    for k in np.flatnonzero(found.kind[:, 0] == DistanceKind.EXACT):
         p = Mesh(found.point_a[k, [0, 0, 0]], np.array([[0, 1, 2]], np.int32))
         still = np.stack([R[k, 0], IDENTITY])[None], np.stack([x[k, 0], np.zeros(3)])[None]
         assert coal_distance(SOLIDS["dilated mesh"].mesh, p, *still) == pytest.approx(0.05, abs=1e-9)
@@ -113,7 +113,7 @@ def test_robots_of_the_library_of_examples_agree_with_coal():
     query = Query(Shapes.build([("part", [Solid(mesh=SLOT)]), ("link", [Solid(mesh=link)])]), [0], [1])
     R, x = poses(100, 2, 0.6, 7)
     found = query.batch(R, x)
-    apart = found.reach[:, 0] == Reach.EXACT
+    apart = found.kind[:, 0] == DistanceKind.EXACT
     theirs = coal_distance(SLOT, link, R, x)
     np.testing.assert_allclose(found.distance[apart, 0], theirs[apart], atol=1e-12)
     assert (found.distance[~apart, 0] <= 0).all()

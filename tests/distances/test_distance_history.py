@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from concave import made_crowd, said, walk
 from seerob.core.errors import InputError, SimulationDiverged, UnknownName
-from seerob.distance.least import Per, Query, Reach
+from seerob.distance.least import DistanceKind, Per, Query
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_the_least_of_all_is_the_least_of_each(crowd):
     least = query.batch(R, x)
     assert (pairs.distance.reshape(-1, 3, 3).min(1) == by_body.distance).all()
     assert (by_body.distance.min(1) == least.distance[:, 0]).all()
-    assert (pairs.reach == Reach.DEPTH_AT_LEAST).any()
+    assert (pairs.kind == DistanceKind.DEPTH_AT_LEAST).any()
     assert (pairs.body_a == np.repeat(SETS[0], 3)).all()
     assert (pairs.body_b == np.tile(SETS[1], 3)).all()
 
@@ -58,7 +58,7 @@ def test_a_cap_changes_nothing_below_it(crowd):
     for one, other in zip(said(free), said(capped), strict=True):
         np.testing.assert_array_equal(one[near], other[near])
     assert (capped.distance[~near] == 0.2).all()
-    assert (capped.reach[~near] == Reach.BEYOND_CAP).all()
+    assert (capped.kind[~near] == DistanceKind.BEYOND_CAP).all()
     assert (capped.body_a[~near] == -1).all()
     assert np.isnan(capped.point_a[~near]).all()
 
@@ -68,7 +68,7 @@ def test_swapping_the_sets_swaps_the_points(crowd):
     one = Query(crowd, *SETS).batch(R, x)
     other = Query(crowd, *SETS[::-1]).batch(R, x)
     assert (one.distance == other.distance).all()
-    single = one.reach[:, 0] == Reach.EXACT
+    single = one.kind[:, 0] == DistanceKind.EXACT
     np.testing.assert_array_equal(one.point_a[single], other.point_b[single])
     np.testing.assert_array_equal(one.body_a[single], other.body_b[single])
 
@@ -79,7 +79,7 @@ def test_a_common_motion_changes_nothing(crowd):
     one = Query(crowd, *SETS).batch(R, x, Per.PAIR)
     moved = Query(crowd, *SETS).batch(turn @ R, x @ turn.T + shift, Per.PAIR)
     np.testing.assert_allclose(moved.distance, one.distance, atol=1e-12)
-    exact = one.reach == Reach.EXACT
+    exact = one.kind == DistanceKind.EXACT
     away = exact & (abs(one.distance) > 1e-6)
     close = abs(one.point_a @ turn.T + shift - moved.point_a).max(-1)[away]
     assert (close < 1e-9).mean() > 0.99  # The rest: two equally near points.

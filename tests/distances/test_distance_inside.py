@@ -5,7 +5,7 @@ import pytest
 
 from concave import IDENTITY, SLOT, SOLIDS, U_BOXES, boxes, bumpy_ball, poses
 from seerob.core.shapes.geometry import Solid, capsule
-from seerob.distance.least import Query, Reach, Shapes
+from seerob.distance.least import DistanceKind, Query, Shapes
 
 
 @pytest.mark.parametrize(
@@ -19,7 +19,7 @@ def test_a_hand_in_a_slot_is_where_it_is(y, true):
     )
     found = Query(shapes, [0], [1]).minimum(np.tile(IDENTITY, (2, 1, 1)), [[0, 0, 0], [0, y, 0.08]])
     assert found.distance == pytest.approx(true, abs=1e-12)
-    assert found.reach == (Reach.EXACT if y < 0.05 else Reach.DEPTH_AT_LEAST)
+    assert found.kind == (DistanceKind.EXACT if y < 0.05 else DistanceKind.DEPTH_AT_LEAST)
     assert np.linalg.norm(found.point_a - found.point_b) == pytest.approx(abs(true), abs=1e-12)
 
 
@@ -94,7 +94,7 @@ def test_two_meshes_overlap_exactly_when_their_boxes_do():
         whole |= (abs(g) + abs(turn) @ half < (high - low) / 2).all(1)
     assert whole.sum() > 50
     assert ((found.distance[:, 0] <= 0) == overlap).all()
-    assert (found.reach[overlap, 0] == Reach.DEPTH_AT_LEAST).all()
+    assert (found.kind[overlap, 0] == DistanceKind.DEPTH_AT_LEAST).all()
     swapped = Query(shapes, [1], [0]).batch(R, x)
     assert (swapped.distance == found.distance).all()
 
@@ -108,7 +108,7 @@ def test_a_body_wholly_inside_a_machine_is_as_deep_as_the_nearest_wall():
     found = Query(shapes, [0], [1, 2, 3]).per_body(np.tile(IDENTITY, (4, 1, 1)), x)
     reach = 0.5 + abs(inner.mesh.vertices[:, 1].min())
     np.testing.assert_allclose(found.distance, [-0.4 - 0.05, -(1 - reach), -0.5 - 0.06], atol=1e-12)
-    assert (found.reach == Reach.DEPTH_AT_LEAST).all()
+    assert (found.kind == DistanceKind.DEPTH_AT_LEAST).all()
     span = np.linalg.norm(found.point_a - found.point_b, axis=1)
     np.testing.assert_allclose(span, -found.distance, atol=1e-12)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from concave import made_crowd, said, walk
-from seerob.distance.least import Per, Query, Reach, Survey
+from seerob.distance.least import DistanceKind, Per, Query, Survey
 from seerob.distance.surveying import Surveyor
 
 
@@ -49,8 +49,8 @@ def test_whether_is_whether_the_distance_is_less(crowd, cap):
     expected = query.batch(R, x, Per.PAIR).distance < cap
     found = query.batch(R, x, Per.WHETHER)
     assert 0 < expected.sum() < expected.size
-    assert ((found.reach == Reach.WITHIN_CAP) == expected).all()
-    assert ((found.reach == Reach.BEYOND_CAP) == ~expected).all()
+    assert ((found.kind == DistanceKind.WITHIN_CAP) == expected).all()
+    assert ((found.kind == DistanceKind.BEYOND_CAP) == ~expected).all()
     assert (found.distance == cap).all()
     assert np.isnan(found.point_a).all()
     for n in np.random.default_rng(1).permutation(len(R)):

@@ -85,5 +85,5 @@ def play(*sources: CaptureFile, **tables: object) -> list[Told]:
         hearing = state.hearings["operator"]
         speed = float(np.abs(state.data.qvel[mechanism.v_address]).max())
         q = state.joint_positions(mechanism).copy()
-        told.append((state.t, state.doubt("operator"), dict(hearing.bones), speed, q))
+        told.append((state.t, state.invalid_reason("operator"), dict(hearing.bones), speed, q))
     return told

@@ -282,5 +282,5 @@ def test_who_is_seen_for_the_first_time_during_a_run_is_put_there():
         engine.take(near)
         state = engine.tick() if tick else engine.start()
         assert np.abs(state.data.qvel[mechanism.v_address]).max() < 10, state.t
-        assert bool(state.doubt("operator")) == (state.t < late - 1e-9), state.t
+        assert bool(state.invalid_reason("operator")) == (state.t < late - 1e-9), state.t
     assert state.joint_positions(mechanism)[0] > 2.9

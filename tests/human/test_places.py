@@ -247,7 +247,7 @@ def test_of_every_device_lost_places_leave_nobody_placed_and_nothing_of_it_is_wi
         if k == 19:
             before = set(hearing.unplaced(float(instant)))
     assert before == set()
-    known = set(BONES) - set(hearing.unseen(t[-1]))
+    known = set(BONES) - set(hearing.unobserved(t[-1]))
     assert known
     assert set(hearing.unplaced(t[-1])) == known
     assert "no device says where" in hearing.displaced(t[-1])

@@ -150,8 +150,8 @@ def test_what_knows_no_bound_stays_undecided(stopped):
     for ask in (
         lambda: state.require("operator"),
         lambda: state.fastest_point(hand),
-        lambda: state.fastest_points((hand,), estimates=True),
-        lambda: state.placed((hand,), estimates=True),
+        lambda: state.fastest_points((hand,), allow_estimated=True),
+        lambda: state.placed((hand,), allow_estimated=True),
         lambda: state.mass_matrix(stage.model.mechanisms["operator"]),
     ):
         with pytest.raises(Undecided, match="the twin is off"):

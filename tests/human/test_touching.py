@@ -134,7 +134,7 @@ def test_a_workpiece_in_the_hand_moves_with_it_and_weighs():
             engine.take(samples)
             state = engine.tick() if seq else engine.start()
         weights.append(gravity(state, station.model.mechanisms["operator"]))
-        assert state.doubt("operator") == ""
+        assert state.invalid_reason("operator") == ""
     box, hand = (station.model.frames[name] for name in ("box", "operator/right_hand"))
     (R, p), (Rh, ph) = state.pose(box), state.pose(hand)
     assert p == pytest.approx(ph + Rh @ [0.06, -0.08, 0.0], abs=1e-9)

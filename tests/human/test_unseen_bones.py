@@ -93,8 +93,8 @@ def test_hips_and_shoulders_of_a_picture_tell_the_trunk():
 )
 def test_who_is_not_seen_at_two_instants_alike_is_not_seen_between_them(sets):
     observed = [(0.1 * k, frozenset(seen)) for k, seen in enumerate(sets)]
-    assert Hearing(given=False, driven=True, observed=observed).unseen(0.05) == BONES
-    assert Hearing(given=False, driven=True).unseen(0.05) == ()
+    assert Hearing(given=False, driven=True, observed=observed).unobserved(0.05) == BONES
+    assert Hearing(given=False, driven=True).unobserved(0.05) == ()
 
 
 @pytest.mark.parametrize("physics", [True, False])
@@ -160,11 +160,11 @@ def test_other_figures_of_an_accepted_estimate_stay_undecided():
 
 
 def test_a_weight_of_nought_is_as_good_as_not_mapped():
-    unseen = dict.fromkeys((bone for bone in BONES if bone not in UPPER), 0.0)
+    unobserved = dict.fromkeys((bone for bone in BONES if bone not in UPPER), 0.0)
     named, _ = seen_only(UPPER, ticks=40)
-    state, _ = seen_only(UPPER, ticks=40, weights=unseen)
+    state, _ = seen_only(UPPER, ticks=40, weights=unobserved)
     assert state.bones_in_doubt("operator") == named.bones_in_doubt("operator") == estimated(UPPER)
-    assert state.interrupted("operator") == ""
+    assert state.input_reason("operator") == ""
 
 
 def test_a_person_whom_a_device_sees_whole_is_decided():

@@ -20,7 +20,7 @@ from seerob.core.samples import JointSample, Quality, SignalSample
 from seerob.devices.live import source_process
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.live.receivers import Receivers
-from seerob.devices.live.source_process import told
+from seerob.devices.live.source_process import pickled_source
 from seerob.devices.sources.headset import Headset
 from seerob.workstation.source import Source
 from told_sources import AtOnce, Delayed, Large, Missing, Mistaken, Stubborn, Told
@@ -183,9 +183,9 @@ def test_what_only_this_process_has_listens_here():
     class Local(Told, frozen=True, kw_only=True):
         """Defined where no other process finds it."""
 
-    assert told(Told(), None)
+    assert pickled_source(Told(), None)
     for source in (Local(), Headset(human="operator")):
-        assert told(source, None) is None
+        assert pickled_source(source, None) is None
     with Receivers([(Local(), None)]) as listening:
         assert process_of(listening) == os.getpid()
 

@@ -165,7 +165,7 @@ def test_who_is_on_whom(model):
 
 def test_a_silent_carrier_leaves_all_it_carries_undecided(model):
     engine, state = moving(model, ticks=5, timeout=0.1)
-    assert [state.doubt(name) for name in MOTION] == [""] * 4
+    assert [state.invalid_reason(name) for name in MOTION] == [""] * 4
     for k in range(5, 25):
         engine.take(
             [
@@ -175,7 +175,7 @@ def test_a_silent_carrier_leaves_all_it_carries_undecided(model):
         )
         state = engine.tick()
     for name in MOTION:
-        assert "axis: not heard for" in state.doubt(name)
+        assert "axis: not heard for" in state.invalid_reason(name)
     with pytest.raises(Undecided, match="axis: not heard"):
         state.closest(model.gap(model.select("arm"), model.select("op")))
 

@@ -82,7 +82,7 @@ def test_what_nobody_knows_looks_so_unless_it_is_held(tmp_path, when_stale, late
     for _ in range(25):
         state = engine.tick()
     assert looks.at(state) == later
-    assert state.signals.at("lamp/on", state.t).doubt
+    assert state.signals.at("lamp/on", state.t).invalid_reason
 
 
 def test_a_display_of_nothing_is_an_error(tmp_path):

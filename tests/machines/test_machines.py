@@ -99,14 +99,14 @@ def test_silence_of_its_source_shows_within_the_time_out(tmp_path):
     doubts = []
     for _ in range(60):
         state = engine.tick()
-        doubts.append(bool(state.doubt("gate")))
+        doubts.append(bool(state.invalid_reason("gate")))
     assert doubts.index(True) == 50
     with pytest.raises(Undecided, match="plc not heard"):
         state.signal("gate/position")
     engine.take([SignalSample(source="plc", seq=1, t=0.62, values={"gate/position": 0.75})])
     for _ in range(4):
         state = engine.tick()
-    assert not state.doubt("gate")
+    assert not state.invalid_reason("gate")
     assert state.q(station.model.mechanism("gate")) == pytest.approx([0.75], abs=1e-6)
 
 
@@ -123,9 +123,9 @@ def test_a_summed_speed_is_the_way_and_is_lost_in_a_silence():
     )
     assert [k for k, p in enumerate(places) if p.anew] == [76]
     lost = at(9.5, {"v": 0.25, "p": False})
-    assert "not known since" in lost.doubt
+    assert "not known since" in lost.invalid_reason
     again = at(9.6, {"v": 0.25, "p": True})
-    assert (again.q[0], again.doubt, again.anew) == (0.11, "", True)
+    assert (again.q[0], again.invalid_reason, again.anew) == (0.11, "", True)
 
 
 def test_a_counted_belt_is_known_again_after_a_silence():
@@ -133,7 +133,7 @@ def test_a_counted_belt_is_known_again_after_a_silence():
     at(0.0, {"x": 0.0})
     later = at(100.0, {"x": 3.0})
     assert later.q[0] == pytest.approx(1.11)
-    assert not later.doubt
+    assert not later.invalid_reason
     stops = follow(Belt(length=2.0, position="x"))
     assert [stops(t, {"x": x}).q[0] for t, x in enumerate((0.0, 1.0, 5.0, 4.5))] == [0.0, 1.0, 2.0, 1.5]
 
@@ -143,8 +143,8 @@ def test_a_counter_that_begins_again_makes_no_speed():
     told = [at(0.1 * k, {"x": x, "v": 0.25}) for k, x in enumerate((1.0, 1.025, 3.0, 3.025))]
     assert [place.anew for place in told] == [False, False, True, False]
     assert [float(place.qd[0]) for place in told] == [0.25] * 4
-    assert ["leapt by 1.95 m" in place.doubt for place in told] == [False, False, True, True]
-    assert not at(0.8, {"x": 3.15, "v": 0.25}).doubt
+    assert ["leapt by 1.95 m" in place.invalid_reason for place in told] == [False, False, True, True]
+    assert not at(0.8, {"x": 3.15, "v": 0.25}).invalid_reason
     # Without a speed beside it nobody knows better than the counter.
     alone = follow(Belt(length=5.0, position="x"))
     assert not any(alone(0.1 * k, {"x": x}).anew for k, x in enumerate((1.0, 3.0)))
@@ -153,7 +153,7 @@ def test_a_counter_that_begins_again_makes_no_speed():
 def test_a_count_of_one_round_that_begins_again_is_no_leap():
     at = follow(Belt(length=2.0, position="x", speed="v", at_end=AtEnd.LOOP))
     places = [at(0.1 * k, {"x": 0.025 * k % 2.0, "v": 0.25}) for k in range(200)]
-    assert not any(place.doubt for place in places)
+    assert not any(place.invalid_reason for place in places)
     np.testing.assert_allclose([p.q[0] for p in places], [0.025 * k % 2.0 for k in range(200)], atol=1e-9)
 
 
@@ -166,7 +166,7 @@ def test_a_machine_that_teleports_is_not_relied_on_for_a_while(tmp_path):
         x = 1.0 if k == 30 else 0.0
         engine.take([SignalSample(source="plc", seq=k, t=0.01 * k, values={"gate/position": x})])
         state = engine.tick() if k else engine.start()
-        undecided += [k] * ("jump" in state.doubt("gate"))
+        undecided += [k] * ("jump" in state.invalid_reason("gate"))
     # There and back are two leaps.
     assert undecided == list(range(30, undecided[-1] + 1))
     assert undecided[-1] in (80, 81)
@@ -188,12 +188,12 @@ def test_with_its_speed_an_uneven_network_does_not_make_a_belt_jerk():
 def test_between_its_ends_a_door_is_nowhere_sure():
     at = follow(Turn(open="o", lower=0.0, upper=1.5, travel=1.0))
     first = at(0.0, {"o": False})
-    assert (first.q[0], first.doubt) == (0.0, "")
+    assert (first.q[0], first.invalid_reason) == (0.0, "")
     on_its_way = at(0.5, {"o": True})
     assert on_its_way.q[0] == pytest.approx(0.75)
-    assert "nobody says where" in on_its_way.doubt
+    assert "nobody says where" in on_its_way.invalid_reason
     there = at(1.2, {"o": True})
-    assert (there.q[0], there.doubt) == (1.5, "")
+    assert (there.q[0], there.invalid_reason) == (1.5, "")
 
 
 def test_angles_go_on_the_short_way():
@@ -275,7 +275,7 @@ def test_after_a_hiccup_a_machine_is_not_as_fast_as_the_twin_that_catches_up(tmp
             seq += 1
         engine.take(samples)
         state = engine.tick() if k else engine.start()
-        if reason := state.doubt("gate"):
+        if reason := state.invalid_reason("gate"):
             reasons.append(reason)
         else:
             speeds.append(abs(float(state.qd(gate)[0])))

@@ -68,9 +68,9 @@ def test_a_cart_goes_round_and_round_at_its_speed():
     assert places[-1].qd is not None
     assert np.hypot(*places[-1].qd[:2]) == pytest.approx(0.7)
     lost = at(60.0, {"v": 0.7, "p": False})
-    assert "not known since" in lost.doubt
+    assert "not known since" in lost.invalid_reason
     again = at(60.1, {"v": 0.7, "p": True})
-    assert (again.doubt, again.anew) == ("", True)
+    assert (again.invalid_reason, again.anew) == ("", True)
     np.testing.assert_allclose(again.q[:2], [1.5, 0.0], atol=1e-9)
 
 
@@ -81,8 +81,8 @@ def test_fingers_go_half_the_way_each():
     assert ends(0.0, {"o": True}).q.tolist() == [0.04]
     going = ends(0.2, {"o": False})
     assert going.q == pytest.approx([0.02])
-    assert "on its way since o changed" in going.doubt
+    assert "on its way since o changed" in going.invalid_reason
     shut = ends(0.4, {"o": False})
-    assert (shut.q.tolist(), shut.doubt) == ([0.0], "")
+    assert (shut.q.tolist(), shut.invalid_reason) == ([0.0], "")
     with pytest.raises(ValueError, match="right angles to z"):
         Fingers(along=(0, 1, 1))

@@ -49,7 +49,7 @@ def test_pressed_against_a_part_the_twin_stops_and_says_so(tmp_path):
         for k in range(150):
             engine.take([heard("arm", 0.01 * k, (-0.01 * k,), (-1.0,))])
             state = engine.tick()
-        reports[name] = state.joint_positions(station.model.robot("arm"))[0], state.doubt("arm")
+        reports[name] = state.joint_positions(station.model.robot("arm"))[0], state.invalid_reason("arm")
     assert reports["free"] == (pytest.approx(-1.49, abs=1e-2), "")
     assert reports["asked"][0] == pytest.approx(-0.8, abs=0.01)
     assert "torque limit" in reports["asked"][1]
@@ -110,7 +110,7 @@ def test_a_robot_never_touches_itself(tmp_path):
     for _ in range(15):
         state = engine.tick()
         assert engine._data.ncon == 0
-    assert not state.doubt("arm")
+    assert not state.invalid_reason("arm")
 
 
 def test_an_area_is_watched_not_touched(tmp_path):

@@ -251,7 +251,7 @@ def test_the_pose_that_fri_says_is_compared(tmp_path: Path, lengths: tuple[float
     message = Monitoring(edition=Edition.V2_7, sequence=0, q=q, tcp=(*said.tolist(), 1.0, 0.0, 0.0, 0.0))
     heard = decode_monitoring(encode_monitoring(message))
     sample = fri_sample(heard, target="arm", arrived=0.0, device=0.0, qd=None)
-    assert bool(LiveWords(model, "arm").doubt(sample)) == doubt
+    assert bool(LiveWords(model, "arm").invalid_reason(sample)) == doubt
 
 
 def test_modbus_says_where_the_tool_is_while_the_robot_stands() -> None:
@@ -339,7 +339,7 @@ def test_each_live_sample_is_compared(tmp_path: Path) -> None:
         for i in range(3):
             engine.take([JointSample(source="s", seq=i, t=0.05 * i, target="arm", q=tuple(MOVING[i]),
                                      tcp=None if tcp is None else tuple(tcp[i]))])  # fmt: skip
-        doubts.append(engine.start().doubt("arm"))
+        doubts.append(engine.start().invalid_reason("arm"))
     assert doubts[:2] == ["", ""]
     assert "20 mm from the twin's, more than 10 mm (tcp_tolerance)" in doubts[2]
     result = Judge(bind(made.model))(engine.start())[0]

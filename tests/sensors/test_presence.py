@@ -21,13 +21,13 @@ def walked(folder, steps, more="response = 0.25\n"):
     index = {body.name: body.index for body in model.bodies}
     bodies = index["one"], index["two"]
     presence = Presence(model, model.workstation.sensors[0], index["mat"], bodies)
-    ways = [(presence.unseen, presence.until_output)]
+    ways = [(presence.undetected, presence.until_output)]
     for t, one, two, inside, triggered in steps:
         positions = np.zeros((len(model.bodies), 3))
         positions[bodies, 0] = one, two
         state = SimpleNamespace(t=t, placed=lambda _, x=positions: (None, x))
         presence.follow(state, np.array(inside), triggered)
-        ways.append((presence.unseen, presence.until_output))
+        ways.append((presence.undetected, presence.until_output))
     return np.array(ways)
 
 
@@ -46,9 +46,9 @@ def test_the_way_of_the_fastest_that_is_inside_counts(tmp_path):
         (0.7, 1.8, 1.1, BOTH, True),
     ]
     # Seen at 0.3 s; the output switches at 0.55 s.
-    unseen = [0, 0, 0.1, 0.4, 0.6, 0.6, 0.6, 0.6, 0.6]
+    undetected = [0, 0, 0.1, 0.4, 0.6, 0.6, 0.6, 0.6, 0.6]
     until = [0, 0, 0, 0, 0, 0.1, 0.2, 0.2 + 0.5 * 0.2, 0.3]
-    np.testing.assert_allclose(walked(tmp_path, steps), np.column_stack([unseen, until]), atol=1e-12)
+    np.testing.assert_allclose(walked(tmp_path, steps), np.column_stack([undetected, until]), atol=1e-12)
 
 
 @pytest.mark.parametrize("leave", [(0.3, 0.4, 0.0, NONE, False), (0.0, 0.4, 0.0, ONE, False)])

@@ -13,7 +13,7 @@ def test_the_truth_lies_in_95_of_100_intervals_of_random_motions():
     inside = []
     for seed in range(200):
         found = explain(cell()[0], "arm", said(seed, 1500))
-        told = [figure.told for figure in figures(found)]
+        told = [figure.determined for figure in figures(found)]
         inside += [
             abs(figure.value - truth) <= figure.half
             for figure, truth, there in zip(figures(found), TRUTH, told, strict=True)

@@ -114,7 +114,7 @@ def kill_and_restart(monkeypatch, ears, kind, kills):
             # Nothing is said for a device that is gone, so that its time-out begins with its last word.
             assert heard.newest <= stopped + 0.5 * source.timeout
             last = Hearing(given=False, driven=True, timeout=source.timeout, heard=[Heard(heard.newest)])
-            assert "not heard for" in last.doubt(stopped + 1.6 * source.timeout)
+            assert "not heard for" in last.invalid_reason(stopped + 1.6 * source.timeout)
             server.start()
         known = heard.known
         wait_for(lambda: heard.known > known + 2)

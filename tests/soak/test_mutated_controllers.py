@@ -132,8 +132,8 @@ def read_sparkplug(data):
 
 def read_plain(data):
     change = plain_change("v", Plain("t", "/a/0"), data, retained=False, now=0.0)
-    if change.doubt:
-        raise ProtocolError(change.doubt)
+    if change.invalid_reason:
+        raise ProtocolError(change.invalid_reason)
 
 
 def json_of(value):

@@ -185,8 +185,8 @@ def test_a_broker_that_falls_over_again_and_again_is_tried_again_and_again(port,
 def test_payloads(pointer, payload, raw, doubt):
     found = plain_change("v", Plain("t", pointer), payload, retained=False, now=0.0)
     assert found.raw == raw
-    assert doubt in found.doubt
-    assert bool(doubt) == bool(found.doubt)
+    assert doubt in found.invalid_reason
+    assert bool(doubt) == bool(found.invalid_reason)
 
 
 def test_what_the_broker_kept_is_as_old_as_it_says_or_doubtful():
@@ -196,10 +196,10 @@ def test_what_the_broker_kept_is_as_old_as_it_says_or_doubtful():
         assert plain_change("v", where, payload, retained=True, now=1002.5).age == pytest.approx(2.5)
     payload = json.dumps({"v": 1, "t": 1.7e12 + 500}).encode()
     assert plain_change("v", where, payload, retained=True, now=1.7e9 + 1).age == pytest.approx(0.5)
-    assert "how old" in plain_change("v", Plain("t"), b"1", retained=True, now=0.0).doubt
+    assert "how old" in plain_change("v", Plain("t"), b"1", retained=True, now=0.0).invalid_reason
     for stamp in (b"true", b"1e999", b"1" + b"0" * 400):
         payload = b'{"v": 1, "t": %s}' % stamp
-        assert "is no time" in plain_change("v", where, payload, retained=False, now=0.0).doubt
+        assert "is no time" in plain_change("v", where, payload, retained=False, now=0.0).invalid_reason
 
 
 @pytest.mark.parametrize(("ahead", "doubtful"), [(-0.5, False), (0.9, False), (1.1, True), (3600.0, True)])
@@ -207,7 +207,7 @@ def test_what_the_broker_kept_is_as_old_as_it_says_or_doubtful():
 def test_a_time_that_lies_ahead_does_not_make_an_old_value_new(ahead, doubtful, retained):
     payload = json.dumps({"v": 1, "t": 1.7e9 + ahead}).encode()
     found = plain_change("v", Plain("t", "/v", time="/t"), payload, retained=retained, now=1.7e9)
-    assert ("ahead of this computer's clock" in found.doubt) is doubtful
+    assert ("ahead of this computer's clock" in found.invalid_reason) is doubtful
     assert found.age == pytest.approx(0.0 if doubtful else max(0.0, -ahead))
 
 

@@ -45,7 +45,7 @@ def test_a_machine_on_the_robot_stops_by_neither_its_brakes_nor_its_table(tmp_pa
         assert stop.courses(moving(cell, speed))(1.0).T_s > 0
         return
     found = stop.courses(moving(cell, speed))(1.0)
-    assert "axis moves on arm" in found.doubt
+    assert "axis moves on arm" in found.unbounded_reason
     # How far it gets before it brakes is known all the same.
     assert (found.S_r > 0).all()
     assert not found.S_s.any()

@@ -97,7 +97,7 @@ def test_a_speed_limit_of_0_says_nothing_of_full_speed(tmp_path, of_the_file):
     said = {"at": "velocity_limits = [0, 1]\n"} if of_the_file else {}
     urdf = two_r() if of_the_file else two_r().replace('velocity="10"', 'velocity="0"')
     found = course(tmp_path / "moves", table(one), (0.0, 0.0), (5.0, 0.0), urdf=urdf, **said)
-    assert "j1: neither the stopping table nor the robot says what full speed" in found.doubt
+    assert "j1: neither the stopping table nor the robot says what full speed" in found.unbounded_reason
     assert course(tmp_path / "stands", table(one), (0.0, 0.0), (0.0, 0.0), urdf=urdf, **said).T_s == 0.0
 
 

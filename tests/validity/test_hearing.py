@@ -92,7 +92,7 @@ def test_a_feed_without_a_source_goes_stale_too(arm):
     engine.take([heard("arm", 0.0, (0.1, 0.2))])
     for _ in range(22):
         state = engine.tick()
-    assert "not heard for" in state.doubt("arm")
+    assert "not heard for" in state.invalid_reason("arm")
 
 
 def test_gap_in_a_recording_is_undecided_though_its_end_is_known(arm):
@@ -141,10 +141,10 @@ def test_values_that_are_not_finite_move_nothing_and_are_undecided(arm, bad):
     engine.start()
     engine.take([heard("arm", 0.01, (bad, 0.2))])
     state = engine.tick()
-    assert "not finite" in state.doubt("arm")
+    assert "not finite" in state.invalid_reason("arm")
     np.testing.assert_allclose(state.joint_positions(arm.model.robot("arm")), [0.1, 0.2], atol=1e-9)
     engine.take([heard("arm", 0.02, (0.1, 0.2), (0.0, bad))])
-    assert "not finite" in engine.tick().doubt("arm")
+    assert "not finite" in engine.tick().invalid_reason("arm")
 
 
 def test_sample_with_another_number_of_joints_is_refused(arm):
@@ -162,7 +162,7 @@ def test_old_samples_do_not_turn_back_time(arm):
     engine.take([heard("arm", 0.5, (0.1, 0.2)), heard("arm", 0.1, (3.0, 3.0), quality=Quality.INVALID)])
     for _ in range(60):
         state = engine.tick()
-    assert not state.doubt("arm")
+    assert not state.invalid_reason("arm")
     np.testing.assert_allclose(state.joint_positions(arm.model.robot("arm")), [0.1, 0.2], atol=1e-6)
 
 
@@ -178,14 +178,14 @@ def test_jumps_of_a_whole_person_do_not_explode(tmp_path, size):
         q = person.home + (step if (k // 20) % 2 else 0)
         engine.take([heard("op", 0.01 * k + 0.01, q)])
         state = engine.tick()
-        doubted += bool(state.doubt("op"))
+        doubted += bool(state.invalid_reason("op"))
         assert np.isfinite(state.positions).all()
         assert np.abs(state.joint_positions(person)).max() < max(size) + 50
     assert doubted >= 4
     for k in range(90, 180):
         engine.take([heard("op", 0.01 * k + 0.01, q)])
         state = engine.tick()
-    assert not state.doubt("op")
+    assert not state.invalid_reason("op")
     np.testing.assert_allclose(state.joint_positions(person), q, atol=0.01)
 
 
@@ -201,8 +201,8 @@ def test_jump_of_a_robot_is_undecided_while_it_happens_and_decided_after(arm):
 def test_a_doubt_about_what_was_said_before_counts_where_that_lies_ahead_too():
     """After a pause of the run the newest sample is repeated as late, and may lie ahead of the tick."""
     good = [Heard(0.99), Heard(1.005)]
-    assert not Hearing(given=False, driven=True, heard=good).doubt(1.0)
+    assert not Hearing(given=False, driven=True, heard=good).invalid_reason(1.0)
     repeated = Hearing(given=False, driven=True, heard=[*good, Heard(1.005 + AFTER, "run time fell behind")])
-    assert repeated.doubt(1.0) == repeated.doubt(1.005) == "run time fell behind"
+    assert repeated.invalid_reason(1.0) == repeated.invalid_reason(1.005) == "run time fell behind"
     later = Hearing(given=False, driven=True, heard=[*good, Heard(1.013, "robot off")])
-    assert not later.doubt(1.0)
+    assert not later.invalid_reason(1.0)

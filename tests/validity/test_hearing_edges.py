@@ -38,12 +38,12 @@ def test_what_is_older_than_the_last_sample_is_forgotten(t: float, kept: list[fl
 
 def test_a_sample_counts_from_its_instant_on_and_to_the_end_of_the_time_out() -> None:
     hearing = heard(SLACK, timeout=0.5)
-    assert hearing.doubt(0.0) == ""
-    assert hearing.doubt(-1e-6) == "nothing heard yet"
+    assert hearing.invalid_reason(0.0) == ""
+    assert hearing.invalid_reason(-1e-6) == "nothing heard yet"
     hearing = heard(0.0, timeout=0.5)
     last = 0.5 + SLACK
-    assert hearing.doubt(last) == ""
-    assert "not heard for" in hearing.doubt(np.nextafter(last, 1))
+    assert hearing.invalid_reason(last) == ""
+    assert "not heard for" in hearing.invalid_reason(np.nextafter(last, 1))
 
 
 def test_what_is_said_of_bones_counts_between_the_samples_beside_an_instant() -> None:
@@ -52,7 +52,7 @@ def test_what_is_said_of_bones_counts_between_the_samples_beside_an_instant() ->
     hearing.parts += [(0.0, (first,)), (1.0, ()), (2.0, ()), (3.0, (last,))]
     expected = {-1.0: (first,), 0.0: (first,), 0.5: (first,), 1.0 - SLACK: (), 1.5: (), 2.5: (last,)}
     for t, doubted in expected.items():
-        assert hearing.doubted(t) == doubted, t
+        assert hearing.invalid_parts(t) == doubted, t
     hearing.aims += [
         (0.0, {"head": 0.9}),
         (1.0, {"head": 0.1, "left_hand": 0.3}),
@@ -70,8 +70,8 @@ def test_what_is_said_of_bones_counts_between_the_samples_beside_an_instant() ->
     everything = frozenset(BONES)
     blind, armless = everything - {"head"}, everything - {"right_hand"}
     hearing.observed += [(0.0, blind), (1.0, everything), (2.0, everything), (3.0, armless)]
-    for t, unseen in {0.5: ("head",), 1.0 - SLACK: (), 1.5: (), 2.5: ("right_hand",)}.items():
-        assert hearing.unseen(t) == unseen, t
+    for t, unobserved in {0.5: ("head",), 1.0 - SLACK: (), 1.5: (), 2.5: ("right_hand",)}.items():
+        assert hearing.unobserved(t) == unobserved, t
 
 
 def test_angles_that_nothing_tells_count_between_the_samples_beside_an_instant() -> None:
@@ -89,5 +89,5 @@ def test_a_joint_beyond_which_nothing_is_seen_tells_nothing_of_its_bone() -> Non
     elbow = frozenset({"right_forearm"})
     hearing.observed += [(t, armless) for t in (0.0, 1.0, 2.0, 3.0)]
     hearing.bare += [(0.0, elbow), (1.0, frozenset()), (2.0, frozenset()), (3.0, elbow)]
-    found = {t: "right_forearm" in hearing.unseen(t) for t in (0.5, 1.0 - SLACK, 1.5, 2.5)}
+    found = {t: "right_forearm" in hearing.unobserved(t) for t in (0.5, 1.0 - SLACK, 1.5, 2.5)}
     assert found == {0.5: True, 1.0 - SLACK: False, 1.5: False, 2.5: True}

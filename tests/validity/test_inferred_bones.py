@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seerob.description.humans.skeleton import BONES, PARENTS
-from seerob.twin.accuracy.tracking_error import told_between, told_bound, told_errors
+from seerob.twin.accuracy.tracking_error import inferred_between, inferred_bound, inferred_errors
 
 
 def elbow(P, C, a, b, angle, rng):
@@ -33,7 +33,7 @@ def test_no_elbow_with_the_same_bones_is_farther_than_the_bound(e):
         d = rng.uniform(abs(a - b) + 1e-3, a + b - 1e-6)
         P, C = np.zeros(3), d * unit(rng)
         J = elbow(P, C, a, b, rng.uniform(0, 7), rng)
-        bound = told_bound(P, J, C, e)
+        bound = inferred_bound(P, J, C, e)
         # The error shared between both ends.
         share = rng.uniform()
         P2, C2 = P + share * e * unit(rng), C + (1 - share) * e * unit(rng)
@@ -47,22 +47,22 @@ def test_no_elbow_with_the_same_bones_is_farther_than_the_bound(e):
 
 def test_a_straight_arm_tells_its_elbow_and_a_bent_one_the_circle():
     P, C = np.zeros(3), np.array([0.6, 0, 0])
-    assert told_bound(P, np.array([0.3, 0, 0]), C, 0.0) == pytest.approx(0, abs=1e-9)
+    assert inferred_bound(P, np.array([0.3, 0, 0]), C, 0.0) == pytest.approx(0, abs=1e-9)
     bent = np.array([0.2, 0.2, 0])
-    assert told_bound(P, bent, np.array([0.4, 0, 0]), 0.0) == pytest.approx(0.4, rel=1e-12)
+    assert inferred_bound(P, bent, np.array([0.4, 0, 0]), 0.0) == pytest.approx(0.4, rel=1e-12)
 
 
 def test_how_the_upper_arm_is_turned_tells_the_elbow():
     seen = set(BONES) - {"left_forearm"}
-    assert told_between(seen) == {"left_forearm": ("left_hand",)}
+    assert inferred_between(seen) == {"left_forearm": ("left_hand",)}
     joints = {bone: np.zeros(3) for bone in BONES}
     joints |= {"left_forearm": np.array([0.2, 0.2, 0]), "left_hand": np.array([0.4, 0, 0])}
     errors = dict.fromkeys(seen, (0.0, None))
-    found = told_errors(seen, errors, joints)
+    found = inferred_errors(seen, errors, joints)
     assert found == pytest.approx({"left_upper_arm": 0.4, "left_forearm": 0.4}, rel=1e-9)
-    turned = told_errors(seen, {**errors, "left_upper_arm": (0.01, 0.1)}, joints)
+    turned = inferred_errors(seen, {**errors, "left_upper_arm": (0.01, 0.1)}, joints)
     assert turned == pytest.approx({"left_forearm": 0.01 + 0.1 * np.hypot(0.2, 0.2)})
-    assert not told_errors(BONES, errors, joints)
+    assert not inferred_errors(BONES, errors, joints)
     assert PARENTS["left_hand"] == "left_forearm"
 
 
@@ -85,7 +85,7 @@ def test_the_bound_is_the_formula():
         e = min(rng.choice([1e-4, 0.005, 0.05]), 0.9 * d)
         P = rng.normal(size=3)
         C = P + d * unit(rng)
-        bound, cap = told_bound(P, elbow(P, C, a, b, 1.0, rng), C, e), 2 * min(a, b) + e
+        bound, cap = inferred_bound(P, elbow(P, C, a, b, 1.0, rng), C, e), 2 * min(a, b) + e
         formula = sampled_bound(a, b, d, e)
         assert bound == pytest.approx(min(cap, formula), rel=2e-3 * e / d + 1e-7)
         capped, free = capped + (formula > cap), free + (formula < cap)
@@ -95,7 +95,7 @@ def test_the_bound_is_the_formula():
 @pytest.mark.parametrize("d", [0.01, 0.01 + 1e-9])
 def test_ends_that_may_meet_tell_nothing_but_the_lengths(d):
     J = np.array([d / 2, 0.2, 0])
-    assert told_bound(np.zeros(3), J, np.array([d, 0, 0]), 0.01) == pytest.approx(
+    assert inferred_bound(np.zeros(3), J, np.array([d, 0, 0]), 0.01) == pytest.approx(
         2 * np.hypot(d / 2, 0.2) + 0.01, rel=1e-12
     )
 
@@ -114,18 +114,18 @@ def test_what_the_ends_are_off_by_adds_and_the_best_child_tells():
     seen = {parent, *children}
     off = {parent: (0.02, None)} | {child: (0.005 * k or None, None) for k, child in enumerate(children)}
     P, J = joints[parent], joints[bone]
-    bounds = [told_bound(P, J, joints[c], 0.02 + (off[c][0] or 0.0)) for c in children]
+    bounds = [inferred_bound(P, J, joints[c], 0.02 + (off[c][0] or 0.0)) for c in children]
     assert len(set(bounds)) == len(bounds)
-    found = told_errors(seen, off, joints)
+    found = inferred_errors(seen, off, joints)
     assert found == pytest.approx({parent: min(bounds), bone: min(bounds)}, rel=1e-12)
-    nothing = told_errors(seen, {**off, parent: (None, None)}, joints)
-    bounds = [told_bound(P, J, joints[c], off[c][0] or 0.0) for c in children]
+    nothing = inferred_errors(seen, {**off, parent: (None, None)}, joints)
+    bounds = [inferred_bound(P, J, joints[c], off[c][0] or 0.0) for c in children]
     assert nothing[bone] == pytest.approx(min(bounds), rel=1e-12)
 
 
 def test_a_bone_is_off_by_no_less_than_its_worst_child():
     bone, parent, children, joints = forked()
     off = {parent: (None, 0.1)} | {child: (2.0 + k, None) for k, child in enumerate(children)}
-    assert told_errors({parent, *children}, off, joints) == {bone: 2.0 + len(children) - 1}
-    turned = told_errors({parent, *children}, {**off, **dict.fromkeys(children, (None, None))}, joints)
+    assert inferred_errors({parent, *children}, off, joints) == {bone: 2.0 + len(children) - 1}
+    turned = inferred_errors({parent, *children}, {**off, **dict.fromkeys(children, (None, None))}, joints)
     assert turned == {bone: pytest.approx(0.1 * np.linalg.norm(joints[bone] - joints[parent]), rel=1e-12)}

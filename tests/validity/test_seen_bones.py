@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from seerob.twin.validity.seen_bones import unseen_reason
+from seerob.twin.validity.seen_bones import unobserved_reason
 
 BONES = ("head", "chest", "pelvis", "left_hand", "right_hand", "left_foot", "right_foot", "left_thigh")
 
@@ -20,4 +20,4 @@ BONES = ("head", "chest", "pelvis", "left_hand", "right_hand", "left_foot", "rig
     ],
 )
 def test_the_first_six_are_named_and_the_others_counted(n, said):
-    assert unseen_reason("operator", BONES[:n]) == said
+    assert unobserved_reason("operator", BONES[:n]) == said

@@ -98,8 +98,8 @@ def test_a_bone_between_two_that_are_seen_ends_where_its_parent_does(tmp_path):
         for bone in ("upper_arm", "forearm")
     )
     arm = {"left_upper_arm": (0.01, 0.2), "left_hand": (0.03, None)}
-    for unseen in ({}, {"left_forearm": (None, None)}):
-        state.hearings["op"].bones = arm | unseen
+    for unobserved in ({}, {"left_forearm": (None, None)}):
+        state.hearings["op"].bones = arm | unobserved
         found = off(station, state, "op/left_forearm", "op/left_hand", "op/right_forearm")
         assert found == pytest.approx([0.01 + 0.2 * np.linalg.norm(elbow - shoulder), 0.03, 0])
     state.hearings["op"].bones = {"left_upper_arm": (0.01, 0.2)}

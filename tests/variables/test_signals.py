@@ -35,16 +35,16 @@ def known(t, age=0.0, source=1.0):
 
 def test_its_own_time_out_counts_after_the_session_has_ended():
     """The last picture is all there is; a second of the source's time-out is not half a second of its own."""
-    assert known(0.49).doubt == ""
+    assert known(0.49).invalid_reason == ""
     for t in (0.51, 0.7, 0.98):
-        assert f"not heard for {t:.2f} s (time-out 0.5 s)" in known(t).doubt
-    assert "time-out 0.2 s" in known(0.3, source=0.2).doubt
+        assert f"not heard for {t:.2f} s (time-out 0.5 s)" in known(t).invalid_reason
+    assert "time-out 0.2 s" in known(0.3, source=0.2).invalid_reason
 
 
 @pytest.mark.parametrize("age", [0.1, 0.4])
 def test_it_is_as_old_as_the_question(age):
-    assert known(0.49 - age, age=age).doubt == ""
-    assert "not heard for 0.51 s" in known(0.51 - age, age=age).doubt
+    assert known(0.49 - age, age=age).invalid_reason == ""
+    assert "not heard for 0.51 s" in known(0.51 - age, age=age).invalid_reason
 
 
 def test_an_answer_that_takes_its_time_is_as_old_as_its_question():
@@ -101,7 +101,9 @@ def gate(folder, more="", address='"gate"', age=0.0, ticks=20):
     ages = {"gate/position": age} if age else {}
     engine.take([SignalSample(source="plc", seq=0, t=0.0, values={"gate/position": 0.25}, ages=ages)])
     states = [engine.start()]
-    return [state.doubt("gate") for state in states] + [engine.tick().doubt("gate") for _ in range(ticks)]
+    return [state.invalid_reason("gate") for state in states] + [
+        engine.tick().invalid_reason("gate") for _ in range(ticks)
+    ]
 
 
 def test_what_moves_by_who_sends_no_time_is_known_where_the_file_bounds_how_late_it_is(tmp_path):

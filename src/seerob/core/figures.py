@@ -81,7 +81,7 @@ def against(value: float | None, limit: float | None, unit: str = "", *, at_most
     return Pair(_signed(repr(float(value))), _signed(repr(float(limit))))
 
 
-def told(value: float, limit: float | None, unit: str = "", *, at_most: bool) -> str:
+def worded(value: float, limit: float | None, unit: str = "", *, at_most: bool) -> str:
     """A value with its unit, on its side of the limit where there is one: what a label in a picture says."""
     if limit is not None and math.isfinite(value) and math.isfinite(limit):
         places = _places(unit, value, limit)

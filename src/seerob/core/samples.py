@@ -30,7 +30,7 @@ class Quality(StrEnum):
     LATE = "late"
     """Heard while this machine fell behind: run time stood still, and speeds across the gap are false."""
 
-    def doubt(self, who: str) -> str:
+    def invalid_reason(self, who: str) -> str:
         """Why what somebody said may not be relied on; empty when it may."""
         if self is Quality.GOOD:
             return ""
@@ -57,13 +57,13 @@ class SampleBase(Struct, frozen=True, kw_only=True, tag=True):
     """How much later it arrived than what came fastest from that device [s]; where that sends no time, how
     much older than ``t`` it may be, as the file says."""
 
-    def doubt(self, who: str) -> str:
+    def invalid_reason(self, who: str) -> str:
         """Why it may not be relied on; empty when it may.
 
         Args:
             who: Whoever says so, for the words.
         """
-        return self.reason or self.quality.doubt(who)
+        return self.reason or self.quality.invalid_reason(who)
 
 
 class JointSample(SampleBase, frozen=True, kw_only=True, tag="joint"):

@@ -314,7 +314,7 @@ class BetweenTicks:
         opened = Told()
         for begin, end in pairwise((before.t, *switches, now.t)):
             known = state.signals.at(active, begin)
-            if end <= begin or (known.value is False and not known.doubt):
+            if end <= begin or (known.value is False and not known.invalid_reason):
                 continue
             if watch.remembers:
                 return Told(open=f"{active} switched between two ticks, and what is asked remembers")
@@ -432,7 +432,7 @@ class BetweenTicks:
             what = "it remembers" if remembers else "something was picked up or let go"
             return Told(open=f"not known to be within from {begin} to {end}: {what}")
         spans = [(low, ends[0].t, *ends)]
-        doubt = ""
+        invalid_reason = ""
         for _ in range(MOST if watch.lowest is None else FEW):
             if not spans:
                 break
@@ -447,11 +447,11 @@ class BetweenTicks:
                     if not low >= 0:
                         heapq.heappush(spans, (low, pair[0].t, *pair))
                 elif _UNDECIDED in (pair[0].verdict, pair[1].verdict):
-                    doubt = doubt or result.reason
-        if not spans and not doubt:
+                    invalid_reason = invalid_reason or result.reason
+        if not spans and not invalid_reason:
             return Told()
         if not spans:
-            return Told(open=f"between two ticks: {doubt}")
+            return Told(open=f"between two ticks: {invalid_reason}")
         _, _, a, b = spans[0]
         return Told(open=f"not known to be within from {a.t:.4f} s to {b.t:.4f} s, between two ticks")
 

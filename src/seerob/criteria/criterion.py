@@ -191,9 +191,9 @@ class Criterion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
                 found |= set(model.select(name))
         return found
 
-    def unseen(self, model: Model) -> str:
+    def unshaped(self, model: Model) -> str:
         """Why nothing is within: what no shape shows of the robots that it speaks of; empty for nothing."""
-        return model.unseen(self.depends(model)) if self.by_shape else ""
+        return model.unshaped(self.depends(model)) if self.by_shape else ""
 
 
 def judge(value: float, limit: float | None, *, at_most: bool = True) -> Verdict | None:

@@ -72,7 +72,7 @@ def bound_to(model: Model, criterion: Criterion, group: str) -> Bound:
     except SeerobError:
         raise
     except Exception as error:
-        raise PluginError(f"{method} of {kind.__module__} fails: {told(error)}") from error
+        raise PluginError(f"{method} of {kind.__module__} fails: {worded(error)}") from error
     for what, returned, right in (
         ("bind", evaluate, callable(evaluate)),
         ("basis", basis, isinstance(basis, Basis)),
@@ -168,7 +168,7 @@ def _where(bound: Bound) -> str:
     return kind_of(bound.group, bound.criterion)
 
 
-def told(error: Exception) -> str:
+def worded(error: Exception) -> str:
     """An error in a sentence, with the place in the code where it came from."""
     last = traceback.extract_tb(error.__traceback__)[-1:]
     place = "".join(f" ({Path(frame.filename).name}, line {frame.lineno})" for frame in last)
@@ -210,10 +210,10 @@ def _open(part: Result, reason: str) -> Result:
 def held(criterion: Criterion, model: Model, findings: Iterable[Finding]) -> str:
     """Why nothing that a criterion says of its subjects is within; empty for nothing.
 
-    Shapes that are missing (`Criterion.unseen`), and findings that hold a name (`Finding.holds`) that means
+    Shapes that are missing (`Criterion.unshaped`), and findings that hold a name (`Finding.holds`) that means
     some of what the criterion's subjects mean.
     """
-    reasons = [criterion.unseen(model)]
+    reasons = [criterion.unshaped(model)]
     subjects = criterion.subjects()
     bodies = {i for name in subjects for i in _meant(model, name)}
     for finding in findings:
@@ -232,7 +232,7 @@ def unmentioned(criterion: Criterion, model: Model) -> dict[str, str]:
     subjects = criterion.depends(model)
     meant = {model.bodies[i].carrier for name in subjects for i in _meant(model, name)}
     meant |= {name.partition("/")[0] for name in subjects}
-    every = {name: model.unseen((name,)) for name in model.mechanisms if name not in meant}
+    every = {name: model.unshaped((name,)) for name in model.mechanisms if name not in meant}
     return {name: text for name, text in every.items() if text}
 
 
@@ -307,8 +307,8 @@ class Judge:
             self._unmentioned = tuple(unmentioned(bound.criterion, model) for bound in self._bound)
             self._as_heard = AsHeard(model)
         assert self._as_heard is not None
-        if (told := self._as_heard.at(state)) is not None:
-            findings = tuple(dict.fromkeys((*state.model.findings, *self._findings, *told)))
+        if (worded := self._as_heard.at(state)) is not None:
+            findings = tuple(dict.fromkeys((*state.model.findings, *self._findings, *worded)))
             self._held = tuple(held(bound.criterion, state.model, findings) for bound in self._bound)
             self._held_names = held_names(findings, state.model)
         results = tuple(self._one(i, bound, state) for i, bound in enumerate(self._bound))
@@ -423,7 +423,7 @@ class Judge:
         return undecided(result, noise.reason) if noise.reason else result
 
     def _failed(self, bound: Bound, error: Exception) -> str:
-        what = f"{_where(bound)} failed: {told(error)}"
+        what = f"{_where(bound)} failed: {worded(error)}"
         self._warn(bound, what)
         return what
 
@@ -448,7 +448,7 @@ class Judge:
 
         Set back before its instant it says nothing.
         """
-        if not kept.since - SLACK <= state.t < kept.due - SLACK or any(map(state.interrupted, kept.asked)):
+        if not kept.since - SLACK <= state.t < kept.due - SLACK or any(map(state.input_reason, kept.asked)):
             return False
         return criterion.active is None or bool(state.signal(criterion.active)) is not kept.muted
 

@@ -35,7 +35,7 @@ def seen_first(
     parts: dict[tuple[int, ...], Evaluate | None] = {}
 
     def evaluate(state: State) -> Result:
-        lost = state.lost_bodies(bodies)
+        lost = state.invalid_bodies(bodies)
         if not lost:
             return judge(state)
         if lost not in parts:
@@ -60,8 +60,8 @@ def partly_seen(model: Model, gap: Gap, bind: Callable[[Gap], Evaluate]) -> Eval
     Args:
         model: The compiled workstation.
         gap: Between the two sets of bodies.
-        bind: Makes the criterion for a part of the gap. It asks for distances with ``estimates`` and widens
-            them by `seerob.twin.accuracy.tracking_error.TrackingError`.
+        bind: Makes the criterion for a part of the gap. It asks for distances with ``allow_estimated`` and
+            widens them by `seerob.twin.accuracy.tracking_error.TrackingError`.
     """
 
     def without(lost: tuple[int, ...]) -> Evaluate | None:

@@ -4,7 +4,7 @@ A `Shapes` is built once per model; a `Query` binds the two sets once and then a
 
 The distance of two solids is that of their cores less their radii. While cores are apart it is exact,
 down to minus the sum of the radii. When cores intersect, or one lies wholly inside a mesh, the
-overlap is *at least* as deep as the (never positive) value says, and `Reach.DEPTH_AT_LEAST` says so:
+overlap is *at least* as deep as the (never positive) value says, and `DistanceKind.DEPTH_AT_LEAST` says so:
 no library gives a meaningful depth of two concave meshes. The least over many pairs is the least of
 these values, so a body inside a machine can never read as far from it.
 """
@@ -25,10 +25,10 @@ from seerob.kernels import nearest as kernel
 from seerob.kernels.pairs import MESH
 from seerob.kernels.shapes import Indices, Shapes
 
-__all__ = ["Closest", "Closests", "Per", "Query", "Reach", "Shapes", "Survey"]
+__all__ = ["Closest", "Closests", "DistanceKind", "Per", "Query", "Shapes", "Survey"]
 
 
-class Reach(IntEnum):
+class DistanceKind(IntEnum):
     """What a distance tells."""
 
     EXACT = kernel.EXACT
@@ -69,7 +69,7 @@ class Closest:
     body_a: int
     """Index in `Shapes.names`; -1 beyond the cap."""
     body_b: int
-    reach: Reach
+    kind: DistanceKind
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +83,8 @@ class Closests:
     point_b: Array
     body_a: Indices
     body_b: Indices
-    reach: NDArray[np.int8]
-    """Values of `Reach`."""
+    kind: NDArray[np.int8]
+    """Values of `DistanceKind`."""
 
     def of(self, *index: int | slice | Indices) -> Closests:
         """Some of them."""
@@ -94,7 +94,7 @@ class Closests:
             self.point_b[index],
             self.body_a[index],
             self.body_b[index],
-            self.reach[index],
+            self.kind[index],
         )
 
     def shaped(self, shape: tuple[int, ...]) -> Closests:
@@ -105,7 +105,7 @@ class Closests:
             self.point_b.reshape((*shape, 3)),
             self.body_a.reshape(shape),
             self.body_b.reshape(shape),
-            self.reach.reshape(shape),
+            self.kind.reshape(shape),
         )
 
     def at(self, *index: int) -> Closest:
@@ -116,7 +116,7 @@ class Closests:
             self.point_b[index],
             int(self.body_a[index]),
             int(self.body_b[index]),
-            Reach(int(self.reach[index])),
+            DistanceKind(int(self.kind[index])),
         )
 
 
@@ -315,18 +315,18 @@ class Survey:
             R, x = R.reshape(-1, 3, 3), x.reshape(-1, 3)
         count = len(caps) * many[0] if many else len(caps)
         # Not bound like the rest: whoever keeps an answer must never see that of a later tick in it.
-        figures, winners, reach = (
+        figures, winners, kinds = (
             np.empty((7, count)),
             np.empty((2, count), np.int64),
             np.empty(count, np.int8),
         )
-        bad, body = kernel.nearest(R, x, n, bound.table, caps, figures, winners, reach)
+        bad, body = kernel.nearest(R, x, n, bound.table, caps, figures, winners, kinds)
         if bad >= 0:
             self._memory = self._forget()
             sample = f" of sample {bad}" if many and many[0] > 1 else ""
             raise SimulationDiverged(f"the pose of {self.shapes.names[body]!r}{sample} is not finite")
         points = figures[1:].reshape(2, count, 3)
-        found = Closests(figures[0], points[0], points[1], winners[0], winners[1], reach)
+        found = Closests(figures[0], points[0], points[1], winners[0], winners[1], kinds)
         return found.shaped((*many, len(caps))) if many else found
 
 

@@ -131,7 +131,7 @@ class Mechanism:
     """Machines that are mounted on it: their bodies are among its own, their joints are not."""
     holders: tuple[str, ...] = ()
     """Machines among ``riders`` that pick things up: its mass depends on them."""
-    unseen: tuple[str, ...] = ()
+    unshaped: tuple[str, ...] = ()
     """Full names of links and things with a mass, part of which lies where none of their shapes is."""
 
     @property
@@ -214,7 +214,7 @@ class Model:
     _gaps: dict[tuple[tuple[int, ...], tuple[int, ...]], Gap] = field(default_factory=dict)
 
     @property
-    def estimates(self) -> dict[str, float]:
+    def estimate_uncertainty(self) -> dict[str, float]:
         """How far bones that nobody sees may be off [m], of the people whose estimate the file accepts."""
         people = self.workstation.humans
         return {h.name: h.unseen_uncertainty for h in people if h.unseen_uncertainty is not None}
@@ -315,7 +315,7 @@ class Model:
             raise UnknownName("robot, human, tool or part with a shape", name, self.names())
         return found
 
-    def unseen(self, names: Iterable[str]) -> str:
+    def unshaped(self, names: Iterable[str]) -> str:
         """What no shape shows of robots and links that names mean, in a sentence; empty for nothing.
 
         Names are those of `select`.
@@ -325,7 +325,7 @@ class Model:
             found |= dict.fromkeys(
                 link
                 for m in self.mechanisms.values()
-                for link in m.unseen
+                for link in m.unshaped
                 if name in (m.name, link) or link.startswith(name + "/") or fnmatchcase(link, name)
             )
         links = ", ".join(found)

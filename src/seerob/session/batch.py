@@ -22,7 +22,7 @@ from seerob.core.errors import Undecided, UnknownName
 from seerob.core.snapshot import Finding, Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, EvaluateMany
-from seerob.criteria.judging import Judge, held, held_names, needed, told, unmentioned
+from seerob.criteria.judging import Judge, held, held_names, needed, unmentioned, worded
 from seerob.model.model import Model
 from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
 from seerob.recording.series import CODES, ONE_INSTANT
@@ -125,7 +125,7 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
         if state.path is not None:
             ways.append(state.path)
         for name, found in doubts.items():
-            found.append(state.doubt(name))
+            found.append(state.invalid_reason(name))
             noise[name].append(state.hearings[name].speed_error(state.t))
     reasons = {name: np.array(found, object) for name, found in doubts.items()}
     n = {name: len(mechanism.joints) for name, mechanism in engine.model.mechanisms.items()}
@@ -356,7 +356,7 @@ def _said(one: _Able, states: States) -> tuple[Answers, Reasons]:
         why = str(reason)
     except Exception as error:
         # One's own criterion that fails must not end a batch that others are judged in.
-        why = f"{criterion.name} failed: {told(error)}"
+        why = f"{criterion.name} failed: {worded(error)}"
     if why:
         reasons[:] = why
         return _nothing(criterion, n), reasons

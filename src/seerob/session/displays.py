@@ -36,7 +36,7 @@ class Looks:
             known = state.signals.at(display.variable, state.t)
             held = state.signals.dictionary[display.variable].when_stale is WhenStale.HOLD
             look: Look
-            if known.value is None or (known.doubt and not held):
+            if known.value is None or (known.invalid_reason and not held):
                 # What may be there is drawn.
                 if not display.colors:
                     continue

@@ -57,12 +57,12 @@ class Figure:
     """Half of the interval in which the true value is with 95 %; infinite when the motion tells nothing."""
 
     @property
-    def told(self) -> bool:
+    def determined(self) -> bool:
         """Whether the motion tells it at all."""
         return bool(np.isfinite(self.half))
 
     def __str__(self) -> str:
-        return f"{self.value:.4g} ± {self.half:.2g}" if self.told else "not told by this motion"
+        return f"{self.value:.4g} ± {self.half:.2g}" if self.determined else "not told by this motion"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class Fitted:
     """Shape (p,)."""
     covariance: Array
     """Shape (p, p)."""
-    told: Array
+    determined: Array
     """Which parameters the rows tell, shape (p,), bool."""
     residuals: Array
     """Shape (N, n); NaN where a row was left out."""
@@ -132,7 +132,7 @@ def fit(columns: Array, measured: Array, used: NDArray[np.bool_]) -> Fitted:
     alive = scale > 0
     scaled = A / np.where(alive, scale, 1.0)
     weights = np.ones(len(b))
-    keep, told = _basis(scaled)
+    keep, determined = _basis(scaled)
     x = np.zeros(p)
     for _ in range(3):
         W = (scaled * weights[:, None]) @ keep
@@ -160,7 +160,7 @@ def fit(columns: Array, measured: Array, used: NDArray[np.bool_]) -> Fitted:
     return Fitted(
         x / back,
         covariance / np.outer(back, back),
-        told & alive,
+        determined & alive,
         residuals,
         float(singular[0] / singular[-1]),
     )
@@ -304,8 +304,8 @@ class Explanation:
         low, high = self.payload.value - self.payload.half, self.payload.value + self.payload.half
         if self.unexplained or low > self.slack or high < -self.slack:
             return False
-        told = self.payload.told and max(abs(low), abs(high)) <= self.slack
-        return True if told and not self.held else None
+        determined = self.payload.determined and max(abs(low), abs(high)) <= self.slack
+        return True if determined and not self.held else None
 
 
 def explain(model: Model, name: str, said: Said) -> Explanation:
@@ -339,8 +339,8 @@ def explain(model: Model, name: str, said: Said) -> Explanation:
         )
     found = fit(np.concatenate([payload, friction(qd)], axis=-1), gap, used)
     figures = [
-        Figure(float(x), float(NORMAL_95 * np.sqrt(max(v, 0.0))) if told else float("inf"))
-        for x, v, told in zip(found.values, np.diag(found.covariance), found.told, strict=True)
+        Figure(float(x), float(NORMAL_95 * np.sqrt(max(v, 0.0))) if determined else float("inf"))
+        for x, v, determined in zip(found.values, np.diag(found.covariance), found.determined, strict=True)
     ]
     joints = []
     for j, joint in enumerate(robot.joints):
@@ -386,13 +386,15 @@ def _centre(found: Fitted, figures: list[Figure]) -> tuple[Figure, Figure, Figur
     """Centre of mass h / m, its variance to first order."""
     m, vm = found.values[0], found.covariance[0, 0]
     none = Figure(float("nan"), float("inf"))
-    if not figures[0].told or abs(m) <= 2 * figures[0].half:
+    if not figures[0].determined or abs(m) <= 2 * figures[0].half:
         return none, none, none
     parts = []
     for k in range(1, 4):
         c = found.values[k] / m
         v = (found.covariance[k, k] - 2 * c * found.covariance[0, k] + c * c * vm) / m**2
-        parts.append(Figure(float(c), float(NORMAL_95 * np.sqrt(max(v, 0.0)))) if figures[k].told else none)
+        parts.append(
+            Figure(float(c), float(NORMAL_95 * np.sqrt(max(v, 0.0)))) if figures[k].determined else none
+        )
     return parts[0], parts[1], parts[2]
 
 

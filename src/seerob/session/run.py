@@ -25,7 +25,7 @@ from seerob.model.model import Model
 from seerob.outputs.sink import KeepsResults, Writer
 from seerob.recording.result_log import ResultLog
 from seerob.session.displays import Looks
-from seerob.session.in_doubt import in_doubt
+from seerob.session.invalid_reasons import invalid_reasons
 from seerob.session.opening import coarse, signal_timeouts, untimed
 from seerob.twin.engine import Engine, last_tick
 from seerob.twin.spans import Points
@@ -167,7 +167,7 @@ def snapshot(
         late=late or {},
         results=results,
         looks={} if looks is None else looks.at(state),
-        doubts=in_doubt(state),
+        doubts=invalid_reasons(state),
     )
 
 

@@ -41,7 +41,7 @@ class BodyPlaces:
 
     def _named(self, state: State, index: int, point: Array) -> str:
         person, bone = self._bones[index]
-        R, x = state.placed((index,), estimates=True, strayed=True)
+        R, x = state.placed((index,), allow_estimated=True, strayed=True)
         local = (point - x[index]) @ R[index]
         area = body_area(bone, local, body=self._sizes[person], hand=self._hands[person])
         return words(

@@ -213,7 +213,7 @@ class Engine:
                 continue
             mechanism = self._target(sample)
             self._hearings[mechanism.name].older = untimed
-            reason = sample.doubt("its source")
+            reason = sample.invalid_reason("its source")
             if not is_possible(sample):
                 # Nothing to be pulled to; not knowing where it is must show all the same.
                 taken, reason = (
@@ -247,7 +247,7 @@ class Engine:
         if sample.target not in self._said:
             self._said[sample.target] = own_words.LiveWords(self.model, sample.target)
         said = self._said[sample.target]
-        found = said.doubt(sample)
+        found = said.invalid_reason(sample)
         self._hearings[sample.target].torque_doubt = said.torque_doubt
         return found
 
@@ -280,7 +280,7 @@ class Engine:
         """A machine follows what its variables say."""
         taken = self._take_one(moved.machine, moved.t, moved.q, moved.qd, anew=self._tick > 0 and moved.anew)
         self._hearings[moved.machine].older = moved.age
-        self._note(moved.machine, moved.t, moved.doubt, None, taken=taken)
+        self._note(moved.machine, moved.t, moved.invalid_reason, None, taken=taken)
 
     def _note(
         self, name: str, t: float, reason: str, sample: JointSample | PoseSample | None, *, taken: bool

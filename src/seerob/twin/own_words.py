@@ -228,7 +228,7 @@ class LiveWords:
         self.torque_doubt = ""
         """Why its torques may not be relied on; empty when they may."""
 
-    def doubt(self, sample: JointSample) -> str:
+    def invalid_reason(self, sample: JointSample) -> str:
         """Why one sample contradicts the twin; empty when it does not, or says nothing of its TCP."""
         looks = sample.t >= self._looked + EVERY
         self._looked = sample.t if looks else self._looked

@@ -22,7 +22,7 @@ class Known(NamedTuple):
 
     value: Value | None
     """In SI; None when it was never heard. The last one known when there is a doubt."""
-    doubt: str
+    invalid_reason: str
     """Why it may not be relied on; empty when it may."""
 
 
@@ -84,8 +84,8 @@ class Signals:
             Undecided: It is not known, or may not be relied on.
         """
         known = self.at(name, t)
-        if known.value is None or known.doubt:
-            raise Undecided(known.doubt or f"{name}: not heard")
+        if known.value is None or known.invalid_reason:
+            raise Undecided(known.invalid_reason or f"{name}: not heard")
         return known.value
 
     def meanwhile(self, name: str, begin: float, t: float) -> tuple[Value, ...]:
@@ -98,8 +98,8 @@ class Signals:
         found = []
         for picture in self._heard.get(source, ()):
             if begin + SLACK < picture.t < t - SLACK:
-                if doubt := doubt_of(picture, name):
-                    raise Undecided(f"{doubt}, at {picture.t:.3f} s")
+                if invalid_reason := doubt_of(picture, name):
+                    raise Undecided(f"{invalid_reason}, at {picture.t:.3f} s")
                 found.append(picture.values[name])
         return tuple(found)
 
@@ -116,7 +116,7 @@ class Signals:
         found, last = [], self.at(name, begin)
         for instant in instants:
             now = self.at(name, instant)
-            if (now.value, bool(now.doubt)) != (last.value, bool(last.doubt)):
+            if (now.value, bool(now.invalid_reason)) != (last.value, bool(last.invalid_reason)):
                 found.append(min(instant, t))
             last = now
         return tuple(found)
@@ -125,7 +125,7 @@ class Signals:
         """Every variable that was heard, and every doubt, at an instant [s]."""
         known = {name: self.at(name, t) for name, v in self.dictionary.items() if not v.write}
         values = {name: k.value for name, k in known.items() if k.value is not None}
-        return values, {name: k.doubt for name, k in known.items() if k.doubt}
+        return values, {name: k.invalid_reason for name, k in known.items() if k.invalid_reason}
 
 
 def doubt_of(picture: SignalSample, name: str) -> str:
@@ -133,5 +133,5 @@ def doubt_of(picture: SignalSample, name: str) -> str:
     if name in picture.doubts:
         return picture.doubts[name]
     if picture.quality is not Quality.GOOD:
-        return f"{name}: {picture.doubt('its source')}"
+        return f"{name}: {picture.invalid_reason('its source')}"
     return "" if name in picture.values else f"{name}: not heard"

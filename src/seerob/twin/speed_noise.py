@@ -42,7 +42,7 @@ def levers(data: Any, joints: Indices, body: Body, R: Array, x: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(squares, 0.0).max(axis=1)) + body.radius + body.deviation)
 
 
-class _Chain(NamedTuple):
+class _KinematicChain(NamedTuple):
     """The joints of one robot, machine or person that move a body; k of them."""
 
     name: str
@@ -62,7 +62,7 @@ class SpeedNoise:
 
     def __init__(self, model: Model) -> None:
         self._model = model
-        self._chains: dict[tuple[int, int], list[_Chain]] = {}
+        self._chains: dict[tuple[int, int], list[_KinematicChain]] = {}
 
     def of_bodies(
         self,
@@ -94,7 +94,7 @@ class SpeedNoise:
                 found[k] += float(((each * error) ** 2).sum())
         return np.sqrt(found)
 
-    def _of(self, index: int, moved_by: int) -> list[_Chain]:
+    def _of(self, index: int, moved_by: int) -> list[_KinematicChain]:
         key = index, moved_by
         if key not in self._chains:
             mj = self._model.mj
@@ -106,5 +106,5 @@ class SpeedNoise:
                 if rows:
                     of = own[rows].astype(np.int64)
                     turns = mj.jnt_type[of] == mujoco.mjtJoint.mjJNT_HINGE
-                    found.append(_Chain(mechanism.name, of, turns, np.abs(mechanism.coupling[rows])))
+                    found.append(_KinematicChain(mechanism.name, of, turns, np.abs(mechanism.coupling[rows])))
         return self._chains[key]

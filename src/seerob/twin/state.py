@@ -279,7 +279,7 @@ class State(Validity):
         self,
         bodies: tuple[int, ...],
         *,
-        estimates: bool = False,
+        allow_estimated: bool = False,
         doubted: bool = False,
         strayed: bool = False,
     ) -> tuple[Array, Array]:
@@ -287,7 +287,7 @@ class State(Validity):
 
         Args:
             bodies: By index.
-            estimates: As in `require_bodies`.
+            allow_estimated: As in `require_bodies`.
             doubted: Also bones in doubt of people of whom the others may be relied on, as they are shown: for
                 whoever judges bone by bone (`bones_in_doubt`).
             strayed: As in `require_bodies`.
@@ -305,7 +305,7 @@ class State(Validity):
             for name in owners.people:
                 self.hearing(name, strayed=strayed)
         else:
-            self.require_bodies(bodies, estimates=estimates, strayed=strayed)
+            self.require_bodies(bodies, allow_estimated=allow_estimated, strayed=strayed)
         if bodies not in self._places:
             if len(self._places) == MOST_PLACES:
                 self._places.clear()
@@ -434,8 +434,8 @@ class State(Validity):
         found = self._ahead(name, t)
         if found is None or name not in self._quicker:
             return found
-        q, qd, doubt = found
-        return q, qd + self._quicker[name], doubt
+        q, qd, invalid_reason = found
+        return q, qd + self._quicker[name], invalid_reason
 
     def measured_torques(self, mechanism: Mechanism) -> Array:
         """Joint torques that its source measured, between samples as positions are [N·m or N], shape (n,).
@@ -675,14 +675,16 @@ class State(Validity):
         along(self._cdof, self._com, roots[rows], moves, points, directions, every)
         return self.columns[mechanism.name].of_rows(every)
 
-    def body_velocities(self, bodies: tuple[int, ...], *, estimates: bool = False) -> tuple[Array, Array]:
+    def body_velocities(
+        self, bodies: tuple[int, ...], *, allow_estimated: bool = False
+    ) -> tuple[Array, Array]:
         """Linear and angular velocities of bodies at their origins [m/s, rad/s].
 
         Returns:
             Of all bodies, shape (n, 3) each, so that indices stay what they are; of others they are NaN.
             Valid until the next tick.
         """
-        self.placed(bodies, estimates=estimates)
+        self.placed(bodies, allow_estimated=allow_estimated)
         self._ask_speeds(bodies)
         key = ("velocities of", bodies)
         if key not in self._cache:
@@ -719,15 +721,15 @@ class State(Validity):
         return float(speed[index]), point[index], velocity[index]
 
     def fastest_points(
-        self, bodies: tuple[int, ...], *, estimates: bool = False
+        self, bodies: tuple[int, ...], *, allow_estimated: bool = False
     ) -> tuple[Array, Array, Array]:
         """Bounds on the speed of any point of bodies [m/s] (b,), with corners (b, 3) and velocities (b, 3).
 
         Args:
             bodies: By index.
-            estimates: As in `require_bodies`.
+            allow_estimated: As in `require_bodies`.
         """
-        self.require_bodies(bodies, estimates=estimates)
+        self.require_bodies(bodies, allow_estimated=allow_estimated)
         self._ask_speeds(bodies)
         rows = self._rows_of(bodies)
         speed, point, velocity = self._fastest()
@@ -753,19 +755,19 @@ class State(Validity):
 
     # -- distances --------------------------------------------------------------------------
 
-    def closest(self, gap: Gap, *, estimates: bool = False, strayed: bool = False) -> Closest:
-        """Where two sets are nearest; ``estimates`` and ``strayed`` as in `require_bodies`."""
-        self.require_bodies((*gap.a, *gap.b), estimates=estimates, strayed=strayed)
+    def closest(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closest:
+        """Where two sets are nearest; ``allow_estimated`` and ``strayed`` as in `require_bodies`."""
+        self.require_bodies((*gap.a, *gap.b), allow_estimated=allow_estimated, strayed=strayed)
         return self._distances(gap.query, Per.SETS).at(0)
 
-    def closest_per_body(self, gap: Gap, *, estimates: bool = False, strayed: bool = False) -> Closests:
+    def closest_per_body(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closests:
         """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``."""
-        self.require_bodies((*gap.a, *gap.b), estimates=estimates, strayed=strayed)
+        self.require_bodies((*gap.a, *gap.b), allow_estimated=allow_estimated, strayed=strayed)
         return self._distances(gap.query, Per.BODY)
 
-    def distances(self, query: Query, per: Per, *, estimates: bool = False) -> Closests:
-        """What a query says now; ``estimates`` as in `require_bodies`."""
-        self.require_bodies((*query.a, *query.b), estimates=estimates)
+    def distances(self, query: Query, per: Per, *, allow_estimated: bool = False) -> Closests:
+        """What a query says now; ``allow_estimated`` as in `require_bodies`."""
+        self.require_bodies((*query.a, *query.b), allow_estimated=allow_estimated)
         return self._distances(query, per)
 
     def _distances(self, query: Query, per: Per) -> Closests:

@@ -75,7 +75,7 @@ def _joint(joint: JointExplained) -> str:
 
 def _payload(found: Explanation) -> str:
     text = f"{found.payload} kg beside the {found.carried:.4g} kg that the file has on the flange"
-    if all(figure.told for figure in found.com):
+    if all(figure.determined for figure in found.com):
         place = ", ".join(f"{1e3 * f.value:.0f} ± {1e3 * f.half:.1g}" for f in found.com)
         text += f", its centre at [{place}] mm of the flange"
     return text
@@ -129,4 +129,4 @@ def figures(found: Explanation) -> dict[str, Any]:
 
 
 def _figure(figure: Figure) -> dict[str, float] | None:
-    return {"value": figure.value, "half": figure.half} if figure.told else None
+    return {"value": figure.value, "half": figure.half} if figure.determined else None

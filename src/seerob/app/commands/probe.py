@@ -68,7 +68,7 @@ async def _heard(
                 told = [change for change in changes if isinstance(change, Change)]
                 if told:
                     arrivals.add(time.monotonic(), None)
-                doubts |= {addresses[change.name]: change.doubt for change in told}
+                doubts |= {addresses[change.name]: change.invalid_reason for change in told}
     except TimeoutError:
         pass  # of the listening, or of a device that has nothing to say
     return arrivals, doubts

@@ -87,11 +87,11 @@ def run(options: argparse.Namespace) -> int:
             )
     mesh = swept.mesh(most=options.triangles)
     write_mesh(options.output, mesh)
-    unseen = model.unseen((_subject(station, options.of),))
-    sure = "less than the truth" if unseen else "not less than the truth"
+    unshaped = model.unshaped((_subject(station, options.of),))
+    sure = "less than the truth" if unshaped else "not less than the truth"
     line("volume", f"{swept.volume:.4g} m³ in voxels of {options.voxel:g} m: {sure}")
-    if unseen:
-        line("undecided", unseen, "yellow")
+    if unshaped:
+        line("undecided", unshaped, "yellow")
     line("contains", swept.guarantee)
     if swept.excess is None:
         line("dilated", f"by up to {swept.dilation * 1e3:.1f} mm for motion between two stamps")
@@ -100,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
     line(
         "wrote", f"{options.output}: {len(mesh.faces)} triangles, metres; holds {signed_volume(mesh):.4g} m³"
     )
-    return Exit.UNDECIDED if unseen else Exit.WITHIN
+    return Exit.UNDECIDED if unshaped else Exit.WITHIN
 
 
 def _subject(station: Station, name: str | None) -> str:

@@ -31,7 +31,7 @@ from seerob.criteria.contact.clamping import (
 )
 from seerob.criteria.contact.joint_gaps import JointGaps
 from seerob.description.norms.crushing_gaps import crushing_gaps, openings, sizes
-from seerob.distance.least import Reach, Survey
+from seerob.distance.least import DistanceKind, Survey
 from seerob.kernels.approach import lowest_and_falling, relative_speeds
 from seerob.kernels.pairs import CORNERS
 from seerob.kernels.shapes import Shapes
@@ -139,7 +139,7 @@ class ClosingGaps:
         if not (caps > -np.inf).any():
             return nothing
         found = self._survey.within(rotations, positions, caps)
-        known = (caps > -np.inf) & (found.reach != Reach.BEYOND_CAP)
+        known = (caps > -np.inf) & (found.kind != DistanceKind.BEYOND_CAP)
         gaps = np.where(known, found.distance - ways, np.inf)
         flags = clamps(gaps, speed, self._period, self._thickness) & of_gaps
         return np.asarray(pairs.per_body(flags) & wanted), pairs.fastest(flags, speed) * wanted

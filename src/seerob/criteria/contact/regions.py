@@ -24,7 +24,7 @@ from seerob.description.humans.posture import posture
 from seerob.description.humans.skeleton import bone_poses, without_side
 from seerob.description.humans.skin import BODY_REGION
 from seerob.description.norms import body_limits
-from seerob.distance.least import Per, Query, Reach, Survey
+from seerob.distance.least import DistanceKind, Per, Query, Survey
 from seerob.model.model import Mechanism, Model
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.spans import Span, rows_of
@@ -35,7 +35,7 @@ SENSITIVE = "Larynx, eyes and ears"
 FEET = "Feet"
 """In no row of the table; no limit is available."""
 REGIONS = (*body_limits.REGIONS, SENSITIVE, FEET)
-_WITHIN_CAP = int(Reach.WITHIN_CAP)
+_WITHIN_CAP = int(DistanceKind.WITHIN_CAP)
 FORBIDDEN = frozenset({*body_limits.FORBIDDEN, SENSITIVE})
 
 
@@ -128,7 +128,7 @@ class Person:
         state.require_bodies(self._asked)
         caps = np.tile(np.nextafter(self._gap.deviation + more, np.inf) + self._off.at(state), self._shape[0])
         found = self._farther.within(*state.placed(self._asked), caps)
-        close: NDArray[np.bool_] = np.asarray(found.reach == _WITHIN_CAP).reshape(self._shape)
+        close: NDArray[np.bool_] = np.asarray(found.kind == _WITHIN_CAP).reshape(self._shape)
         return close @ self._member
 
     def near(
@@ -154,7 +154,7 @@ class Person:
             found = self._farther.within(*state.placed(self._asked), caps)
         else:
             found = state.distances(self._query, Per.WHETHER)
-        close: NDArray[np.bool_] = np.asarray(found.reach == _WITHIN_CAP).reshape(self._shape)
+        close: NDArray[np.bool_] = np.asarray(found.kind == _WITHIN_CAP).reshape(self._shape)
         self._close = np.asarray(close.any(axis=0))
         near: NDArray[np.bool_] = close @ self._member
         if speed is not None:

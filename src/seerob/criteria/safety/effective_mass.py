@@ -106,9 +106,9 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         """The point, and whom it faces."""
         return (self.at,) if self.toward is None else (self.at, self.toward)
 
-    def unseen(self, model: Model) -> str:
+    def unshaped(self, model: Model) -> str:
         """Say what no shape shows of the robot; a direction that is not toward somebody needs no shape."""
-        return "" if self.toward is None else super().unseen(model)
+        return "" if self.toward is None else super().unshaped(model)
 
     def bind(self, model: Model) -> Evaluate:
         """Look up every name in the model once and return the function that judges one instant."""
@@ -163,7 +163,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                     Arrow(
                         origin=tuple(center.tolist()),
                         vector=tuple((length * u).tolist()),
-                        label=figures.told(mass, self.limit, self.unit, at_most=True),
+                        label=figures.worded(mass, self.limit, self.unit, at_most=True),
                         verdict=verdict,
                     ),
                 )

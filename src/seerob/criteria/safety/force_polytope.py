@@ -260,7 +260,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
             radius = min(DRAWN * self.limit, LARGEST_DRAWN)
             markers.append(Sphere(center=center, radius=radius, label=f"limit {self.limit:g} N"))
         length = LARGEST_DRAWN if value is None else min(DRAWN * value, LARGEST_DRAWN)
-        label = "unbounded" if value is None else figures.told(value, self.limit, self.unit, at_most=True)
+        label = "unbounded" if value is None else figures.worded(value, self.limit, self.unit, at_most=True)
         arrow = tuple((length * direction).tolist())
         markers.append(Arrow(origin=center, vector=arrow, label=label, verdict=verdict))
         return tuple(markers)

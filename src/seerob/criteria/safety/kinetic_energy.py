@@ -106,7 +106,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
             sphere = Sphere(
                 center=tuple(position.tolist()),
                 radius=DRAWN * max(energy, 0.0) ** (1 / 3),
-                label=figures.told(energy, self.limit, self.unit, at_most=True),
+                label=figures.worded(energy, self.limit, self.unit, at_most=True),
                 verdict=verdict,
             )
             return Result(

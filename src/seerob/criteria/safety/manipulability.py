@@ -122,7 +122,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
                 center=tuple((position + rotation @ offset).tolist()),
                 wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
                 radii=(DRAWN * sigma[0], DRAWN * sigma[1], DRAWN * sigma[2]),
-                label=f"σ₃ {figures.told(smallest, self.limit, self.unit, at_most=False)}",
+                label=f"σ₃ {figures.worded(smallest, self.limit, self.unit, at_most=False)}",
                 verdict=verdict,
             )
             parts = (

@@ -13,7 +13,7 @@ from seerob.core.snapshot import Basis, Result, Segment, Verdict
 from seerob.core.tolerances import Tolerance, deciding
 from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge_interval
 from seerob.criteria.partly_seen import partly_seen
-from seerob.distance.least import Reach
+from seerob.distance.least import DistanceKind
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
 from seerob.recording.answers import Answers
@@ -61,23 +61,23 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
         ends = DistanceEnds(model, gap)
 
         def evaluate(state: State) -> Result:
-            closest = state.closest(gap, estimates=True, strayed=True)
+            closest = state.closest(gap, allow_estimated=True, strayed=True)
             distance = closest.distance
             low, high = ends.of_sets(state, distance)
             seen = (high - low) / 2
             interval = (low - gap.deviation - self.uncertainty, high + self.uncertainty)
             verdict = judge_interval(interval, self.limit, at_most=False)
             open_ = f"; {_deciding(self.uncertainty, seen, gap)}" if verdict is Verdict.UNDECIDED else ""
-            if closest.reach == Reach.DEPTH_AT_LEAST and self.limit is not None:
+            if closest.kind == DistanceKind.DEPTH_AT_LEAST and self.limit is not None:
                 # Crossing shapes are deeper than the figure says: never within, not even of 0.
                 verdict = Verdict.EXCEEDED
             a_named = places.named(state, closest.body_a, closest.point_a)
             b_named = places.named(state, closest.body_b, closest.point_b)
-            deeper = " (overlap, at least this deep)" if closest.reach == Reach.DEPTH_AT_LEAST else ""
+            deeper = " (overlap, at least this deep)" if closest.kind == DistanceKind.DEPTH_AT_LEAST else ""
             segment = Segment(
                 start=tuple(closest.point_a.tolist()),
                 end=tuple(closest.point_b.tolist()),
-                label=figures.told(distance, self.limit, self.unit, at_most=False),
+                label=figures.worded(distance, self.limit, self.unit, at_most=False),
                 verdict=verdict,
             )
             return Result(
@@ -104,7 +104,7 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
             found = Answers.against(closest.distance, self.limit, at_most=False)
             if gap.deviation + either > 0:
                 found = found.between(low, high, at_most=False)
-            crossing = closest.reach == Reach.DEPTH_AT_LEAST
+            crossing = closest.kind == DistanceKind.DEPTH_AT_LEAST
             return found if self.limit is None else found.exceeded(crossing)
 
         return evaluate

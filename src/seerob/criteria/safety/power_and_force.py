@@ -426,15 +426,17 @@ class Contacts:
         if self.ends.tolerances:
             given = None if mover is None else masses
             ends = self.ends.at(state, self.moving, spec.mass, simplified, clamped, STANDSTILL, given)
-        doubt = ""
+        invalid_reason = ""
         if mover is not None:
             k, F_d = self.arrays.stiffness * (1 - spec.stiffness_tolerance), spec.drive_force
             if len(self.ends.masses):
-                doubt = f"mass_tolerance is not followed on what moves {robot.name}: leave it out here"
+                invalid_reason = (
+                    f"mass_tolerance is not followed on what moves {robot.name}: leave it out here"
+                )
                 F_d = None
             else:
-                doubt = NOT_GIVEN if F_d is None else f"the drive keeps pushing with {F_d:g} N"
-                doubt += (
+                invalid_reason = NOT_GIVEN if F_d is None else f"the drive keeps pushing with {F_d:g} N"
+                invalid_reason += (
                     f" ({mover.name} moves" + ("" if mover is robot else f" and carries {robot.name}") + ")"
                 )
             ends = pushed(speeds, ends, k, self.arrays.force, clamped, F_d)
@@ -444,15 +446,15 @@ class Contacts:
             pressed = clamped & np.isin(self.moving, sorted(own))[:, None]
             if pressed.any():
                 names, F_d = ", ".join(rider.name for rider in riders), spec.drive_force
-                doubt = NOT_GIVEN if F_d is None else f"the drive keeps pushing with {F_d:g} N"
-                doubt += f" ({names} moves)"
+                invalid_reason = NOT_GIVEN if F_d is None else f"the drive keeps pushing with {F_d:g} N"
+                invalid_reason += f" ({names} moves)"
                 k = self.arrays.stiffness * (1 - spec.stiffness_tolerance)
                 ends = pushed(speeds, ends, k, self.arrays.force, clamped, F_d, where=pressed)
         v = contact_limits.relative(v_r, v_h, closing)
         governing = self._governing(v, near, speeds, ends)
         return Judged(
             v_r, v_h, near, projected, speeds, clamped, *governing, ends, on_floor, closing, simplified,
-            doubt, mover is not None,
+            invalid_reason, mover is not None,
         )  # fmt: skip
 
     def lowest(self, points: Points) -> Lowest | None:
@@ -547,14 +549,14 @@ class Contacts:
         found: list[tuple[Result, int]] = []
         measured: dict[str, tuple[Result, ...]] = {}
         # Who is touched all the same was not kept from contact.
-        touched, doubt = self._touched(state, people, near) if spec.excluded else (None, "")
+        touched, invalid_reason = self._touched(state, people, near) if spec.excluded else (None, "")
         for k in np.flatnonzero(near.any(axis=0)).tolist():
             part, row = self._region(k, judged)
             if people is not None and people.several:
                 part = replace(part, reason=f"{part.reason}; {', '.join(people.owners(REGIONS[k]))}")
             if touched is not None and REGIONS[k] in spec.excluded and touched[:, k].any():
                 row = int(touched[:, k].argmax())
-                reason = f"{part.reason}, and {doubt or f'touched by {self.names[row]} here'}"
+                reason = f"{part.reason}, and {invalid_reason or f'touched by {self.names[row]} here'}"
                 part = replace(part, verdict=Verdict.UNDECIDED, reason=reason)
             if told := self._measured(k, judged):
                 part, measured[part.name] = with_measured(part, told), told

@@ -60,7 +60,7 @@ class Required(NamedTuple):
     """What is sure from below, of the speeds as they are known [m], shape (n,)."""
     most: Array
     """A bound from above [m], shape (n,)."""
-    doubt: str
+    unbounded_reason: str
     """Why it may be still more; empty when it may not."""
 
 
@@ -239,9 +239,9 @@ class Separation(Criterion, frozen=True, kw_only=True):
         """
         if state.strays(gap.a):
             return 0.0, 0.0
-        lost = state.lost_bodies(gap.a)
+        lost = state.invalid_bodies(gap.a)
         people = tuple(i for i in gap.a if i not in lost)
-        speeds = state.fastest_points(people, estimates=True)[0]
+        speeds = state.fastest_points(people, allow_estimated=True)[0]
         return float(speeds.max(initial=0.0)), float((speeds + state.speed_noise(people)).max(initial=0.0))
 
     def looks_ahead(self, model: Model) -> Mapping[str, float]:
@@ -290,16 +290,16 @@ class Separation(Criterion, frozen=True, kw_only=True):
         movers = (human, *self._everybody(model))
 
         def evaluate(state: State) -> Result:
-            found = state.closest_per_body(gap, estimates=True, strayed=True)
+            found = state.closest_per_body(gap, allow_estimated=True, strayed=True)
             stray = state.strays(gap.a)
             course = stop.courses(state)
             now = course(1.0)
             seen = self._seen(state, gap)
-            S_p, most, doubt = self._required(now, K, *seen)
+            S_p, most, unbounded_reason = self._required(now, K, *seen)
             if self.mode == "fixed":
                 S_p, most = (each.including(state, x) for each, x in zip(largest, (S_p, most), strict=True))
             slower = f"{stray}: how fast the person is nobody knows" if stray else ""
-            unknown = "; ".join(filter(None, (unknown_ever, doubt, slower)))
+            unknown = "; ".join(filter(None, (unknown_ever, unbounded_reason, slower)))
             unknown = f"{unknown}; S_p is at least the figure shown" if unknown else ""
             near, far = ends_of_distance.of_bodies(state, found.distance)
             span = ends.at(state) if ends.tolerances else None
@@ -362,7 +362,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 parts=(
                     *parts,
                     *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r), seen[0]),
-                    *self._more(most - S_p, doubt),
+                    *self._more(most - S_p, unbounded_reason),
                     *self._permissible(stop, state, course, now, found.distance, K),
                 ),
                 markers=(segment,),
@@ -371,10 +371,10 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return evaluate
 
     @staticmethod
-    def _more(more: Array, doubt: str) -> tuple[Result, ...]:
+    def _more(more: Array, unbounded_reason: str) -> tuple[Result, ...]:
         """By how much S_p of some part may be larger than shown; no value where that has no bound."""
-        if doubt:
-            return (Result(name=MORE, unit="m", reason=doubt),)
+        if unbounded_reason:
+            return (Result(name=MORE, unit="m", reason=unbounded_reason),)
         most = float(more.max())
         return (Result(name=MORE, value=most, unit="m"),) if most > 0 else ()
 
@@ -543,7 +543,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         S_p = most = self._distance(now, K, seen)
         if now.most is not None or seen_most > seen:
             most = np.maximum(self._distance(now.most or now, K, seen_most), S_p)
-        doubts = (now.doubt, "" if now.most is None else now.most.doubt)
+        doubts = (now.unbounded_reason, "" if now.most is None else now.most.unbounded_reason)
         return Required(S_p, most, "; ".join(dict.fromkeys(filter(None, doubts))))
 
     def required(self, model: Model) -> Callable[[State], Required]:
@@ -558,7 +558,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
             if own.mode != "fixed":
                 return found
             S_p, most = (each.including(state, x) for each, x in zip(largest, found[:2], strict=True))
-            return Required(S_p, most, found.doubt)
+            return Required(S_p, most, found.unbounded_reason)
 
         return at
 
@@ -577,8 +577,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
             course = stop.courses(state)
             now = course(1.0)
             required = self._required(now, K, *self._seen(state, gap))
-            if required.doubt:
-                raise Undecided(required.doubt)
+            if required.unbounded_reason:
+                raise Undecided(required.unbounded_reason)
             return required.most, self._permissible(stop, state, course, now, distance, K)
 
         return at
@@ -592,13 +592,17 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
         def S_p(scale: float) -> Array:
             required = self._required(course(scale), K, *seen)
-            if required.doubt:
-                raise Undecided(required.doubt)
+            if required.unbounded_reason:
+                raise Undecided(required.unbounded_reason)
             return required.most
 
         least, most = stop.reactions(state)
         onset = least if most is None else most
-        if state.strays(self._gap(state.model).a) or now.doubt or (now.most is not None and now.most.doubt):
+        if (
+            state.strays(self._gap(state.model).a)
+            or now.unbounded_reason
+            or (now.most is not None and now.most.unbounded_reason)
+        ):
             reason = "S_p is at least what is shown: no speed follows"
         elif stop.inverse is not None and onset(1.0).linear:
             given = self.human_speed

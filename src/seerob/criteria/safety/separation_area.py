@@ -119,9 +119,15 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
             may = off.at(state) + gap.deviation + float((most - S_p).max())
             surely = float((least - may).min())
             k, perhaps = int(least.argmin()), int((least - may).argmin())
-            doubt = self._doubt(model, outside[perhaps], float(least[perhaps]), float(may[perhaps]), unknown)
+            unbounded_reason = self._doubt(
+                model, outside[perhaps], float(least[perhaps]), float(may[perhaps]), unknown
+            )
             verdict = (
-                Verdict.EXCEEDED if least[k] <= ROUNDING else Verdict.UNDECIDED if doubt else Verdict.WITHIN
+                Verdict.EXCEEDED
+                if least[k] <= ROUNDING
+                else Verdict.UNDECIDED
+                if unbounded_reason
+                else Verdict.WITHIN
             )
             parts: list[Result] = []
             lit: list[Marker] = []
@@ -156,7 +162,7 @@ class SeparationArea(Criterion, frozen=True, kw_only=True):
                 limit=0.0,
                 at_most=False,
                 verdict=verdict,
-                reason=doubt if verdict is Verdict.UNDECIDED else model.bodies[outside[k]].name,
+                reason=unbounded_reason if verdict is Verdict.UNDECIDED else model.bodies[outside[k]].name,
                 interval=(surely, float(least[k])) if surely < least[k] else None,
                 parts=(*parts, Result(name="largest S_p", value=float(S_p.max()), unit="m")),
                 markers=(*drawn[0][1], *lit),

@@ -54,14 +54,14 @@ class SweptVolume(Criterion, frozen=True, kw_only=True):
             Sweep(model, bodies, voxel=self.voxel),
             max(model.workstation.engine.tick, self.every or 0.0),
         )
-        unseen = self.every is not None and self.every > model.workstation.engine.tick * 1.5
+        unshaped = self.every is not None and self.every > model.workstation.engine.tick * 1.5
 
         def evaluate(state: State) -> Result:
             state.require(*carriers)
             way.follow(state)
             swept = way.sweep.swept
             verdict, doubts = judge(swept.volume, self.limit), list(way.unheard)
-            if unseen:
+            if unshaped:
                 doubts.append(f"seen every {self.every:g} s only: what lies between is not known")
             if doubts and verdict is Verdict.WITHIN:
                 verdict = Verdict.UNDECIDED

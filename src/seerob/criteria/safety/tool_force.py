@@ -208,10 +208,10 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
             if verdict is Verdict.UNDECIDED:
                 reasons.append(f"the torques' uncertainty is ± {error:.3g} N, across the limit")
         if hidden.max() > NOTHING:
-            unseen = found.axes[:3, int(hidden.argmax())]
+            unshaped = found.axes[:3, int(hidden.argmax())]
             share = found.hidden[int(hidden.argmax())]
             reasons.append(
-                f"singular: {share:.0%} of a force along ±{_vector(unseen)} does not show in the torques"
+                f"singular: {share:.0%} of a force along ±{_vector(unshaped)} does not show in the torques"
             )
             # What is seen of a force may exceed a limit; what is not seen cannot be within one.
             verdict, interval = (Verdict.UNDECIDED if verdict is Verdict.WITHIN else verdict), None
@@ -246,7 +246,7 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
     def _markers(self, force: Array, size: float, at: Array, verdict: Verdict | None) -> tuple[Marker, ...]:
         center = tuple(at.tolist())
         drawn = DRAWN * force * min(1.0, LARGEST_DRAWN / max(DRAWN * size, 1e-12))
-        shown = figures.told(size, self.limit, self.unit, at_most=True)
+        shown = figures.worded(size, self.limit, self.unit, at_most=True)
         arrow = Arrow(origin=center, vector=tuple(drawn.tolist()), label=shown, verdict=verdict)
         if self.limit is None:
             return (arrow,)

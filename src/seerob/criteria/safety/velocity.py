@@ -87,9 +87,9 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         at = model.frame(self.at or "").mj
         return {body.index for body in model.bodies if body.mj == at}
 
-    def unseen(self, model: Model) -> str:
+    def unshaped(self, model: Model) -> str:
         """Say what no shape shows of the robots; a point needs no shape."""
-        return super().unseen(model) if self.of else ""
+        return super().unshaped(model) if self.of else ""
 
     def bind(self, model: Model) -> Evaluate:
         """Look up every name in the model once and return the function that judges one instant."""
@@ -165,7 +165,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         arrow = Arrow(
             origin=tuple(point.tolist()),
             vector=tuple((DRAWN * v).tolist()),
-            label=figures.told(speed, self.limit, self.unit, at_most=True),
+            label=figures.worded(speed, self.limit, self.unit, at_most=True),
             verdict=verdict,
         )
         return Result(

@@ -99,7 +99,7 @@ class Presence:
         self._off = TrackingError(model, bodies)
         self._last: tuple[float, Array] | None = None
         self._since: float | None = None
-        self.unseen = 0.0
+        self.undetected = 0.0
         """Path inside the field before it was seen [m]."""
         self.until_output = 0.0
         """Further path until the output had switched [m]."""
@@ -113,17 +113,17 @@ class Presence:
         """Take the way of what is inside since the last evaluation into account."""
         now = state.placed(self.bodies)[1][list(self.bodies)]
         if self._last is None or state.t <= self._last[0]:
-            self._last, self._since, self.unseen, self.until_output = None, None, 0.0, 0.0
+            self._last, self._since, self.undetected, self.until_output = None, None, 0.0, 0.0
         way = 0.0
         if self._last is not None and inside.any():
             way = float(np.linalg.norm(now - self._last[1], axis=1)[inside].max())
         if not inside.any() and not triggered:
-            self._since, self.unseen, self.until_output = None, 0.0, 0.0
+            self._since, self.undetected, self.until_output = None, 0.0, 0.0
         elif not triggered:
-            self.unseen += way
+            self.undetected += way
         elif self._since is None:
             self._since = state.t
-            self.unseen += way
+            self.undetected += way
         elif self.sensor.response is not None and self._last is not None:
             # Of the way since the last evaluation, the share that lies before the output switched.
             left = self._since + self.sensor.response - self._last[0]
@@ -216,7 +216,7 @@ class Presence:
         if not present:
             return ()
         why = "" if triggered else "not detected yet"
-        ways = [Result(name="walked before detection", value=self.unseen, unit="m", reason=why)]
+        ways = [Result(name="walked before detection", value=self.undetected, unit="m", reason=why)]
         response = self.sensor.response
         if triggered:
             ways.append(

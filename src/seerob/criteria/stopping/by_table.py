@@ -11,7 +11,7 @@ from msgspec.structs import replace as changed
 from seerob.core.errors import InputError
 from seerob.core.snapshot import Input, Origin
 from seerob.criteria.stopping.in_span import InSpan, Stopping, reach_of
-from seerob.criteria.stopping.onset import Chain, Levers, Onset
+from seerob.criteria.stopping.onset import KinematicChain, Levers, Onset
 from seerob.criteria.stopping.table import JointStop, SpeedStop, StoppingTable, interpolate, joint_stop
 from seerob.criteria.stopping.terms import Braking, Course, braking, travel
 from seerob.model.model import Gap, Mechanism, Model
@@ -108,8 +108,8 @@ def _by_tool_speed(
         top, end = float(onset.v_s.max()), tool.speed[-1]
         beyond = f"{top:.3g} m/s is beyond the stopping table, which ends at {end:g} m/s"
         T_s = interpolate([tool.speed], np.array(tool.time), [min(top, end)])
-        doubts = (onset.doubt, unknown, beyond if top > end * (1 + 1e-9) else "")
-        return braking(replace(onset, doubt="; ".join(filter(None, doubts))), T_s)
+        doubts = (onset.unbounded_reason, unknown, beyond if top > end * (1 + 1e-9) else "")
+        return braking(replace(onset, unbounded_reason="; ".join(filter(None, doubts))), T_s)
 
     return after
 
@@ -153,7 +153,7 @@ def _by_joint(
         way, time = joint_stop(entry, *within)
         return min(way, speed * time), time, beyond or unknown
 
-    def after(onset: Onset, far: float, chains: Sequence[Chain]) -> Course:
+    def after(onset: Onset, far: float, chains: Sequence[KinematicChain]) -> Course:
         speeds, ways = onset.speeds, onset.ways
         assert speeds is not None
         assert ways is not None
@@ -163,7 +163,7 @@ def _by_joint(
         total = np.array([travel(turns.tolist(), every[rows], arms) for turns, rows, arms in chains])
         # What the way of both exceeds the reaction's by; the lever may grow during the reaction.
         beside = np.maximum(total - onset.S_r, 0.0)
-        doubts = dict.fromkeys((onset.doubt, *(why for _, _, why in stops)))
+        doubts = dict.fromkeys((onset.unbounded_reason, *(why for _, _, why in stops)))
         longest = max(time for _, time, _ in stops)
         return Course(onset.v_r, onset.S_r, beside, longest, "; ".join(filter(None, doubts)))
 
@@ -174,11 +174,11 @@ def _by_joint(
         def at(onset: Onset, scale: float) -> Course:
             if onset.speeds is None or onset.ways is None:
                 speeds, ways = scale * np.abs(state.qd(robot)), np.zeros(len(robot.joints))
-                doubt = (
+                unbounded_reason = (
                     "an acceleration of points says nothing of joints, and the stopping table is by joints: "
                     f"give acceleration_limits of {robot.name} instead of stop.acceleration"
                 )
-                onset = replace(onset, speeds=speeds, ways=ways, doubt=doubt)
+                onset = replace(onset, speeds=speeds, ways=ways, unbounded_reason=unbounded_reason)
             return after(onset, far, chains)
 
         return at

@@ -22,7 +22,7 @@ import numpy as np
 from seerob.core.transforms import Array
 from seerob.criteria.stopping.onset import (
     LARGEST_WINDOW,
-    Chain,
+    KinematicChain,
     Levers,
     Onset,
     by_joints,
@@ -37,7 +37,7 @@ from seerob.twin.validity.hearing import SLACK
 InSpan = Callable[[Points], Callable[[Span], Course | None]]
 """From the points of which the motion is bounded to the longest course that begins within a span; None where
 nobody knows."""
-Stopping = Callable[[Onset, float, Sequence[Chain]], Course]
+Stopping = Callable[[Onset, float, Sequence[KinematicChain]], Course]
 """Course after an onset, with the flange so far from the first axis [m] and parts so far from theirs."""
 
 
@@ -52,7 +52,7 @@ def reach_of(data: mujoco.MjData, model: Model, robot: Mechanism) -> float:
     return float(np.linalg.norm(np.cross(data.xaxis[joint], arm)))
 
 
-def grown(chain: Chain, half: Array) -> Chain:
+def grown(chain: KinematicChain, half: Array) -> KinematicChain:
     """Replace the levers of a chain, given in the middle of a span, by their largest within it.
 
     Args:
@@ -127,7 +127,7 @@ def bind_in_span(
                 return None
             extension = reach_of(data, model, robot) + float(span.fast[row]) * span.T + ROUNDING
             course = after(onset, extension, chains)
-            return None if course.doubt else course
+            return None if course.unbounded_reason else course
 
         return at_most
 

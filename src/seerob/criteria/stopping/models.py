@@ -208,8 +208,10 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
     if not found.timed and robot.riders:
         found = replace(found, braking=_while_riders_rest(found.braking, model, robot))
     if not found.timed and robot.on:
-        doubt = f"{robot.on}, which carries {robot.name}, has a way to stop of its own that is not in it"
-        found = replace(found, doubts=(*found.doubts, doubt))
+        unbounded_reason = (
+            f"{robot.on}, which carries {robot.name}, has a way to stop of its own that is not in it"
+        )
+        found = replace(found, doubts=(*found.doubts, unbounded_reason))
     by_onset, T_r, a = found.by_onset, stop.reaction, stop.acceleration or 0.0
     asked, how, left_out = bind_reaction(
         model, robot, gap, stop.reaction, stop.acceleration, points=stop.model != "simulated"
@@ -232,9 +234,9 @@ def bind_stop(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> StopModel
             try:
                 if brake is not None:
                     return brake(onset, scale)
-                doubts = (onset.doubt, why)
+                doubts = (onset.unbounded_reason, why)
             except Undecided as reason:
-                doubts = (onset.doubt, str(reason))
+                doubts = (onset.unbounded_reason, str(reason))
             # It reacts before it brakes: so far it gets whatever the stop is like.
             least = np.zeros_like(onset.S_r)
             return Course(onset.v_r, onset.S_r, least, 0.0, "; ".join(filter(None, doubts)))
@@ -345,7 +347,7 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
     if stop.rated_payload is not None and table.rated_payload is not None:
         what = f"{stop.rated_payload:g} kg, and the table of {table.robot} says {table.rated_payload:g} kg"
         raise InputError.at("stop", "rated_payload", what, "leave it out: the table's own holds")
-    doubt = not_its_own(table, model, robot) if stop.table_for is None else ""
+    unbounded_reason = not_its_own(table, model, robot) if stop.table_for is None else ""
 
     def bind(after: Stopping) -> InSpan | None:
         if stop.acceleration:
@@ -373,7 +375,7 @@ def _tabulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
         by_table,
         formula,
         (named, *inputs, *rest),
-        doubts=(doubt,) if doubt else (),
+        doubts=(unbounded_reason,) if unbounded_reason else (),
         not_modelled=(
             f"stop category {table.category} only, as tabulated",
             "below the table's first speed, payload and extension its first stopping time holds"
@@ -402,14 +404,16 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
             found = stopped.course()
             if not state.speed_errors.keys().isdisjoint(everybody):
                 why = f"the noise of positions that speeds of {robot.name} are derived from is not followed"
-                onset = replace(onset, doubt=onset.doubt or f"{why} in a simulated stop")
+                onset = replace(
+                    onset, unbounded_reason=onset.unbounded_reason or f"{why} in a simulated stop"
+                )
             S_r = np.maximum(found.S_r, onset.S_r)
             if stop.direction == "path":
-                return Course(found.v_r, S_r, found.S_s, found.T_s, onset.doubt)
+                return Course(found.v_r, S_r, found.S_s, found.T_s, onset.unbounded_reason)
             nearer = approach(stopped, state, gap)
             # S_r and S_s only count together; neither may be larger than its path.
             S_r = np.minimum(S_r, nearer)
-            return Course(found.v_r, S_r, nearer - S_r, found.T_s, onset.doubt)
+            return Course(found.v_r, S_r, nearer - S_r, found.T_s, onset.unbounded_reason)
 
         def weighing(onset: Onset, scale: float, shifts: Shifts) -> Course:
             held = once(onset, scale, None, shifts)
@@ -422,7 +426,7 @@ def _simulated(stop: Stop, model: Model, robot: Mechanism, gap: Gap) -> _Brakes:
                 np.maximum(held.S_r, later.S_r),
                 np.maximum(held.S_r + held.S_s, later.S_r + later.S_s) - np.maximum(held.S_r, later.S_r),
                 max(held.T_s, later.T_s),
-                onset.doubt,
+                onset.unbounded_reason,
             )
 
         def at(onset: Onset, scale: float) -> Course:
@@ -466,7 +470,9 @@ def _each(ends: Callable[..., Any], courses: Sequence[Course]) -> Course:
     """The least or the largest of every term of courses that begin alike, each by itself."""
     terms = ([getattr(course, name) for course in courses] for name in ("S_r", "S_s"))
     S_r, S_s = (np.asarray(ends(term, axis=0)) for term in terms)
-    return Course(courses[0].v_r, S_r, S_s, float(ends([c.T_s for c in courses])), courses[0].doubt)
+    return Course(
+        courses[0].v_r, S_r, S_s, float(ends([c.T_s for c in courses])), courses[0].unbounded_reason
+    )
 
 
 def _brakes(stop: Stop, robot: Mechanism) -> tuple[Array, Origin, str]:
@@ -495,7 +501,7 @@ def approach(stopped: Stopped, state: State, gap: Gap) -> Array:
     """
     K = len(stopped.t)
     picked = np.unique(np.linspace(0, K - 1, min(K, INSTANTS)).round().astype(int))
-    R, x = state.placed(gap.a, estimates=True)
+    R, x = state.placed(gap.a, allow_estimated=True)
     rotations = np.repeat(R[None], len(picked), axis=0)
     positions = np.repeat(x[None], len(picked), axis=0)
     rotations[:, gap.b] = stopped.rotations[picked]

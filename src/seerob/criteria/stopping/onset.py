@@ -65,7 +65,7 @@ class Onset:
     """Where the joints are at the ticks until then, of a motion that is known [rad or m], shape (m, j)."""
     qd: Array | None = None
     """How fast they are there [rad/s or m/s], likewise."""
-    doubt: str = ""
+    unbounded_reason: str = ""
     """Why it may be more than this."""
     linear: bool = True
     """Whether way and speed grow linearly with the factor on the present speeds."""
@@ -91,17 +91,17 @@ Reaction = Callable[[State], At]
 """May raise `Undecided`: who it speaks of was not heard."""
 
 
-def held(v: Array, T_r: float, qd: Array, doubt: str = "") -> Onset:
+def held(v: Array, T_r: float, qd: Array, unbounded_reason: str = "") -> Onset:
     """At the present speeds.
 
     Args:
         v: Of the parts [m/s], shape (n,).
         T_r: Reaction time [s].
         qd: Of the joints [rad/s or m/s], shape (j,).
-        doubt: Why it may be more.
+        unbounded_reason: Why it may be more.
     """
     speeds = np.abs(qd)
-    return Onset(v, v * T_r, v, speeds * T_r, speeds, doubt=doubt)
+    return Onset(v, v * T_r, v, speeds * T_r, speeds, unbounded_reason=unbounded_reason)
 
 
 def accelerated(v: Array, T_r: float, a: float, qd: Array) -> Onset:
@@ -113,13 +113,13 @@ def accelerated(v: Array, T_r: float, a: float, qd: Array) -> Onset:
     return Onset(v, v * T_r + a * T_r**2 / 2, v + a * T_r, None, None)
 
 
-def constant(robot: Mechanism, gap: Gap, T_r: float, a: float, doubt: str = "") -> Reaction:
+def constant(robot: Mechanism, gap: Gap, T_r: float, a: float, unbounded_reason: str = "") -> Reaction:
     """Every part accelerates by a given figure [m/s²]."""
 
     def at(state: State) -> At:
         v, qd = state.fastest_points(gap.b)[0], state.qd(robot)
-        if doubt:
-            return lambda scale: held(scale * v, T_r, scale * qd, doubt)
+        if unbounded_reason:
+            return lambda scale: held(scale * v, T_r, scale * qd, unbounded_reason)
         return lambda scale: accelerated(scale * v, T_r, a, scale * qd)
 
     return at
@@ -169,9 +169,9 @@ class Foreseen:
         foreseen = state.foresee(self._robot.name, instants)
         if foreseen is None:
             return None
-        q, qd, doubt = foreseen
+        q, qd, unbounded_reason = foreseen
         if self._T_r > LARGEST_WINDOW:
-            doubt = doubt or f"a motion is looked at {LARGEST_WINDOW:g} s ahead at most"
+            unbounded_reason = unbounded_reason or f"a motion is looked at {LARGEST_WINDOW:g} s ahead at most"
         if self._run() is not state or k < self._last:
             self._run, self._known = weakref.ref(state), {}
         self._last = k
@@ -188,8 +188,8 @@ class Foreseen:
                 before = self._known.get(k + i - 1)
                 known = self._known[k + i] = self._stretch(state, t, at_q, at_qd, before)
             # Of a motion that may be another one, or jumps, nothing is known between instants.
-            told.append(known.ends if doubt else known.most)
-            turning.append(known.joint_ends if doubt else known.joints)
+            told.append(known.ends if unbounded_reason else known.most)
+            turning.append(known.joint_ends if unbounded_reason else known.joints)
         v, joints = np.concatenate(told), np.concatenate(turning)
         # A twin that does not stand exactly where the motion has it may be faster now.
         v[0], joints[0] = np.maximum(v[0], v_now), np.maximum(joints[0], qd_now)
@@ -212,7 +212,7 @@ class Foreseen:
                 scale * speeds,
                 q[:m] if scale == 1.0 else None,
                 qd[:m] if scale == 1.0 else None,
-                doubt,
+                unbounded_reason,
             )
 
         return at
@@ -365,7 +365,7 @@ def speeds_of(
 # -- accelerations of the joints ----------------------------------------------------------------
 
 
-class Chain(NamedTuple):
+class KinematicChain(NamedTuple):
     """The k joints of a robot that move a part, from the base outward."""
 
     turns: NDArray[np.bool_]
@@ -392,18 +392,18 @@ class Levers:
         self._chains = [(index, turns[row], row) for index, row in zip(gap.b, rows, strict=True)]
         self._robot, self._model = robot, model
 
-    def at(self, state: State) -> list[Chain]:
+    def at(self, state: State) -> list[KinematicChain]:
         """Of every part, now."""
-        return [Chain(t, rows, _levers(state, self._robot, rows, i)) for i, t, rows in self._chains]
+        return [KinematicChain(t, rows, _levers(state, self._robot, rows, i)) for i, t, rows in self._chains]
 
-    def placed(self, data: mujoco.MjData) -> list[Chain]:
+    def placed(self, data: mujoco.MjData) -> list[KinematicChain]:
         """Of every part, where data with kinematics have it; of those that nobody picks up."""
         found = []
         for i, turns, rows in self._chains:
             body = self._model.bodies[i]
             R, x = data.xmat[body.mj].reshape(3, 3), data.xpos[body.mj]
             joints = self._model.mj.dof_jntid[self._robot.v_address[rows]]
-            found.append(Chain(turns, rows, levers_of(data, joints, body, R, x)))
+            found.append(KinematicChain(turns, rows, levers_of(data, joints, body, R, x)))
         return found
 
 
@@ -435,7 +435,7 @@ def by_joints(
     qdd: Array,
     largest: Array,
     coupling: Array,
-    chains: Sequence[Chain],
+    chains: Sequence[KinematicChain],
     lead: float = 0.0,
 ) -> Onset:
     """Bound with joints that accelerate, for a reaction that begins within ``lead`` [s].

@@ -40,7 +40,7 @@ class Course:
     """Way while braking [m], shape (n,)."""
     T_s: float
     """Stopping time [s]."""
-    doubt: str = ""
+    unbounded_reason: str = ""
     """Why it may be more than this."""
     most: Course | None = None
     """A bound from above, where this is one from below."""
@@ -69,7 +69,7 @@ def way_of_person(v_h: Array | float, T_r: float, T_s: Array | float) -> Array:
 
 def braking(onset: Onset, T_s: float, share: float = BOUND) -> Course:
     """Course of parts that do something known before a stop that takes a known time; as `course`."""
-    return Course(onset.v_r, onset.S_r, share * onset.v_s * T_s, T_s, onset.doubt)
+    return Course(onset.v_r, onset.S_r, share * onset.v_s * T_s, T_s, onset.unbounded_reason)
 
 
 def course(v_r: Array, T_r: float, T_s: float, share: float = BOUND) -> Course:

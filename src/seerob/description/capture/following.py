@@ -279,7 +279,7 @@ class Following:
             share = age / (device.times[k + 1] - device.times[k])
             instant = t
             points = between(points, device.samples[k + 1].points, share)
-        reason = sample.doubt(name)
+        reason = sample.invalid_reason(name)
         if sample.quality is Quality.INVALID:
             return _Told([], reason)
         return self._believed(device, points, instant, reason, placed=sample.placed)

@@ -133,7 +133,7 @@ def calibrated(description: Description, calibration: Calibration, file: str) ->
     Raises:
         InputError: It is that of another type of robot.
     """
-    chain = _Chain(description, calibration, file)
+    chain = _KinematicChain(description, calibration, file)
     nominal = poses(description, np.zeros(6))
     placed: dict[str, Array] = {}
     links: list[Link] = []
@@ -163,7 +163,7 @@ def off_by(description: Description, calibration: Calibration, file: str) -> flo
     Raises:
         InputError: They are of another type.
     """
-    chain = _Chain(description, calibration, file)
+    chain = _KinematicChain(description, calibration, file)
     off = 0.0
     for q in _postures():
         there = chain.root_from_base @ calibration.frames(q)[-1]
@@ -197,7 +197,7 @@ def poses(description: Description, q: Array) -> dict[str, Array]:
     return found
 
 
-class _Chain:
+class _KinematicChain:
     """Six joints in a row, where they are and where they were measured, at angles 0, in the root's frame."""
 
     def __init__(self, description: Description, calibration: Calibration, file: str) -> None:

@@ -53,7 +53,7 @@ class Instant(NamedTuple):
 
     t: float | None
     """On the host's clock [s]; None for what is no news: not newer than what was heard before."""
-    doubt: str = ""
+    invalid_reason: str = ""
     """Why the device's time may not be relied on now; empty when it may."""
 
 

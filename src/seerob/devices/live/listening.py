@@ -76,7 +76,7 @@ class LiveSource(Source, frozen=True, kw_only=True):
     what is sent without a time also how late it is at most."""
 
     live: ClassVar[bool] = True
-    apart: ClassVar[bool] = True
+    own_process: ClassVar[bool] = True
     """Whether it may listen in another process: not who takes what this one has."""
     loads: ClassVar[tuple[str, ...]] = ()
     """Libraries that it needs when it listens: loaded before anybody does, since that holds others up."""
@@ -301,14 +301,14 @@ class Listener:
             heard = self._clock.hear(sample.t_device, host, _content(sample))
         if heard.t is None:
             self._arrivals.repeat()
-            if heard.doubt and what in self._posted:
+            if heard.invalid_reason and what in self._posted:
                 # No news, and a doubt about what was said before.
-                self._doubt(what, heard.doubt)
+                self._doubt(what, heard.invalid_reason)
             return
         late = (self._source.delay or 0.0) * (not self._source.asked)
         if sample.t_device is not None:
             late = self._clock.latency
-        reason = heard.doubt or self._contradiction(sample, what, host)
+        reason = heard.invalid_reason or self._contradiction(sample, what, host)
         if sample.t_device is None and not self._source.asked and self._source.delay is None:
             reason = reason or UNTIMED
         quality = sample.quality

@@ -14,7 +14,7 @@ from typing import Self
 
 from seerob.core.samples import Mailbox, Sample, SignalSample, key
 from seerob.devices.live.listening import Listener, LiveSource, delay_of, name_of, stop
-from seerob.devices.live.source_process import SourceProcess, told
+from seerob.devices.live.source_process import SourceProcess, pickled_source
 from seerob.workstation.source import Target
 
 PATIENCE = 1.0
@@ -41,7 +41,7 @@ class Receivers:
         self._here: list[Listener] = []
         self._apart: list[SourceProcess] = []
         for source, target in sources:
-            pair = told(source, target)
+            pair = pickled_source(source, target)
             if pair is None:
                 self._here.append(Listener(source, target, self._box.post))
             else:

@@ -52,7 +52,7 @@ class Order(NamedTuple):
     again: bool
     """Whether another one listened before."""
     pair: bytes
-    """From `told`."""
+    """From `pickled_source`."""
     known: Known | None = None
     """What the one before knew of the device's clock."""
 
@@ -67,11 +67,11 @@ class Said(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     trace: str | None = None
 
 
-def told(source: LiveSource, target: Target | None) -> bytes | None:
+def pickled_source(source: LiveSource, target: Target | None) -> bytes | None:
     """A source and what it drives, as another process can be told; None when only this one knows it."""
     if os.name != "posix" or not sys.executable or getattr(sys, "frozen", False):
         return None  # memory is inherited by its descriptor; a frozen program is no interpreter
-    if not type(source).apart or type(source).__module__ == "__main__":
+    if not type(source).own_process or type(source).__module__ == "__main__":
         return None
     try:
         return pickle.dumps((source, target))
@@ -84,7 +84,7 @@ class SourceProcess:
 
     Args:
         name: Of the source.
-        pair: It and what it drives, from `told`.
+        pair: It and what it drives, from `pickled_source`.
     """
 
     def __init__(self, name: str, pair: bytes) -> None:

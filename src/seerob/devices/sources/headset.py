@@ -41,7 +41,7 @@ BODY = "hips"
 class Headset(CaptureStream, frozen=True, kw_only=True):
     """A person who wears a headset that shows this run's page."""
 
-    apart: ClassVar[bool] = False
+    own_process: ClassVar[bool] = False
     """The page's server is of the run's own process."""
     frequency: Annotated[float, Meta(ge=30, le=144, extra={"unit": "Hz"})] = 72.0
     """Pictures per second of the headset [Hz]."""

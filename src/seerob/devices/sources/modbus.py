@@ -85,7 +85,7 @@ class Modbus(VariablesSource, frozen=True, kw_only=True):
                 found = await device.read(wanted)
                 age = time.monotonic() - asked
                 yield tuple(
-                    Change(name, None, doubt=str(value))
+                    Change(name, None, invalid_reason=str(value))
                     if isinstance(value, Refused)
                     else Change(name, value, age=age)
                     for name, value in found.items()

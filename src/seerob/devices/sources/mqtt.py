@@ -17,7 +17,7 @@ from seerob.core.errors import InputError, Problem, SeerobError
 from seerob.core.extras import need
 from seerob.core.snapshot import Finding
 from seerob.devices.variables.access import missing_access
-from seerob.devices.variables.json_values import told
+from seerob.devices.variables.json_values import value_and_time
 from seerob.devices.variables.live_source import BEAT, LONGEST_PULSE, PULSES, Change, Node, VariablesSource
 from seerob.files.tables.mapping import toml_value
 from seerob.protocols import ProtocolError
@@ -108,15 +108,17 @@ def plain_change(name: str, where: Plain, payload: bytes, *, retained: bool, now
             if where.pointer or where.time:
                 raise
             value = payload.decode("utf-8", "replace")
-        raw, age = told(value, where.pointer, where.time, now=now)
+        raw, age = value_and_time(value, where.pointer, where.time, now=now)
         if where.time is not None:
             return Change(name, raw, age=age)
     except (ProtocolError, ValueError) as error:
-        return Change(name, None, doubt=f"{where.topic}: {error}")
+        return Change(name, None, invalid_reason=f"{where.topic}: {error}")
     except KeyError as error:
-        return Change(name, None, doubt=f"{where.topic}: the payload has no {error.args[0]!r}")
+        return Change(name, None, invalid_reason=f"{where.topic}: the payload has no {error.args[0]!r}")
     if retained:
-        return Change(name, raw, doubt=f"{where.topic}: kept by the broker, nobody says how old it is")
+        return Change(
+            name, raw, invalid_reason=f"{where.topic}: kept by the broker, nobody says how old it is"
+        )
     return Change(name, raw)
 
 
@@ -298,11 +300,11 @@ def _standing(wanted: dict[str, Address], nodes: dict[str, sparkplug.Node]) -> t
 def _metric(name: str, where: Metric, node: sparkplug.Node) -> Change:
     said = node.values.get((where.speaker, where.metric))
     if not node.alive:
-        return Change(name, None, doubt=f"{where.node}: not alive, or its birth was not heard")
+        return Change(name, None, invalid_reason=f"{where.node}: not alive, or its birth was not heard")
     if said is None:
-        return Change(name, None, doubt=f"{where.speaker}: has no metric {where.metric!r}")
+        return Change(name, None, invalid_reason=f"{where.speaker}: has no metric {where.metric!r}")
     if said[0] is None:
-        return Change(name, None, doubt=f"{where.speaker}: says that {where.metric!r} has no value")
+        return Change(name, None, invalid_reason=f"{where.speaker}: says that {where.metric!r} has no value")
     return Change(name, said[0])
 
 

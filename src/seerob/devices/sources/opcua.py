@@ -115,13 +115,16 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
                     lost[variable.name] = str(error)
             changes = Changes()
             lost |= await changes.watch(client, nodes, self.interval)
-            yield tuple(Change(name, None, doubt=why) for name, why in lost.items())
+            yield tuple(Change(name, None, invalid_reason=why) for name, why in lost.items())
             within = min([self.timeout / PULSES, *(v.timeout / PULSES for v in variables), LONGEST_PULSE])
             async for changed, shown in changes.heard(client, within):
                 yield (
                     Shown(shown),
                     # A value that stands is as new as the newest answer, however long ago it changed.
-                    *(Change(name, found.value, doubt=found.doubt) for name, found in changed.items()),
+                    *(
+                        Change(name, found.value, invalid_reason=found.invalid_reason)
+                        for name, found in changed.items()
+                    ),
                 )
 
     async def write(self, variable: Variable, raw: bool, folder: Path) -> None:

@@ -240,7 +240,7 @@ def joint_sample(
         return None
     moving = [newest.get(f"v{k}") for k in range(n)] if speeds is not None else []
     numbers = [float(s.value) for s in moving if s is not None and isinstance(s.value, int | float)]
-    doubtful = any(s.doubt for s in heard)
+    doubtful = any(s.invalid_reason for s in heard)
     stamps = [s.stamp for s in heard if s.stamp is not None]
     qd = None
     if speeds is not None and len(numbers) == n:

@@ -111,7 +111,10 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
                     some = addresses[k : k + s7_web.MOST]
                     said += s7_web.results(await session.post(s7_web.reading(some)), len(some))
                 age = time.monotonic() - asked
-                yield tuple(Change(n, raw, doubt, age) for n, (raw, doubt) in zip(names, said, strict=True))
+                yield tuple(
+                    Change(n, raw, invalid_reason, age)
+                    for n, (raw, invalid_reason) in zip(names, said, strict=True)
+                )
                 # What was asked late is not made up for.
                 due = max(due + self.every, clock.time())
                 await asyncio.sleep(due - clock.time())

@@ -21,7 +21,7 @@ from seerob.core.host_name import is_loopback
 from seerob.core.quantities import Seconds
 from seerob.core.snapshot import Finding
 from seerob.devices.variables.access import missing_access
-from seerob.devices.variables.json_values import told
+from seerob.devices.variables.json_values import value_and_time
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.http_answer import LARGEST, answer
@@ -177,17 +177,19 @@ class Web(VariablesSource, frozen=True, kw_only=True):
         now = time.time()
         for name, where in wanted.items():
             if isinstance(said, ProtocolError):
-                yield Change(name, None, doubt=str(said))
+                yield Change(name, None, invalid_reason=str(said))
                 continue
             try:
-                value, age = told(said, where.pointer, where.time, now=now)
+                value, age = value_and_time(said, where.pointer, where.time, now=now)
                 yield Change(name, value, age=max(age, took))
             except KeyError as error:
                 # Of what is pushed, a document may tell a part; what stays out grows old.
                 if not self._pushed:
-                    yield Change(name, None, doubt=f"the document has no {error.args[0]!r} ({where.pointer})")
+                    yield Change(
+                        name, None, invalid_reason=f"the document has no {error.args[0]!r} ({where.pointer})"
+                    )
             except ValueError as error:
-                yield Change(name, None, doubt=str(error))
+                yield Change(name, None, invalid_reason=str(error))
 
     def _place(self, path: str) -> str:
         """The URL of a path, on the same server.

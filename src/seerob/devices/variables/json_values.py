@@ -15,7 +15,7 @@ AHEAD = 1.0
 """Of clocks that differ by more nobody knows how old a value is [s]."""
 
 
-def told(document: Any, pointer: str, time: str | None, *, now: float) -> tuple[Any, float]:
+def value_and_time(document: Any, pointer: str, time: str | None, *, now: float) -> tuple[Any, float]:
     """A value, and how old it is [s]; 0 when nothing says it.
 
     Args:

@@ -46,7 +46,7 @@ class Change(NamedTuple):
     """In the dictionary."""
     raw: object
     """As it was sent."""
-    doubt: str = ""
+    invalid_reason: str = ""
     """Why the device itself does not stand by it."""
     age: float = 0.0
     """How old it may have been when it arrived [s]: since it was asked for, or by the device's own stamps."""
@@ -228,8 +228,8 @@ class Picture:
             self.begun = True
             self._said[change.name] = now - change.age
             self._bad.pop(change.name, None)
-            if change.doubt:
-                self._bad[change.name] = f"{change.name}: {change.doubt}"
+            if change.invalid_reason:
+                self._bad[change.name] = f"{change.name}: {change.invalid_reason}"
                 continue
             try:
                 self._values[change.name] = variable.value(change.raw)

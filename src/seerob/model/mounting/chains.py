@@ -87,9 +87,11 @@ def _weighed(robot: str, link: Link, *, bodiless: bool) -> LinkMass:
     """What one link weighs by what its file says of it alone."""
     name, inertial = f"{robot}/{link.name}", link.inertial
     if inertial is not None:
-        doubt = f"it is a guess ({inertial.source})" if inertial.origin is Origin.ASSUMED else too_light(link)
-        if doubt:
-            return LinkMass(name=name, origin=Origin.MISSING, note=doubt)
+        invalid_reason = (
+            f"it is a guess ({inertial.source})" if inertial.origin is Origin.ASSUMED else too_light(link)
+        )
+        if invalid_reason:
+            return LinkMass(name=name, origin=Origin.MISSING, note=invalid_reason)
         return LinkMass(name=name, mass=inertial.mass, origin=inertial.origin, source=inertial.source)
     if link.refused_mass:
         return LinkMass(name=name, origin=Origin.MISSING, note=link.refused_mass)

@@ -27,7 +27,7 @@ from seerob.model.mounting.areas import mount_sensor, mount_swept
 from seerob.model.mounting.chains import assumed, payload, placeholder
 from seerob.model.mounting.contacts import add_contacts
 from seerob.model.mounting.in_place import implausible
-from seerob.model.mounting.mechanisms import Chain, Riders, mechanism
+from seerob.model.mounting.mechanisms import MechanismDraft, Riders, mechanism
 from seerob.model.mounting.overrides import home, overridden
 from seerob.model.mounting.people import describe
 from seerob.model.mounting.picked_up import picked_up
@@ -112,7 +112,7 @@ class _Compiler:
         self.file = next(iter(station.files), "workstation")
         self.mounting = Mounting(self.file)
         self.problems: list[Problem] = []
-        self.chains: dict[str, Chain] = {}
+        self.chains: dict[str, MechanismDraft] = {}
         self.carriers: dict[str, str] = {}
         self.bound = Bound({}, {}, ())
 
@@ -183,7 +183,7 @@ class _Compiler:
             description = calibrated_by(description, robot.calibration, self.folder)
         q = home(description, robot, self.file)
         on = self._above(robot.on, "on", ("machine",))
-        chain = Chain(description, "robot", q, robot.q is not None, on=on)
+        chain = MechanismDraft(description, "robot", q, robot.q is not None, on=on)
         self._chain(robot.name, chain, pose_matrix(robot.base))
         self.mounting.files |= filed(
             robot.name,
@@ -211,15 +211,15 @@ class _Compiler:
         description, said = describe(human, touches=bool(self.station.contacts))
         self.mounting.findings += said
         q = posture.posture(description, human.posture, joints=human.joints, file=f"{human.name}.joints")
-        self._chain(human.name, Chain(description, "human", q, True), pose_matrix(human.at))
+        self._chain(human.name, MechanismDraft(description, "human", q, True), pose_matrix(human.at))
 
-    def _chain(self, name: str, chain: Chain, above_from_base: Array) -> None:
+    def _chain(self, name: str, chain: MechanismDraft, above_from_base: Array) -> None:
         self.chains[name] = chain
         self.mounting.findings += chain.description.findings
         for link in chain.description.links:
             self._link(name, chain, link, above_from_base)
 
-    def _link(self, owner: str, chain: Chain, link: Link, above_from_base: Array) -> None:
+    def _link(self, owner: str, chain: MechanismDraft, link: Link, above_from_base: Array) -> None:
         full = f"{owner}/{link.name}"
         if link.parent is None:
             parent, pose = chain.on or None, above_from_base @ link.parent_from_link
@@ -257,7 +257,7 @@ class _Compiler:
         description, thing = machine_mounting.loaded(machine, self.folder, file=self.file)
         start = machine_mounting.home(machine.motion)
         on = self._above(machine.on, "on", ("robot", "machine"))
-        chain = Chain(description, "machine", start, True, on=on)
+        chain = MechanismDraft(description, "machine", start, True, on=on)
         self._chain(machine.name, chain, pose_matrix(machine.at))
         self.mounting.files |= filed(
             machine.name, thing.files, folder=self.folder, references=(machine.mesh,)
@@ -415,8 +415,8 @@ class _Compiler:
     def _too_small(self, model: Model) -> Iterator[Finding]:
         """What is said of areas that something sweeps of which no shape shows a part."""
         for area in self.station.areas:
-            if area.swept is not None and (unseen := model.unseen((area.swept.of,))):
-                text = f"{area.name} is swept by what is not all shown: {unseen}"
+            if area.swept is not None and (unshaped := model.unshaped((area.swept.of,))):
+                text = f"{area.name} is swept by what is not all shown: {unshaped}"
                 yield Finding(level="warning", subject=area.name, text=text, holds=(area.name,))
 
     def _riders(self) -> Riders:

@@ -29,7 +29,7 @@ LUMP = 0.02
 
 
 @dataclass
-class Chain:
+class MechanismDraft:
     """A robot, a person or a machine on its way to a `Mechanism`."""
 
     description: Description
@@ -52,7 +52,7 @@ class Riders:
 
     def __init__(
         self,
-        chains: Mapping[str, Chain],
+        chains: Mapping[str, MechanismDraft],
         carriers: Mapping[str, str],
         entries: Sequence[Entry],
     ) -> None:
@@ -103,7 +103,12 @@ class Riders:
 
 
 def mechanism(
-    mj: Any, name: str, chain: Chain, riders: Riders, carriers: Mapping[str, str], bodies: Sequence[Body]
+    mj: Any,
+    name: str,
+    chain: MechanismDraft,
+    riders: Riders,
+    carriers: Mapping[str, str],
+    bodies: Sequence[Body],
 ) -> Mechanism:
     """A chain as the compiled model has it.
 
@@ -166,7 +171,7 @@ def mechanism(
         on=riders.above(name),
         riders=riders.of(name),
         holders=tuple(dict.fromkeys(b.holder for b in own_bodies if b.holder and b.holder != name)),
-        unseen=() if chain.role == "human" else tuple(_unseen(mj, masses, own_bodies)),
+        unshaped=() if chain.role == "human" else tuple(_unshaped(mj, masses, own_bodies)),
     )
 
 
@@ -185,7 +190,7 @@ def stands_out(a: float, b: float, variance: float) -> float:
     return math.sqrt(((a - b) / 2) ** 2 + variance) - (a + b) / 2
 
 
-def _unseen(mj: Any, masses: Iterable[LinkMass], bodies: Sequence[Body]) -> Iterable[str]:
+def _unshaped(mj: Any, masses: Iterable[LinkMass], bodies: Sequence[Body]) -> Iterable[str]:
     """Bodies with a mass of which some lies, by centre of mass and inertia, where nothing has a shape.
 
     The shapes of all that moves as one with a body count, and all its mass must go into them. A body whose

@@ -13,7 +13,7 @@ from seerob.outputs.html import Html, joined, table, tag, whole
 from seerob.outputs.palette import DARK_HEX, HEX
 from seerob.outputs.report import plots as _plots
 from seerob.outputs.report.evidence import assumed, evaluated, not_covered
-from seerob.outputs.report.posture_safety import told
+from seerob.outputs.report.posture_safety import posture_safety_section
 from seerob.outputs.report.report import Report, badge, input_row
 from seerob.outputs.report.time_shares import spread_over_time
 from seerob.outputs.sentences import about, bound, extremum, listed, percent, reached, summary
@@ -142,7 +142,7 @@ def page(report: Report) -> str:
         _opening(report),
         _verdicts(report),
         _criteria(report),
-        told(report.scene, report.log),
+        posture_safety_section(report.scene, report.log),
         added(report.sections),
         assumed(report),
         not_covered(report),

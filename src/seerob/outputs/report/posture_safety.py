@@ -137,7 +137,7 @@ def _place(series: Series, reason: str, person: str) -> tuple[str, str]:
     return ("", region) if region in series.parts else area_in(reason, person)
 
 
-def told(scene: Scene, log: ResultLog) -> Html | None:
+def posture_safety_section(scene: Scene, log: ResultLog) -> Html | None:
     """The report's table; nothing where no person has both."""
     parts = []
     for one in sides(scene, log):

@@ -114,7 +114,7 @@ class Said(NamedTuple):
     """What a server says of one node."""
 
     value: Any
-    doubt: str
+    invalid_reason: str
     """Its status, when that is not good."""
     age: float
     """By its own stamps [s]."""
@@ -395,10 +395,12 @@ class Changes:
 def said(value: Any) -> Said:
     """What a data value says."""
     status = value.StatusCode
-    doubt = "" if status is None or status.is_good() else f"the server says {status.name}"
+    invalid_reason = "" if status is None or status.is_good() else f"the server says {status.name}"
     stamp = _seconds(value.SourceTimestamp)
     # Of two clocks that differ nothing is known; what lies ahead is as new as can be.
-    return Said(value.Value.Value, doubt, 0.0 if stamp is None else max(0.0, time.time() - stamp), stamp)
+    return Said(
+        value.Value.Value, invalid_reason, 0.0 if stamp is None else max(0.0, time.time() - stamp), stamp
+    )
 
 
 def _seconds(stamp: datetime | None) -> float | None:

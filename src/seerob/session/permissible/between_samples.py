@@ -27,7 +27,7 @@ from seerob.core.errors import InputError, Undecided
 from seerob.core.transforms import Array
 from seerob.model.model import Model
 from seerob.session.permissible.given_motion import GivenMotion
-from seerob.session.permissible.moving_joints import Chain, MovingJoints, chains_of
+from seerob.session.permissible.moving_joints import KinematicChain, MovingJoints, chains_of
 from seerob.twin.state import Hearing, State
 
 ROUNDING = 1e-7
@@ -133,8 +133,8 @@ class BetweenSamples:
 
         And where no shape shows a part of a robot that a name means.
         """
-        if unseen := self._model.unseen(names):
-            raise Undecided(unseen)
+        if unshaped := self._model.unshaped(names):
+            raise Undecided(unshaped)
         followed = {m.name for m in self._model.workstation.machines if m.motion.variables()}
         ids: set[int] = set()
         for i in bodies:
@@ -224,7 +224,7 @@ class BetweenSamples:
             f"speed of {of}", "m/s", True, middle, agility, bound, lambda v: -float(v.max()), tolerance
         )
 
-    def _agility(self, chains: list[Chain], low: float, high: float) -> Array:
+    def _agility(self, chains: list[KinematicChain], low: float, high: float) -> Array:
         qd, qdd = self._joints.largest(np.array([low]), np.array([high]))
         return np.array([float(chain.agility(qd, qdd)[0]) for chain in chains])
 

@@ -28,7 +28,7 @@ from seerob.session.permissible.given_motion import GivenMotion, largest_on
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class KinematicChain:
     """The joints that move one body, from base to tip; k of them."""
 
     dofs: NDArray[np.int64]
@@ -53,7 +53,7 @@ class Chain:
         return np.asarray((a * w + v * turned).sum(axis=1))
 
 
-def chains_of(model: Model, bodies: Sequence[int], slid: Array) -> list[Chain]:
+def chains_of(model: Model, bodies: Sequence[int], slid: Array) -> list[KinematicChain]:
     """The chains of bodies.
 
     Args:
@@ -81,7 +81,7 @@ def chains_of(model: Model, bodies: Sequence[int], slid: Array) -> list[Chain]:
                 weight[k] = length
             else:
                 length += float(slid[dofs[k]])
-        found.append(Chain(dofs, turns, weight))
+        found.append(KinematicChain(dofs, turns, weight))
     return found
 
 

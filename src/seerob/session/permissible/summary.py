@@ -199,11 +199,11 @@ def _float(cell: Cell) -> float:
 
 def _least(found: PermissibleSpeed) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
-    for c, t, doubt in least_by_region(found.map):
+    for c, t, invalid_reason in least_by_region(found.map):
         speed = "undecided" if c.undecided else "–" if not np.isfinite(c.speed) else f"{c.speed:.3f} m/s"
         if not c.undecided and c.share == 0:
             speed = "none"
-        if doubt and not c.undecided:
+        if invalid_reason and not c.undecided:
             speed += ", elsewhere undecided"
         name = f"{c.criterion}: {c.region}" if c.region else c.criterion
         why = c.reason if c.undecided or c.share == 0 else c.governs

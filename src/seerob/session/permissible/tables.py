@@ -154,9 +154,11 @@ def least_by_region(found: SpeedMap) -> list[tuple[Ceiling, float, bool]]:
             for c in ceilings:
                 key = (c.criterion, c.region)
                 now = least.get(key)
-                doubt = c.undecided or (now is not None and now[2])
+                invalid_reason = c.undecided or (now is not None and now[2])
                 smaller = now is None or now[0].undecided or (not c.undecided and c.share < now[0].share)
-                least[key] = (c, t, doubt) if now is None or smaller else (now[0], now[1], doubt)
+                least[key] = (
+                    (c, t, invalid_reason) if now is None or smaller else (now[0], now[1], invalid_reason)
+                )
     return sorted(least.values(), key=lambda entry: (math.isnan(entry[0].share), entry[0].share))
 
 

@@ -48,7 +48,7 @@ class Witness:
         self.t.append(state.t)
         self._qpos.append(np.array(state.data.qpos))
         self._qvel.append(np.array(state.data.qvel))
-        self._doubts.append({name: state.doubt(name) for name in state.hearings})
+        self._doubts.append({name: state.invalid_reason(name) for name in state.hearings})
         asked = {c.active for c in state.model.workstation.safety if c.active is not None}
         self._heard.append({name: _heard(state, name) for name in asked})
         people = {name: h for name, h in state.hearings.items() if h.bones}
@@ -134,7 +134,7 @@ class Posed(State):
         self.asked.clear()
         self.refresh(t)
 
-    def whole_doubt(self, name: str) -> str:
+    def invalid_place_reason(self, name: str) -> str:
         """Why nothing of a robot or person may be relied on; others as the run knew them then, bones too."""
         return self.doubts.get(name, "")
 

@@ -20,7 +20,7 @@ from seerob.core.errors import InputError, Problem, UnknownName
 from seerob.core.transforms import Array
 from seerob.distance.least import Per, Query, Survey
 from seerob.model.model import Mechanism, Model
-from seerob.session.permissible.moving_joints import Chain, chains_of
+from seerob.session.permissible.moving_joints import KinematicChain, chains_of
 
 RESOLUTION = 1e-3
 """A span on which no point moves farther and that is not clear is given up [m]."""
@@ -93,7 +93,7 @@ class Clearance:
         problems = [
             Problem("workstation", other.name, why, "a way is clear only of what has a shape")
             for other in (robot, *there)
-            if (why := model.unseen((other.name,)))
+            if (why := model.unshaped((other.name,)))
         ]
         problems += [
             Problem("workstation", other.name, "nobody says where it stands", "give its q in the file")
@@ -238,7 +238,7 @@ class Clearance:
         self.left_out = tuple(touching)
         return found
 
-    def _weight(self, chain: Chain, without: frozenset[int]) -> Array:
+    def _weight(self, chain: KinematicChain, without: frozenset[int]) -> Array:
         """Of one body, per commanded joint of the robot, shape (n,)."""
         each = np.zeros(self._model.mj.nv)
         for dof, w in zip(chain.dofs.tolist(), chain.weight.tolist(), strict=True):

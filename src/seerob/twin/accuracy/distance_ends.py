@@ -66,5 +66,5 @@ class DistanceEnds:
     def _within(self, state: State, caps: Array) -> Array:
         """Distance of every pair [m], or its cap where it is not less, shape (a, b)."""
         beyond = np.nextafter(caps, np.inf).ravel()
-        found = self._pairs.within(*state.placed(self._concerned, estimates=True, strayed=True), beyond)
+        found = self._pairs.within(*state.placed(self._concerned, allow_estimated=True, strayed=True), beyond)
         return found.distance.reshape(self._shape)

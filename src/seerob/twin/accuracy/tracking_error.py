@@ -28,7 +28,7 @@ from seerob.model.model import Model
 from seerob.twin.state import State
 
 
-def told_between(seen: Collection[str]) -> dict[str, tuple[str, ...]]:
+def inferred_between(seen: Collection[str]) -> dict[str, tuple[str, ...]]:
     """Bones that no device sees between a parent and children that are seen: bone → those children."""
     found: dict[str, tuple[str, ...]] = {}
     for bone, parent in PARENTS.items():
@@ -39,7 +39,7 @@ def told_between(seen: Collection[str]) -> dict[str, tuple[str, ...]]:
     return found
 
 
-def told_bound(P: Array, J: Array, C: Array, e: float) -> float:
+def inferred_bound(P: Array, J: Array, C: Array, e: float) -> float:
     """How far the joint between two bones may be from the twin's [m].
 
     Args:
@@ -67,7 +67,7 @@ def _height(a: float, b: float, d: float) -> float:
     return math.sqrt(max(a * a - t * t, 0.0))
 
 
-def told_errors(
+def inferred_errors(
     seen: Collection[str],
     errors: Mapping[str, tuple[float | None, float | None]],
     joints: Mapping[str, Array],
@@ -82,7 +82,7 @@ def told_errors(
         joints: Where each bone of the twin begins [m], shape (3,).
     """
     found: dict[str, float] = {}
-    for bone, children in told_between(seen).items():
+    for bone, children in inferred_between(seen).items():
         parent = PARENTS[bone]
         position, angle = errors.get(parent, (None, None))
         P, J = joints[parent], joints[bone]
@@ -90,7 +90,7 @@ def told_errors(
             bound = (position or 0.0) + angle * float(np.linalg.norm(J - P))
         else:
             ends = ((joints[child], errors.get(child, (None, None))[0] or 0.0) for child in children)
-            bound = min(told_bound(P, J, C, (position or 0.0) + e) for C, e in ends)
+            bound = min(inferred_bound(P, J, C, (position or 0.0) + e) for C, e in ends)
             found[parent] = max(found.get(parent, 0.0), bound)
         own = max(errors.get(child, (None, None))[0] or 0.0 for child in children)
         found[bone] = max(bound, own)
@@ -117,7 +117,7 @@ class TrackingError:
     def __init__(self, model: Model, bodies: Sequence[int]) -> None:
         self._bones: dict[str, list[tuple[int, str, float]]] = {}
         self._n = len(bodies)
-        self._accepted = model.estimates
+        self._accepted = model.estimate_uncertainty
         bones = {body.mj: body for body in model.bodies if body.role == "human"}
         for row, index in enumerate(bodies):
             body = model.bodies[index]
@@ -156,7 +156,7 @@ class TrackingError:
                 position, angle = errors.get(bone, (None, None))
                 chord = 2 * reach * np.sin(unaimed.get(bone, 0.0) / 2)
                 found[row] = (position or 0.0) + max((angle or 0.0) * reach, chord)
-            told = self._told(state, person, errors) if errors else {}
+            told = self._inferred(state, person, errors) if errors else {}
             for row, bone, _ in bones if told else ():
                 found[row] = max(found[row], told.get(bone, 0.0))
             if stray:
@@ -169,21 +169,21 @@ class TrackingError:
             for row, bone, _ in bones if slack else ():
                 found[row] += slack.get(bone, 0.0)
             if person in self._accepted:
-                unseen = (*hearing.unseen(state.t), *hearing.unplaced(state.t))
-                for row, bone, _ in bones if unseen else ():
-                    found[row] = max(found[row], self._accepted[person] * (bone in unseen))
+                unobserved = (*hearing.unobserved(state.t), *hearing.unplaced(state.t))
+                for row, bone, _ in bones if unobserved else ():
+                    found[row] = max(found[row], self._accepted[person] * (bone in unobserved))
         return found
 
-    def _told(
+    def _inferred(
         self, state: State, person: str, errors: Mapping[str, tuple[float | None, float | None]]
     ) -> dict[str, float]:
         """Of bones between two that are seen [m], see `seerob.twin.accuracy.tracking_error`."""
         where = self._joints[person]
         seen = {bone for bone, error in errors.items() if error != (None, None) and bone in where}
-        if not told_between(seen):
+        if not inferred_between(seen):
             return {}
         _, x = state.captured(person, tuple(where.values()))
-        return told_errors(seen, errors, dict(zip(where, x, strict=True)))
+        return inferred_errors(seen, errors, dict(zip(where, x, strict=True)))
 
 
 def tracking(error: float) -> Tolerance:

@@ -40,7 +40,7 @@ class Moved(NamedTuple):
     """Joint positions [m or rad]."""
     qd: Array | None
     """Joint velocities [m/s or rad/s]; None to be derived."""
-    doubt: str
+    invalid_reason: str
     """Why it may be elsewhere; empty when it is known."""
     anew: bool = False
     """It was put there, and did not move there."""
@@ -53,7 +53,7 @@ class Place(NamedTuple):
 
     q: Array
     qd: Array | None = None
-    doubt: str = ""
+    invalid_reason: str = ""
     anew: bool = False
 
 
@@ -100,19 +100,21 @@ class _Follower:
         if t <= self._t:
             return None
         known = {name: signals.at(name, t) for name in self._names}
-        doubt = next((k.doubt for k in known.values() if k.doubt), "")
+        invalid_reason = next((k.invalid_reason for k in known.values() if k.invalid_reason), "")
         values = {name: k.value for name, k in known.items() if k.value is not None}
-        if doubt:
-            self._lose(doubt)
+        if invalid_reason:
+            self._lose(invalid_reason)
             if self._last is None:
                 return None
             self._t = t
-            return Moved(self._name, t, self._last, np.zeros_like(self._last), doubt)
+            return Moved(self._name, t, self._last, np.zeros_like(self._last), invalid_reason)
         place = self._follow(t, values)
         self._last, self._t = place.q, t
-        doubt = next((signals.untimed[name] for name in self._names if name in signals.untimed), "")
+        invalid_reason = next((signals.untimed[name] for name in self._names if name in signals.untimed), "")
         age = max((ages.get(name, 0.0) for name in self._names), default=0.0)
-        return Moved(self._name, t, place.q, place.qd, place.doubt or doubt, place.anew, age)
+        return Moved(
+            self._name, t, place.q, place.qd, place.invalid_reason or invalid_reason, place.anew, age
+        )
 
 
 def follow(motion: Motion) -> Follow:
@@ -194,7 +196,7 @@ class _Routed:
         self._heading = q[2] = nearest_turn(float(q[2]), self._heading)
         # Once around is no jump.
         anew = way.anew and self._way.jumped
-        return Place(q, None if way.qd is None else per_metre * way.qd[0], way.doubt, anew)
+        return Place(q, None if way.qd is None else per_metre * way.qd[0], way.invalid_reason, anew)
 
 
 def nearest_turn(angle: float, last: float | None) -> float:
@@ -220,8 +222,8 @@ class _Ends:
         self._t = t
         q = wanted if self._q is None else self._q + float(np.clip(wanted - self._q, -step, step))
         self._q = q
-        doubt = f"{ON_ITS_WAY} {self._name} changed: between its ends nobody says where"
-        return Place(np.array([q]), doubt="" if q == wanted else doubt)
+        invalid_reason = f"{ON_ITS_WAY} {self._name} changed: between its ends nobody says where"
+        return Place(np.array([q]), invalid_reason="" if q == wanted else invalid_reason)
 
 
 class _Carried:
@@ -276,8 +278,8 @@ class _Carried:
             self._way, speed = q, None if speed is None else np.zeros(1)
         around = self._way // self._length != last // self._length and self._at_end is AtEnd.LOOP
         self._until = -math.inf if anew else self._until
-        doubt = self._lost or (self._leapt if t <= self._until else "")
-        return Place(np.array([q]), speed, doubt, self.jumped or around)
+        invalid_reason = self._lost or (self._leapt if t <= self._until else "")
+        return Place(np.array([q]), speed, invalid_reason, self.jumped or around)
 
     def _sum(self, t: float, speed: float) -> float | None:
         """How far it was carried since it was heard last; None when that is too long ago."""

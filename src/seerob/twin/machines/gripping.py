@@ -104,7 +104,7 @@ class _Grip:
         if state.attachments.unknown.keys() & set(self._resting):
             return False
         if self._silent(state):
-            self._unheard = state.doubt(self._hand) or "not heard"
+            self._unheard = state.invalid_reason(self._hand) or "not heard"
             return False
         unheard, self._unheard = self._unheard, ""
         if self._holds == self._grips(state):
@@ -125,7 +125,7 @@ class _Grip:
         """Whether the gripper or whoever carries it is not known to be where it is shown."""
         name = self._hand
         while name:
-            why = state.hearings[name].doubt(state.t)
+            why = state.hearings[name].invalid_reason(state.t)
             if why and not why.startswith(ON_ITS_WAY):
                 return True
             name = state.model.mechanisms[name].on

@@ -126,7 +126,7 @@ class Hearing:
             while len(told) > 1 and told[1][0] <= t:
                 del told[0]
 
-    def doubt(self, t: float) -> str:
+    def invalid_reason(self, t: float) -> str:
         """Why what was heard does not tell where it is at ``t`` [s]; empty when it does.
 
         A sample ahead of the tick does not make up for silence before it: all that happened between two
@@ -177,7 +177,7 @@ class Hearing:
             return f"its motion ends at {last:.3f} s, and what it does after is not known"
         return ""
 
-    def doubted(self, t: float) -> tuple[PartDoubt, ...]:
+    def invalid_parts(self, t: float) -> tuple[PartDoubt, ...]:
         """Bones that may not be relied on at ``t`` [s], with the reasons."""
         return tuple(part for told in _around(self.parts, t) for part in told)
 
@@ -212,7 +212,7 @@ class Hearing:
         """Angles of the posture at ``t`` [s] that nothing tells, each with its side."""
         return frozenset().union(*_around(self.untold, t))
 
-    def unseen(self, t: float) -> tuple[str, ...]:
+    def unobserved(self, t: float) -> tuple[str, ...]:
         """Bones that no device sees at ``t`` [s] and that the bones beside them do not tell.
 
         Empty for a person whom no device sees, whom joints or keyframes move.

@@ -24,7 +24,7 @@ def bones_of(model: Model, bodies: Sequence[int]) -> tuple[tuple[str, ...], dict
     return tuple(others), {name: frozenset(bones) for name, bones in people.items()}
 
 
-def unseen_reason(person: str, bones: Sequence[str]) -> str:
+def unobserved_reason(person: str, bones: Sequence[str]) -> str:
     """Why nothing is decided of a person of whom bones are not seen; empty when there are none."""
     if not bones:
         return ""

@@ -15,7 +15,7 @@ from seerob.model.model import Model
 from seerob.twin.attachments import Attachments
 from seerob.twin.signals import Signals
 from seerob.twin.validity.hearing import Hearing, nobody_says
-from seerob.twin.validity.seen_bones import bones_of, unseen_reason
+from seerob.twin.validity.seen_bones import bones_of, unobserved_reason
 from seerob.workstation.variables.dictionary import VARIABLE, Value
 
 MOST = 4096
@@ -118,7 +118,7 @@ class Validity:
         if names in self._relied_on:
             return
         for name in names:
-            if reason := self.doubt(name):
+            if reason := self.invalid_reason(name):
                 raise Undecided(reason)
         self._relied_on.add(names)
 
@@ -129,43 +129,43 @@ class Validity:
             reason = self._reasons[key] = find(name)
         return reason
 
-    def doubt(self, name: str) -> str:
+    def invalid_reason(self, name: str) -> str:
         """Why a twin may not be where the real one is, all of it; empty when it may be relied on.
 
         After `VARIABLE`, the name of a variable: why it may not be relied on.
         """
-        return self._once("where", name, self._doubt)
+        return self._once("where", name, self._invalid_reason)
 
-    def _doubt(self, name: str) -> str:
-        if reason := self.interrupted(name):
+    def _invalid_reason(self, name: str) -> str:
+        if reason := self.input_reason(name):
             return reason
         if name.startswith(VARIABLE):
             return ""
         hearing = self._hearings[name]
-        if reason := unseen_reason(name, hearing.unseen(self.t)):
+        if reason := unobserved_reason(name, hearing.unobserved(self.t)):
             return reason
         reason = nobody_says(hearing.unplaced(self.t))
         return f"{name}: {reason}" if reason else ""
 
-    def interrupted(self, name: str) -> str:
+    def input_reason(self, name: str) -> str:
         """Why what was known a moment ago may not hold now, but for what no device ever saw; else empty."""
-        return self._once("interrupted", name, self._interrupted)
+        return self._once("interrupted", name, self._input_reason)
 
-    def _interrupted(self, name: str) -> str:
+    def _input_reason(self, name: str) -> str:
         if name.startswith(VARIABLE):
-            return self._signals.at(name.removeprefix(VARIABLE), self.t).doubt
-        if reason := self.whole_doubt(name):
+            return self._signals.at(name.removeprefix(VARIABLE), self.t).invalid_reason
+        if reason := self.invalid_place_reason(name):
             return reason
         hearing = self._hearings[name]
-        parts = hearing.doubted(self.t)
+        parts = hearing.invalid_parts(self.t)
         reason = parts[0][0] if parts else hearing.displaced(self.t)
         return f"{name}: {reason}" if reason else ""
 
-    def whole_doubt(self, name: str) -> str:
+    def invalid_place_reason(self, name: str) -> str:
         """Why nothing of a robot or person may be relied on; doubt about single bones does not count."""
-        return self._once("whole", name, self._whole_doubt)
+        return self._once("whole", name, self._invalid_place)
 
-    def _whole_doubt(self, name: str) -> str:
+    def _invalid_place(self, name: str) -> str:
         hearing = self._hearings[name]
         if reason := self.heard_doubt(name):
             return reason
@@ -182,11 +182,11 @@ class Validity:
         return self._once("heard", name, self._heard_doubt)
 
     def _heard_doubt(self, name: str) -> str:
-        reason = self._hearings[name].doubt(self.t)
+        reason = self._hearings[name].invalid_reason(self.t)
         if reason:
             return f"{name}: {reason}"
         above = self.model.mechanisms[name].on
-        return self.whole_doubt(above) if above else ""
+        return self.invalid_place_reason(above) if above else ""
 
     def hearing(self, name: str, *, strayed: bool = False) -> Hearing:
         """What is known of where a robot or human really is, bone by bone of a person.
@@ -199,7 +199,7 @@ class Validity:
             Undecided: Nothing of it may be relied on.
         """
         self.asked.add(name)
-        if (reason := self.whole_doubt(name)) and not (strayed and reason == self.stray(name)):
+        if (reason := self.invalid_place_reason(name)) and not (strayed and reason == self.stray(name)):
             raise Undecided(reason)
         return self._hearings[name]
 
@@ -225,7 +225,7 @@ class Validity:
         hearing = self._hearings[name]
         if hearing.captured is None or hearing.error <= self._tracking_limits[name] or self.heard_doubt(name):
             return ""
-        reason = self.whole_doubt(name)
+        reason = self.invalid_place_reason(name)
         return reason if hearing.lost <= self.t - 2 * self._period else ""
 
     def strays(self, bodies: tuple[int, ...]) -> str:
@@ -240,7 +240,7 @@ class Validity:
         Raises:
             Undecided: Nothing of the person may be relied on.
         """
-        if reason := self.whole_doubt(name):
+        if reason := self.invalid_place_reason(name):
             raise Undecided(reason)
         return self._bones_in_doubt(name)
 
@@ -266,20 +266,20 @@ class Validity:
         key = "turned", name
         if key not in self._bones:
             hearing = self._hearings[name]
-            doubted = (bone for _, bones in hearing.doubted(self.t) for bone in bones)
-            self._bones[key] = tuple(dict.fromkeys((*doubted, *hearing.unseen(self.t))))
+            doubted = (bone for _, bones in hearing.invalid_parts(self.t) for bone in bones)
+            self._bones[key] = tuple(dict.fromkeys((*doubted, *hearing.unobserved(self.t))))
         return self._bones[key]
 
     # -- of bodies ----------------------------------------------------------------------------
 
     def require_bodies(
-        self, bodies: tuple[int, ...], *, estimates: bool = False, strayed: bool = False
+        self, bodies: tuple[int, ...], *, allow_estimated: bool = False, strayed: bool = False
     ) -> None:
         """Raise `Undecided` unless these bodies are where the twin shows them: of a person, these bones only.
 
         Args:
             bodies: By index.
-            estimates: Whether bones that nobody sees will do where the file accepts them
+            allow_estimated: Whether bones that nobody sees will do where the file accepts them
                 (``unseen_uncertainty``): whoever asks adds
                 `seerob.twin.accuracy.tracking_error.TrackingError`.
             strayed: Whether people will do of whom the twin is elsewhere than they were captured, as a table
@@ -287,26 +287,30 @@ class Validity:
         """
         owners = self._owners(bodies)
         self.asked |= owners.everyone
-        key = owners.key, estimates, strayed
+        key = owners.key, allow_estimated, strayed
         if key in self._relied_on:
             return
         self.require(*owners.others)
         if lost := self.attachments.unknown.keys() & owners.bodies:
             raise Undecided(self.attachments.unknown[min(lost)])
         for name, bones in owners.people.items():
-            if (reason := self.whole_doubt(name)) and not (strayed and reason == self.stray(name)):
+            if (reason := self.invalid_place_reason(name)) and not (strayed and reason == self.stray(name)):
                 raise Undecided(reason)
             if bones.isdisjoint(self._bones_in_doubt(name)):
                 continue
-            if not estimates or self.model.estimates.get(name) is None or self.interrupted(name):
-                raise Undecided(self.doubt(name))
+            if (
+                not allow_estimated
+                or self.model.estimate_uncertainty.get(name) is None
+                or self.input_reason(name)
+            ):
+                raise Undecided(self.invalid_reason(name))
         self._relied_on.add(key)
 
-    def lost_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
+    def invalid_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
         """Bodies that are bones in doubt, of people whose other bones may be relied on."""
         owners = self._owners(bodies)
         if owners.key not in self._lost:
-            known = frozenset(name for name in owners.people if not self.whole_doubt(name))
+            known = frozenset(name for name in owners.people if not self.invalid_place_reason(name))
             lost = {f"{name}/{bone}" for name in known for bone in self.bones_in_doubt(name)}
             which = tuple(i for i in bodies if self.model.bodies[i].name in lost) if lost else ()
             self._lost[owners.key] = known, which

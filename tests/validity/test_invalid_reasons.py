@@ -7,7 +7,7 @@ import numpy as np
 from made_cell import FLOATING, TWO_R, heard, made, state_at, two_r
 from seerob.core.errors import Undecided
 from seerob.description.humans.skeleton import BONES
-from seerob.session.in_doubt import in_doubt
+from seerob.session.invalid_reasons import invalid_reasons
 from seerob.session.run import Judge, bind, ticks
 from seerob.twin.engine import Engine
 
@@ -37,12 +37,12 @@ def test_a_silent_robot_is_in_doubt_until_it_is_heard_again(tmp_path):
 def test_bones_that_no_device_sees_are_named_with_what_the_person_holds(tmp_path):
     station = made(tmp_path, FLOATING + PERSON + KNIFE)
     state = state_at(station)
-    assert in_doubt(state) == {}
+    assert invalid_reasons(state) == {}
     state.hearings["op"].bones = dict.fromkeys(BONES, (0.0, 0.0))
     seen = frozenset(bone for bone in BONES if not bone.startswith("right_"))
     state.hearings["op"].observed[:] = [(0.0, seen)]
     state.heard()
-    doubts = in_doubt(state)
+    doubts = invalid_reasons(state)
     assert "op" not in doubts
     assert "op/right_hand" in doubts
     for body in station.model.bodies:

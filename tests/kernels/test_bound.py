@@ -70,7 +70,7 @@ def test_an_answer_that_is_kept_stays_that_of_its_tick():
     one = query.minimum(R, x)
     assert not np.array_equal(query.per_body(R, 2 * x).distance, kept.distance)
     query.minimum(R, 3 * x)
-    for name in ("distance", "point_a", "point_b", "body_a", "body_b", "reach"):
+    for name in ("distance", "point_a", "point_b", "body_a", "body_b", "kind"):
         assert np.array_equal(getattr(kept, name), getattr(before, name))
     assert np.array_equal(one.point_a, kept.at(0).point_a)
 

@@ -46,7 +46,7 @@ def test_a_doubt_is_there_until_a_good_value_comes():
     assert picture.sample(0.0).doubts == {}
     for bad, why in (
         (Change("speed", 3000), "not in"),
-        (Change("speed", 1, doubt="bad sensor"), "bad sensor"),
+        (Change("speed", 1, invalid_reason="bad sensor"), "bad sensor"),
     ):
         picture.take((bad,), 1.0)
         sample = picture.sample(1.0)

@@ -264,6 +264,43 @@ def test_a_joint_that_gets_faster_than_the_file_says_it_can(limits, acceleration
     assert not found or hurries
 
 
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(
+    ("limits", "acceleration", "device", "hurries"),
+    [
+        ((3.0,), 6.0, True, True),
+        ((6.0,), 6.0, True, False),
+        ((), 6.0, True, False),
+        ((1.0,), 12.0, False, True),
+        ((5.0,), 6.0, False, False),  # by a jitter of arrivals
+    ],
+)
+def test_a_joint_without_velocities_that_gets_faster_than_the_file_says_it_can(
+    limits, acceleration, device, hurries, way
+):
+    target = Target(name="arm", joints=("a",), units=("rad",), velocity=(3.2,), acceleration=limits)
+    looking, found = Contradictions(target), []
+    for t in np.arange(0, 0.3, 0.008).tolist():
+        # From rest at 50 ms on.
+        q = way * acceleration * max(t - 0.05, 0.0) ** 2 / 2
+        found.append(looking.find(said(t, (q,), device=device)))
+    said_so = [why for why in found if why]
+    assert bool(said_so) == hurries
+    assert all("by its positions, and acceleration_limits says" in why for why in said_so)
+
+
+@pytest.mark.parametrize("hertz", [20, 125, 500])
+def test_a_joint_without_velocities_that_keeps_its_limits_says_nothing(hertz):
+    """To and fro at its limit of 3 rad/s², stops three times as hard, and half a milliradian of noise."""
+    target = Target(name="arm", joints=("a",), units=("rad",), velocity=(3.2,), acceleration=(3.0,))
+    looking, noise, q = Contradictions(target), np.random.default_rng(7), 0.0
+    for t in np.arange(0, 6.0, 1 / hertz).tolist():
+        phase, way = t % 1.0, 1 if t % 2 < 1 else -1
+        speed = 3.0 * min(phase, 0.4) if phase < 0.6 else max(1.2 - 9.0 * (phase - 0.6), 0.0)
+        q += way * speed / hertz
+        assert looking.find(said(t, (q + noise.uniform(-5e-4, 5e-4),))) == "", t
+
+
 def test_a_joint_that_is_stopped_may_brake_harder_than_it_accelerates():
     target = Target(name="arm", joints=("a",), units=("rad",), velocity=(3.2,), acceleration=(1.0,))
     motion = [said(t, (2 * t - 6 * t * t / 2,), (2 - 6 * t,)) for t in np.arange(0, 0.3, 0.008).tolist()]

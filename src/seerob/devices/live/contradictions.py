@@ -4,7 +4,8 @@ A run takes the newest sample of each tick; what came between is seen here only.
 farther than anybody could in the time between two stamps, and the velocities that a controller measures must
 be the derivative of the positions that it measures: over the last `SPAN`, no joint's way may differ from the
 integral of its velocity by more than noise, rounding and the lag of a filter explain. Nor may a joint get
-faster more quickly than the accelerations that the file states, on which stopping distances rest.
+faster more quickly than the accelerations that the file states, on which stopping distances rest: by its
+velocities, or by its positions where a device gives no velocities.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ SHARE = 0.2
 10 Hz."""
 SPEED_NOISE = {"rad": 0.02, "m": 0.005}
 """Of a difference of two velocities [rad/s or m/s]: twice that of `NOISE`."""
+POSITION_NOISE = {"rad": 5e-4, "m": 1e-4}
+"""Of a position from which speeds are derived [rad or m]: a tenth of `NOISE`."""
 LAG = 0.03
 """By which a filter may delay velocities [s]: a low-pass of 5 Hz, lower than controllers have."""
 FASTEST = {"rad": 30.0, "m": 10.0}
@@ -77,6 +80,8 @@ class Contradictions:
         self._at = -math.inf
         self._told: deque[_Told] = deque(maxlen=ANCHORS)
         self._newest: _Told | None = None
+        self._places: deque[tuple[float, tuple[float, ...]]] = deque(maxlen=ANCHORS + 1)
+        """Instants [s] and positions of a device that gives no velocities."""
 
     def find(self, sample: Sample) -> str:
         """Why this sample and those before it are no one motion; empty when they may be."""
@@ -89,6 +94,7 @@ class Contradictions:
         self._at, self._before = t, sample
         if not 0 < step < SILENCE or type(before) is not type(sample):
             self._told.clear()
+            self._places.clear()
             self._newest = None
             before = None
         if isinstance(sample, JointSample):
@@ -111,7 +117,7 @@ class Contradictions:
         q, qd = sample.q, sample.qd
         if qd is None or len(qd) != len(q):
             self._newest = None
-            return ""
+            return self._speeds_up(q, t, LOOSE if sample.t_device is None else 0.0)
         last = self._newest
         if last is None or len(last.q) != len(q):
             zeros = (0.0,) * len(q)
@@ -145,6 +151,39 @@ class Contradictions:
                     f"joint {k + 1} gets faster with {gained / dt:.3g} {unit}/s², "
                     f"and acceleration_limits says {limit:g}"
                 )
+        return ""
+
+    def _speeds_up(self, q: tuple[float, ...], t: float, jitter: float) -> str:
+        """As `_hurries`, of mean speeds in two neighbouring spans of equal numbers of instants.
+
+        Args:
+            q: Positions now [rad or m].
+            t: When [s].
+            jitter: By which the time between two instants may be off [s].
+        """
+        places = self._places
+        if places and len(places[-1][1]) != len(q):
+            places.clear()
+        if places and t - places[-1][0] < SPAN / ANCHORS:
+            return ""
+        places.append((t, q))
+        for n in range(1, (len(places) - 1) // 2 + 1):
+            (t0, q0), (t1, q1) = places[-1 - 2 * n], places[-1 - n]
+            first, second = t1 - t0, t - t1
+            for k, limit in enumerate(self._quickest[: len(q)]):
+                unit, way = self._units[k], q[k] - q1[k]
+                steps = [places[-i][1][k] - places[-i - 1][1][k] for i in range(1, 2 * n + 1)]
+                if any(step * way < 0 for step in steps):
+                    continue  # It turned round, and may have braked more quickly than it gets faster.
+                before, now = abs(q1[k] - q0[k]) / first, abs(way) / second
+                noise = 2 * POSITION_NOISE[unit] * (1 / first + 1 / second) + SPEED_NOISE[unit]
+                noise += jitter * (before / first + now / second)
+                gained, dt = now - before, 0.5 * (first + second)
+                if gained > (1 + SHARE) * limit * dt + noise:
+                    return (
+                        f"joint {k + 1} gets faster with {gained / dt:.3g} {unit}/s², by its positions, "
+                        f"and acceleration_limits says {limit:g}"
+                    )
         return ""
 
     def _differ(self, then: _Told, now: _Told) -> str:

@@ -109,9 +109,8 @@ def recorded(model: Model, feed: Feed, end: float) -> Motion:
     """
     station = model.workstation
     placed = changed(station, engine=changed(station.engine, physics=False))
-    engine = engine_of(replace(model, workstation=placed))
+    engine = engine_of(replace(model, workstation=placed), _Whereabouts)
     engine.end = end
-    engine.state = _Whereabouts(model, engine.state.data, engine.state.hearings, engine.state.signals)
     t, q, v = [], [], []
     ways: list[Path] = []
     doubts: dict[str, list[str]] = {name: [] for name in engine.model.mechanisms}

@@ -182,8 +182,8 @@ def warm_up(model: Model) -> None:
     Engine(model).tick()
 
 
-def engine_of(model: Model) -> Engine:
-    """The twin as the workstation's sources drive it."""
+def engine_of(model: Model, state: type[State] = State) -> Engine:
+    """The twin as the workstation's sources drive it; ``state`` as of `Engine`."""
     # What is shown is a delay old: silence shows that much earlier, so that it shows within the time-out.
     delay = delay_of(model.workstation.sources)
     driven: dict[str, float] = {}
@@ -194,16 +194,15 @@ def engine_of(model: Model) -> Engine:
             driven[source.target()] = max(timeout, driven.get(source.target(), timeout))
     live = {s.target() for s in model.workstation.sources if isinstance(s, LiveSource)}
     signals, following = signal_timeouts(model)
-    engine = Engine(
+    return Engine(
         model,
         driven={**following, **driven},
         live={*live, *following},
         signals=signals,
         untimed=untimed(model),
+        coarse=coarse(model),
+        state=state,
     )
-    for name, why in coarse(model).items():
-        engine.state.hearings[name].coarse = why
-    return engine
 
 
 def ticks(

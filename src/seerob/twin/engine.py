@@ -15,7 +15,8 @@ gains as applied forces diverge at a floating root. Torque limits clamp the whol
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 
 import mujoco
 import numpy as np
@@ -83,8 +84,10 @@ class Engine:
         live: Collection[str] = (),
         signals: dict[str, float] | None = None,
         untimed: dict[str, str] | None = None,
+        coarse: Mapping[str, str] = MappingProxyType({}),
         controllers: bool = True,
         contacts: bool = True,
+        state: type[State] = State,
     ) -> None:
         """Set the twin up at its home position.
 
@@ -97,7 +100,9 @@ class Engine:
             untimed: Why nobody knows how late a variable is heard, by name.
             controllers: Whether the twin is pulled at all; off, it moves freely from where the first
                 samples put it, and nothing that is heard later is compared with it.
+            coarse: Why what is heard is too coarse for energies and forces, by name.
             contacts: Whether the contacts that the file asks for act.
+            state: What follows from where everybody is.
         """
         driven = driven or {}
         self.model = model = own_masses(model)
@@ -149,6 +154,7 @@ class Engine:
                 driven=m.name in driven and controllers,
                 timeout=driven.get(m.name, DEFAULT_TIMEOUT),
                 grace=BEATS if m.name in following else 0.0,
+                coarse=coarse.get(m.name, ""),
             )
             for m in self._mechanisms
         }
@@ -177,7 +183,7 @@ class Engine:
         """By person that devices see."""
         self.signals = Signals(model.dictionary, signals or {}, untimed)
         self._machines = Machines(model.workstation.machines, self.signals)
-        self.state = State(model, self._shown, self._hearings, self.signals)
+        self.state = state(model, self._shown, self._hearings, self.signals)
         self.state.foresee, self.state.knots = self._foresee, self._knots_of
         self._grips = Grips(self.state, self._mj)
         self._tick = 0

@@ -138,12 +138,8 @@ def batch(cell, motion):
 @pytest.fixture(scope="module")
 def road(cell):
     engine, judge = Engine(cell.model, driven={"arm": 1.0}), Judge(cell.bound)
-    results = []
-    for k in range(N):
-        # Nobody knows what comes, as of instants that are given.
-        engine.take([heard("arm", 0.01 * k, *wave(0.01 * k))])
-        results.append(judge(engine.tick() if k else engine.start()))
-    return results
+    engine.take([heard("arm", float(t), *wave(t)) for t in 0.01 * np.arange(N + 2)])
+    return [judge(engine.tick() if k else engine.start()) for k in range(N)]
 
 
 def test_values_limits_and_verdicts_are_those_of_the_road(batch, road):
@@ -170,9 +166,8 @@ def test_the_motion_crosses_limits(batch):
         assert len(np.unique(batch[name].answers.verdict)) > 1, name
 
 
-def test_what_remembers_or_depends_on_what_comes_is_asked_instant_by_instant(batch):
-    asked = {name for name, column in batch.items() if column.note}
-    assert asked == {"fixed", "contact", "separation", "open separation"}
+def test_only_what_remembers_is_asked_instant_by_instant(batch):
+    assert {name for name, column in batch.items() if column.note} == {"fixed", "contact"}
 
 
 def test_number_of_threads_changes_no_bit(cell, motion, batch, monkeypatch):

@@ -161,6 +161,7 @@ def test_the_distance_asked_for_is_that_of_the_present_speeds_and_in_the_fixed_m
     for mode in ("dynamic", "fixed"):
         twin = cell(tmp_path / mode, BOUND, f'{KNOWN}mode = "{mode}"\n')
         S = twin.bound[0].criterion
+        assert (S.batch(twin.model) is None) == (mode == "fixed")
         required, state = S.required(twin.model), state_at(twin, arm=AT_HOME)
         first = required(state).S_p
         assert first == pytest.approx([(v + V_H) * T + K for v in (np.hypot(1, 0.05), V)])
@@ -168,6 +169,8 @@ def test_the_distance_asked_for_is_that_of_the_present_speeds_and_in_the_fixed_m
         state.refresh(0.0)
         halved = [(v / 2 + V_H) * T + K for v in (np.hypot(1, 0.05), V)]
         assert required(state).S_p == pytest.approx(first if mode == "fixed" else halved)
+    off = cell(tmp_path / "off", BOUND, KNOWN + "intrusion_tolerance = 0.1\n")
+    assert off.bound[0].criterion.batch(off.model) is None
 
 
 def test_what_a_surface_may_stick_out_is_in_every_separation_distance(larger):

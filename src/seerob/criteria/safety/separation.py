@@ -19,6 +19,7 @@ from seerob.core.transforms import Array
 from seerob.criteria.criterion import (
     Criterion,
     Evaluate,
+    EvaluateMany,
     Follows,
     Moment,
     judge_interval,
@@ -28,6 +29,7 @@ from seerob.criteria.partly_seen import partly_seen
 from seerob.criteria.sensors.detection import Detection, device_of
 from seerob.criteria.stopping.inputs import approach_speed, intrusion
 from seerob.criteria.stopping.largest import LargestSeparation
+from seerob.criteria.stopping.many_instants import separations
 from seerob.criteria.stopping.models import MOVING, Stop, StopModel, bind_stop
 from seerob.criteria.stopping.onset import LARGEST_WINDOW
 from seerob.criteria.stopping.search import TOP, factor_by_search
@@ -246,6 +248,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
     def looks_ahead(self, model: Model) -> Mapping[str, float]:
         """Look ahead as long as the robot takes to react [s], by its name."""
+        if self.stop.acceleration is not None:
+            return {}
         worst = self._by_device(model)[0].at_worst(model).stop.reaction
         return {self._sides(model)[0]: min(worst, LARGEST_WINDOW) + model.workstation.engine.tick}
 
@@ -333,9 +337,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 open_ = deciding((*ends.tolerances, tracking(wide / 2)), np.append(widths, wide))
                 if most[k] > S_p[k] and bool((most - S_p)[k] >= max(wide, *widths.tolist(), 0.0)):
                     faster = "if the robot gets faster during the reaction time as its torques allow: give "
-                    ahead = "as its motion, which is known ahead, gets faster than stop.acceleration says"
-                    given = self.stop.acceleration is not None
-                    why = stop.more or (ahead if given else f"{faster}stop.acceleration")
+                    why = stop.more or f"{faster}stop.acceleration"
                     if not state.speed_errors.keys().isdisjoint(movers):
                         why = "by the noise of positions that speeds are derived from"
                     open_ = f"S_p is up to {most[k]:.3f} m {why}"
@@ -388,6 +390,16 @@ class Separation(Criterion, frozen=True, kw_only=True):
         terms = {"S_h": S_h, "S_r": float(now.S_r[k]), "S_s": float(now.S_s[k])}
         terms |= dict(zip(("C", "Z_d", "Z_r"), rest, strict=True))
         return tuple(Result(name=name, value=value, unit="m") for name, value in terms.items())
+
+    def batch(self, model: Model) -> EvaluateMany | None:
+        """Judge many instants at once, where the stopping time is given and S_p is that of present speeds."""
+        own, _, _ = self._by_device(model)
+        gap = own._gap(model)
+        K = sum(own._terms()[0]) + gap.deviation
+        if self.mode == "fixed" or own._tolerances():
+            return None
+        incomplete = bool(self.unknown(model))
+        return separations(own.stop, gap, own._distance, K, incomplete=incomplete)
 
     def remembers(self, model: Model) -> bool:
         """Say whether the result depends on earlier instants, so that it is asked in the order of time."""

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import mujoco
@@ -34,8 +32,6 @@ torques allow, and of speeds that may be off by the noise of positions that they
 
 NAME = "acceleration during T_r"
 GIVE = "give stop.acceleration"
-ROUNDED = 1e-6
-"""Farther [m] or faster [m/s] by less is no contradiction."""
 
 
 def bind_reaction(
@@ -75,17 +71,7 @@ def bind_reaction(
         )
         given = constant(robot, gap, T_r, a, unsaid)
         what = Input(name=NAME, value=a, unit="m/s²", origin=Origin.GIVEN, source="workstation file")
-
-        motion = cache(lambda: Foreseen(model, robot, gap, T_r))
-
-        def contradicted(state: State) -> tuple[At, At | None]:
-            # What it is known to do counts beside what the file says that it may do.
-            least, known = given(state), motion().at(state) if points else None
-            if known is None or not _faster(known(1.0), least(1.0)):
-                return with_noise(state, (least, None))
-            return with_noise(state, (least, lambda scale: _larger(least(scale), known(scale))))
-
-        return contradicted, what, ()
+        return lambda state: with_noise(state, (given(state), None)), what, ()
     foreseen = Foreseen(model, robot, gap, T_r)
     limits = _acceleration_limits(model, robot)
     torques = np.array([np.nan if limit is None else limit.value for limit in robot.effort_limits])
@@ -157,26 +143,6 @@ def bind_reaction(
     what = Input(name=NAME, value=value, unit=unit, origin=origin, source=source)
     left_out = tuple(f"an acceleration of {name}, which {robot.name} carries" for name in robot.riders)
     return reactions, what, left_out
-
-
-def _faster(known: Onset, said: Onset) -> bool:
-    """Whether a motion that is known goes farther, or gets faster, than is said of it, but for rounding."""
-    return bool((known.S_r > said.S_r + ROUNDED).any() or (known.v_s > said.v_s + ROUNDED).any())
-
-
-def _larger(one: Onset, other: Onset) -> Onset:
-    """The larger of each figure; the joints' where both know them."""
-    ways, speeds = (
-        None if x is None or y is None else np.maximum(x, y)
-        for x, y in ((one.ways, other.ways), (one.speeds, other.speeds))
-    )
-    return replace(
-        one,
-        S_r=np.maximum(one.S_r, other.S_r),
-        v_s=np.maximum(one.v_s, other.v_s),
-        ways=ways,
-        speeds=speeds,
-    )
 
 
 def _acceleration_limits(model: Model, robot: Mechanism) -> Array | None:

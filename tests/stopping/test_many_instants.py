@@ -1,0 +1,52 @@
+"""Separation at many instants at once is that of each of them by itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, results_at, two_r
+from seerob.recording.series import CODES
+
+PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\nat = { position = [6, 0, -1] }\n'
+ASKED = (
+    '[[safety]]\nkind = "separation"\nname = "{name}"\nbetween = ["arm", "op"]\nhuman_uncertainty = 0\n'
+    "robot_uncertainty = 0\nstop = {{ acceleration = 0, reaction = 0.1, {stop} }}\n{more}\n"
+)
+GIVEN = "intrusion = 0.2\n"
+TIMED = {
+    "bound": ("stopping = 0.3", GIVEN),
+    "half": ('stopping = 0.3, model = "constant_deceleration"', GIVEN),
+    "open": ("stopping = 0.3", ""),
+}
+OTHERS = {
+    "braking": ('deceleration = 2, model = "constant_deceleration"', GIVEN),
+    "simulated": ('model = "simulated", brakes = [9, 9]', GIVEN),
+    "table": ('model = "table", table = "ur10_cb3", stopping = 0.3', GIVEN),
+    "off": ("stopping = 0.3, tolerance = { reaction = 0.01 }", GIVEN),
+    "fixed": ("stopping = 0.3", f'{GIVEN}mode = "fixed"'),
+    "off, too": ("stopping = 0.3", f"{GIVEN}intrusion_tolerance = 0.1"),
+}
+# From 0 m/s to where the slower link, farther away, has more room than the faster one by more than both.
+MOTION = [((0.0, 0.0), (v, 0.0)) for v in (0.0, 1.0, -2.0, 3.5, 10.0)]
+
+
+def test_only_what_depends_on_its_instant_and_has_a_stopping_time_is_asked_in_one_go(tmp_path):
+    text = "".join(ASKED.format(name=k, stop=s, more=m) for k, (s, m) in {**TIMED, **OTHERS}.items())
+    cell = made(tmp_path, FLOATING + TWO_R + PERSON + text, {"arm.urdf": two_r()})
+    asked = {bound.criterion.name: bound.criterion.batch(cell.model) is not None for bound in cell.bound}
+    assert asked == dict.fromkeys(TIMED, True) | dict.fromkeys(OTHERS, False)
+
+
+@pytest.mark.parametrize("name", TIMED)
+def test_many_instants_are_each_of_them(tmp_path, name):
+    stop, more = TIMED[name]
+    text = FLOATING + TWO_R + PERSON + ASKED.format(name=name, stop=stop, more=more)
+    cell = made(tmp_path, text, {"arm.urdf": two_r()})
+    alone = [results_at(cell, arm=each)[name] for each in MOTION]
+    q, qd = (np.array([each[k] for each in MOTION]) for k in (0, 1))
+    many = cell.batch({"arm": q}, {"arm": qd})[name].answers
+    np.testing.assert_allclose(many.value, [result.value for result in alone], rtol=1e-9)
+    np.testing.assert_allclose(many.limit, [result.limit for result in alone], rtol=1e-9)
+    assert many.verdict.tolist() == [CODES[result.verdict] for result in alone]
+    assert {result.verdict for result in alone} == {"undecided" if more == "" else "within", "exceeded"}

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 
 from seerob.core import plugin
@@ -78,3 +81,31 @@ def test_a_module_of_ours_is_no_kind_of_another_group():
         plugin.load("safety", "seerob.core.errors", Criterion)
     with pytest.raises(SeerobError, match=r"no module 'acme\.nothing'"):
         plugin.load("safety", "acme.nothing", Criterion)
+
+
+@pytest.mark.parametrize("how", ["-m seerob check-file", "sr.load"])
+@pytest.mark.parametrize("inside", [True, False])
+@pytest.mark.parametrize("kind", ["rce.evil", "evil.rule"])
+def test_a_module_beside_the_file_is_never_run(tmp_path, how, inside, kind):
+    cell = tmp_path / "cell"
+    (cell / "rce").mkdir(parents=True)
+    ran = tmp_path / "ran"
+    text = f"open({str(ran)!r}, 'w').close()\n"
+    for file in ("rce/__init__.py", "rce/evil.py", "evil.py"):
+        (cell / file).write_text(text)
+    (cell / "workstation.toml").write_text(
+        f'[[robots]]\nname = "r"\nmodel = "library:ur5e"\n[[safety]]\nkind = "{kind}"\n'
+    )
+    where = "." if inside else str(cell)
+    words = how.split() if how[0] == "-" else ["-c", "import sys, seerob; seerob.load(sys.argv[1])"]
+    done = subprocess.run(
+        [sys.executable, *words, where],
+        cwd=cell if inside else tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert "safety[0].kind" in done.stderr
+    assert kind in done.stderr
+    assert not ran.exists()

@@ -21,4 +21,6 @@ def program() -> int:
 
 
 if __name__ == "__main__":
+    if not sys.flags.safe_path:
+        del sys.path[0]  # the folder it is started in, where a kind must find no module
     sys.exit(program())

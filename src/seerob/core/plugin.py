@@ -9,6 +9,8 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
+from importlib.machinery import PathFinder
+from pathlib import Path
 from typing import TypeVar
 
 from seerob.core.errors import SeerobError, UnknownName
@@ -45,13 +47,14 @@ def kinds(package: str) -> tuple[str, ...]:
     return tuple(sorted(m.name for m in pkgutil.iter_modules(found.__path__) if not m.name.startswith("_")))
 
 
-def load(package: str, kind: str, base: type[T]) -> type[T]:
+def load(package: str, kind: str, base: type[T], *, folder: Path | None = None) -> type[T]:
     """The plug-in class of a kind.
 
     Args:
         package: ``safety``, ``ergonomics``, ``sources``, ``sinks`` or ``emulators``.
         kind: Module name in that package, or a dotted module name of your own.
         base: What the class must derive from.
+        folder: Of the workstation file that says so, from which no module is taken.
 
     Raises:
         UnknownName: No such kind.
@@ -62,6 +65,8 @@ def load(package: str, kind: str, base: type[T]) -> type[T]:
         raise UnknownName(what, kind, kinds(package))
     if "." in kind:
         name = kind
+        if folder is not None:
+            _refuse_beside(folder, kind)
     elif kind in kinds(package):
         name = f"{home(package)}.{kind}"
     else:
@@ -87,3 +92,20 @@ def load(package: str, kind: str, base: type[T]) -> type[T]:
         found = ", ".join(c.__name__ for c in classes) or "none"
         raise PluginError(f"module {name!r} must define one {base.__name__}, it defines: {found}")
     return classes[0]
+
+
+def _refuse_beside(folder: Path, kind: str) -> None:
+    """Refuse a kind whose module would be taken from the workstation's folder; imports nothing.
+
+    Raises:
+        PluginError: It would.
+    """
+    spec = PathFinder.find_spec(kind.split(".", maxsplit=1)[0])
+    places = [] if spec is None else [*(spec.submodule_search_locations or ()), spec.origin or ""]
+    here = folder.resolve()
+    for place in places:
+        if place and Path(place).resolve().is_relative_to(here):
+            raise PluginError(
+                f"the module of kind {kind!r} lies in the workstation's folder, and opening a folder runs "
+                "nothing of it; install its package, or keep it in a folder of its own on PYTHONPATH"
+            )

@@ -173,7 +173,7 @@ def _plugin(
         problems.append(Problem(file, f"{key}.kind", what, f"kinds of [[{group}]]: {known}"))
         return None
     try:
-        wanted = plugin.load(group, kind, BASES[group])
+        wanted = plugin.load(group, kind, BASES[group], folder=Path(file).parent)
     except SeerobError as error:
         problems.append(Problem(file, f"{key}.kind", str(error)))
         return None

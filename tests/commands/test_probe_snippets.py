@@ -38,7 +38,7 @@ def test_what_hears_an_emulated_device_is_understood_and_goes_where_it_is(kind, 
     assert commands
     for command in commands:
         *environment, line = command.partition("seerob probe ")[::2]
-        assert environment in ([""], ["PLC_PASSWORD=seerob "])
+        assert environment in ([""], ["SEEROB_PLC_PASSWORD=seerob SEEROB_PLC_PASSWORD_HOST=127.0.0.1 "])
         source, _ = probe._source(words(probe, line))
         where = getattr(source, "url", None) or f"{getattr(source, 'host', host) or host}:{source.port}"
         assert f"127.0.0.1:{port}" in where

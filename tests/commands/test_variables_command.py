@@ -23,7 +23,7 @@ kind = "siemens_web"
 name = "plc"
 url = "URL"
 user = "seerob"
-password_env = "PLC_PASSWORD"
+password_env = "SEEROB_PLC_PASSWORD"
 every = 0.1
 timeout = 1.0
 [[machines]]
@@ -50,7 +50,8 @@ timeout = 1
 @pytest.fixture
 def cell(tmp_path, monkeypatch):
     """A cell with a door, and its PLC."""
-    monkeypatch.setenv("PLC_PASSWORD", "seerob")
+    monkeypatch.setenv("SEEROB_PLC_PASSWORD", "seerob")
+    monkeypatch.setenv("SEEROB_PLC_PASSWORD_HOST", "127.0.0.1")
     with SiemensWeb(port=0).ready().server as plc:
         (tmp_path / "workstation.toml").write_text(STATION.replace("URL", plc.url), encoding="utf-8")
         (tmp_path / "variables.toml").write_text(VARIABLES, encoding="utf-8")

@@ -401,11 +401,13 @@ class Own(Criterion, frozen=True, kw_only=True):
 def test_a_quantity_of_somebody_elses_criterion_is_looked_at(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "rules_of_mine").mkdir()
-    (tmp_path / "rules_of_mine/own.py").write_text(OWN)
-    monkeypatch.syspath_prepend(tmp_path)
+    installed, folder = tmp_path / "installed", tmp_path / "cell"
+    (installed / "rules_of_mine").mkdir(parents=True)
+    (installed / "rules_of_mine/own.py").write_text(OWN)
+    monkeypatch.syspath_prepend(installed)
+    folder.mkdir()
     more = '[[safety]]\nkind = "rules_of_mine.own"\nname = "own"\nrobot = "ur5"\nreach = 1300\n'
-    station = station_of(tmp_path, cell(more=more))
+    station = station_of(folder, cell(more=more))
     assert [f.holds for f in doubted(station)] == [("own",)]
     assert verdicts(station)["own"] is Verdict.UNDECIDED
 

@@ -147,9 +147,10 @@ def siemens_web(patch):
     from seerob.app.emulators.siemens_web import SiemensWebServer
     from seerob.devices.sources.siemens_web import SiemensWeb
 
-    patch.setenv("PLC_PASSWORD", "secret")
+    patch.setenv("SEEROB_PLC_PASSWORD", "secret")
+    patch.setenv("SEEROB_PLC_PASSWORD_HOST", "127.0.0.1")
     server = SiemensWebServer({"speed": lambda t: 250.0}, user="twin", password="secret").start()
-    options = {"user": "twin", "password_env": "PLC_PASSWORD", "every": 0.02}
+    options = {"user": "twin", "password_env": "SEEROB_PLC_PASSWORD", "every": 0.02}
     return Made(server, SiemensWeb(name="plc", url=server.url, **options), target("speed", "speed"))
 
 

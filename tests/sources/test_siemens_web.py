@@ -34,7 +34,8 @@ TARGET = Target(variables=(SPEED, RUNS, GONE))
 
 @pytest.fixture(autouse=True)
 def password(monkeypatch):
-    monkeypatch.setenv("PLC_PASSWORD", "secret")
+    monkeypatch.setenv("SEEROB_PLC_PASSWORD", "secret")
+    monkeypatch.setenv("SEEROB_PLC_PASSWORD_HOST", "127.0.0.1")
 
 
 def plc(**more):
@@ -46,7 +47,7 @@ def source(server, **more):
         "name": "plc",
         "url": server.url,
         "user": "twin",
-        "password_env": "PLC_PASSWORD",
+        "password_env": "SEEROB_PLC_PASSWORD",
         "every": 0.05,
     }
     return SiemensWeb(**(options | more))
@@ -137,7 +138,8 @@ def test_only_the_certificate_that_was_given_is_trusted(tmp_path):
 
 
 def test_a_wrong_password_is_said(monkeypatch):
-    monkeypatch.setenv("PLC_PASSWORD", "guessed")
+    monkeypatch.setenv("SEEROB_PLC_PASSWORD", "guessed")
+    monkeypatch.setenv("SEEROB_PLC_PASSWORD_HOST", "127.0.0.1")
     with plc() as server:
         said = " ".join(f.text for f in source(server).open(None, None).findings)
         assert "Login failed" in said
@@ -146,7 +148,7 @@ def test_a_wrong_password_is_said(monkeypatch):
 
 def test_a_password_does_not_travel_unencrypted(tmp_path):
     with pytest.raises(ValueError, match="unencrypted"):
-        SiemensWeb(url="http://192.168.0.1", user="a", password_env="PLC_PASSWORD")
+        SiemensWeb(url="http://192.168.0.1", user="a", password_env="SEEROB_PLC_PASSWORD")
     wrong = SiemensWeb(url="https://192.168.0.1", user="a", password_env="SEEROB_NONE", ca="gone.pem")
     bad = Variable(name="bad", source="plc", address=5, unit="1")
     target = Target(name="", joints=(), units=(), lower=(), upper=(), velocity=(), variables=(bad,))

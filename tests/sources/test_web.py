@@ -33,7 +33,8 @@ def patience(monkeypatch):
     """A machine under load answers late."""
     monkeypatch.setattr("seerob.devices.live.listening.ASK_WITHIN", 30.0)
     monkeypatch.setattr("seerob.devices.live.listening.FIRST_PAUSE", 0.02)
-    monkeypatch.setenv("PLC_TOKEN", "secret")
+    monkeypatch.setenv("SEEROB_PLC_TOKEN", "secret")
+    monkeypatch.setenv("SEEROB_PLC_TOKEN_HOST", "127.0.0.1")
 
 
 def good(heard):
@@ -66,7 +67,7 @@ def test_values_arrive_and_what_is_not_there_is_doubted(way):
 @pytest.mark.parametrize("way", [polled, pushed])
 def test_only_who_has_the_token_is_answered(way):
     with WebServer(told, token="secret") as server:
-        with listening(way(server, token_env="PLC_TOKEN"), ALL) as heard:
+        with listening(way(server, token_env="SEEROB_PLC_TOKEN"), ALL) as heard:
             wait_for(lambda: good(heard))
         said = " ".join(f.text for f in way(server).open(None, ALL).findings)
         assert "not reached at start" in said
@@ -110,21 +111,21 @@ def test_a_document_that_is_another_gives_no_value(document, says):
 
 def test_secrets_do_not_travel_unencrypted_and_mistakes_are_told(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match="unencrypted"):
-        Web(url="http://192.168.0.7/state", token_env="PLC_TOKEN")
+        Web(url="http://192.168.0.7/state", token_env="SEEROB_PLC_TOKEN")
     with pytest.raises(ValueError, match="holds a password"):
         Web(url="https://user:word@192.168.0.7/state")
     with pytest.raises(ValueError, match="hello is sent to a WebSocket"):
         Web(url="https://192.168.0.7/state", hello="all")
-    monkeypatch.delenv("PLC_TOKEN")
+    monkeypatch.delenv("SEEROB_PLC_TOKEN")
     wrong = (
         Variable(name="a", source="plc", address=5, unit="1"),
         Variable(name="b", source="plc", address="belt/speed", unit="1"),
         Variable(name="c", source="plc", address={"pointer": "/x", "path": "y"}, unit="1"),
     )
-    source = Web(url="wss://192.168.0.7/live", token_env="PLC_TOKEN", ca="gone.pem")
+    source = Web(url="wss://192.168.0.7/live", token_env="SEEROB_PLC_TOKEN", ca="gone.pem")
     with pytest.raises(InputError) as caught:
         source.open(tmp_path, Target(variables=wrong))
-    for part in ("a.address", "b.address", "no JSON pointer", "has no paths", "PLC_TOKEN", "gone.pem"):
+    for part in ("a.address", "b.address", "no JSON pointer", "has no paths", "SEEROB_PLC_TOKEN", "gone.pem"):
         assert part in str(caught.value)
 
 

@@ -17,12 +17,13 @@ from seerob.core.snapshot import Verdict
 from seerob.protocols import ProtocolError
 from seerob.session.writing.triggers import Triggers, allowed
 
-SOURCE = 'kind = "siemens_web"\nurl = "URL"\nuser = "twin"\npassword_env = "PLC_PASSWORD"'
+SOURCE = 'kind = "siemens_web"\nurl = "URL"\nuser = "twin"\npassword_env = "SEEROB_PLC_PASSWORD"'
 
 
 @pytest.fixture
 def plc(monkeypatch):
-    monkeypatch.setenv("PLC_PASSWORD", "secret")
+    monkeypatch.setenv("SEEROB_PLC_PASSWORD", "secret")
+    monkeypatch.setenv("SEEROB_PLC_PASSWORD_HOST", "127.0.0.1")
     with SiemensWebServer({}, user="twin", password="secret", outputs=('"Twin".fast',)) as server:
         yield server
 
@@ -79,7 +80,8 @@ def test_what_a_dead_plc_missed_is_written_when_it_is_back(tmp_path, plc, caplog
 @pytest.mark.parametrize("file", [True, False])
 @pytest.mark.parametrize("line", [True, False])
 def test_it_takes_the_file_and_the_command_line(tmp_path, file, line, monkeypatch):
-    monkeypatch.setenv("PLC_PASSWORD", "secret")
+    monkeypatch.setenv("SEEROB_PLC_PASSWORD", "secret")
+    monkeypatch.setenv("SEEROB_PLC_PASSWORD_HOST", "127.0.0.1")
     text = STATION if file else STATION.replace("allow_writing = true\n", "")
     model = made(tmp_path, "http://127.0.0.1:1", station=text).model
     assert allowed(model, on_command_line=line) is (file and line)

@@ -166,7 +166,7 @@ class SiemensWeb(EmulatorOptions, frozen=True, kw_only=True):
         what = f"variables {', '.join(program)}; speeds in mm/s, positions in mm"
         password = self.password if self.password == PASSWORD else "…"
         hear = (
-            f"PLC_PASSWORD={password} seerob probe siemens_web http://{{at}}"
-            f" --set user={self.user} --set password_env=PLC_PASSWORD"
+            f"SEEROB_PLC_PASSWORD={password} SEEROB_PLC_PASSWORD_HOST={self.host} seerob probe siemens_web http://{{at}}"
+            f" --set user={self.user} --set password_env=SEEROB_PLC_PASSWORD"
         )
         return Ready(server, what, f"{self.host}:{self.port}", (hear,))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import time
 from collections.abc import AsyncGenerator, Iterator
 from contextlib import aclosing, asynccontextmanager
@@ -21,6 +20,7 @@ from seerob.devices.variables.json_values import value_and_time
 from seerob.devices.variables.live_source import BEAT, LONGEST_PULSE, PULSES, Change, Node, VariablesSource
 from seerob.files.tables.mapping import toml_value
 from seerob.protocols import ProtocolError
+from seerob.protocols.links.credentials import Server, secret
 from seerob.protocols.links.json_pointer import document, parts
 from seerob.protocols.links.trusted_certificates import trusting
 from seerob.protocols.plc import sparkplug
@@ -140,6 +140,10 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
     password_env: str | None = None
     """Environment variable that holds the password: a workstation file is no place for one."""
 
+    @property
+    def _server(self) -> Server:
+        return Server(self.host, self.port, self.tls)
+
     def open(self, folder: Path, target: Target | None) -> Opened:
         """Understand every address, and look whether the broker is there.
 
@@ -154,7 +158,7 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
                     raise ValueError('a trigger is true or false on a topic of its own: write "a/topic"')
             except (ValueError, msgspec.ValidationError) as error:
                 problems.append(Problem(f"mqtt {self.host}", f"{variable.name}.address", str(error)))
-        problems += missing_access(self, folder, where=f"mqtt {self.host}")
+        problems += missing_access(self, folder, where=f"mqtt {self.host}", server=self._server)
         if problems:
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
@@ -228,7 +232,8 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
         need("aiomqtt")
         import aiomqtt
 
-        password = None if self.password_env is None else os.environ.get(self.password_env)
+        name = self.password_env
+        password = None if name is None else secret("password_env", name, self._server)
         trusted = None if self.ca is None else folder / self.ca
         context = trusting(trusted, server=f"{self.host}:{self.port}") if self.tls else None
         client = aiomqtt.Client(

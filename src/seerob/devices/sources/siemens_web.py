@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
 import time
 from collections import defaultdict, deque
 from collections.abc import AsyncGenerator
@@ -23,6 +22,7 @@ from seerob.core.snapshot import Finding
 from seerob.devices.variables.access import missing_access
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
 from seerob.protocols import ProtocolError
+from seerob.protocols.links.credentials import Server, secret, server_of
 from seerob.protocols.links.http_answer import answer
 from seerob.protocols.links.trusted_certificates import trusting
 from seerob.protocols.plc import s7_web
@@ -65,6 +65,10 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
         if parts.scheme == "http" and not is_loopback(parts.hostname or ""):
             raise ValueError(f"url = {self.url!r} would send a password unencrypted: write https://")
 
+    @property
+    def _server(self) -> Server:
+        return server_of(self.url, encrypted=self.url.startswith("https:"))
+
     def period(self) -> float:
         """Interval between samples that is expected [s]."""
         return self.every
@@ -81,7 +85,7 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
             for v in (() if target is None else target.variables)
             if not isinstance(v.address, str) or not v.address
         ]
-        problems += missing_access(self, folder, where=where)
+        problems += missing_access(self, folder, where=where, server=self._server)
         if problems:
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
@@ -150,7 +154,7 @@ class SiemensWeb(VariablesSource, frozen=True, kw_only=True):
         async with httpx.AsyncClient(verify=context, timeout=PATIENCE, trust_env=False) as client:
             session = _Session(client, self.url.rstrip("/") + s7_web.PATH)
             await _give_back(session)
-            password = os.environ.get(self.password_env, "")
+            password = secret("password_env", self.password_env, self._server)
             found = s7_web.result(await session.post(s7_web.login(self.user, password)))
             token = found.get("token") if isinstance(found, dict) else None
             if not isinstance(token, str):

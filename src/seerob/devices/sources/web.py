@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import time
 from collections.abc import AsyncGenerator, Iterator, Mapping
 from contextlib import aclosing
@@ -24,6 +23,7 @@ from seerob.devices.variables.access import missing_access
 from seerob.devices.variables.json_values import value_and_time
 from seerob.devices.variables.live_source import Change, Node, VariablesSource
 from seerob.protocols import ProtocolError
+from seerob.protocols.links.credentials import Server, secret, server_of
 from seerob.protocols.links.http_answer import LARGEST, answer
 from seerob.protocols.links.json_pointer import document, parts
 from seerob.protocols.links.trusted_certificates import trusting
@@ -120,6 +120,10 @@ class Web(VariablesSource, frozen=True, kw_only=True):
         return urlsplit(self.url).scheme in ("https", "wss")
 
     @property
+    def _server(self) -> Server:
+        return server_of(self.url, encrypted=self._encrypted)
+
+    @property
     def _pushed(self) -> bool:
         return urlsplit(self.url).scheme in ("ws", "wss")
 
@@ -146,7 +150,7 @@ class Web(VariablesSource, frozen=True, kw_only=True):
                 problems.append(Problem(where, f"{variable.name}.address", str(error)))
         if len(spots) > MOST_PATHS:
             problems.append(Problem(where, "address", f"{len(spots)} paths", f"at most {MOST_PATHS}"))
-        problems += missing_access(self, folder, where=where, env="token_env")
+        problems += missing_access(self, folder, where=where, server=self._server, env="token_env")
         if problems:
             raise InputError(problems)
         return VariablesSource.open(self.beside(folder), folder, target)
@@ -264,7 +268,7 @@ class Web(VariablesSource, frozen=True, kw_only=True):
     def _headers(self) -> dict[str, str]:
         if self.token_env is None:
             return {}
-        return {self.header: f"{self.scheme} {os.environ.get(self.token_env, '')}".strip()}
+        return {self.header: f"{self.scheme} {secret('token_env', self.token_env, self._server)}".strip()}
 
     def _context(self, folder: Path) -> Any:
         return trusting(None if self.ca is None else folder / self.ca, server=self.url)

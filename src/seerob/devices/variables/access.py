@@ -5,7 +5,6 @@ So it is with certificates and passwords of OPC UA sources: what is named must b
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from seerob.core.errors import Problem
-from seerob.protocols.plc.opcua_client import Security
+from seerob.protocols.links.credentials import Server, refusal
+from seerob.protocols.plc.opcua_client import Security, server
 
 CA = ("ca",)
 
@@ -24,6 +24,7 @@ def missing_access(
     folder: Path,
     *,
     where: str,
+    server: Server,
     env: str = "password_env",
     files: tuple[str, ...] = CA,
 ) -> Iterator[Problem]:
@@ -33,12 +34,13 @@ def missing_access(
         source: Whose keys these are.
         folder: The workstation's.
         where: For messages.
+        server: Who would be given the secret.
         env: Key that names an environment variable.
         files: Keys that name files beside the workstation.
     """
     variable = getattr(source, env)
-    if variable is not None and variable not in os.environ:
-        yield Problem(where, env, f"no environment variable {variable!r}", "set it before the start")
+    if variable is not None and (refused := refusal(variable, server)):
+        yield Problem(where, env, *refused)
     for key in files:
         name = getattr(source, key)
         if name is not None and not (folder / name).is_file():
@@ -56,7 +58,7 @@ def missing(where: str, source: Any, folder: Path) -> list[Problem]:
             if getattr(source, key) is None:
                 what = f"security = {source.security.value!r} needs one"
                 problems.append(Problem(where, key, what, "name a file beside the workstation"))
-    return [*problems, *missing_access(source, folder, where=where, files=FILES)]
+    return [*problems, *missing_access(source, folder, where=where, server=server(source), files=FILES)]
 
 
 def at_home(source: Any, folder: Path) -> Any:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
 import time
 import traceback
 from collections.abc import AsyncGenerator, Iterator, Mapping
@@ -25,6 +24,7 @@ from msgspec import Meta
 from seerob.core.errors import SeerobError
 from seerob.core.extras import need
 from seerob.protocols import ProtocolError
+from seerob.protocols.links.credentials import Server, secret, server_of
 from seerob.protocols.plc.opcua_address import Address, browse_name, node_name
 from seerob.protocols.plc.opcua_units import unit
 
@@ -110,6 +110,11 @@ class Way(msgspec.Struct, frozen=True, kw_only=True):
     """Environment variable that holds the password."""
 
 
+def server(way: Any) -> Server:
+    """Who is given the password of a `Way`, or of what has its fields."""
+    return server_of(way.url, encrypted=way.security is not Security.NONE)
+
+
 class Said(NamedTuple):
     """What a server says of one node."""
 
@@ -146,7 +151,8 @@ async def connect(way: Way, folder: Path) -> AsyncGenerator[Client, None]:
     client.name = client.description = "seerob"
     if way.user is not None:
         client.set_user(way.user)
-        client.set_password(os.environ.get(way.password_env or "", ""))
+        if way.password_env is not None:
+            client.set_password(secret("password_env", way.password_env, server(way)))
     try:
         if way.security is not Security.NONE:
             await _protect(client, way, folder)

@@ -29,11 +29,11 @@ export class Recent {
     this.bytes = 0;
   }
 
-  /** Keep a message unless it follows too closely. */
-  keep(t: number, message: Uint8Array): void {
+  /** Keep a message unless it follows too closely; one that `matters` is kept however closely it follows. */
+  keep(t: number, message: Uint8Array, matters = false): void {
     const last = this.kept[this.kept.length - 1];
     if (last && t <= last.t) return;
-    if (last && t - last.t < this.spacing) return;
+    if (last && !matters && t - last.t < this.spacing) return;
     this.kept.push({ t, message });
     this.bytes += message.byteLength;
     if (this.bytes > this.budget) this.forget();

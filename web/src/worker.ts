@@ -79,7 +79,9 @@ function heard(snapshot: Snapshot, raw: Uint8Array): void {
   newest = snapshot.t;
   if (live) {
     collector.add(snapshot);
-    recent.keep(snapshot.t, raw);
+    // One may go to the worst instant of an exceedance, and a neighbour would show another verdict.
+    const exceeded = snapshot.results.some((result) => result.verdict === "exceeded");
+    recent.keep(snapshot.t, raw, exceeded);
     newestRaw = raw;
   }
   if (lookingAt === null) show(snapshot);

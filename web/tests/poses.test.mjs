@@ -79,3 +79,16 @@ test("looking back finds the first kept snapshot at or after an instant, within 
   assert.equal(at(0), recent.oldest);
   assert.equal(recent.at(99), null);
 });
+
+test("what matters is kept however closely it follows, so that it is found at its own instant", async () => {
+  const { Recent } = await load("recent");
+  const recent = new Recent(8000, 0.04);
+  const message = (k) => new Uint8Array([k]);
+  recent.keep(1.0, message(0));
+  recent.keep(1.01, message(1));
+  recent.keep(1.02, message(2), true);
+  recent.keep(1.03, message(3));
+  assert.equal(recent.at(1.02)[0], 2);
+  assert.equal(recent.at(1.005)[0], 2);
+  assert.equal(recent.at(1.03), null);
+});

@@ -18,6 +18,9 @@ interface Visited {
   shown: boolean;
 }
 
+/** What differs by less is the same instant on the page: times are read to a hundredth [s]. */
+const NEAR_S = 0.01;
+
 const visited = signal<Visited | null>(null);
 
 export function ElsewhereNote({ other }: { other: Elsewhere }) {
@@ -61,11 +64,13 @@ export function VisitedInstant() {
   const limit = Number.isNaN(instant.limit)
     ? ""
     : ` (${atMost ? "≤" : "≥"} ${withUnit(figures.limit, unit)})`;
+  const elsewhere = shown && lookingAt.value === instant.t && Math.abs(now.value - instant.t) > NEAR_S;
   return (
     <div class="visited" role="status">
       <span>
         Worst of <strong>{name}</strong>: <strong>{withUnit(figures.value, unit)}</strong>
         {limit} at {formatTime(instant.t)}
+        {elsewhere && <em> – shown is {formatTime(now.value)}, the nearest that is kept</em>}
         {!shown && <em> – older than what a live run keeps to look back at; the recording has it</em>}
       </span>
       {isLive.value && lookingAt.value !== null && (

@@ -15,6 +15,7 @@ from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Ready, option, port
 from seerob.app.emulation.ros_robot import LATE, RosOptions, RosRobot
 from seerob.protocols import ProtocolError
+from seerob.protocols.links.tcp_server import close_server
 from seerob.protocols.ros import ros_tcp
 from seerob.protocols.ros.ros_messages import ros1_name, same_type
 from seerob.protocols.ros.ros_serialised import Edition, encode, store
@@ -69,7 +70,7 @@ class RosTcpEndpoint(_Playing):
         self._begun = time.monotonic()
         ready()
         await over.wait()
-        server.close()
+        await close_server(server)
 
     async def _welcome(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         splitter, wanted = Splitter(), set[str]()

@@ -20,6 +20,7 @@ from seerob.app.emulation.motions import Motion
 from seerob.app.emulation.options import Ready, RobotOptions, option, port
 from seerob.core.errors import InputError
 from seerob.protocols import ProtocolError
+from seerob.protocols.links.tcp_server import close_server
 from seerob.protocols.robots.rtde import (
     NOT_FOUND,
     Accepted,
@@ -158,9 +159,9 @@ class RtdeServer(LoopEmulator):
             self.primary_port = primary.sockets[0].getsockname()[1]
         ready()
         await over.wait()
-        server.close()
+        await close_server(server)
         if primary is not None:
-            primary.close()
+            await close_server(primary)
         # What is left, the clients' tasks, asyncio.run cancels.
 
     async def _say_kinematics(self, _: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

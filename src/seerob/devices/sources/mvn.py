@@ -31,6 +31,7 @@ from seerob.devices.capture.xsens import anatomical, differences
 from seerob.devices.live.listening import say_once
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.datagrams import listening
+from seerob.protocols.links.tcp_server import close_server
 from seerob.protocols.tracking import mvn
 from seerob.protocols.tracking.mvn import Assembly, Items, Kind, Scale, Tags, decode
 from seerob.protocols.tracking.mvn_pose import METRES, POSES, Up, looks_y_up, pose, unit_of
@@ -401,7 +402,7 @@ async def _connected(bind: str, port: int, sender: str) -> AsyncGenerator[tuple[
                 raise item
             yield item
     finally:
-        server.close()
+        await close_server(server)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(0.2):
                 await server.wait_closed()

@@ -21,6 +21,7 @@ from seerob.core.errors import InputError
 from seerob.devices.ros.live_source import RosSource
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.connection import Connection, connected
+from seerob.protocols.links.tcp_server import close_server
 from seerob.protocols.ros import ros_tcp
 from seerob.protocols.ros.ros_messages import ros1_name, same_type
 from seerob.protocols.ros.ros_serialised import Edition, decode, store
@@ -215,6 +216,6 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
             async with aclosing(frames()) as heard:
                 yield heard
         finally:
-            server.close()
+            await close_server(server)
             for writer in newest:
                 writer.transport.abort()

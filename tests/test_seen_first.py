@@ -11,6 +11,7 @@ from seerob.core.snapshot import Result, Verdict
 from seerob.criteria.judging import Judge
 from seerob.criteria.partly_seen import seen_first
 from seerob.description.humans.skeleton import BONES
+from seerob.twin.validity.hearing import BonesHeard
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 RIGHT = frozenset(bone for bone in BONES if bone.startswith("right_"))
@@ -58,7 +59,7 @@ def test_what_is_seen_exceeds_and_what_is_not_seen_leaves_it_open(tmp_path, aske
     state = state_at(station)
     hearing = state.hearings["op"]
     hearing.bones = dict.fromkeys(BONES, (0.0, 0.0))
-    hearing.observed[:] = [(0.0, frozenset(BONES) - frozenset(unseen))]
+    hearing.bones_heard[:] = [BonesHeard(0.0, observed=frozenset(BONES) - frozenset(unseen))]
     (found,) = Judge(station.bound)(state)
     assert found.verdict == verdict
     if unseen and verdict == "exceeded":
@@ -79,7 +80,7 @@ def test_an_estimate_that_the_file_accepts_may_be_off_by_so_much(tmp_path, accep
         state = state_at(station)
         hearing = state.hearings["op"]
         hearing.bones = dict.fromkeys(BONES, (0.0, 0.0))
-        hearing.observed[:] = [(0.0, frozenset(BONES) - {"head"})]
+        hearing.bones_heard[:] = [BonesHeard(0.0, observed=frozenset(BONES) - {"head"})]
         assert Judge(station.bound)(state)[0].verdict == verdict
 
 
@@ -118,7 +119,10 @@ def test_of_whom_nothing_is_seen_nothing_is_known(tmp_path, observed):
     """Across the ankles of a person who is seen before or never: no bone is left to ask about."""
     station = made(tmp_path, FLOATING + PERSON + CELL.format(z=0.1) + NEAR)
     state = state_at(station)
-    state.hearings["op"].observed[:] = [(0.0, frozenset(observed)), (0.1, frozenset())]
+    state.hearings["op"].bones_heard[:] = [
+        BonesHeard(0.0, observed=frozenset(observed)),
+        BonesHeard(0.1, observed=frozenset()),
+    ]
     (found,) = Judge(station.bound)(state)
     assert found.verdict == "undecided"
     assert "no device sees" in found.reason

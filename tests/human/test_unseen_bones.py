@@ -21,7 +21,7 @@ from seerob.session.run import Judge
 from seerob.session.station import Station
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.engine import Engine
-from seerob.twin.validity.hearing import Hearing
+from seerob.twin.validity.hearing import BonesHeard, Hearing
 
 RIGHT = ("right_clavicle", "right_upper_arm", "right_forearm", "right_hand")
 UPPER = ("pelvis", "lumbar", "thorax", "neck", "head", *RIGHT)
@@ -92,8 +92,8 @@ def test_hips_and_shoulders_of_a_picture_tell_the_trunk():
     ids=["nothing", "nothing next", "nothing before", "nothing twice"],
 )
 def test_who_is_not_seen_at_two_instants_alike_is_not_seen_between_them(sets):
-    observed = [(0.1 * k, frozenset(seen)) for k, seen in enumerate(sets)]
-    assert Hearing(given=False, driven=True, observed=observed).unobserved(0.05) == BONES
+    said = [BonesHeard(0.1 * k, observed=frozenset(seen)) for k, seen in enumerate(sets)]
+    assert Hearing(given=False, driven=True, bones_heard=said).unobserved(0.05) == BONES
     assert Hearing(given=False, driven=True).unobserved(0.05) == ()
 
 

@@ -17,6 +17,7 @@ from seerob.session.permissible.methods import By, governing
 from seerob.session.permissible.witness import Posed, Witness
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.state import Hearing, State
+from seerob.twin.validity.hearing import BonesHeard
 
 PLC = '[[sources]]\nkind = "signals_csv"\nname = "plc"\nfile = "s.csv"\ntime = "t"\ntime_unit = "s"\n'
 GATE = '[[variables]]\nname = "gate/open"\nsource = "plc"\naddress = "x"\ntype = "bool"\n'
@@ -124,7 +125,7 @@ def test_a_hand_that_nobody_sees_aimed_is_as_far_off_in_the_map_as_in_the_run(tm
         model, mujoco.MjData(model.mj), {n: Hearing(given=True, driven=False) for n in model.mechanisms}
     )
     state.hearings["op"].bones = {"right_hand": (0.01, None)}
-    state.hearings["op"].aims = [(0.0, {"right_hand": 0.5})]
+    state.hearings["op"].bones_heard[:] = [BonesHeard(0.0, unaimed={"right_hand": 0.5})]
     witness = Witness(lambda _: ())
     state.refresh(0.0)
     witness(state)

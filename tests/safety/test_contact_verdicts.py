@@ -15,6 +15,7 @@ from seerob.criteria.judging import Judge
 from seerob.criteria.safety.power_and_force import STANDSTILL, PowerAndForce
 from seerob.description.humans.skeleton import BONES
 from seerob.session.station import Station
+from seerob.twin.validity.hearing import BonesHeard
 
 KEPT = 'excluded = ["Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"]\n'
 FLAT = 'mass = "simplified"\ncontact_area = { arm = 1e-4 }\n'
@@ -131,7 +132,7 @@ def test_what_the_bones_that_are_seen_exceed_is_exceeded(
     state = state_at(station, arm=((0.0, 0.0), (0.005, 0.0)))
     hearing = state.hearings["op"]
     hearing.bones = dict.fromkeys(BONES, (0.0, 0.0))
-    hearing.observed[:] = [(0.0, frozenset(BONES) - set(lost))]
+    hearing.bones_heard[:] = [BonesHeard(0.0, observed=frozenset(BONES) - set(lost))]
     (result,) = Judge(station.bound)(state)
     assert result.verdict is verdict
     assert result.reason.endswith("without op/right_hand, which may be elsewhere") == (verdict == "exceeded")

@@ -8,6 +8,7 @@ from made_cell import FLOATING, TWO_R, heard, made, two_r
 from seerob.description.humans.skeleton import BONES
 from seerob.session.run import Judge
 from seerob.twin.engine import Engine
+from seerob.twin.validity.hearing import BonesHeard
 
 CELL = """[[humans]]
 name = "op"
@@ -54,7 +55,7 @@ def judged(folder, seen, *, x=2.4):
     engine = Engine(station.model, driven={"arm": 0.2})
     engine.take([heard("arm", 0.0, (0.0, 0.0), (3.0, 0.0))])
     state = engine.start()
-    state.hearings["op"].observed = [(0.0, frozenset(seen))]
+    state.hearings["op"].bones_heard[:] = [BonesHeard(0.0, observed=frozenset(seen))]
     return {result.name: result for result in Judge(station.bound)(state)}
 
 

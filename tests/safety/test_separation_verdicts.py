@@ -15,6 +15,7 @@ from seerob.criteria.stopping.models import MOVING
 from seerob.description.humans.skeleton import BONES
 from seerob.distance.least import Query
 from seerob.twin.engine import Engine
+from seerob.twin.validity.hearing import BonesHeard
 
 KNOWN = TERMS + "human_speed = 1.6\n"
 V_H, T = 1.6, 0.4
@@ -209,7 +210,7 @@ def test_a_bone_that_no_device_sees_is_estimated_where_the_file_accepts_it(tmp_p
     state = state_at(twin, arm=AT_HOME)
     hearing = state.hearings["op"]
     hearing.bones = dict.fromkeys(BONES, (0.0, 0.0))
-    hearing.observed[:] = [(0.0, frozenset(BONES) - {"right_hand"})]
+    hearing.bones_heard[:] = [BonesHeard(0.0, observed=frozenset(BONES) - {"right_hand"})]
     (S,) = Judge(twin.bound)(state)
     assert S.verdict == verdict
     if accepted is not None:

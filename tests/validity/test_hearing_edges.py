@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from seerob.description.humans.skeleton import BONES
-from seerob.twin.validity.hearing import SLACK, Heard, Hearing
+from seerob.twin.validity.hearing import SLACK, BonesHeard, Heard, Hearing
 
 
 def heard(*instants: float, timeout: float = 0.5) -> Hearing:
     hearing = Hearing(given=False, driven=True, timeout=timeout)
     hearing.heard += [Heard(t, torques=np.array([t])) for t in instants]
     return hearing
+
+
+def said(**fields: list[Any]) -> list[BonesHeard]:
+    """Of 0, 1, 2 and 3 s, with one value of each field at each."""
+    return [BonesHeard(float(t), **{name: values[t] for name, values in fields.items()}) for t in range(4)]
 
 
 @pytest.mark.parametrize(
@@ -28,12 +35,10 @@ def heard(*instants: float, timeout: float = 0.5) -> Hearing:
 )
 def test_what_is_older_than_the_last_sample_is_forgotten(t: float, kept: list[float]) -> None:
     hearing = heard(0.0, 1.0, 2.0)
-    told = (hearing.parts, hearing.observed, hearing.bare, hearing.aims, hearing.untold)
-    for instants in told:
-        instants += [(float(k), ()) for k in range(3)]  # type: ignore[arg-type]
+    hearing.bones_heard += [BonesHeard(float(k)) for k in range(3)]
     hearing.forget(t)
     assert [said.t for said in hearing.heard] == kept
-    assert [[instant for instant, _ in instants] for instants in told] == [kept] * 5
+    assert [said.t for said in hearing.bones_heard] == kept
 
 
 def test_a_sample_counts_from_its_instant_on_and_to_the_end_of_the_time_out() -> None:
@@ -49,16 +54,11 @@ def test_a_sample_counts_from_its_instant_on_and_to_the_end_of_the_time_out() ->
 def test_what_is_said_of_bones_counts_between_the_samples_beside_an_instant() -> None:
     hearing = heard(0.0)
     first, last = ("first", ("head",)), ("last", ("pelvis",))
-    hearing.parts += [(0.0, (first,)), (1.0, ()), (2.0, ()), (3.0, (last,))]
+    hearing.bones_heard = said(parts=[(first,), (), (), (last,)])
     expected = {-1.0: (first,), 0.0: (first,), 0.5: (first,), 1.0 - SLACK: (), 1.5: (), 2.5: (last,)}
     for t, doubted in expected.items():
         assert hearing.invalid_parts(t) == doubted, t
-    hearing.aims += [
-        (0.0, {"head": 0.9}),
-        (1.0, {"head": 0.1, "left_hand": 0.3}),
-        (2.0, {"head": 0.2}),
-        (3.0, {}),
-    ]
+    hearing.bones_heard = said(unaimed=[{"head": 0.9}, {"head": 0.1, "left_hand": 0.3}, {"head": 0.2}, {}])
     for t, unaimed in {
         0.5: {"head": 0.9, "left_hand": 0.3},
         1.0 - SLACK: {"head": 0.2, "left_hand": 0.3},
@@ -69,7 +69,7 @@ def test_what_is_said_of_bones_counts_between_the_samples_beside_an_instant() ->
         assert hearing.unaimed(t) == unaimed, t
     everything = frozenset(BONES)
     blind, armless = everything - {"head"}, everything - {"right_hand"}
-    hearing.observed += [(0.0, blind), (1.0, everything), (2.0, everything), (3.0, armless)]
+    hearing.bones_heard = said(observed=[blind, everything, everything, armless])
     for t, unobserved in {0.5: ("head",), 1.0 - SLACK: (), 1.5: (), 2.5: ("right_hand",)}.items():
         assert hearing.unobserved(t) == unobserved, t
 
@@ -77,7 +77,7 @@ def test_what_is_said_of_bones_counts_between_the_samples_beside_an_instant() ->
 def test_angles_that_nothing_tells_count_between_the_samples_beside_an_instant() -> None:
     hearing = heard(0.0)
     wrist, neck = ("wrist_flexion", 1), ("neck_twist", 0)
-    hearing.untold += [(0.0, frozenset({wrist})), (1.0, frozenset()), (2.0, frozenset()), (3.0, {neck})]
+    hearing.bones_heard = said(untold=[frozenset({wrist}), frozenset(), frozenset(), frozenset({neck})])
     assert hearing.untold_angles(0.5) == {wrist}
     assert hearing.untold_angles(1.0 - SLACK) == hearing.untold_angles(1.5) == frozenset()
     assert hearing.untold_angles(2.5) == hearing.untold_angles(9.0) == {neck}
@@ -87,7 +87,6 @@ def test_a_joint_beyond_which_nothing_is_seen_tells_nothing_of_its_bone() -> Non
     hearing = heard(0.0)
     armless = frozenset(BONES) - {"right_hand"}
     elbow = frozenset({"right_forearm"})
-    hearing.observed += [(t, armless) for t in (0.0, 1.0, 2.0, 3.0)]
-    hearing.bare += [(0.0, elbow), (1.0, frozenset()), (2.0, frozenset()), (3.0, elbow)]
+    hearing.bones_heard = said(observed=[armless] * 4, bare=[elbow, frozenset(), frozenset(), elbow])
     found = {t: "right_forearm" in hearing.unobserved(t) for t in (0.5, 1.0 - SLACK, 1.5, 2.5)}
     assert found == {0.5: True, 1.0 - SLACK: False, 1.5: False, 2.5: True}

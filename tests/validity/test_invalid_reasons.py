@@ -10,6 +10,7 @@ from seerob.description.humans.skeleton import BONES
 from seerob.session.invalid_reasons import invalid_reasons
 from seerob.session.run import Judge, bind, ticks
 from seerob.twin.engine import Engine
+from seerob.twin.validity.hearing import BonesHeard
 
 PERSON = '[[humans]]\nname = "op"\nstature = 1.75\nmass = 75\nsex = "male"\n'
 KNIFE = '[[tools]]\nname = "knife"\non = "op/right_hand"\nshape = { box = [0.02, 0.02, 0.2] }\nmass = 0.1\n'
@@ -40,7 +41,7 @@ def test_bones_that_no_device_sees_are_named_with_what_the_person_holds(tmp_path
     assert invalid_reasons(state) == {}
     state.hearings["op"].bones = dict.fromkeys(BONES, (0.0, 0.0))
     seen = frozenset(bone for bone in BONES if not bone.startswith("right_"))
-    state.hearings["op"].observed[:] = [(0.0, seen)]
+    state.hearings["op"].bones_heard[:] = [BonesHeard(0.0, observed=seen)]
     state.heard()
     doubts = invalid_reasons(state)
     assert "op" not in doubts

@@ -10,6 +10,7 @@ from seerob.criteria.judging import Judge
 from seerob.description.humans.skeleton import BONES
 from seerob.distance.least import Query
 from seerob.twin.accuracy.tracking_error import TrackingError, tracking
+from seerob.twin.validity.hearing import BonesHeard
 
 PEOPLE = person("op", 3, 0, 0) + person("other", -9, 0, 0)
 AREA = '[[areas]]\nname = "zone"\nshape = { box = [1, 1, 3] }\n'
@@ -68,7 +69,7 @@ def test_a_bone_that_is_not_aimed_is_on_a_circle_around_its_joint(tmp_path):
     hearing.bones = {"head": (0.02, None), "right_hand": (0.01, 0.9)}
     r = reach(station, HEAD)
     for angle in (0.3, np.pi):
-        hearing.aims[:] = [(0.0, {"head": angle, "right_hand": 0.3})]
+        hearing.bones_heard[:] = [BonesHeard(0.0, unaimed={"head": angle, "right_hand": 0.3})]
         assert off(station, state, HEAD, HAND, "op/left_hand") == pytest.approx(
             [0.02 + 2 * r * np.sin(angle / 2), 0.01 + 0.9 * reach(station, HAND), 0.0]
         )
@@ -84,7 +85,7 @@ def test_what_no_device_sees_is_off_by_what_the_file_accepts_or_by_more(tmp_path
         state = state_at(station)
         hearing = state.hearings["op"]
         hearing.bones = {"head": (0.02, 0.0), "right_hand": (0.0, 0.0), "left_hand": (0.5, 0.0)}
-        hearing.observed[:] = [(0.0, frozenset(BONES) - {"right_hand", "left_hand"})]
+        hearing.bones_heard[:] = [BonesHeard(0.0, observed=frozenset(BONES) - {"right_hand", "left_hand"})]
         assert off(station, state, HEAD, HAND, "op/left_hand", "op/pelvis", "other/head") == pytest.approx(
             [0.02, accepted, 0.5, 0.0, 0.0]
         )

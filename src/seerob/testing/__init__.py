@@ -39,6 +39,7 @@ from seerob.session.run import engine_of, pump, ticks
 from seerob.session.station import Station, load
 from seerob.twin.engine import Engine
 from seerob.twin.state import VARIABLE, State
+from seerob.twin.validity.hearing import BonesHeard
 from seerob.workstation.source import Opened, Source
 from seerob.workstation.variables.dictionary import Kind, Value, Variable
 
@@ -400,7 +401,7 @@ class _Harness:
             state: State = engine.tick() if k else engine.start()
             if hidden:
                 doubt = "seerob.testing", tuple(BONES)
-                state.hearings[hidden].parts = [(state.t, (doubt,))]
+                state.hearings[hidden].bones_heard = [BonesHeard(state.t, parts=(doubt,))]
             results = []
             for judge in judges:
                 (result,) = judge(state)

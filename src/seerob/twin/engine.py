@@ -40,7 +40,7 @@ from seerob.twin.moving_base import moved_by_poses
 from seerob.twin.signals import Signals
 from seerob.twin.spans import Path
 from seerob.twin.state import Hearing, State
-from seerob.twin.validity.hearing import NOWHERE, Heard
+from seerob.twin.validity.hearing import NOWHERE, BonesHeard, Heard
 
 DEFAULT_TIMEOUT = 0.2
 """Time-out [s] of what is heard without a source that states one."""
@@ -236,7 +236,7 @@ class Engine:
                 reason = reason or missed
             self._note(mechanism.name, sample.t, reason, sample, taken=taken)
             if isinstance(sample, JointSample) and not sample.placed:
-                self._hearings[mechanism.name].places.append((sample.t, NOWHERE))
+                self._hearings[mechanism.name].bones_heard.append(BonesHeard(sample.t, places=NOWHERE))
 
         for name, following in self._followings.items():
             hearing = self._hearings[name]

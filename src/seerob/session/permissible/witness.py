@@ -13,7 +13,7 @@ from seerob.core.snapshot import Result
 from seerob.core.transforms import Array
 from seerob.model.model import Mechanism, Model
 from seerob.twin.state import Hearing, State
-from seerob.twin.validity.hearing import Places
+from seerob.twin.validity.hearing import EVERYWHERE, BonesHeard
 from seerob.workstation.variables.dictionary import Value
 
 
@@ -129,8 +129,8 @@ class Posed(State):
         self._said, seen = self._witness.heard(others_at)
         for name, hearing in self.hearings.items():
             hearing.bones, unaimed, slack = seen.get(name, Seen({}, {}, {}))
-            hearing.aims = [(t, unaimed)]
-            hearing.places = [(t, Places(frozenset(), frozenset(), slack))]
+            places = EVERYWHERE._replace(slack=slack)
+            hearing.bones_heard = [BonesHeard(t, unaimed=unaimed, places=places)]
         self.asked.clear()
         self.refresh(t)
 

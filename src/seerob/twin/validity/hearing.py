@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import NamedTuple, TypeVar
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from seerob.description.capture.following import Followed, PartDoubt
 from seerob.description.humans.skeleton import BONES
 from seerob.kernels.pull import SLACK as SLACK  # noqa: PLC0414
 
-Told = TypeVar("Told")
 STANDS = 1e-2
 """Speed below which a motion that ends has stopped [rad/s or m/s]: noise of encoders makes standing robots
 as fast, and within the time-out nothing gets farther than some millimetres."""
@@ -38,8 +38,30 @@ class Places(NamedTuple):
     """Bone → how much farther a point of it may be, as it is held or seen elsewhere, too [m]."""
 
 
+EVERYWHERE = Places(frozenset(), frozenset(), MappingProxyType({}))
+"""What is left open of a person whose bones are all placed: nothing."""
 NOWHERE = Places(frozenset(BONES), frozenset(BONES), {})
 """What is left open of a person whose posture is told, and the place of no bone."""
+
+
+class BonesHeard(NamedTuple):
+    """What one sample said of the bones of a person, besides how joints are."""
+
+    t: float
+    """Its instant [s]."""
+    parts: tuple[PartDoubt, ...] = ()
+    """Why single bones may not be relied on when the rest may, as (reason, bones)."""
+    observed: frozenset[str] | None = None
+    """Bones that some device sees; None where no device is asked, as joints move the person."""
+    bare: frozenset[str] = frozenset()
+    """Bones of limbs that devices see without anything that shows where they point."""
+    unaimed: Mapping[str, float] = MappingProxyType({})
+    """Hands, feet and heads of which only the joint is seen, with a bound on how far they may be turned from
+    the twin's [rad]."""
+    untold: frozenset[tuple[str, int]] = frozenset()
+    """Angles of the posture that nothing tells, each with its side."""
+    places: Places = EVERYWHERE
+    """Of which bones nobody says where they are."""
 
 
 class Heard(NamedTuple):
@@ -75,22 +97,8 @@ class Hearing:
     bones: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
     """Bone of a person that devices see → how far the twin's is from the device's, position [m] and angle
     [rad]; None where none was seen."""
-    parts: list[tuple[float, tuple[PartDoubt, ...]]] = field(default_factory=list)
-    """Instant [s] and why single bones of a person may not be relied on when the rest may, as (reason,
-    bones); oldest first."""
-    observed: list[tuple[float, frozenset[str]]] = field(default_factory=list)
-    """Instant [s] and the bones of a person that some device sees then, oldest first."""
-    bare: list[tuple[float, frozenset[str]]] = field(default_factory=list)
-    """Instant [s] and the bones of a person's limbs that devices see without anything that shows where they
-    point, oldest first."""
-    aims: list[tuple[float, Mapping[str, float]]] = field(default_factory=list)
-    """Of a person that devices see: instant [s], and hands, feet and heads of which only the joint is seen,
-    with a bound on how far they may be turned from the twin's [rad]; oldest first."""
-    untold: list[tuple[float, frozenset[tuple[str, int]]]] = field(default_factory=list)
-    """Instant [s] and angles of a person's posture that nothing tells, each with its side, oldest first."""
-    places: list[tuple[float, Places]] = field(default_factory=list)
-    """Of a person that devices see: instant [s], and of which bones nobody says where they are; oldest
-    first."""
+    bones_heard: list[BonesHeard] = field(default_factory=list)
+    """Of a person, what the newest samples said of bones, oldest first; empty of whom joints move."""
     captured: Array | None = None
     """Of a person whom the physics moves: the joint positions that the twin is pulled to now [rad or m]."""
     residual: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
@@ -111,20 +119,17 @@ class Hearing:
     def follow(self, found: Followed) -> None:
         """Take what devices told of a person at one instant."""
         self.heard.append(Heard(found.t, found.reason))
-        self.parts.append((found.t, found.parts))
-        self.observed.append((found.t, found.observed))
-        self.bare.append((found.t, found.bare))
-        self.aims.append((found.t, found.unaimed))
-        self.untold.append((found.t, found.untold))
-        self.places.append((found.t, Places(found.unplaced, found.displaced, found.slack)))
+        places = Places(found.unplaced, found.displaced, found.slack)
+        self.bones_heard.append(
+            BonesHeard(found.t, found.parts, found.observed, found.bare, found.unaimed, found.untold, places)
+        )
 
     def forget(self, t: float) -> None:
         """Drop what is older than the last sample at or before ``t`` [s]."""
         while len(self.heard) > 1 and self.heard[1].t <= t:
             del self.heard[0]
-        for told in (self.parts, self.observed, self.bare, self.aims, self.untold, self.places):
-            while len(told) > 1 and told[1][0] <= t:
-                del told[0]
+        while len(self.bones_heard) > 1 and self.bones_heard[1].t <= t:
+            del self.bones_heard[0]
 
     def invalid_reason(self, t: float) -> str:
         """Why what was heard does not tell where it is at ``t`` [s]; empty when it does.
@@ -134,7 +139,7 @@ class Hearing:
         """
         if not self.driven:
             return "" if self.given else "no source drives it and the file gives no position (q)"
-        k = sum(1 for said in self.heard if said.t <= t + SLACK)
+        k = _by(self.heard, t)
         if k == 0:
             return "nothing heard yet"
         last = self.heard[k - 1].t
@@ -155,7 +160,7 @@ class Hearing:
 
     def around(self, t: float) -> list[Heard]:
         """Return the last sample at or before ``t`` [s] and the next one, where there are such."""
-        k = sum(1 for said in self.heard if said.t <= t + SLACK)
+        k = _by(self.heard, t)
         return self.heard[max(k - 1, 0) : k + 1]
 
     def speed_error(self, t: float) -> Array | None:
@@ -179,7 +184,7 @@ class Hearing:
 
     def invalid_parts(self, t: float) -> tuple[PartDoubt, ...]:
         """Bones that may not be relied on at ``t`` [s], with the reasons."""
-        return tuple(part for told in _around(self.parts, t) for part in told)
+        return tuple(part for said in self._said_of_bones(t) for part in said.parts)
 
     def unaimed(self, t: float) -> dict[str, float]:
         """Hands, feet and heads at ``t`` [s] of which only the joint is seen, each with a bound [rad].
@@ -187,39 +192,46 @@ class Hearing:
         It bounds the angle between how the twin's is turned and how the person's may be.
         """
         found: dict[str, float] = {}
-        for told in _around(self.aims, t):
-            found |= {bone: max(angle, found.get(bone, 0.0)) for bone, angle in told.items()}
+        for said in self._said_of_bones(t):
+            found |= {bone: max(angle, found.get(bone, 0.0)) for bone, angle in said.unaimed.items()}
         return found
 
     def unplaced(self, t: float) -> tuple[str, ...]:
         """Bones of which it is known how they are turned at ``t`` [s], and nobody says where they are."""
-        found = frozenset[str]().union(*(places.unplaced for places in _around(self.places, t)))
+        found = {bone for said in self._said_of_bones(t) for bone in said.places.unplaced}
         return tuple(bone for bone in BONES if bone in found) if found else ()
 
     def displaced(self, t: float) -> str:
         """Why nobody may rely any more on where bones are that were placed before; empty when all may."""
-        found = frozenset[str]().union(*(places.displaced for places in _around(self.places, t)))
+        found = {bone for said in self._said_of_bones(t) for bone in said.places.displaced}
         return nobody_says(tuple(bone for bone in BONES if bone in found)) if found else ""
 
     def slack(self, t: float) -> dict[str, float]:
         """Bones of which a point may be farther than what is seen shows at ``t`` [s], and by how much [m]."""
         found: dict[str, float] = {}
-        for places in _around(self.places, t):
-            found |= {bone: max(size, found.get(bone, 0.0)) for bone, size in places.slack.items()}
+        for said in self._said_of_bones(t):
+            found |= {bone: max(size, found.get(bone, 0.0)) for bone, size in said.places.slack.items()}
         return found
 
     def untold_angles(self, t: float) -> frozenset[tuple[str, int]]:
         """Angles of the posture at ``t`` [s] that nothing tells, each with its side."""
-        return frozenset().union(*_around(self.untold, t))
+        return frozenset(angle for said in self._said_of_bones(t) for angle in said.untold)
 
     def unobserved(self, t: float) -> tuple[str, ...]:
         """Bones that no device sees at ``t`` [s] and that the bones beside them do not tell.
 
         Empty for a person whom no device sees, whom joints or keyframes move.
         """
-        around = _around(self.observed, t)
-        bare = frozenset().union(*_around(self.bare, t))
-        return estimated(frozenset.intersection(*around), bare) if around else ()
+        around = self._said_of_bones(t)
+        seen = [said.observed for said in around if said.observed is not None]
+        if not seen:
+            return ()
+        return estimated(frozenset.intersection(*seen), frozenset().union(*(said.bare for said in around)))
+
+    def _said_of_bones(self, t: float) -> list[BonesHeard]:
+        """What was said last by ``t`` [s] and what next: between two samples either may hold."""
+        k = _by(self.bones_heard, t)
+        return self.bones_heard[max(k - 1, 0) : k + 1]
 
 
 def nobody_says(bones: Sequence[str]) -> str:
@@ -229,7 +241,11 @@ def nobody_says(bones: Sequence[str]) -> str:
     return f"no device says where {which}, only how bones are turned" if bones else ""
 
 
-def _around(told: list[tuple[float, Told]], t: float) -> list[Told]:
-    """What was told last by ``t`` [s] and what next: between two samples either may hold."""
-    k = sum(1 for instant, _ in told if instant <= t + SLACK)
-    return [what for _, what in told[max(k - 1, 0) : k + 1]]
+def _by(said: Sequence[Heard] | Sequence[BonesHeard], t: float) -> int:
+    """How many of some samples, oldest first, are of ``t`` [s] or before."""
+    k = 0
+    for each in said:
+        if not each.t <= t + SLACK:
+            break
+        k += 1
+    return k

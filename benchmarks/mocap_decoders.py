@@ -26,8 +26,8 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "
 
 import numpy as np
 
-from seerob.app.emulation.mvn_datagrams import datagrams
 from seerob.app.emulation.mvn_person import Pose
+from seerob.app.emulators.mvn import datagrams
 from seerob.devices.sources import bvh, mvnx
 from seerob.devices.sources.mvn import Frames
 from seerob.protocols.tracking.mvn import Kind, decode

@@ -4,7 +4,7 @@ import csv
 
 import pytest
 
-from seerob.core.files.no_formula import FORMULA, no_formula
+from seerob.outputs.tables.growing_table import FORMULA, no_formula
 from seerob.session.permissible.tables import csv_bytes
 
 

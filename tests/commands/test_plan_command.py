@@ -18,7 +18,7 @@ from seerob.app.emulators import fri, rtde
 from seerob.core.errors import InputError
 from seerob.description.robots import library
 from seerob.files.waypoints.arm import Arm
-from seerob.files.waypoints.branches import branch
+from seerob.files.waypoints.inverse import branch
 
 CELL = """
 [[robots]]

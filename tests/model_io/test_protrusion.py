@@ -7,8 +7,8 @@ import pytest
 
 from seerob.core.shapes.geometry import Mesh, Solid, capsule, dilated_rectangle
 from seerob.description.description import Description, Link
+from seerob.description.robots.maker_geometry import outside_distances, with_protrusions
 from seerob.description.shapes import shapes
-from seerob.description.shapes.protrusion import outside_distances, with_protrusions
 
 
 def robot(visual: Mesh, *solids: Solid) -> Description:

@@ -4,14 +4,14 @@ import json
 
 import numpy as np
 
-from seerob.app.emulation import kinect_person
+from seerob.app.emulators import kinect
 from seerob.protocols.tracking.kinect import JOINTS, Picture, body_object
 
 RATE = 30.0
 
 
 def scene(file="library:reach"):
-    return kinect_person.animated(file)
+    return kinect.animated(file)
 
 
 def pictures(count=40, file="library:reach", lost=()):

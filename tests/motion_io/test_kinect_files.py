@@ -6,7 +6,7 @@ import made_pictures
 import numpy as np
 import pytest
 
-from seerob.app.emulation.kinect_person import CAMERA
+from seerob.app.emulators.kinect import CAMERA
 from seerob.core.errors import InputError
 from seerob.files.motion_capture import kinect_bag, kinect_recording
 from seerob.files.motion_capture.kinect_recording import Reading

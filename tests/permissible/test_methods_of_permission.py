@@ -11,10 +11,9 @@ from test_permissible_speed import KEPT_OUT, KNOWN, PERSON, PFL, cell
 
 from seerob.core.errors import InputError
 from seerob.core.verdict import Verdict
-from seerob.session.permissible.ceiling import Ceiling, Method
+from seerob.session.permissible.ceilings import By, Ceiling, Method, governing
 from seerob.session.permissible.evaluation import Wish, given_motion, witness
 from seerob.session.permissible.joint_limits import joint_limits
-from seerob.session.permissible.methods import By, governing
 from seerob.session.permissible.path import path_of
 from seerob.session.permissible.survey import Survey
 

@@ -12,8 +12,7 @@ from test_permissible_speed import KEPT_OUT, KNOWN, LIMITS, PERSON, PFL, SOURCE,
 
 from made_cell import FLOATING, TWO_R, made, two_r
 from seerob.core.errors import Undecided
-from seerob.session.permissible.ceiling import Ceiling, Method
-from seerob.session.permissible.methods import By, governing
+from seerob.session.permissible.ceilings import By, Ceiling, Method, governing
 from seerob.session.permissible.witness import Posed, Witness
 from seerob.twin.accuracy.tracking_error import TrackingError
 from seerob.twin.state import Hearing, State

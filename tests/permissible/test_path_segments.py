@@ -18,11 +18,10 @@ from seerob.core.errors import InputError
 from seerob.core.samples import PoseSample
 from seerob.core.verdict import Verdict
 from seerob.criteria.safety.path_speed import passed
-from seerob.files.trajectories.path_map import read_map
-from seerob.files.trajectories.path_markers import Place, path_markers
+from seerob.files.trajectories.path_map import Place, path_markers, read_map
 from seerob.session.permissible.evaluation import Wish
 from seerob.session.permissible.given_motion import solved
-from seerob.session.permissible.segments import segments
+from seerob.session.permissible.speed_map import segments
 from seerob.session.permissible.tables import SEGMENT_HEAD, csv_bytes, map_head, map_rows, segment_rows
 
 TIP = '[[safety]]\nkind = "velocity"\nname = "V"\nat = "arm"\nlimit = 0.5\n'

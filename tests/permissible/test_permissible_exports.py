@@ -13,10 +13,17 @@ import pytest
 from made_cell import FLOATING, UR10, made
 from seerob.core.errors import InputError
 from seerob.core.samples import JointSample
-from seerob.session.permissible.segments import segments
-from seerob.session.permissible.tables import csv_bytes, map_head, map_rows, trajectory_head, trajectory_rows
-from seerob.session.permissible.urscript import refusal, urscript
-from seerob.session.permissible.workbook import workbook
+from seerob.session.permissible.speed_map import segments
+from seerob.session.permissible.tables import (
+    csv_bytes,
+    map_head,
+    map_rows,
+    refusal,
+    trajectory_head,
+    trajectory_rows,
+    urscript,
+    workbook,
+)
 
 START = np.array([0, -1.2, 1.4, -1.5, -1.5, 0])
 TIP = '[[safety]]\nkind = "velocity"\nname = "V"\nat = "arm"\nlimit = 0.4\n'

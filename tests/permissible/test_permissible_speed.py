@@ -11,8 +11,8 @@ from made_cell import FLOATING, TWO_R, heard, made, state_at, two_r
 from seerob.app import cli
 from seerob.core.errors import InputError
 from seerob.session.permissible import evaluation
+from seerob.session.permissible.ceilings import By
 from seerob.session.permissible.evaluation import Wish
-from seerob.session.permissible.methods import By
 from seerob.session.permissible.rescaled import Rescaled
 
 LIMITS = "acceleration_limits = [6.0, 6.0]\njerk_limits = [60.0, 60.0]\n"

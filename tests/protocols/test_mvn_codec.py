@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from seerob.app.emulation.mvn_datagrams import datagrams
 from seerob.app.emulation.mvn_person import Pose
+from seerob.app.emulators.mvn import datagrams
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking.mvn import (
     LATE,

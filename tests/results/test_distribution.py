@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from seerob.core.snapshot import Level, Result
-from seerob.recording.distribution import distribution
+from seerob.outputs.report.time_shares import distribution
 from seerob.recording.series import Series
 
 LEVELS = (Level(up_to=2, name="one"), Level(up_to=4, name="two"), Level(up_to=7, name="three"))

@@ -23,7 +23,7 @@ from seerob.core.snapshot import (
     Verdict,
 )
 from seerob.description.shapes.glb import glb_bytes
-from seerob.kernels.raster import raster
+from seerob.kernels.paint import raster
 from seerob.outputs.palette import FILL
 from seerob.outputs.picture.camera import look_along
 from seerob.outputs.picture.canvas import in_front

@@ -75,8 +75,7 @@ def drfl(patch):
 
 
 def modbus_robot(_):
-    from seerob.app.emulation.modbus_robot import program
-    from seerob.app.emulators.modbus import ModbusServer
+    from seerob.app.emulators.modbus import ModbusServer, program
     from seerob.devices.sources.modbus_robot import ModbusRobot
     from seerob.protocols.plc.modbus_map import load
 
@@ -240,8 +239,7 @@ def vive(patch):
 
 
 def kinect(_):
-    from seerob.app.emulation.kinect_person import animated
-    from seerob.app.emulators.kinect import KinectSender
+    from seerob.app.emulators.kinect import KinectSender, animated
     from seerob.devices.sources.kinect import Kinect, Link
 
     server = KinectSender(animated("library:reach"), to=None, port=0, rate=60.0).start()

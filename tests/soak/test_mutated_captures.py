@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from seerob.app.emulation.kinect_person import animated
+from seerob.app.emulators.kinect import animated
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking.kinect import decode_message, encode_message
 from soak.mutations import mutated

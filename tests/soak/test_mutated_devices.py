@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from seerob.app.emulation import natnet_datagrams
 from seerob.app.emulation.mvn_person import animated
+from seerob.app.emulators import natnet as natnet_datagrams
 from seerob.app.emulators.natnet import NatnetServer
 from seerob.app.emulators.rokoko import RokokoSender
 from seerob.app.emulators.vive import FIVE, WORN, worn

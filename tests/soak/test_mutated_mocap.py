@@ -14,8 +14,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "sources"))
 
 from made_mvnx import Q  # tests/sources
 
-from seerob.app.emulation.mvn_datagrams import datagrams
 from seerob.app.emulation.mvn_person import Pose, segments
+from seerob.app.emulators.mvn import datagrams
 from seerob.devices.sources.mvn import Frames
 from seerob.protocols import ProtocolError
 from seerob.protocols.tracking.mvn import HEADER, Kind, Splitter, decode

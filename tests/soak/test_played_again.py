@@ -12,10 +12,10 @@ import pytest
 from free_ports import free_port
 from live_story import listening, wait_for
 from relay import HERE, LOOP, Datagrams, Garbled, Stream
-from seerob.app.emulation.kinect_person import animated as seen
 from seerob.app.emulation.motions import swing
 from seerob.app.emulation.mvn_person import animated
 from seerob.app.emulators.kinect import KinectSender
+from seerob.app.emulators.kinect import animated as seen
 from seerob.app.emulators.mvn import MvnSender
 from seerob.app.emulators.rokoko import RokokoSender
 from seerob.app.emulators.rtde import RtdeServer

@@ -6,7 +6,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from seerob.app.emulation.kinect_person import CAMERA, animated
+from seerob.app.emulators.kinect import CAMERA, animated
 from seerob.core.samples import Quality
 from seerob.core.transforms import wxyz_from_rotation
 from seerob.description.humans import keyframes, manikin, motion

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from free_ports import free_port
-from seerob.app.emulation.kinect_person import CAMERA, animated
-from seerob.app.emulators.kinect import KinectSender
+from seerob.app.emulators.kinect import CAMERA, KinectSender, animated
 from seerob.core.errors import InputError
 from seerob.core.samples import Quality
 from seerob.core.transforms import wxyz_from_rotation

@@ -19,9 +19,8 @@ from pymodbus.client import ModbusTcpClient
 from live_story import Story, listening, lived, open_files, wait_for
 from made_cell import made
 from seerob.app import cli
-from seerob.app.emulation.modbus_robot import program
 from seerob.app.emulators.modbus import Modbus as ModbusOptions
-from seerob.app.emulators.modbus import ModbusServer
+from seerob.app.emulators.modbus import ModbusServer, program
 from seerob.core.errors import InputError, UnknownName
 from seerob.core.samples import JointSample, Quality, SignalSample
 from seerob.devices.sources.modbus import Modbus

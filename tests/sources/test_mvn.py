@@ -16,9 +16,8 @@ from test_bvh import made as made_bvh
 
 from free_ports import free_port
 from seerob.app.commands.emulate import options_of
-from seerob.app.emulation.mvn_datagrams import datagrams
 from seerob.app.emulation.mvn_person import Pose, animated, followed, recorded, segments
-from seerob.app.emulators.mvn import MvnSender
+from seerob.app.emulators.mvn import MvnSender, datagrams
 from seerob.core.errors import InputError
 from seerob.core.transforms import rotation_from_wxyz, wxyz_from_rotation
 from seerob.description.humans.skeleton import BONES, bone_poses

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from free_ports import free_port
-from seerob.app.emulation import natnet_datagrams
 from seerob.app.emulation.mvn_person import animated
+from seerob.app.emulators import natnet as natnet_datagrams
 from seerob.app.emulators.natnet import BONES, NatnetServer
 from seerob.core.samples import Quality
 from seerob.core.transforms import inverse, rotation_from_wxyz, transform, wxyz_from_rotation

@@ -20,7 +20,7 @@ from seerob.devices.live.listening import Listener
 from seerob.devices.sources.rtde import Rtde, figures, joint_sample, states
 from seerob.outputs.sinks.recorder import Recorder
 from seerob.protocols import ProtocolError
-from seerob.protocols.robots.rtde_states import RobotMode, SafetyStatus, quality
+from seerob.protocols.robots.rtde import RobotMode, SafetyStatus, quality
 from seerob.recording.recording import Recording
 from seerob.session.recorded_station import load_recorded
 

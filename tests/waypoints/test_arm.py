@@ -6,8 +6,15 @@ import pytest
 from seerob.core.errors import UnknownName
 from seerob.description.robots import library
 from seerob.files.waypoints.arm import Arm
-from seerob.files.waypoints.branches import Branch, branch, factors, is_classic, parse
-from seerob.files.waypoints.inverse import rotation_vectors, solutions
+from seerob.files.waypoints.inverse import (
+    Branch,
+    branch,
+    factors,
+    is_classic,
+    parse,
+    rotation_vectors,
+    solutions,
+)
 
 D1, A2, A3, D4, D5, D6 = 0.1273, -0.612, -0.5723, 0.163941, 0.1157, 0.0922
 """Universal Robots, DH parameters of the UR10 [m]."""

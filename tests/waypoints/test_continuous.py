@@ -8,9 +8,8 @@ import pytest
 from seerob.core.errors import InputError
 from seerob.description.robots import library
 from seerob.files.waypoints.arm import Arm
-from seerob.files.waypoints.branches import parse
 from seerob.files.waypoints.continuous import Wish, continuous
-from seerob.files.waypoints.inverse import rotation_vectors, solutions
+from seerob.files.waypoints.inverse import parse, rotation_vectors, solutions
 from seerob.files.waypoints.joint_limits import JointLimits
 from seerob.files.waypoints.timing import Limits, needed, profile, reachable
 from seerob.files.waypoints.waypoint import Move, Program, ToolPose, Waypoint

@@ -6,8 +6,7 @@ from scipy.optimize import least_squares
 
 from seerob.description.robots import library
 from seerob.files.waypoints.arm import Arm
-from seerob.files.waypoints.inverse import rotation_vectors, solutions
-from seerob.files.waypoints.unreachable import why_not
+from seerob.files.waypoints.inverse import rotation_vectors, solutions, why_not
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 NEAR = np.array([0.0, -1.2, 1.4, -1.7, -1.57, 0.0])

@@ -19,7 +19,7 @@ from seerob.core.snapshot import Snapshot
 from seerob.core.transforms import rotation_from_wxyz, transform
 from seerob.protocols.ros.ros_serialised import Edition
 from seerob.session.writing.cartesian_targets import CartesianTargets, message, serialised, targets_allowed
-from seerob.workstation.tables.targets import CartesianTarget, TargetMessage, TargetWire
+from seerob.workstation.tables.writing import CartesianTarget, TargetMessage, TargetWire
 
 HALF = math.sqrt(0.5)
 STATION = """

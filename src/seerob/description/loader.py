@@ -45,7 +45,7 @@ def load_robot(
     else:
         description = _from_file(model, folder, packages or {}, arguments or {}, name)
         # Numba is imported only where a file brings shapes of its own.
-        from seerob.description.shapes.protrusion import with_protrusions
+        from seerob.description.robots.maker_geometry import with_protrusions
 
         description = with_protrusions(description)
     if meshes is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
@@ -9,7 +10,7 @@ from typing import Protocol, Self, runtime_checkable
 from msgspec import Struct
 
 from seerob.core.samples import Sample
-from seerob.core.snapshot import Scene, Snapshot
+from seerob.core.snapshot import CriterionInfo, Scene, Snapshot
 from seerob.recording.result_log import ResultLog
 
 
@@ -66,3 +67,55 @@ class Sink(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             folder: Where to write.
         """
         raise NotImplementedError
+
+
+# -- files that are there, whole, only when the run is over ---------------------------------------
+
+Progress = Callable[[int, int], None]
+"""Called with how many of how many steps of writing are done."""
+
+
+class AtEnd(Closing):
+    """What such writers do alike: they say how far they are, and an impatient user does not wait."""
+
+    progress: Progress | None = None
+    """Called while `close` works."""
+
+    def close(self) -> None:
+        """Write, whole or not at all."""
+        raise NotImplementedError
+
+    def abandon(self) -> None:
+        """Leave nothing behind: called in place of `close` when somebody does not want to wait."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        # Whoever interrupts a run a second time does not want to wait for this.
+        if kind is not None and issubclass(kind, KeyboardInterrupt):
+            self.abandon()
+            return
+        try:
+            self.close()
+        except KeyboardInterrupt:
+            self.abandon()
+            raise
+
+    def _tell(self, done: int, total: int) -> None:
+        if self.progress is not None:
+            self.progress(done, total)
+
+
+class AtEndWithResults(AtEnd):
+    """One that needs every result of the run.
+
+    Attributes:
+        log: Of the run, once it has one; its own until then.
+    """
+
+    def __init__(self, criteria: Iterable[CriterionInfo]) -> None:
+        self.log = ResultLog(criteria)
+
+    def share(self, log: ResultLog) -> None:
+        """Use the log of the run, which holds the same: see `seerob.outputs.sink.KeepsResults`."""
+        self.log = log

@@ -24,8 +24,7 @@ from seerob.devices.live.real_time import Clock
 from seerob.model.model import Model
 from seerob.outputs.sink import KeepsResults, Writer
 from seerob.recording.result_log import ResultLog
-from seerob.session.displays import Looks
-from seerob.session.invalid_reasons import invalid_reasons
+from seerob.session.displays import Looks, invalid_reasons
 from seerob.session.opening import coarse, signal_timeouts, untimed
 from seerob.twin.engine import Engine, last_tick
 from seerob.twin.spans import Points

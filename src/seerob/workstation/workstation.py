@@ -10,7 +10,7 @@ import hashlib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, field
 
 from seerob.core.errors import InputError
 from seerob.core.quantities import (
@@ -24,18 +24,37 @@ from seerob.core.quantities import (
     Radian,
     Radians,
     Share,
+    Table,
     Tolerance,
     unit,
 )
 from seerob.core.quantities import Metres3 as Metres3  # noqa: PLC0414
 from seerob.core.quantities import Pose as Pose  # noqa: PLC0414
-from seerob.workstation.tables.displays import Display
 from seerob.workstation.tables.machines import Belt, Fingers, Motion, Route, Slide, Turn, Vehicle
 from seerob.workstation.tables.sensors import Sensor
 from seerob.workstation.tables.simple_shape import Shape as Shape  # noqa: PLC0414
-from seerob.workstation.tables.targets import CartesianTarget
 from seerob.workstation.tables.task_phase import TaskPhase
-from seerob.workstation.tables.triggers import Trigger
+from seerob.workstation.tables.writing import CartesianTarget, Trigger
+
+Color = tuple[Share, Share, Share]
+
+
+class Display(Table, frozen=True, kw_only=True):
+    """A look that follows a variable: a lamp's colour, or whether something is there to be seen."""
+
+    of: str
+    """Name of a part, a machine or an area; wildcards allowed."""
+    variable: str
+    """Variable of the dictionary: a bool, a choice or a text."""
+    colors: dict[str, Color] = field(default_factory=dict)
+    """Value → red, green, blue in 0…1: ``{ true = [0.9, 0.1, 0.1] }``; its own colour at any other."""
+    hidden: tuple[str, ...] = ()
+    """Values at which it is not drawn. It counts in distances all the same."""
+
+    def __post_init__(self) -> None:
+        if not self.colors and not self.hidden:
+            raise ValueError("give colors, hidden or both")
+
 
 FILE_NAME = "workstation.toml"
 

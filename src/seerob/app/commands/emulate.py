@@ -19,6 +19,9 @@ from seerob.core.plugin import kinds, load
 if TYPE_CHECKING:
     from seerob.app.emulation.options import EmulatorOptions
 
+
+from seerob.core.host_name import is_loopback
+
 HELP = "be a controller or a device without the hardware: a real server that plays a motion"
 EXAMPLE = "seerob emulate rtde --robot ur10 --file motion.csv"
 PACKAGE = "emulators"
@@ -126,7 +129,7 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         InputError: What it shall play is wrong, or it cannot listen there.
     """
-    from seerob.app.emulation.hint import probes_of
+    from seerob.app.commands.emulate import probes_of
     from seerob.app.emulation.options import COMMAND
     from seerob.devices.live.listening import because
 
@@ -153,3 +156,41 @@ def run(options: argparse.Namespace) -> int:
     finally:
         server.stop()
     return Exit.WITHIN
+
+
+# -- what to type to hear it ----------------------------------------------------------------------
+
+ANYWHERE = ("0.0.0.0", "::", "")  # noqa: S104 - compared with, not listened on
+
+
+def probes_of(kind: str, host: str, port: int, *, sends: bool, commands: tuple[str, ...]) -> tuple[str, ...]:
+    """Commands that hear it.
+
+    Args:
+        kind: What is emulated.
+        host: Where it listens, or whom it sends to.
+        port: The same.
+        sends: Whether it sends by itself, so that its source listens.
+        commands: Given when its own kind with the address is not the way to hear it; with ``{at}`` for
+            both, ``{host}``, ``{port}``, and ``{option}`` for a port that its source does not expect.
+    """
+    option = _port_option(kind, port)
+    if sends:
+        option += "" if is_loopback(host) else f" --set bind={host}"
+    host = "127.0.0.1" if host in ANYWHERE else host
+    at = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    if commands:
+        return tuple(command.format(at=at, host=host, port=port, option=option) for command in commands)
+    address = "" if sends else f" {host}"
+    return (f"seerob probe {kind}{address}{option}",)
+
+
+def _port_option(kind: str, port: int) -> str:
+    """The port, where the source expects another one."""
+    from msgspec.structs import fields
+
+    from seerob.core.plugin import load
+    from seerob.workstation.source import Source
+
+    usual = {field.name: field.default for field in fields(load("sources", kind, Source))}.get("port", port)
+    return "" if port == usual else f" --port {port}"

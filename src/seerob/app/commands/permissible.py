@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from seerob.outputs.sink import Writer
     from seerob.session.permissible.between_samples import Bound
     from seerob.session.permissible.evaluation import PermissibleSpeed
-    from seerob.session.permissible.segments import PathSegment
+    from seerob.session.permissible.speed_map import PathSegment
     from seerob.session.station import Station
 
 HELP = "how fast a robot may go along its path: map, rescaled motion, cycle time, CSV, Excel, URScript"
@@ -111,9 +111,9 @@ def run(options: argparse.Namespace) -> int:
     need("toppra", "matplotlib")
     station = compiled(options.workstation, quiet=options.json)
     from seerob.outputs.sinks.dossier import Dossier
+    from seerob.session.permissible.ceilings import By
     from seerob.session.permissible.evaluation import Wish
-    from seerob.session.permissible.methods import By
-    from seerob.session.permissible.segments import segments
+    from seerob.session.permissible.speed_map import segments
 
     folder = run_folder(station.model.folder, options.output)
     refuse_existing([Dossier()], folder)
@@ -201,8 +201,7 @@ def _write(
     """The tables."""
     from seerob.outputs.sinks.dossier import write_whole
     from seerob.session.permissible import tables
-    from seerob.session.permissible.urscript import PERIODS, refusal, urscript
-    from seerob.session.permissible.workbook import workbook
+    from seerob.session.permissible.tables import PERIODS, refusal, urscript, workbook
 
     scene = station.scene()
     files = {

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from seerob.outputs.sink import Writer
     from seerob.session.permissible.between_samples import Bound
     from seerob.session.permissible.evaluation import PermissibleSpeed, Sources
-    from seerob.session.permissible.segments import PathSegment
+    from seerob.session.permissible.speed_map import PathSegment
     from seerob.session.station import Station
 
 CHOICES = ("all", "ssm", "pfl", "both", "either")
@@ -49,9 +49,9 @@ def permissible_found(
     Raises:
         InputError: As of `Station.permissible_speed`; or no robot moves.
     """
+    from seerob.session.permissible.ceilings import By
     from seerob.session.permissible.evaluation import Wish
-    from seerob.session.permissible.methods import By
-    from seerob.session.permissible.segments import segments
+    from seerob.session.permissible.speed_map import segments
 
     driven = {source.target() for source in station.workstation.sources}
     robots = [robot.name for robot in station.workstation.robots if robot.name in driven]
@@ -83,7 +83,7 @@ def add_sections(
 
 def tell_permissible(found: PermissibleSpeed, cut: Sequence[PathSegment], bounds: Sequence[Bound]) -> None:
     """Print what was found, and the verdicts of the run of the rescaled motion."""
-    from seerob.session.permissible.methods import By
+    from seerob.session.permissible.ceilings import By
 
     tell_plan(found, cut)
     for bound in bounds:

@@ -286,8 +286,7 @@ class _Given:
         import numpy as np
 
         from seerob.core.transforms import rotation_from_wxyz
-        from seerob.files.waypoints.inverse import solutions
-        from seerob.files.waypoints.unreachable import why_not
+        from seerob.files.waypoints.inverse import solutions, why_not
 
         near = self._mechanism.home if start is None else np.array(start)
         goals: list[ArrayLike] = []
@@ -310,7 +309,7 @@ class _Given:
 
     def tell(self, plan: Plan, *, first: int) -> None:
         """Say of every pose which way of reaching it the plan took; ``first`` is where goals begin."""
-        from seerob.files.waypoints.branches import branch, is_classic
+        from seerob.files.waypoints.inverse import branch, is_classic
 
         classic, n = is_classic(self._arm), self._arm.n
         for k, count in self._ways.items():

@@ -71,7 +71,7 @@ class Ready(NamedTuple):
     """Where it listens or what it sends to, for a message when that cannot be had: ``127.0.0.1:30004``."""
     commands: tuple[str, ...] = ()
     """That hear it, where ``seerob probe`` with its kind and address is not the way; see
-    `seerob.app.emulation.hint`."""
+    `seerob.app.commands.emulate`."""
 
 
 class EmulatorOptions(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

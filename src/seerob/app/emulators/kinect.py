@@ -2,14 +2,106 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from seerob.app.emulation.kinect_person import Scene, animated, recorded
+import numpy as np
+
 from seerob.app.emulation.message_sender import MessageSender, Way
 from seerob.app.emulation.options import LIBRARY, EmulatorOptions, Ready, option, port
-from seerob.protocols.tracking.kinect import PORT, encode_message
+from seerob.core.transforms import Array, inverse, rotation_from_rpy, transform
+from seerob.description.capture.mapping import conventions, plain
+from seerob.description.description import Description
+from seerob.description.humans import keyframes, manikin, motion
+from seerob.description.humans.skeleton import BONES, bone_poses
+from seerob.protocols.tracking.kinect import JOINTS, PORT, Body, Picture, encode_message
+
+RATE = 30.0
+"""Of keyframes [Hz]."""
+STATURE = 1.75
+CAMERA = transform(rotation_from_rpy((0.0, np.radians(12.0), np.pi)), (2.5, 0.0, 1.6))
+"""Where the camera stands that sees our digital human: in front of it, tilted down by 12°."""
+
+Scene = Callable[[float], Picture]
+"""What the camera sees at a time [s]."""
+
+
+def joints(person: Description, q: Array, *, stature: float) -> Array:
+    """Where a body tracker would see the joints of our digital human.
+
+    Args:
+        person: Made by `seerob.description.humans.manikin.build`.
+        q: Joint values [rad, m], shape (..., 53).
+        stature: Of the person [m].
+
+    Returns:
+        Positions in the person's root frame, z up [m], shape (..., 32, 3).
+    """
+    rotations, origins = bone_poses(person, q)
+    places = conventions()["azure_kinect"].places
+    rows = []
+    for name in JOINTS:
+        place = places[plain(name)]
+        bone = BONES.index(place.bone)
+        rows.append(origins[..., bone, :] + rotations[..., bone, :, :] @ (place.at * stature))
+    return np.stack(rows, axis=-2)
+
+
+def animated(file: str, *, camera: Array = CAMERA, folder: Path = Path()) -> Scene:
+    """Somebody of medium size who does what keyframes say, again and again.
+
+    Args:
+        file: Keyframes, or ``library:reach``.
+        camera: World from camera (x forward, y left, z up), shape (4, 4).
+        folder: Where relative paths start.
+
+    Raises:
+        InputError: The file is missing or wrong.
+    """
+    person = manikin.build(name="person", stature=STATURE, mass=75.0, sex="male")
+    played = motion.sample(keyframes.read(file, person, folder=folder), person, RATE)
+    camera_from_world = inverse(camera)
+    seen = joints(person, played.q, stature=STATURE) @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
+    sure = np.ones(len(JOINTS))
+    pictures = [
+        Picture(t=t, bodies=(Body(1, row, None, sure),)) for t, row in zip(played.t, seen, strict=True)
+    ]
+    return repeated(pictures, up=camera_from_world[:3, 2])
+
+
+def recorded(path: Path, subject: str = "") -> Scene:
+    """Who was recorded, in the frame of the camera, again and again.
+
+    Raises:
+        InputError: The file is missing or wrong.
+    """
+    from seerob.devices.sources.kinect_recording import KinectRecording
+    from seerob.workstation.workstation import Pose
+
+    # Any pose but the default keeps what is seen in the frame of the camera.
+    source = KinectRecording(human="person", file=path.name, subject=subject, at=Pose(rpy=(0.0, 0.0, 0.0)))
+    frames = list(source.read(path).frames)
+    pictures = []
+    for frame in frames:
+        seen = bool(np.isfinite(frame.positions).any())
+        body = Body(1, frame.positions, frame.orientations, frame.confidence)
+        pictures.append(Picture(t=frame.t - frames[0].t, bodies=(body,) if seen else ()))
+    return repeated(pictures)
+
+
+def repeated(pictures: list[Picture], up: Array | None = None) -> Scene:
+    """The nearest picture before; from the end it starts again."""
+    times = np.array([picture.t for picture in pictures])
+    period = float(times[-1]) + (float(times[-1] - times[-2]) if len(times) > 1 else 1.0)
+
+    def scene(t: float) -> Picture:
+        k = max(int(np.searchsorted(times, t % period + 1e-9, side="right")) - 1, 0)
+        return Picture(t=t, bodies=pictures[k].bodies, camera="emulated", up=up)
+
+    return scene
+
 
 FIRST = 1.0
 """The camera's clock at the first picture [s]; it counts from when it was switched on."""

@@ -3,16 +3,153 @@
 from __future__ import annotations
 
 import socket
+import struct
 import time
 from collections.abc import Callable, Sequence
 from typing import Annotated
 
+import numpy as np
+
 from seerob.app.emulation.background import Emulator
-from seerob.app.emulation.mvn_datagrams import datagrams
-from seerob.app.emulation.mvn_person import Person
+from seerob.app.emulation.mvn_person import Person, Pose
 from seerob.app.emulation.options import PersonOptions, Ready, To, option, port
+from seerob.core.transforms import Array, rotation_from_wxyz
+from seerob.devices.capture.xsens import anatomical, joint_angles
 from seerob.protocols.tracking import mvn
-from seerob.protocols.tracking.mvn import Kind
+from seerob.protocols.tracking.mvn import Header, Kind, ScalePoint, encode, pack_items, pack_scale, pack_tags
+from seerob.protocols.tracking.mvn_segments import JOINTS, PARENTS, SEGMENTS, UNITY
+
+IDS = np.arange(1, len(SEGMENTS) + 1)
+HEAD_OVER_NECK = 2.0
+"""Height of the head over the length of the neck: what the emulated person's stature is made of."""
+_JOINT_IDS = np.array([[(SEGMENTS.index(p) + 1) << 8, (SEGMENTS.index(c) + 1) << 8] for _, p, c in JOINTS])
+_UNITY_ROWS = [SEGMENTS.index(name) for name in UNITY]
+_Y_UP = [1, 2, 0]
+"""(x, y, z) with z up → y up: the inverse of what a reader does."""
+
+
+def datagrams(
+    kind: Kind,
+    pose: Pose,
+    *,
+    sample: int,
+    t: float,
+    units: float = 1.0,
+    character: int = 0,
+    name: str = "emulated",
+    items_each: int = 0,
+    old: bool = False,
+) -> list[bytes]:
+    """One instant in one kind.
+
+    Args:
+        kind: Of `Kind`; motion trackers (23) and points (03) are not emulated.
+        pose: The person.
+        sample: Counter.
+        t: Time code [s].
+        units: Units of the stream per metre: 1 or 100.
+        character: Its number.
+        name: Its name.
+        items_each: At most so many items per datagram, then there are several; 0 for all in one.
+        old: Header of versions before 2019, with zeros at its end.
+
+    Raises:
+        ValueError: The kind is not emulated.
+    """
+    ids, values, payload = np.zeros(0, int), np.zeros((0, 1)), b""
+    p = units * pose.positions
+    match kind:
+        case Kind.EULER:
+            ids, values = IDS, np.hstack([p[:, _Y_UP], _euler(pose.wxyz)])
+        case Kind.QUATERNION:
+            ids, values = IDS, np.hstack([p, pose.wxyz])
+        case Kind.UNITY:
+            ids, values = IDS, _unity(Pose(p, pose.wxyz))
+        case Kind.ANGLES:
+            ids, values = _JOINT_IDS, np.degrees(joint_angles(anatomical(pose.wxyz)))
+        case Kind.LINEAR:
+            ids, values = IDS, np.hstack([p, np.zeros((len(IDS), 6))])
+        case Kind.ANGULAR:
+            ids, values = IDS, np.hstack([pose.wxyz, np.zeros((len(IDS), 6))])
+        case Kind.MASS_CENTER:
+            payload = struct.pack(">3f", *p.mean(axis=0))
+        case Kind.META:
+            payload = pack_tags({"name": name, "xmid": "00000000", "color": "e96417"})
+        case Kind.SCALE:
+            payload = _scale(Pose(p, pose.wxyz))
+        case Kind.TIME_CODE:
+            whole = int(t)
+            clock = (
+                f"{whole // 3600 % 24:02d}:{whole // 60 % 60:02d}:{whole % 60:02d}.{int(1000 * (t % 1)):03d}"
+            )
+            payload = clock.encode()
+        case _:
+            raise ValueError(f"{kind!r} is not emulated")
+    each = items_each or max(len(ids), 1)
+    starts = range(0, max(len(ids), 1), each)
+    found = []
+    for part, start in enumerate(starts):
+        own = slice(start, start + each)
+        body = payload or pack_items(ids[own], values[own])
+        header = Header(
+            kind=kind,
+            sample=sample,
+            part=part,
+            last=part == len(starts) - 1,
+            items=len(ids[own]) or 1,
+            time_code=round(1000 * t),
+            character=character,
+            segments=0 if old else len(SEGMENTS),
+        )
+        data = encode(header, body)
+        found.append(data[:17] + bytes(7) + data[24:] if old else data)
+    return found
+
+
+def _euler(wxyz: Array) -> Array:
+    """Turns about the fixed axes x, y, z with y up [deg]."""
+    from scipy.spatial.transform import Rotation
+
+    turned = wxyz[:, [0, 2, 3, 1]]
+    angles = Rotation.from_quat(turned[:, [1, 2, 3, 0]]).as_euler("xyz", degrees=True)
+    return np.asarray(angles)
+
+
+def _unity(pose: Pose) -> Array:
+    """Offsets and turns against the parents, y up, left-handed."""
+    from scipy.spatial.transform import Rotation
+
+    offsets, turns = _against_parents(pose)
+    q = Rotation.from_matrix(turns).as_quat()  # x, y, z, w
+    left = np.stack([-offsets[:, 1], offsets[:, 2], offsets[:, 0]], axis=1)
+    quaternions = np.stack([q[:, 3], q[:, 1], -q[:, 2], -q[:, 0]], axis=1)
+    return np.asarray(np.hstack([left, quaternions])[_UNITY_ROWS])
+
+
+def _scale(pose: Pose) -> bytes:
+    """The person in the T-pose, where every segment's axes are the world's."""
+    offsets, _ = _against_parents(pose)
+    at = np.zeros_like(offsets)
+    for k, parent in enumerate(PARENTS):
+        if parent >= 0:
+            at[k] = at[parent] + offsets[k]
+    at[:, 2] -= at[:, 2].min()
+    head = SEGMENTS.index("Head")
+    neck = float(np.linalg.norm(offsets[head]))
+    top = ScalePoint(head + 1, 1, "pTopOfHead", 0, (0.0, 0.0, HEAD_OVER_NECK * neck))
+    return pack_scale([(name, p) for name, p in zip(SEGMENTS, at.tolist(), strict=True)], [top])
+
+
+def _against_parents(pose: Pose) -> tuple[Array, Array]:
+    """Offsets and rotations of the segments in the frames of their parents."""
+    R = rotation_from_wxyz(pose.wxyz)
+    offsets, turns = pose.positions.copy(), R.copy()
+    for k, parent in enumerate(PARENTS):
+        if parent >= 0:
+            offsets[k] = R[parent].T @ (pose.positions[k] - pose.positions[parent])
+            turns[k] = R[parent].T @ R[k]
+    return offsets, turns
+
 
 KINDS = (Kind.QUATERNION, Kind.ANGLES, Kind.MASS_CENTER, Kind.META, Kind.SCALE)
 SELDOM = frozenset({Kind.META, Kind.SCALE})

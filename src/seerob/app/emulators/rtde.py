@@ -36,6 +36,8 @@ from seerob.protocols.robots.rtde import (
     Recipe,
     Reply,
     Request,
+    RobotMode,
+    SafetyStatus,
     Splitter,
     StartRequest,
     TextMessage,
@@ -45,7 +47,6 @@ from seerob.protocols.robots.rtde import (
     encode_reply,
     pack,
 )
-from seerob.protocols.robots.rtde_states import RobotMode, SafetyStatus
 from seerob.protocols.robots.ur_primary import Kinematics, encode_state
 
 _log = logging.getLogger(__name__)

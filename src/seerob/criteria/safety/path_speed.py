@@ -17,8 +17,7 @@ from seerob.core.snapshot import Basis, Input, Origin, Result, Verdict
 from seerob.core.transforms import Array
 from seerob.core.verdict import keeps
 from seerob.criteria.criterion import Criterion, Evaluate
-from seerob.files.trajectories.path_map import MAX_SIZE, PathMap, read_map
-from seerob.files.trajectories.path_markers import Place, path_markers
+from seerob.files.trajectories.path_map import MAX_SIZE, PathMap, Place, path_markers, read_map
 from seerob.model import provenance
 from seerob.model.model import Model
 from seerob.twin.spans import ROUNDING, UNBOUNDED, Fall, Falls, Points, Span, down_to

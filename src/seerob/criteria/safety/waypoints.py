@@ -12,8 +12,8 @@ from seerob.core.errors import InputError
 from seerob.core.snapshot import Basis, Label, Marker, Polyline, Result, Sphere, Vec3
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate
+from seerob.files.waypoints.continuous import Programmed
 from seerob.files.waypoints.joint_limits import JointLimits
-from seerob.files.waypoints.programmed import Programmed
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin.state import State

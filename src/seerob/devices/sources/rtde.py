@@ -25,8 +25,17 @@ from seerob.devices.live.listening import LiveSource, at_start, because
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
 from seerob.protocols.robots import rtde, ur_primary
-from seerob.protocols.robots.rtde import CB3_RATE, Level, TextMessage, Value, is_cb3
-from seerob.protocols.robots.rtde_states import RobotMode, SafetyStatus, name, quality
+from seerob.protocols.robots.rtde import (
+    CB3_RATE,
+    Level,
+    RobotMode,
+    SafetyStatus,
+    TextMessage,
+    Value,
+    is_cb3,
+    name,
+    quality,
+)
 from seerob.workstation.source import Opened, Target
 
 _log = logging.getLogger(__name__)

@@ -21,8 +21,8 @@ from seerob.core.transforms import Array, rotation_from_rpy, rotation_from_wxyz,
 from seerob.devices.motion_files.trajectory_file import TrajectoryFile, notes
 from seerob.files.trajectories.trajectory import MotionOrigin, Trajectory
 from seerob.files.waypoints.arm import Arm
-from seerob.files.waypoints.branches import parse
 from seerob.files.waypoints.continuous import Continuous, Wish, continuous
+from seerob.files.waypoints.inverse import parse
 from seerob.files.waypoints.joint_limits import JointLimits
 from seerob.files.waypoints.reading import Point, read_program
 from seerob.files.waypoints.reduction import reduced

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -15,13 +17,12 @@ from seerob.core.transforms import Array, rotation_from_wxyz
 from seerob.files.trajectories.trajectory import MAX_SAMPLES, Trajectory
 from seerob.files.waypoints.arm import Arm
 from seerob.files.waypoints.blending import Leg, meet, rounded
-from seerob.files.waypoints.branches import Branch, branch, is_classic
-from seerob.files.waypoints.inverse import solutions
+from seerob.files.waypoints.inverse import Branch, branch, is_classic, solutions, why_not
 from seerob.files.waypoints.joint_limits import JointLimits
 from seerob.files.waypoints.pieces import SINGULAR, Piece, joint_line, tool_way
 from seerob.files.waypoints.timing import Limits, Profile, profile
-from seerob.files.waypoints.unreachable import why_not
 from seerob.files.waypoints.waypoint import Program, Waypoint
+from seerob.workstation.source import Target
 
 
 class Goals:
@@ -333,3 +334,23 @@ def _sampled(legs: list[Leg], file: str, period: float, first: Array, rests: flo
         later = times > begin + timing.duration
         q[later], qd[later] = leg.piece.last, 0.0
     return Trajectory(file=file, t=times, q=q, qd=qd)
+
+
+# -- for those who draw waypoints and do not know the source --------------------------------------
+
+
+@runtime_checkable
+class Programmed(Protocol):
+    """A source whose motion goes through waypoints; see `seerob.devices.sources.waypoints`."""
+
+    robot: str
+    file: str
+
+    def program(self, path: Path) -> Program:
+        """The waypoints."""
+
+    def arm(self, program: Program, target: Target) -> tuple[Arm, tuple[str, ...]]:
+        """The robot up to its tool point, and what is assumed of both."""
+
+    def motion(self, program: Program, arm: Arm, limits: JointLimits) -> Continuous:
+        """The continuous motion."""

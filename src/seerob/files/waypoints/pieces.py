@@ -18,9 +18,7 @@ from numpy.typing import ArrayLike
 from seerob.core.errors import InputError
 from seerob.core.transforms import Array, rotation_from_axis_angle
 from seerob.files.waypoints.arm import Arm
-from seerob.files.waypoints.branches import factors, is_classic
-from seerob.files.waypoints.inverse import follow, rotation_vectors, solutions
-from seerob.files.waypoints.unreachable import why_not
+from seerob.files.waypoints.inverse import factors, follow, is_classic, rotation_vectors, solutions, why_not
 
 STEP, TURN = 0.005, 0.02
 """Largest distance [m] and angle [rad] between two solved points."""

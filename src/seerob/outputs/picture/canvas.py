@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.kernels.paint import averaged, darken, glaze, outline, solid, stroke
-from seerob.kernels.raster import raster
+from seerob.kernels.paint import averaged, darken, glaze, outline, raster, solid, stroke
 from seerob.outputs.picture.camera import NEAR, Camera
 
 if TYPE_CHECKING:

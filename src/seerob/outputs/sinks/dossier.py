@@ -14,8 +14,7 @@ from seerob.core.files.whole_file import whole_file
 from seerob.core.report_section import ReportSection
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Basis, Finding, Scene, Snapshot
-from seerob.outputs.at_end import AtEndWithResults
-from seerob.outputs.sink import Sink
+from seerob.outputs.sink import AtEndWithResults, Sink
 from seerob.recording.result_log import result_named
 
 

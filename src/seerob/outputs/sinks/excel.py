@@ -14,12 +14,11 @@ from seerob.core.files.whole_file import whole_file
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Basis, Scene, Snapshot
 from seerob.description.norms.editions import editions
-from seerob.outputs.at_end import AtEndWithResults
 from seerob.outputs.report import posture_safety as _posture_safety
 from seerob.outputs.report.bone_errors import HEAD as ERRORS
 from seerob.outputs.report.bone_errors import bone_rows
 from seerob.outputs.report.time_shares import HEAD, time_rows
-from seerob.outputs.sink import Sink
+from seerob.outputs.sink import AtEndWithResults, Sink
 from seerob.outputs.workbook.motion_sheets import MotionSheets
 from seerob.outputs.workbook.sheet_rows import Cell
 from seerob.outputs.workbook.sheets import workbook

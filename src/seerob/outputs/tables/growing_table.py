@@ -7,6 +7,7 @@ does not grow with the length of the run.
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -88,3 +89,39 @@ class GrowingTable:
         with suppress(OSError):  # of a full disk, once more; the file is closed all the same
             self._file.close()
         self._waiting.unlink(missing_ok=True)
+
+
+# -- text that spreadsheets take for no formula ---------------------------------------------------
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What a formula begins with."""
+
+
+def no_formula(text: str) -> str:
+    """The text, with an apostrophe before it where it begins like a formula."""
+    return f"'{text}" if text.startswith(FORMULA) else text
+
+
+# -- when a further row is due --------------------------------------------------------------------
+
+_SLACK = 1e-6
+"""Of a period: instants are not exact multiples of it."""
+
+
+class Pace:
+    """Rows at least so far apart.
+
+    Args:
+        every: Least time between two rows [s]; 0 for every tick.
+        period: Of ticks [s].
+    """
+
+    def __init__(self, every: float, period: float) -> None:
+        self._every, self._slack, self._next = every, _SLACK * period, -math.inf
+
+    def due(self, t: float) -> bool:
+        """Whether the tick at ``t`` [s] has a row; to be asked once per tick."""
+        if t < self._next - self._slack:
+            return False
+        self._next = t + self._every
+        return True

@@ -13,7 +13,7 @@ from seerob.core.errors import InputError, SeerobError
 from seerob.core.files.whole_file import hidden_beside
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Snapshot
-from seerob.outputs.at_end import AtEnd
+from seerob.outputs.sink import AtEnd
 from seerob.outputs.tables.growing_table import GrowingTable
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"

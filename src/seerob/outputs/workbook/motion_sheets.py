@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from seerob.core.samples import BodySample, Sample
 from seerob.core.snapshot import Scene, Snapshot
 from seerob.outputs.tables import sample_cells as _sample_cells
-from seerob.outputs.tables.pace import Pace
+from seerob.outputs.tables.growing_table import Pace
 from seerob.outputs.tables.people import people
 
 Cell = str | float | int | None

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
-from seerob.core.files.no_formula import FORMULA
 from seerob.core.snapshot import Verdict
 from seerob.outputs.palette import DARK_HEX, HEX
+from seerob.outputs.tables.growing_table import FORMULA
 
 if TYPE_CHECKING:
     from xlsxwriter import Workbook

@@ -19,14 +19,15 @@ the surface that permits the least share of its own speed counts.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 from msgspec.structs import replace as changed
 
-from seerob.core.errors import Undecided
+from seerob.core.errors import InputError, Problem, Undecided
 from seerob.core.snapshot import Verdict
 from seerob.core.transforms import Array
 from seerob.core.verdict import admitted
@@ -40,9 +41,81 @@ from seerob.criteria.safety.power_and_force import STANDSTILL, Contacts, PowerAn
 from seerob.criteria.safety.separation import Separation
 from seerob.criteria.safety.velocity import Velocity
 from seerob.model.model import Model
-from seerob.session.permissible.ceiling import Answer, Ask, Ceiling, Figure, Look, Method
 from seerob.twin.accuracy.distance_ends import DistanceEnds
 from seerob.twin.state import State
+
+
+class Method(StrEnum):
+    """How a criterion protects a person."""
+
+    SSM = "ssm"
+    """Speed and separation monitoring."""
+    PFL = "pfl"
+    """Power and force limiting."""
+    OWN = "own"
+    """A limit of the workstation file on speed or energy."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A limit that governs, with its source."""
+
+    value: float
+    unit: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """The largest speed that one criterion permits, for one body region if it has any."""
+
+    criterion: str
+    share: float
+    """Largest permitted share of the speed that was asked about: inf without a limit, NaN when it cannot be
+    told."""
+    speed: float = math.nan
+    """Largest permitted speed of the governing surface patch [m/s]; NaN where there is none."""
+    region: str = ""
+    """Body region; empty for criteria that know none."""
+    surface: str = ""
+    """Part of the robot that governs."""
+    contact: str = ""
+    """``free``, ``clamped`` or ``clamped on the floor``; empty without contact."""
+    governs: str = ""
+    """``force``, ``pressure``, ``energy``, ``separation`` …"""
+    reason: str = ""
+    """Why it cannot be told, or why no speed is permitted."""
+    asked: bool = True
+    """False where its variable says that it does not apply there: it permits nothing and forbids nothing."""
+    method: Method = Method.OWN
+    limit: Figure | None = None
+    """The figure that governs, such as a pressure; None where it has none of its own."""
+
+    @property
+    def undecided(self) -> bool:
+        """Whether it is not known."""
+        return math.isnan(self.share)
+
+    def words(self) -> str:
+        """``separation: Chest, free, pressure``: who governs, and by what."""
+        where = ", ".join(x for x in (self.region, self.contact, self.governs) if x)
+        return f"{self.criterion}: {where}" if where else self.criterion
+
+
+Answer = Callable[[State], tuple[Ceiling, ...]]
+Look = Callable[[State], None]
+
+
+@dataclass(frozen=True)
+class Ask:
+    """How to ask a criterion."""
+
+    ceilings: Answer
+    """At a state in which the robot has the speed that is asked about; never raises `Undecided`."""
+    method: Method
+    look: Look | None = None
+    """Shown every place before the first is asked about, for a criterion that judges a run as a whole."""
+
 
 ANYWHERE = 1e3
 """Horizon within which everybody is [m]: a method that permits a speed by itself has to judge everybody."""
@@ -273,3 +346,116 @@ def _power(criterion: Criterion, model: Model, robot: str, limit: float, power: 
         return (Ceiling(criterion.name, share, speed, surface=result.reason, governs=governs, limit=figure),)
 
     return ask
+
+
+# -- methods that limit a speed, and their ceilings together --------------------------------------
+
+
+class By(StrEnum):
+    """Which methods count."""
+
+    ALL = "all"
+    """Every method that the workstation has; the lesser of both speeds counts."""
+    SSM = "ssm"
+    """Speed and separation monitoring alone."""
+    PFL = "pfl"
+    """Power and force limiting alone."""
+    BOTH = "both"
+    """The lesser of the two; both must be there."""
+    EITHER = "either"
+    """Whichever permits more at each place; both must be there, and about the same people."""
+
+    def counts(self, method: Method) -> bool:
+        """Whether ceilings of a method count."""
+        if self is By.SSM:
+            return method is not Method.PFL
+        return self is not By.PFL or method is not Method.SSM
+
+    def contact_anywhere(self, criteria: Sequence[Criterion], robot: str) -> bool:
+        """Whether contact is asked about wherever people are, not only within its horizon.
+
+        A speed that contact permits by itself holds for whoever comes near: nothing else keeps them away.
+        """
+        separated = any(isinstance(c, Separation) and robot in c.between for c in criteria)
+        return self in (By.PFL, By.EITHER) or (self is By.ALL and not separated)
+
+
+BY = {
+    By.ALL: "by every criterion that limits it",
+    By.SSM: "by speed and separation monitoring",
+    By.PFL: "by power and force limiting",
+    By.BOTH: "by speed and separation monitoring and power and force limiting, the lesser of both",
+    By.EITHER: "by separation monitoring or power and force limiting, whichever permits more at each place",
+}
+
+EITHER_NEEDS = (
+    "each method alone is enough; that needs a controller that monitors both at once and falls back "
+    "to the speed of power and force limiting, or stops, before the separation is lost; a detection that "
+    "sees everybody who can come near; and contacts that are limited all along the path, wherever they count"
+)
+
+
+def governing(ceilings: Sequence[Ceiling], by: By, *, below: float = 1.0) -> Ceiling | None:
+    """What governs at a place: what cannot be told, else the least share; None when none is below a share."""
+    counted = [c for c in ceilings if by.counts(c.method) and c.asked]
+    # What is not asked there protects nobody, and no method is enough without it.
+    if by is By.EITHER and all(c.asked or c.method is Method.OWN for c in ceilings):
+        own = [c for c in counted if c.method is Method.OWN]
+        ssm, pfl = (_least([c for c in counted if c.method is m]) for m in (Method.SSM, Method.PFL))
+        # Who permits everything needs no help of the other.
+        counted = own if ssm is None or pfl is None else [*own, _larger(ssm, pfl)]
+    least = _least(counted)
+    return least if least is not None and (least.undecided or least.share < below) else None
+
+
+def _least(ceilings: Sequence[Ceiling]) -> Ceiling | None:
+    """What cannot be told, else the least; None when nothing limits the speed."""
+    doubts = [c for c in ceilings if c.undecided]
+    least = doubts[0] if doubts else min(ceilings, key=lambda c: c.share, default=None)
+    return None if least is None or least.share == math.inf else least
+
+
+def _larger(a: Ceiling, b: Ceiling) -> Ceiling:
+    """Of two methods that each permit a share; who is unknown only counts where the other permits none."""
+    for known, other in ((a, b), (b, a)):
+        if other.undecided and not known.undecided:
+            return known if known.share > 0 else other
+    return a if a.undecided or a.share >= b.share else b
+
+
+def require(by: By, criteria: Sequence[Criterion], model: Model, robot: str) -> None:
+    """Refuse a choice that the criteria of a workstation do not carry.
+
+    Raises:
+        InputError: A method that nobody asks for, or methods that do not speak of the same people; all of it.
+    """
+    ssm = [c for c in criteria if isinstance(c, Separation) and robot in c.between]
+    pfl = [c for c in criteria if isinstance(c, PowerAndForce) and c.robot == robot]
+    needed = {
+        "separation": (by in (By.SSM, By.BOTH, By.EITHER), ssm),
+        "power_and_force": (by in (By.PFL, By.BOTH, By.EITHER), pfl),
+    }
+    problems = [
+        Problem(
+            "permissible speed",
+            "by",
+            f"{by.value} needs a criterion of kind {kind} for {robot}",
+            f'add [[safety]] with kind = "{kind}"',
+        )
+        for kind, (wanted, found) in needed.items()
+        if wanted and not found
+    ]
+    if by is By.EITHER and ssm and pfl:
+        asked = {name for c in ssm for name in c.between}
+        problems += [
+            Problem(
+                "permissible speed",
+                "by",
+                f"either: separation does not ask about {human.name}, contact alone would not protect them",
+                f"add a criterion of kind separation for {human.name}",
+            )
+            for human in model.workstation.humans
+            if human.name not in asked
+        ]
+    if problems:
+        raise InputError(problems)

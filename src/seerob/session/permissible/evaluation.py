@@ -15,9 +15,9 @@ from seerob.files.trajectories.trajectory import TrajectorySamples
 from seerob.model.model import Model
 from seerob.recording.result_log import ResultLog
 from seerob.recording.series import worst_verdict
+from seerob.session.permissible.ceilings import By
 from seerob.session.permissible.given_motion import GivenMotion, solved
 from seerob.session.permissible.joint_limits import JointLimits
-from seerob.session.permissible.methods import By
 from seerob.session.permissible.path import Path, path_of
 from seerob.session.permissible.rescaled import Check, Rescaled, Spent, check, rescale, spent
 from seerob.session.permissible.speed_map import SpeedMap, Stations

@@ -16,13 +16,11 @@ from seerob.core.extras import need
 from seerob.core.report_section import ReportSection, ReportTable
 from seerob.core.snapshot import Result, Scene
 from seerob.core.transforms import Array
-from seerob.files.trajectories.path_markers import Place, path_markers
+from seerob.files.trajectories.path_map import Place, path_markers
 from seerob.session.permissible.between_samples import METHOD, Bound
-from seerob.session.permissible.ceiling import Ceiling
+from seerob.session.permissible.ceilings import BY, EITHER_NEEDS, By, Ceiling
 from seerob.session.permissible.evaluation import PermissibleSpeed
-from seerob.session.permissible.methods import BY, EITHER_NEEDS, By
-from seerob.session.permissible.segments import PathSegment
-from seerob.session.permissible.speed_map import SpeedMap
+from seerob.session.permissible.speed_map import PathSegment, SpeedMap
 from seerob.session.permissible.tables import COST_HEAD, Cell, cost_rows, least_by_region
 from seerob.session.permissible.verification import Verified
 

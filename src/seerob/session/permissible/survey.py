@@ -12,11 +12,9 @@ from seerob.core.errors import InputError
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion
 from seerob.model.model import Mechanism, Model
-from seerob.session.permissible.ceiling import Ask, Ceiling, Method
-from seerob.session.permissible.ceilings import ceilings_of
+from seerob.session.permissible.ceilings import Ask, By, Ceiling, Method, ceilings_of, governing, require
 from seerob.session.permissible.given_motion import GivenMotion
 from seerob.session.permissible.joint_limits import JointLimits
-from seerob.session.permissible.methods import By, governing, require
 from seerob.session.permissible.path import Path, Piece
 from seerob.session.permissible.speed_map import SpeedMap, Stations, reference_speed
 from seerob.session.permissible.witness import Clock, Posed, Witness

@@ -34,7 +34,7 @@ from seerob.protocols.ros.ros_messages import ros1_name
 from seerob.protocols.ros.ros_serialised import Edition, store
 from seerob.protocols.ros.rosbridge import Status
 from seerob.session.opening import target
-from seerob.workstation.tables.targets import CartesianTarget, TargetMessage, TargetWire
+from seerob.workstation.tables.writing import CartesianTarget, TargetMessage, TargetWire
 
 CONNECT_WITHIN = 2.0
 """[s]"""

@@ -20,7 +20,7 @@ from seerob.core.snapshot import Snapshot
 from seerob.devices.live.listening import because
 from seerob.model.model import Model
 from seerob.outputs.sink import Closing
-from seerob.workstation.tables.triggers import Trigger
+from seerob.workstation.tables.writing import Trigger
 from seerob.workstation.variables.dictionary import Variable
 
 _log = logging.getLogger(__name__)

@@ -157,6 +157,49 @@ def fastest(
         speed[i] = math.sqrt(best) + turn * reach[i] if best >= 0 else 0.0
 
 
+@njit(
+    f"void({_ROWS}, {_ROWS}, {_ROWS}, {_ROWS}, i8[::1], i8[::1], {_ROWS}, i8[::1], f8[::1], f8[::1])",
+    cache=True,
+    nogil=True,
+)
+def fastest_of(
+    xmat: Array,
+    xpos: Array,
+    cvel: Array,
+    subtree_com: Array,
+    ids: Indices,
+    roots: Indices,
+    corners: Array,
+    start: Indices,
+    reach: Array,
+    speed: Array,
+) -> None:
+    """Bound on the speed of any point of some of MuJoCo's bodies; writes into the last argument.
+
+    Args:
+        xmat: As `placed` takes it, with the next.
+        xpos: Likewise.
+        cvel: As `velocities` takes it, with the next.
+        subtree_com: Likewise.
+        ids: Which bodies, shape (n,).
+        roots: The first body of the tree of each, shape (n,).
+        corners: As `fastest` takes it, with the next two.
+        start: Likewise.
+        reach: Likewise.
+        speed: Bound [m/s], shape (n,).
+    """
+    n = len(ids)
+    rotations, every = np.empty((n, 3, 3)), np.empty((5, n, 3))
+    positions, linear, angular = every[0], every[1], every[2]
+    for i in range(n):
+        for c in range(9):
+            rotations[i, c // 3, c % 3] = xmat[ids[i], c]
+        for c in range(3):
+            positions[i, c] = xpos[ids[i], c]
+    velocities(cvel, subtree_com, positions, ids, roots, linear, angular)
+    fastest(rotations, positions, linear, angular, corners, start, reach, speed, every[3], every[4])
+
+
 def stacked(parts: list[Array]) -> tuple[Array, Indices]:
     """Corners of all bodies in one array, and where each body's start."""
     start = np.concatenate([[0], np.cumsum([len(part) for part in parts])]).astype(np.int64)

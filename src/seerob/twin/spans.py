@@ -89,6 +89,21 @@ UNBOUNDED = Fall(np.inf)
 """The fall within a span of which nothing is known."""
 
 
+class Chains(NamedTuple):
+    """Joints that move some points and no others, as `seerob.kernels.spans.point_bounds` takes them."""
+
+    dofs: Indices
+    """In ``MjData.qvel``, increasing, shape (d,)."""
+    start: Indices
+    """Where the joints of each point begin, shape (p + 1,)."""
+    joints: Indices
+    """Of one point after the other, from base to tip, among ``dofs``."""
+    turns: NDArray[np.bool_]
+    """Whether each turns."""
+    lengths: Array
+    """Of the segment behind each [m]."""
+
+
 class Points:
     """Points of which the motion is bounded: of every body its outermost, and what criteria add.
 
@@ -182,6 +197,19 @@ class Points:
         assert self._ids is not None
         part = slice(int(self._start[point]), int(self._start[point + 1]))
         return self._joints[part], self._turns[part], self._lengths[part]
+
+    def chains(self, points: Indices, ids: Indices, mj: Any) -> Chains:
+        """Joints that move some points; ids and model as `span` takes them."""
+        if self._ids is None or not np.array_equal(self._ids, ids):
+            self._chains(mj, ids)
+        every = [self.chain(point) for point in points.tolist()]
+        joints, turns, lengths = (
+            np.concatenate([each[i] for each in every]) if every else np.zeros(0, kind)
+            for i, kind in enumerate((np.int64, np.bool_, float))
+        )
+        dofs = np.unique(joints)
+        start = np.cumsum([0, *(len(each[0]) for each in every)])
+        return Chains(dofs, start, np.searchsorted(dofs, joints), turns, lengths)
 
     def column_changes(self, point: int, span: Span, coupling: Coupling) -> Array:
         r"""How quickly columns of a point's linear Jacobian change at most, per second, shape (n,).

@@ -21,9 +21,9 @@ from __future__ import annotations
 
 import math
 import weakref
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import mujoco
@@ -33,10 +33,10 @@ from numpy.typing import NDArray
 from seerob.core.domains import at_least, number
 from seerob.core.errors import Undecided
 from seerob.core.transforms import Array
-from seerob.kernels.speed import fastest, placed, stacked, velocities
+from seerob.kernels.ahead import joint_speeds, kept, part_speeds, until_braking
+from seerob.kernels.speed import fastest_of, stacked
 from seerob.model.model import Body, Gap, Mechanism, Model
-from seerob.twin.attachments import Attachments
-from seerob.twin.spans import ROUNDING, Knots, Path, Points, rows_of
+from seerob.twin.spans import ROUNDING, Chains, Knots, Points, rows_of
 from seerob.twin.speed_noise import levers as levers_of
 from seerob.twin.state import State
 from seerob.twin.validity.hearing import SLACK
@@ -45,6 +45,10 @@ BEYOND = 0.05
 """Share by which a joint may be faster than its limit without refuting it: noise. Own choice."""
 LARGEST_WINDOW = 2.0
 """A motion is looked at so far ahead at most [s]."""
+MOST, ENDS = 0, 1
+"""Of bounds from instant to instant: the largest, and the larger of both instants."""
+
+Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +138,8 @@ class Foreseen:
     Between two instants, ticks and knots of its interpolation, it moves along a cubic, on which the largest
     speed of a joint is known and that of a point is bounded (`seerob.kernels.spans`). A reaction that begins
     until the next tick counts like one that begins now, so that S_p of a tick holds until the next. What
-    others do that carry it or that it carries is not known ahead: they go on as they do.
+    others do that carry it or that it carries is not known ahead: they go on as they do. What was found of a
+    tick is kept as long as the motion there stays what it was.
     """
 
     def __init__(self, model: Model, robot: Mechanism, gap: Gap, T_r: float) -> None:
@@ -146,17 +151,17 @@ class Foreseen:
             gap: Its second set are the moving parts.
             T_r: Reaction time [s].
         """
-        self._model, self._robot, self._gap, self._T_r = model, robot, gap, T_r
+        number("T_r", T_r, 0.0, unit="s")
+        self._robot, self._gap, self._T_r = robot, gap, T_r
         self._period = model.workstation.engine.tick
         self._with = (robot.name, *robot.riders, *model.carriers_of(robot.name))
         self._data = mujoco.MjData(model.mj)
-        self._bodies = [model.bodies[i] for i in gap.b]
-        self._corners = stacked([body.corners for body in self._bodies])
-        self._reach = np.array([body.radius + body.deviation for body in self._bodies])
+        bodies = [model.bodies[i] for i in gap.b]
+        self._corners = stacked([body.corners for body in bodies])
+        self._reach = np.array([body.radius + body.deviation for body in bodies])
+        self._points, self._parts, self._joints = Points(model), rows_of(gap.b), _Joints()
         self._run: Callable[[], State | None] = lambda: None
-        self._known: dict[int, _Stretch] = {}
-        self._last = -1
-        self._points, self._parts = Points(model), rows_of(gap.b)
+        self._window: _Window | None = None
 
     def at(self, state: State) -> At | None:
         """None where nobody knows what it will do."""
@@ -172,122 +177,188 @@ class Foreseen:
         q, qd, unbounded_reason = foreseen
         if self._T_r > LARGEST_WINDOW:
             unbounded_reason = unbounded_reason or f"a motion is looked at {LARGEST_WINDOW:g} s ahead at most"
-        if self._run() is not state or k < self._last:
-            self._run, self._known = weakref.ref(state), {}
-        self._last = k
-        for old in [i for i in self._known if i < k - 1]:
-            del self._known[old]
-        v_now, qd_now = state.fastest_points(self._gap.b)[0], np.abs(state.qd(self._robot))
         rows = np.searchsorted(instants, ticks)
-        told: list[Array] = []
-        turning: list[Array] = []
-        for i, (a, b) in enumerate(pairwise(rows.tolist())):
-            t, at_q, at_qd = (each[a : b + 1] for each in (instants, q, qd))
-            known = self._known.get(k + i)
-            if known is None or not known.same(at_q, at_qd):
-                before = self._known.get(k + i - 1)
-                known = self._known[k + i] = self._stretch(state, t, at_q, at_qd, before)
-            # Of a motion that may be another one, or jumps, nothing is known between instants.
-            told.append(known.ends if unbounded_reason else known.most)
-            turning.append(known.joint_ends if unbounded_reason else known.joints)
-        v, joints = np.concatenate(told), np.concatenate(turning)
-        # A twin that does not stand exactly where the motion has it may be faster now.
-        v[0], joints[0] = np.maximum(v[0], v_now), np.maximum(joints[0], qd_now)
+        known = self._known(state, k, rows, instants, q, qd)
+        v_now, qd_now = state.fastest_points(self._gap.b)[0], np.abs(state.qd(self._robot))
         left = np.minimum(instants - state.t, T_r + period)
-        S_r, ways = (
-            np.maximum(farthest(left, each, self._T_r, period), now * self._T_r)
-            for each, now in ((v, v_now), (joints, qd_now))
-        )
-        v_s, speeds = v.max(axis=0), joints.max(axis=0)
+        # Of a motion that may be another one, or jumps, nothing is known between instants.
+        side = ENDS if unbounded_reason else MOST
+        # A twin that does not stand exactly where the motion has it may be faster now.
+        S_r, v_s = farthest(left, known.parts[:, side], v_now, self._T_r, period)
+        ways, speeds = farthest(left, known.joints[:, side], qd_now, self._T_r, period)
         # A simulated stop goes by the ticks.
-        m = math.ceil(T_r / period - 1e-6)
-        q, qd = q[rows[1:]], qd[rows[1:]]
+        later = rows[1 : 1 + math.ceil(T_r / period - 1e-6)]
+        now = Onset(v_now, S_r, v_s, ways, speeds, q[later], qd[later], unbounded_reason)
 
         def at(scale: float) -> Onset:
-            return Onset(
-                scale * v_now,
-                scale * S_r,
-                scale * v_s,
-                scale * ways,
-                scale * speeds,
-                q[:m] if scale == 1.0 else None,
-                qd[:m] if scale == 1.0 else None,
-                unbounded_reason,
-            )
+            if scale == 1.0:
+                return now
+            v, far, most, turned, turning = (scale * each for each in (v_now, S_r, v_s, ways, speeds))
+            return Onset(v, far, most, turned, turning, unbounded_reason=unbounded_reason)
 
         return at
 
-    def _stretch(self, state: State, t: Array, q: Array, qd: Array, before: _Stretch | None) -> _Stretch:
-        """What bounds it from tick to tick, with the robot elsewhere than now and all others as they are.
+    def _known(self, state: State, k: int, rows: Indices, t: Array, q: Array, qd: Array) -> _Window:
+        """Bounds of all ticks from tick k on, as they were found where the motion is still the same.
 
         Args:
             state: The twin.
-            t: Both ticks and the knots between them [s], shape (m,).
-            q: Positions of its joints there [rad or m], shape (m, j).
+            k: Number of the first tick.
+            rows: Which instants are ticks, shape (s + 1,).
+            t: Ticks, and the knots between them [s], shape (m,).
+            q: Positions of the robot's joints there [rad or m], shape (m, j).
             qd: Velocities there, shape (m, j).
-            before: What bounds it until then, when that is known.
         """
-        first = before is not None and before.same(q[:1], qd[:1], last=True)
-        speeds = [before.last if before is not None and first else self._speeds(state, q[0], qd[0])]
-        speeds += [self._speeds(state, *each) for each in zip(q[1:], qd[1:], strict=True)]
-        robot, now = self._robot, state.data_of(*self._with)
-        every_v = np.tile(now.qvel, (len(t), 1))
-        every_q = np.tile(now.qpos, (len(t), 1))
-        for mechanism in state.model.mechanisms.values():
-            # Who goes on as they do is where that brings them: all of their joints turn or slide.
-            at = mechanism.q_address
-            every_q[:, at] = now.qpos[at] + (t - t[0])[:, None] * now.qvel[mechanism.v_address]
-        every_q[:, robot.q_address] = q @ robot.coupling.T + robot.offset
-        every_v[:, robot.v_address] = qd @ robot.coupling.T
-        ends = np.maximum(speeds[:-1], speeds[1:])
-        path, most = Path(t, every_q, every_v), []
-        for i, (a, b) in enumerate(pairwise(t.tolist())):
-            span = self._points.span(path, a, b, state.attachments.ids, state.model.mj)
-            # Along the straight line between two velocities no speed is larger than at both ends.
-            bound = np.minimum(span.fast[self._parts], ends[i] + span.bend[self._parts]) + ROUNDING
-            most.append(np.maximum(bound, ends[i]))
-        joint_ends = np.maximum(np.abs(qd[:-1]), np.abs(qd[1:]))
-        return _Stretch(
-            q, qd, np.array(most), ends, speeds[-1], largest_between(t, q, qd), joint_ends, _bits(q, qd)
-        )
+        now = _Window.of(k, rows, np.ascontiguousarray(q), np.ascontiguousarray(qd), len(self._parts))
+        before = self._window
+        if before is None or self._run() is not state or k < before.first:
+            missing = list(range(len(now.last)))
+        else:
+            shift = k - before.first
+            now.behind = before.end(shift - 1) if shift else before.behind
+            same = np.empty(len(now.last), bool)
+            found = kept(shift, *before.arrays, *now.arrays, same) == 0
+            missing = [] if found else np.flatnonzero(~same).tolist()
+        for i in missing:
+            self._find(state, now, i, t)
+        self._run, self._window = weakref.ref(state), now
+        return now
 
-    def _speeds(self, state: State, q: Array, qd: Array) -> Array:
-        """Of the parts [m/s], shape (n,), with the robot elsewhere than now and all others as they are."""
-        mj, data, robot = state.model.mj, self._data, self._robot
+    def _find(self, state: State, window: _Window, i: int, t: Array) -> None:
+        """Bound the speeds from a tick to the next, with all others as they are or go on.
+
+        Args:
+            state: The twin.
+            window: All that comes before is known.
+            i: Which tick.
+            t: All instants of the window [s], shape (m,).
+        """
+        a, b = window.rows[i : i + 2].tolist()
+        t, q, qd = (each[a : b + 1] for each in (t, window.q, window.qd))
+        before = window.end(i - 1) if i else window.behind
+        speeds = np.empty((len(t), len(self._parts)))
+        first = before is not None and _bits(before.q, before.qd) == _bits(q[0], qd[0])
+        if before is not None and first:
+            speeds[0] = before.speeds
         now = state.data_of(*self._with)
+        for row in range(int(first), len(t)):
+            self._speeds(state, now, q[row], qd[row], speeds[row])
+        chains = self._joints.of(self._points, self._parts, self._robot, state)
+        all_q, all_v = self._joints.motion(self._robot, now, t, q, qd)
+        part_speeds(
+            t, all_q, all_v, speeds, state.model.mj.qpos0[chains.dofs],
+            chains.start, chains.joints, chains.turns, chains.lengths, ROUNDING, window.parts[a:b],
+        )  # fmt: skip
+        joint_speeds(t, q, qd, window.joints[a:b])
+        window.last[i] = speeds[-1]
+
+    def _speeds(self, state: State, now: mujoco.MjData, q: Array, qd: Array, speeds: Array) -> None:
+        """Of the parts [m/s], into the last argument (n,), with the robot elsewhere and all others as now."""
+        mj, data, robot = state.model.mj, self._data, self._robot
         data.qpos[:], data.qvel[:] = now.qpos, now.qvel
         data.qpos[robot.q_address] = robot.coupling @ q + robot.offset
         data.qvel[robot.v_address] = robot.coupling @ qd
         mujoco.mj_kinematics(mj, data)
         mujoco.mj_comPos(mj, data)
         mujoco.mj_comVel(mj, data)
-        return speeds_of(data, state.attachments, self._gap.b, self._corners, self._reach)
+        ids, roots = (each[self._parts] for each in (state.attachments.ids, state.attachments.roots))
+        fastest_of(
+            data.xmat, data.xpos, data.cvel, data.subtree_com, ids, roots, *self._corners, self._reach, speeds
+        )
 
 
-@dataclass(frozen=True, eq=False)
-class _Stretch:
-    """From tick to tick of a motion that is known; m instants, n parts, j joints."""
+class _End(NamedTuple):
+    """Where a tick of a window ends."""
 
     q: Array
-    """Shape (m, j)."""
     qd: Array
-    most: Array
-    """Largest speed of each part from instant to instant [m/s], shape (m - 1, n)."""
-    ends: Array
-    """The larger of its speeds at both [m/s], shape (m - 1, n)."""
-    last: Array
-    """Speed of each part at the last instant [m/s], shape (n,)."""
-    joints: Array
-    """Largest speed of each joint from instant to instant [rad/s or m/s], shape (m - 1, j)."""
-    joint_ends: Array
-    """The larger of its speeds at both, likewise."""
-    bits: bytes
-    """Of ``q`` and ``qd``."""
+    speeds: Array
+    """Of the parts [m/s], shape (n,)."""
 
-    def same(self, q: Array, qd: Array, *, last: bool = False) -> bool:
-        """Whether it is of these joint positions and velocities; its ``last`` alone when so asked."""
-        own = _bits(self.q[-1:], self.qd[-1:]) if last else self.bits
-        return own == _bits(q, qd)
+
+@dataclass(eq=False)
+class _Window:
+    """What is known of a motion from a tick on; s ticks, m instants, n parts, j joints."""
+
+    first: int
+    """Number of the first tick."""
+    rows: Indices
+    """Which instants are ticks, shape (s + 1,)."""
+    q: Array
+    """Positions of the joints [rad or m], shape (m, j)."""
+    qd: Array
+    """Their velocities [rad/s or m/s], likewise."""
+    parts: Array
+    """Largest speed of each part from instant to instant, and the larger of both instants [m/s], shape
+    (m - 1, 2, n)."""
+    joints: Array
+    """Those of each joint, likewise [rad/s or m/s], shape (m - 1, 2, j)."""
+    last: Array
+    """Speed of each part at the end of each tick [m/s], shape (s, n)."""
+    behind: _End | None = None
+    """Of the tick before the first, when that is known."""
+
+    @classmethod
+    def of(cls, first: int, rows: Indices, q: Array, qd: Array, n: int) -> _Window:
+        """With nothing known yet."""
+        m, j = q.shape
+        bounds = np.empty((m - 1, 2, n)), np.empty((m - 1, 2, j))
+        return cls(first, rows, q, qd, *bounds, np.empty((len(rows) - 1, n)))
+
+    @property
+    def arrays(self) -> tuple[Indices, Array, Array, Array, Array, Array]:
+        """All of them, as `seerob.kernels.ahead.kept` takes them."""
+        return self.rows, self.q, self.qd, self.parts, self.joints, self.last
+
+    def end(self, i: int) -> _End | None:
+        """Of a tick; None where there is none."""
+        if not 0 <= i < len(self.last):
+            return None
+        row = self.rows[i + 1]
+        return _End(self.q[row], self.qd[row], self.last[i])
+
+
+class _Joints:
+    """All joints that move some parts of a robot, its own and those of whom it rides on."""
+
+    def __init__(self) -> None:
+        self._ids: Indices | None = None
+
+    def of(self, points: Points, parts: Indices, robot: Mechanism, state: State) -> Chains:
+        """Their chains now."""
+        ids = state.attachments.ids
+        if self._ids is None or not np.array_equal(self._ids, ids):
+            self._ids = ids.copy()
+            self._chains = points.chains(parts, ids, state.model.mj)
+            dofs = self._chains.dofs.tolist()
+            own = {dof: column for column, dof in enumerate(robot.v_address.tolist())}
+            others = (m for m in state.model.mechanisms.values() if m is not robot)
+            going = {dof for other in others for dof in other.v_address.tolist()}
+            self._own = np.array([i for i, dof in enumerate(dofs) if dof in own], np.int64)
+            self._columns = np.array([own[dof] for dof in dofs if dof in own], np.int64)
+            self._going = np.array([i for i, dof in enumerate(dofs) if dof in going - own.keys()], np.int64)
+        return self._chains
+
+    def motion(
+        self, robot: Mechanism, now: mujoco.MjData, t: Array, q: Array, qd: Array
+    ) -> tuple[Array, Array]:
+        """Positions and velocities of all at instants, shape (m, d) each.
+
+        Args:
+            robot: Whose own are known.
+            now: Where all are at the first instant, but for the robot's.
+            t: Instants [s], shape (m,).
+            q: Positions of the robot's there [rad or m], shape (m, j).
+            qd: Velocities there, shape (m, j).
+        """
+        dofs = self._chains.dofs
+        every_q, every_v = (np.tile(each[dofs], (len(t), 1)) for each in (now.qpos, now.qvel))
+        if len(self._going):
+            # Who goes on as they do is where that brings them: all of their joints turn or slide.
+            every_q[:, self._going] += (t - t[0])[:, None] * every_v[0, self._going]
+        every_q[:, self._own] = (q @ robot.coupling.T + robot.offset)[:, self._columns]
+        every_v[:, self._own] = (qd @ robot.coupling.T)[:, self._columns]
+        return every_q, every_v
 
 
 def _bits(q: Array, qd: Array) -> bytes:
@@ -296,9 +367,13 @@ def _bits(q: Array, qd: Array) -> bytes:
 
 def with_knots(knots: Knots, name: str, ticks: Array) -> Array:
     """Ticks, and the knots between them of what a robot is known to do [s], increasing."""
-    between = np.array([*knots(name, float(ticks[0]), float(ticks[-1]))], float)
-    own = np.abs(between[:, None] - ticks).min(axis=1) > SLACK
-    return np.unique(np.concatenate([ticks, between[own]]))
+    every = ticks.tolist()
+    own: set[float] = set()
+    for t in knots(name, every[0], every[-1]):
+        i = bisect_left(every, t)
+        if min(abs(t - tick) for tick in every[max(i - 1, 0) : i + 1]) > SLACK:
+            own.add(t)
+    return np.array(sorted({*every, *own})) if own else ticks
 
 
 def largest_between(t: Array, q: Array, qd: Array) -> Array:
@@ -309,57 +384,32 @@ def largest_between(t: Array, q: Array, qd: Array) -> Array:
         q: Positions there [rad or m], shape (k, j).
         qd: Velocities there, shape (k, j).
     """
-    T, chord = np.diff(t)[:, None], np.diff(q, axis=0)
-    c_1, last = T * qd[:-1], T * qd[1:]
-    c_2, c_3 = 3 * chord - 2 * c_1 - last, c_1 + last - 2 * chord
-    x = np.clip(-c_2 / np.where(c_3 == 0.0, np.inf, 3 * c_3), 0.0, 1.0)
-    peak = np.abs(c_1 + x * (2 * c_2 + x * 3 * c_3)) / T
-    return np.asarray(np.maximum(peak, np.maximum(np.abs(qd[:-1]), np.abs(qd[1:]))))
+    bounds = np.empty((len(t) - 1, 2, q.shape[1]))
+    joint_speeds(t, np.ascontiguousarray(q), np.ascontiguousarray(qd), bounds)
+    return bounds[:, MOST]
 
 
-def farthest(t: Array, most: Array, T_r: float, lead: float) -> Array:
-    """Bound on the way in any stretch of T_r that begins within ``lead`` [m or rad], shape (...).
+def farthest(t: Array, most: Array, now: Array, T_r: float, lead: float) -> tuple[Array, Array]:
+    """Bound the way in any stretch of T_r that begins within ``lead``, and the speed until then.
 
     Args:
         t: Instants from now to ``T_r + lead`` [s], shape (k,).
-        most: Largest speeds from instant to instant, shape (k - 1, ...).
+        most: Largest speeds from instant to instant, shape (k - 1, n).
+        now: Speeds now, which may be larger, shape (n,).
         T_r: [s]
         lead: [s]
+
+    Returns:
+        [m or rad, and m/s or rad/s], shape (n,) each.
     """
     number("T_r", T_r, 0.0, unit="s")
     number("lead", lead, 0.0, unit="s")
-    steps = np.diff(t)
+    n = len(now)
+    speeds, steps, (outside, top) = np.empty((len(t) - 1, n)), np.empty(len(t) - 1), np.empty((2, n))
+    until_braking(t, most, now, T_r, lead, SLACK, speeds, steps, outside, top)
     # What lies outside of the stretch is at its ends.
-    ends = most[(t[:-1] < lead - SLACK) | (t[1:] > T_r + SLACK)].min(axis=0)
-    return np.asarray(np.maximum(steps @ most - lead * ends, 0.0), float)
-
-
-def speeds_of(
-    data: mujoco.MjData,
-    attachments: Attachments,
-    bodies: Sequence[int],
-    corners: tuple[Array, NDArray[np.int64]],
-    reach: Array,
-) -> Array:
-    """Speed of the fastest point of bodies [m/s], shape (n,).
-
-    Args:
-        data: Where everybody is, with MuJoCo's velocities.
-        attachments: Who moves whom.
-        bodies: By index.
-        corners: Of the bodies, `seerob.kernels.speed.stacked`.
-        reach: How far their surfaces are outside the hull of these [m], shape (n,).
-    """
-    n = len(bodies)
-    rows = np.array(bodies, np.int64)
-    ids, roots = attachments.ids[rows], attachments.roots[rows]
-    rotations, positions, quaternions = np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, 4))
-    placed(data.xmat, data.xpos, data.xquat, ids, rotations, positions, quaternions)
-    linear, angular = np.empty((2, n, 3))
-    velocities(data.cvel, data.subtree_com, positions, ids, roots, linear, angular)
-    speed, point, velocity = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
-    fastest(rotations, positions, linear, angular, *corners, reach, speed, point, velocity)
-    return speed
+    way = np.maximum(steps @ speeds - lead * outside, 0.0)
+    return np.maximum(way, now * T_r), top
 
 
 # -- accelerations of the joints ----------------------------------------------------------------

@@ -10,6 +10,7 @@ import pytest
 
 from live_story import Story, lived, open_files, wait_for
 from made_cell import made
+from reached import asked
 from seerob.app.emulators.fri import FriServer
 from seerob.core.errors import InputError
 from seerob.core.samples import JointSample, SignalSample
@@ -91,7 +92,7 @@ def test_silence_is_undecided_and_the_robot_is_followed_again(tmp_path, port):
 def test_what_the_controller_is_is_said_at_start(tmp_path, port):
     with FriServer(motion, to=("127.0.0.1", port), period=0.01) as server:
         server.overlay = True
-        said = " ".join(f.text for f in cell(tmp_path, port).scene().findings)
+        said = " ".join(f.text for f in asked(cell(tmp_path, port)).scene().findings)
     for text in ("speaks FRI 2.7", "slope of a parabola", "sends every 10 ms", "motion overlay", "torques"):
         assert text in said
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from free_ports import free_port
+from reached import reached
 from seerob.app.emulators.kinect import CAMERA, KinectSender, animated
 from seerob.core.errors import InputError
 from seerob.core.samples import Quality
@@ -168,6 +169,5 @@ def test_what_must_be_given_is_asked(tmp_path):
 
 
 def test_a_sender_that_is_not_there_is_a_warning_not_an_end(tmp_path):
-    opened = source(free_port()).open(tmp_path, None)
-    (warning,) = (f for f in opened.findings if f.level == "warning")
+    (warning,) = (f for f in reached(source(free_port()), tmp_path, None) if f.level == "warning")
     assert "not reached at start: nothing came to port" in warning.text

@@ -18,6 +18,7 @@ from pymodbus.client import ModbusTcpClient
 
 from live_story import Story, listening, lived, open_files, wait_for
 from made_cell import made
+from reached import asked, reached
 from seerob.app import cli
 from seerob.app.emulators.modbus import Modbus as ModbusOptions
 from seerob.app.emulators.modbus import ModbusServer, program
@@ -128,7 +129,7 @@ def test_at_start_it_is_told_what_the_device_does_not_have(monkeypatch):
     monkeypatch.setattr("seerob.devices.live.listening.ASK_WITHIN", 30.0)
     monkeypatch.setattr("seerob.devices.variables.live_source.COVER_WITHIN", 30.0)
     with plc() as server:
-        findings = Modbus(host="127.0.0.1", port=server.port).open(Path(), TARGET).findings
+        findings = reached(Modbus(host="127.0.0.1", port=server.port), Path(), TARGET)
     told = {f.subject: f.text for f in findings if f.level == "warning"}
     assert told == {"gone": "the device has no such register"}
     assert "3 of 4 variables are heard at start" in " ".join(f.text for f in findings)
@@ -296,7 +297,7 @@ def test_the_state_says_what_joints_are_worth(state, quality):
 
 def test_what_registers_mean_is_said_at_start(tmp_path):
     with robot() as server:
-        said = " ".join(f.text for f in cell(tmp_path, server.port).scene().findings)
+        said = " ".join(f.text for f in asked(cell(tmp_path, server.port)).scene().findings)
     for text in ("0.1°", "every 100 ms", "intervals of results do not contain this", "energies", "IO Table"):
         assert text in said
 
@@ -312,7 +313,7 @@ def test_old_software_without_torques_is_read_without_them(tmp_path):
     target = Target(name="arm", joints=("a", "b"), folder=str(tmp_path))
     with ModbusServer(played) as server:
         source = ModbusRobot(robot="arm", host="127.0.0.1", port=server.port, every=0.03, map="old.toml")
-        said = " ".join(f.text for f in source.open(tmp_path, target).findings)
+        said = " ".join(f.text for f in reached(source, tmp_path, target))
         assert "no such register: holding 50 to 51 are left out" in said
         with listening(source, target) as heard:
             wait_for(lambda: any(isinstance(s, JointSample) for s in heard))

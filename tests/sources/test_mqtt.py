@@ -16,6 +16,7 @@ from paho.mqtt import publish
 
 from amqtt_broker import broker
 from live_story import listening, open_files, wait_for
+from reached import reached
 from seerob.core.errors import InputError
 from seerob.devices.sources.mqtt import Mqtt, Plain, address, plain_change
 from seerob.protocols.plc.sparkplug import Metric, Payload, encode
@@ -84,7 +85,7 @@ def test_topics_that_nobody_publishes_to_are_told_at_start(port, monkeypatch, tm
     monkeypatch.setattr("seerob.devices.variables.live_source.COVER_WITHIN", 0.2)
     target = Target(variables=(SPEED, COUNT))
     with broker(port):
-        findings = Mqtt(name="plc", host="127.0.0.1", port=port).open(tmp_path, target).findings
+        findings = reached(Mqtt(name="plc", host="127.0.0.1", port=port), tmp_path, target)
     told = {f.subject: f.text for f in findings if f.level == "warning"}
     assert told["belt/speed"] == "not heard within 0.2 s"
     assert "birth was not heard" in told["count"]

@@ -11,6 +11,8 @@ from uuid import UUID
 import numpy as np
 import pytest
 
+from reached import asked, reached
+
 pytest.importorskip("asyncua")
 
 from live_story import Story, listening, lived, wait_for
@@ -154,7 +156,7 @@ def test_at_start_it_is_told_what_the_server_does_not_have_or_states_otherwise(s
     wrong = Variable(name="wrong", source="plc", unit="kg", scale=1e-3, address=same.address)
     far = Variable(name="far", source="plc", unit="mm/s", range=(0, 10), address=same.address)
     aim = target(SPEED, RUNS, GONE, OTHER, same, scaled, wrong, far)
-    findings = Opcua(name="plc", url=server.url).open(tmp_path, aim).findings
+    findings = reached(Opcua(name="plc", url=server.url), tmp_path, aim)
     told = {f.subject: f.text for f in findings if f.level == "warning"}
     assert set(told) == {"gone", "other", "wrong", "far"}
     assert "states the unit mm/s, the dictionary kg" in told["wrong"]
@@ -172,7 +174,7 @@ def cell(folder, server, more="", robot="ur10"):
 
 
 def test_a_robot_is_bound_without_a_dictionary(tmp_path, server):
-    station = cell(tmp_path, server, 'device = "R1"\n')
+    station = asked(cell(tmp_path, server, 'device = "R1"\n'))
     said = " ".join(f.text for f in station.scene().findings)
     assert "R1, seerob, emulated; axes Axis_1" in said
     story = lived(station, Story(150))
@@ -191,9 +193,9 @@ def test_a_robot_is_bound_without_a_dictionary(tmp_path, server):
 def test_units_are_required_and_never_guessed(tmp_path):
     with OpcuaServer(robots={"R1": motion}, axis_unit="") as silent:
         with pytest.raises(InputError, match="Axis_1 states no unit"):
-            _ = cell(tmp_path / "a", silent).sources
+            cell(tmp_path / "a", silent).reach()
         with pytest.raises(InputError, match="Axis_1 is in m, its joint in rad"):
-            _ = cell(tmp_path / "b", silent, 'position_unit = "mm"\n').sources
+            cell(tmp_path / "b", silent, 'position_unit = "mm"\n').reach()
         source = OpcuaRobot(robot="arm", url=silent.url, position_unit="deg")
         with listening(source) as heard:
             wait_for(lambda: any(isinstance(s, JointSample) for s in heard))
@@ -204,13 +206,13 @@ def test_units_are_required_and_never_guessed(tmp_path):
 
 def test_which_robot_and_which_axes_must_be_clear(tmp_path, server):
     with pytest.raises(InputError, match="several robots; the server has: Cell/R1, Cell/R2"):
-        _ = cell(tmp_path / "a", server).sources
+        cell(tmp_path / "a", server).reach()
     names = ", ".join(f'"J{k}"' for k in range(1, 7))
     with pytest.raises(InputError, match="no axis J1"):
-        _ = cell(tmp_path / "b", server, f'device = "R2"\naxes = [{names}]\n').sources
-    _ = cell(tmp_path / "c", server, 'device = "R2"\n').sources
+        cell(tmp_path / "b", server, f'device = "R2"\naxes = [{names}]\n').reach()
+    cell(tmp_path / "c", server, 'device = "R2"\n').reach()
     with pytest.raises(InputError, match=r"R2 has the axes Axis_1, .*, arm has 7 joints; name one"):
-        _ = cell(tmp_path / "d", server, 'device = "R2"\n', robot="iiwa14").sources
+        cell(tmp_path / "d", server, 'device = "R2"\n', robot="iiwa14").reach()
 
 
 def test_a_server_that_comes_late_with_other_axes_is_not_heard(server, caplog):
@@ -275,9 +277,9 @@ def test_only_who_is_known_comes_in(tmp_path):
 
         with listening(source("twin"), target(SPEED, folder=tmp_path)) as heard:
             wait_for(lambda: good(heard))
-        said = " ".join(f.text for f in source("stranger").open(tmp_path, target()).findings)
+        said = " ".join(f.text for f in reached(source("stranger"), tmp_path, target()))
         assert "not reached at start" in said
-        said = " ".join(f.text for f in Opcua(name="plc", url=server.url).open(tmp_path, target()).findings)
+        said = " ".join(f.text for f in reached(Opcua(name="plc", url=server.url), tmp_path, target()))
         assert "not reached at start" in said
 
 

@@ -223,7 +223,7 @@ def test_a_trajectory_is_played_and_then_stands():
 def test_another_robots_joints_and_wrong_counts_are_errors(tmp_path):
     with RosbridgeServer(motion, ("a", "b", "c", "d", "e", "f")) as server:
         with pytest.raises(InputError, match="messages of a, b, c"):
-            _ = cell(tmp_path / "a", server).sources
+            cell(tmp_path / "a", server).reach()
         with pytest.raises(InputError, match="2 joints for the 6"):
             _ = cell(tmp_path / "b", server, 'joints = ["a", "b"]\n').sources
 

@@ -13,6 +13,7 @@ import pytest
 
 from live_story import Story, lived, open_files, wait_for
 from made_cell import TWO_R, made, two_r
+from reached import asked
 from seerob.app.emulators.rtde import RtdeServer
 from seerob.core.errors import InputError
 from seerob.core.samples import Quality, SignalSample
@@ -103,7 +104,7 @@ def test_a_controller_that_comes_late_is_followed(tmp_path):
         port = there.port
     server = RtdeServer(motion, port=port)
     station = cell(tmp_path, server)
-    warning = [f.text for f in station.scene().findings if "not reached at start" in f.text]
+    warning = [f.text for f in asked(station).scene().findings if "not reached at start" in f.text]
     assert warning == [
         "controller: not reached at start: Connection refused; it is tried again during the run"
     ]
@@ -178,7 +179,7 @@ def test_what_a_controller_lacks_is_said_and_what_cannot_be_known_is_undecided(t
 def test_a_controller_without_joints_and_a_robot_of_another_kind_are_errors(tmp_path):
     with RtdeServer(motion, without=frozenset({"actual_q"})) as server:
         with pytest.raises(InputError, match="the controller has no actual_q"):
-            _ = cell(tmp_path / "a", server).sources
+            cell(tmp_path / "a", server).reach()
         text = TWO_R + '[[sources]]\nkind = "rtde"\nrobot = "arm"\nhost = "127.0.0.1"\n'
         with pytest.raises(InputError, match="arm has 2 joints"):
             _ = made(tmp_path / "b", text, {"arm.urdf": two_r()}).sources

@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from live_story import listening, wait_for
+from reached import reached
 from relay import Stream
 from seerob.app.emulators.siemens_web import SiemensWebServer
 from seerob.core.errors import InputError
@@ -130,9 +131,9 @@ def test_only_the_certificate_that_was_given_is_trusted(tmp_path):
             source(server, ca="plc.pem"), msgspec.structs.replace(TARGET, folder=str(tmp_path))
         ) as heard:
             wait_for(lambda: good(heard))
-        opened = source(server, ca="plc.pem").open(tmp_path, TARGET)
-        assert "asked from https" in opened.findings[1].text
-        said = " ".join(f.text for f in source(server).open(tmp_path, TARGET).findings)
+        said = reached(source(server, ca="plc.pem"), tmp_path, TARGET)
+        assert "asked from https" in said[1].text
+        said = " ".join(f.text for f in reached(source(server), tmp_path, TARGET))
         assert "not reached at start" in said
         assert "certificate verify failed" in said.lower()
 
@@ -141,7 +142,7 @@ def test_a_wrong_password_is_said(monkeypatch):
     monkeypatch.setenv("SEEROB_PLC_PASSWORD", "guessed")
     monkeypatch.setenv("SEEROB_PLC_PASSWORD_HOST", "127.0.0.1")
     with plc() as server:
-        said = " ".join(f.text for f in source(server).open(None, None).findings)
+        said = " ".join(f.text for f in reached(source(server), None, None))
         assert "Login failed" in said
         assert not server.sessions
 

@@ -9,6 +9,7 @@ import time
 import pytest
 
 from live_story import listening, open_files, wait_for
+from reached import reached
 from seerob.app import cli
 from seerob.app.emulators.web import STATE, WebServer
 from seerob.app.emulators.web import Web as WebOptions
@@ -69,14 +70,14 @@ def test_only_who_has_the_token_is_answered(way):
     with WebServer(told, token="secret") as server:
         with listening(way(server, token_env="SEEROB_PLC_TOKEN"), ALL) as heard:
             wait_for(lambda: good(heard))
-        said = " ".join(f.text for f in way(server).open(None, ALL).findings)
+        said = " ".join(f.text for f in reached(way(server), None, ALL))
         assert "not reached at start" in said
         assert "401" in said or "403" in said
 
 
 def test_at_start_it_is_told_what_the_machine_does_not_have():
     with WebServer(told) as server:
-        found = {f.subject: f.text for f in polled(server).open(None, ALL).findings if f.level == "warning"}
+        found = {f.subject: f.text for f in reached(polled(server), None, ALL) if f.level == "warning"}
     assert found["gone"] == "the document has no 'gone' (/belt/gone)"
     assert set(found) == {"gone"}
 
@@ -105,7 +106,7 @@ def test_several_documents_of_one_server_and_none_of_another(tmp_path):
 )
 def test_a_document_that_is_another_gives_no_value(document, says):
     with WebServer(lambda t: document) as server:
-        found = " ".join(f.text for f in polled(server).open(None, Target(variables=(SPEED,))).findings)
+        found = " ".join(f.text for f in reached(polled(server), None, Target(variables=(SPEED,))))
         assert says in found
 
 

@@ -33,7 +33,7 @@ MOST_NAMED = 5
 
 
 def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
-    """Open every source of the workstation and check it against what it drives.
+    """Open every source of the workstation and check it against what it drives; connects to nothing.
 
     Raises:
         InputError: With every mistake in every file.
@@ -66,6 +66,26 @@ def open_sources(model: Model) -> tuple[tuple[Source, Opened], ...]:
         source, first = opened[0]
         opened[0] = source, replace(first, findings=(*first.findings, *found))
     return tuple((source, delayed(each, source.begins or 0.0)) for source, each in opened)
+
+
+def reached(model: Model, opened: Sequence[tuple[Source, Opened]]) -> tuple[tuple[Source, Opened], ...]:
+    """Sources of which the live ones have been asked what they have; this connects.
+
+    Raises:
+        InputError: With everything that can be reached and is not what its source can use.
+    """
+    found: list[tuple[Source, Opened]] = []
+    problems: list[Problem] = []
+    file = next(iter(model.workstation.files), "workstation")
+    for i, (source, one) in enumerate(opened):
+        try:
+            said = () if one.reach is None else one.reach()
+            found.append((source, replace(one, findings=(*one.findings, *said), reach=None)))
+        except InputError as error:
+            problems += (_placed(problem, source, f"sources[{i}].file", file) for problem in error.problems)
+    if problems:
+        raise InputError(problems)
+    return tuple(found)
 
 
 def _ships(source: Source) -> bool:

@@ -17,7 +17,8 @@ from seerob.core.errors import InputError
 from seerob.core.snapshot import Finding, Scene
 from seerob.criteria.contact.measured import curves
 from seerob.criteria.criterion import Criterion
-from seerob.devices.live.listening import LiveSource
+from seerob.devices.live.contact import Contact
+from seerob.devices.live.listening import LiveSource, name_of
 from seerob.devices.live.real_time import Clock, hear, require_recorded
 from seerob.devices.live.receivers import Receivers
 from seerob.model.model import Model
@@ -28,7 +29,7 @@ from seerob.outputs.sink import Sink, Writer
 from seerob.recording.filing import source_files
 from seerob.recording.recording import Recording
 from seerob.session import run as road
-from seerob.session.opening import open_sources, source_target
+from seerob.session.opening import open_sources, reached, source_target
 from seerob.session.reading import read
 from seerob.session.run import Bound, Feed, Summary
 from seerob.session.scene import scene_of
@@ -86,8 +87,21 @@ class Station:
 
     @cached_property
     def sources(self) -> tuple[tuple[Source, Opened], ...]:
-        """Its sources, opened and checked."""
+        """Its sources, opened and checked; nothing is connected to until `reach`."""
         return open_sources(self.model)
+
+    def contacts(self) -> dict[str, Contact]:
+        """Whom a live run connects to, where it listens and as whom, by the name of the source."""
+        live = (source for source in self.workstation.sources if isinstance(source, LiveSource))
+        return {name_of(source): source.contact() for source in live}
+
+    def reach(self) -> None:
+        """Ask every live source what it has, once, which connects; `scene` tells what they said.
+
+        Raises:
+            InputError: One can be reached, and is not what its source can use.
+        """
+        self.sources = reached(self.model, self.sources)
 
     @property
     def duration(self) -> float:
@@ -197,10 +211,14 @@ class Station:
         heard: tuple[LiveSource, ...] = ()
         if feed is None and live:
             heard = tuple(s for s in self.workstation.sources if isinstance(s, LiveSource))
+            self.reach()
         elif feed is None:
             require_recorded(self.workstation)
         clock = Clock() if live else None
         scene = scene or self.scene(with_sources=feed is None)
+        if heard:  # also what was asked after a scene was made counts
+            said = (f for _, opened in self.sources for f in opened.findings)
+            scene = replace(scene, findings=tuple(dict.fromkeys((*scene.findings, *said))))
         if feed is None:
             end = math.inf if live else self.duration
             feed = road.pump(

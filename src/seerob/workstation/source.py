@@ -8,7 +8,7 @@ are interpolated between two samples and nothing lags.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -58,7 +58,7 @@ class Target(Struct, frozen=True, kw_only=True):
 
 
 class Opened(Struct, frozen=True, kw_only=True):
-    """A source that has read what it can read at start."""
+    """A source that has read what it can read without a connection."""
 
     samples: Iterable[Sample]
     """In time order, ``t`` from 0; iterating again starts again."""
@@ -68,6 +68,9 @@ class Opened(Struct, frozen=True, kw_only=True):
     """Instant of its first sample on the clock of its file [s]; None where it has none."""
     findings: tuple[Finding, ...] = ()
     """The mapping that was used, limits that were passed, losses in the file."""
+    reach: Callable[[], tuple[Finding, ...]] | None = None
+    """Connects, for what a live source says of itself; only a run and `seerob probe` call it. None where
+    there is nothing to ask, or it was asked."""
 
 
 class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -108,7 +111,7 @@ class Source(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return ""
 
     def open(self, folder: Path, target: Target | None) -> Opened:
-        """Read or connect, and check against the target's limits.
+        """Read, and check against the target's limits; connects to nothing.
 
         Args:
             folder: Folder of the workstation file; relative paths start there.

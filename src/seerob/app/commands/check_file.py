@@ -37,11 +37,13 @@ def _masses(station: Station) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Read, compile, bind and open everything; run nothing."""
+    """Read, compile, bind and open everything; run nothing, connect to nothing."""
     station = compiled(options.workstation)
     describe(station)
     for finding in station.scene().findings:
         line(finding.level, f"{finding.subject}: {finding.text}")
+    for name, contact in station.contacts().items():
+        line("would", f"{name}: {contact}; checking connects to nothing, seerob probe and run do")
     _masses(station)
     line(
         "fine",

@@ -91,7 +91,8 @@ ADDRESSES = ("host", "url", "address")
 
 def add(sub: argparse.ArgumentParser) -> None:
     """Arguments."""
-    sub.add_argument("kind", help="what it speaks: the kind of a live source, as `seerob kinds` lists it")
+    text = "what it speaks: the kind of a live source, as `seerob kinds` lists it; or a workstation's folder"
+    sub.add_argument("kind", help=text)
     sub.add_argument("address", nargs="?", help="its name, address or URL; none for what sends to us")
     sub.add_argument("--port", type=port, help="port, when it is not the usual one")
     sub.add_argument("--frequency", type=float, help="samples per second to ask for [Hz]")
@@ -121,9 +122,12 @@ def run(options: argparse.Namespace) -> int:
     """
     import asyncio
 
+    from seerob.core.plugin import kinds
     from seerob.core.samples import SignalSample
     from seerob.devices.live.listening import Listener, because
 
+    if options.address is None and options.kind not in kinds("sources") and Path(options.kind).exists():
+        return _workstation(Path(options.kind))
     source, given = _source(options)
     where = f"{options.kind} {options.address or ''}".strip()
     if options.address is not None and (port := getattr(source, "port", None)) is not None:
@@ -177,6 +181,21 @@ def run(options: argparse.Namespace) -> int:
     if source.asks and source.asks.split()[1] not in given:
         OUT.print(source.asks, markup=False)
     return Exit.WITHIN
+
+
+def _workstation(path: Path) -> int:
+    """Ask every live source of a workstation what it has; `Exit.ERROR` when one is not reached."""
+    from seerob.app.commands.run import reach
+    from seerob.app.console.loading import compiled
+
+    station = compiled(path)
+    before = {f for _, opened in station.sources for f in opened.findings}
+    reach(station)
+    said = [f for _, opened in station.sources for f in opened.findings if f not in before]
+    for finding in said:
+        style = "" if finding.level == "note" else "yellow"
+        line(finding.level, f"{finding.subject}: {finding.text}", style)
+    return Exit.ERROR if any("not reached at start" in f.text for f in said) else Exit.WITHIN
 
 
 def heard_rate(source: LiveSource, given: dict[str, Any], rate: float | None) -> int | None:

@@ -64,10 +64,24 @@ def run(options: argparse.Namespace) -> int:
     if options.workstation is None:
         raise InputError.at("seerob run", "workstation", "missing", "name a folder, or --replay FILE")
     station = compiled(options.workstation)
-    scene = station.scene()
     describe(station)
+    reach(station)
+    scene = station.scene()
     tell(scene.findings)
     return live(station, scene, options)
+
+
+def reach(station: Station) -> None:
+    """Say whom the run connects to and as whom, then ask them what they have.
+
+    Raises:
+        InputError: One of them is not what its source can use.
+    """
+    for name, contact in station.contacts().items():
+        line("connects", f"{name}: {contact}")
+    with spinner() as say:
+        say("asking live sources")
+        station.reach()
 
 
 def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:

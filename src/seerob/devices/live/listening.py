@@ -20,6 +20,7 @@ import time
 from collections.abc import AsyncGenerator, Callable, Coroutine, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import ContextVar
+from functools import partial
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Annotated, Any, ClassVar, TypeVar
@@ -33,6 +34,7 @@ from seerob.core.host_name import check_host, check_url
 from seerob.core.samples import BodySample, JointSample, Quality, Sample, SignalSample, key
 from seerob.core.snapshot import Finding
 from seerob.devices.live.arrivals import Arrivals, Statistics
+from seerob.devices.live.contact import Contact, contact_of
 from seerob.devices.live.contradictions import Contradictions
 from seerob.devices.live.device_clock import AFTER, HOLD, DeviceClock, Instant, Known
 from seerob.workstation.source import Opened, Source, Target
@@ -123,27 +125,38 @@ class LiveSource(Source, frozen=True, kw_only=True):
         return await self.ask()
 
     def open(self, folder: Path, target: Target | None) -> Opened:
+        """Check what can be checked without a connection; what `Opened.reach` asks is asked by a run.
+
+        Raises:
+            InputError: An option that does not fit what it drives.
+            MissingPackage: A package that it needs is not installed.
+        """
+        need(*self.loads)
+        text = (
+            f"the twin runs {1e3 * self.behind():.0f} ms behind the world, where samples lie on either side"
+        )
+        behind = Finding(level="note", subject=self.target() or self.name, text=text)
+        return Opened(samples=(), duration=0.0, findings=(behind,), reach=partial(self.reach, folder, target))
+
+    def reach(self, folder: Path, target: Target | None) -> tuple[Finding, ...]:
         """Ask the other end what it has, if it can be reached: a run may begin before it can.
 
         Raises:
             InputError: It can be reached, and is not what this source can use.
-            MissingPackage: A package that it needs is not installed.
         """
-        need(*self.loads)
-        about = self.target() or self.name
-        text = (
-            f"the twin runs {1e3 * self.behind():.0f} ms behind the world, where samples lie on either side"
-        )
-        behind = Finding(level="note", subject=about, text=text)
         try:
-            said = at_start(self.inquire(folder, target), within=self.patience())
+            return at_start(self.inquire(folder, target), within=self.patience())
         except InputError:
             raise
         except (OSError, EOFError, SeerobError) as error:
+            about = self.target() or self.name
             who = "" if about == self.name else f"{self.name}: "
             text = f"{who}not reached at start: {because(error)}; it is tried again during the run"
-            said = (Finding(level="warning", subject=about, text=text),)
-        return Opened(samples=(), duration=0.0, findings=(behind, *said))
+            return (Finding(level="warning", subject=about, text=text),)
+
+    def contact(self) -> Contact:
+        """Whom it connects to, or where it listens; by its ``url``, or ``host``, ``bind`` and ``port``."""
+        return contact_of(self, listens=hasattr(self, "bind"))
 
     def patience(self) -> float:
         """How long a run waits for the answer at start [s]."""

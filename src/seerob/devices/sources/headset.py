@@ -22,6 +22,7 @@ from seerob.core.snapshot import Finding
 from seerob.description.capture.captured import CaptureFrame, Layout, Seen
 from seerob.description.capture.mapping import conventions, plain
 from seerob.devices.capture.stream_source import CaptureStream
+from seerob.devices.live.contact import Contact
 from seerob.devices.live.headset_offers import OFFERS, Offer
 from seerob.devices.live.listening import say_once
 from seerob.protocols.tracking.xr_axes import world_positions, world_turns
@@ -49,6 +50,10 @@ class Headset(CaptureStream, frozen=True, kw_only=True):
     def period(self) -> float:
         """Interval between samples that is expected [s]."""
         return 1 / self.frequency
+
+    def contact(self) -> Contact:
+        """Nobody: it comes over the page."""
+        return Contact("takes what a page of this run offers")
 
     async def ask(self) -> tuple[Finding, ...]:
         """What is to be said before anybody wears it."""

@@ -25,6 +25,7 @@ from seerob.core.transforms import Array
 from seerob.description.capture.captured import CaptureFrame, Layout
 from seerob.devices.capture.options import placement
 from seerob.devices.capture.stream_source import CaptureStream
+from seerob.devices.live.contact import Contact, contact_of
 from seerob.files.motion_capture.persons import Follower, numbers
 from seerob.files.motion_capture.upright import camera_upright, upright_rotation
 from seerob.protocols.tracking.kinect import LAYOUT, PORT, Body, Picture, from_datagrams, from_websocket
@@ -96,6 +97,10 @@ class Kinect(CaptureStream, frozen=True, kw_only=True):
         if self.link == Link.WEBSOCKET:
             return from_websocket(self.host, self.port)
         return from_datagrams(self.bind, self.port, self.host or None)
+
+    def contact(self) -> Contact:
+        """The camera's PC."""
+        return contact_of(self, listens=self.link is Link.UDP)
 
     async def ask(self) -> tuple[Finding, ...]:
         """Listen for a second: which camera, how many persons, and how it is tilted."""

@@ -84,7 +84,7 @@ class ModbusRobot(LiveSource, frozen=True, kw_only=True):
         at_home = self if not self.map.endswith(SUFFIX) else replace(self, map=str(folder / self.map))
         opened = LiveSource.open(at_home, folder, target)
         about = (Finding(level=level, subject=self.robot, text=text) for level, text in remarks(found))
-        return Opened(samples=(), duration=0.0, findings=(*opened.findings, *about))
+        return replace(opened, findings=(*opened.findings, *about))
 
     async def ask(self) -> tuple[Finding, ...]:
         """Read everything once: what the controller has not is said."""

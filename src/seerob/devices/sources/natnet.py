@@ -15,6 +15,7 @@ from seerob.core.snapshot import Finding
 from seerob.core.transforms import Array, rotation_from_wxyz, turned, wxyz_from_rotation
 from seerob.description.capture.captured import CaptureFrame, Layout, Seen
 from seerob.devices.capture.stream_source import CaptureStream
+from seerob.devices.live.contact import Contact, contact_of
 from seerob.files.motion_capture.upright import Up, world_from_file
 from seerob.protocols.tracking import natnet
 from seerob.protocols.tracking.natnet import Body, BoneModel, Heard, Models, SkeletonModel, frames
@@ -118,6 +119,10 @@ class Natnet(CaptureStream, frozen=True, kw_only=True):
             ids = tuple(bone.id & 0xFFFF for bone in model.bones)
             found.append((layout, _frame(heard.frame.t, ids, bones, world, model.name)))
         return found
+
+    def contact(self) -> Contact:
+        """The computer with Motive, which is asked and then sends."""
+        return contact_of(self, listens=False)
 
     async def ask(self) -> tuple[Finding, ...]:
         """Which version, which people and bodies."""

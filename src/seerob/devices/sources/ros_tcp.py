@@ -18,6 +18,7 @@ from typing import Annotated, ClassVar
 from msgspec import Meta
 
 from seerob.core.errors import InputError
+from seerob.devices.live.contact import Contact, contact_of
 from seerob.devices.ros.live_source import RosSource
 from seerob.protocols import ProtocolError
 from seerob.protocols.links.connection import Connection, connected
@@ -74,6 +75,10 @@ class RosTcp(RosSource, frozen=True, kw_only=True):
         """
         self._check()
         return RosSource.open(self, folder, target)
+
+    def contact(self) -> Contact:
+        """The other side."""
+        return contact_of(self, listens=self.side is Side.ENDPOINT)
 
     def _check(self) -> None:
         if (self.side is Side.CLIENT) != bool(self.host):

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta
-from msgspec.structs import replace
 
 from seerob.core.errors import InputError
 from seerob.core.samples import JointSample, Sample, SignalSample
 from seerob.core.snapshot import Finding
 from seerob.description.robots.calibration import Calibration, off_by
+from seerob.devices.live.contact import Contact
 from seerob.devices.live.listening import LiveSource, at_start, because
 from seerob.files.trajectories.trajectory import MotionOrigin, origin_finding
 from seerob.protocols import ProtocolError
@@ -178,20 +178,34 @@ class Rtde(LiveSource, frozen=True, kw_only=True):
         return 1 / self.frequency
 
     def open(self, folder: Path, target: Target | None) -> Opened:
-        """Ask the controller what it has, if it can be reached.
+        """Check the robot; connects to nothing.
 
         Raises:
-            InputError: The robot does not have six joints, or the controller does not say where they are.
+            InputError: The robot does not have six joints.
         """
         if target is None:
             raise InputError.at("sources", "robot", f"no robot {self.robot!r}", "name a robot")
         if len(target.joints) != 6:
             what = f"{target.name} has {len(target.joints)} joints, a Universal Robots arm has 6"
             raise InputError.at(f"rtde {self.host}", "robot", what, "name another robot")
-        opened = super().open(folder, target)
-        if self.primary_port and not any("not reached" in f.text for f in opened.findings):
-            opened = replace(opened, findings=(*opened.findings, self._kinematics(target)))
-        return opened
+        return super().open(folder, target)
+
+    def reach(self, folder: Path, target: Target | None) -> tuple[Finding, ...]:
+        """Ask the controller what it has, and for the kinematics of this very robot, if it can be reached.
+
+        Raises:
+            InputError: The controller does not say where the joints are.
+        """
+        said = super().reach(folder, target)
+        if target is None or not self.primary_port or any("not reached" in f.text for f in said):
+            return said
+        return (*said, self._kinematics(target))
+
+    def contact(self) -> Contact:
+        """The controller, on the port of RTDE and on that of its kinematics."""
+        found = super().contact()
+        more = f" and :{self.primary_port}" if self.primary_port else ""
+        return found._replace(where=f"{found.where}{more}")
 
     def _kinematics(self, target: Target) -> Finding:
         """Whether the model has the kinematics of this very robot."""

@@ -26,6 +26,7 @@ from seerob.description.capture.captured import CaptureFrame, Layout
 from seerob.devices.capture import worn_trackers as _worn_trackers
 from seerob.devices.capture.stream_source import CaptureStream
 from seerob.devices.capture.worn_trackers import Names, OriginWatch, remarks
+from seerob.devices.live.contact import Contact, contact_of
 from seerob.devices.live.listening import say_once
 from seerob.protocols.links.live_messages import Sieve, from_datagrams, from_websocket
 from seerob.protocols.tracking.vive import PORT, Device, Devices, decode
@@ -136,6 +137,12 @@ class Vive(CaptureStream, frozen=True, kw_only=True):
                     yield layout, CaptureFrame(t=instant.t, positions=np.full((len(rows), 3), np.nan))
                     continue
                 yield layout, _worn_trackers.frame(instant, rows)
+
+    def contact(self) -> Contact:
+        """The computer with SteamVR, or the one on this machine."""
+        if self.link in (Link.UDP, Link.WEBSOCKET):
+            return contact_of(self, listens=self.link is Link.UDP)
+        return Contact(f"asks {self.link.value} on this machine")
 
     async def ask(self) -> tuple[Finding, ...]:
         """Which devices there are, where they are worn, and which of them are tracked."""

@@ -69,13 +69,13 @@ def own(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
     count = iter(range(99))
 
-    def write(text, more="", head=HEAD, q=""):
+    def write(text, more="", head=HEAD, q="", engine=FLOATING):
         kind = f"own_{next(count)}_{tmp_path.name.replace('-', '_')}"
         package = tmp_path / kind
         package.mkdir()
         (package / "__init__.py").touch()
         (package / "rule.py").write_text(head + text)
-        cell = FLOATING + TWO_R + q + OWN.format(f"{kind}.rule") + more
+        cell = engine + TWO_R + q + OWN.format(f"{kind}.rule") + more
         return made(tmp_path / f"{kind}_cell", cell, {"arm.urdf": two_r()})
 
     return write
@@ -216,6 +216,7 @@ def test_subjects_are_a_tuple_of_names(own):
         ("return Result(name='own', reason='no device')", "say nothing=True with a reason; no device"),
         ("return Result(name='own', limit=2.0)", "says nothing, neither a figure nor a verdict"),
         ("return Result(name='own', value=3.0, limit=2.0)", "it has a limit and no verdict"),
+        ("return Result(name='own', value=3.0)", "it has a limit and no verdict"),
         ("return Result(name='own', nothing=True)", "there is nothing to judge, and not why"),
         (
             "return Result(name='own', value=1.0, limit=2.0, verdict=Verdict.WITHIN, nothing=True)",
@@ -231,7 +232,11 @@ def test_what_is_no_result_or_contradicts_itself_is_undecided(own, returned, wor
 
 @pytest.mark.parametrize("words", ["nothing=True, reason='nobody is near'", "value=3.0"])
 def test_nothing_to_judge_is_said_with_its_reason_and_a_figure_without_a_limit_informs(own, words):
-    found = unheard(own(BIND.format(f"return Result(name='own', {words})"), q="q = [0, 0]\n"))
+    text, head = (
+        BIND.format(f"return Result(name='own', {words})"),
+        HEAD.replace("limit: float", "other: float"),
+    )
+    found = unheard(own(text, q="q = [0, 0]\n", head=head))
     assert (found.verdict, found.nothing) == (None, "nothing" in words)
 
 
@@ -267,9 +272,85 @@ def test_a_whole_is_no_greener_than_its_parts(own):
     assert "2.5  lies above its limit" in contradiction(wide, criterion)
     low = Result(name="own", value=3.0, limit=2.0, at_most=False, interval=(1.5, 4.0), verdict=WITHIN)
     assert "1.5  lies below its limit" in contradiction(low, criterion)
+    high = Result(name="own", value=3.0, limit=2.0, at_most=False, verdict=WITHIN)
+    assert "from the other side" in contradiction(high, criterion)
+    boundless = Result(name="own", value=3.0, limit=float("inf"), verdict=WITHIN)
+    assert "its limit is inf" in contradiction(boundless, criterion)
     least = MinimumDistance(name="own", between=("arm", "op"), limit=2.0)
     assert "from the other side" in contradiction(Result(name="own", **within), least)
     nested = Result(name="a", parts=(Result(name="b", verdict=EXCEEDED),))
     assert "its part b" in contradiction(Result(name="own", parts=(nested,), **within), criterion)
     assert contradiction(Result(name="own", parts=(Result(name="a"),), **within), criterion) == ""
     assert contradiction(Result(name="own", value=9.0, limit=2.0, verdict=EXCEEDED), criterion) == ""
+
+
+# -- what a criterion does beside ----------------------------------------------------------------
+
+NOBODY = "    def subjects(self): return ()\n"
+GAP = "t [s],j1 [rad],j2 [rad]\n" + "".join(
+    f"{k / 100},{k / 1000},{k / 500}\n" for k in range(101) if not 30 < k < 95
+)
+LOG = '[[sources]]\nkind = "csv"\nrobot = "arm"\nfile = "m.csv"\n'
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "try: kept.append(state.q(arm)[0])\n            except Exception: pass",
+        "if not kept: kept.append(state.q(arm)[0])",
+        "if not kept: kept.append(state.placed(bodies)[1])",
+        "if not kept: kept.append(state.data_of('arm'))",
+        "if not kept: kept.append(state.once(('own',), lambda: state.q(arm)[0]))",
+    ],
+)
+@pytest.mark.parametrize("whole", ["", "    whole = False\n"])
+def test_whom_it_asked_for_once_it_rests_on_though_it_hides_that(own, body, whole):
+    """It says that it is about nobody, and swallows what it is told, or remembers what it once read."""
+    text = BIND.format(f"{body}\n            return self.result(1.0)").replace("arm, ", "kept, arm, ", 1)
+    text = text.replace('= model.mechanisms["arm"]', '= [], model.mechanisms["arm"]') + NOBODY
+    station = own(text.replace("    def bind", f"{whole}    def bind", 1), LOG)
+    Path(station.model.folder, "m.csv").write_text(GAP)
+    found = station.run().results["own"]
+    assert found.verdict is UNDECIDED
+    said = dict(zip(found.t.round(3).tolist(), found.verdicts.tolist(), strict=True))
+    assert (said[0.2], said[0.6]) == (0, 2)
+    assert any("does not declare it (depends, variables)" in reason for reason in found.reasons)
+
+
+ALTERED = {
+    "masses": "state.mass_matrix(arm)[:] *= 1e-6",
+    "ellipsoid": "state.mass_ellipsoid(frame, arm).masses[:] = 0",
+    "jacobian": "state.jacobian(frame, arm)[:] = 0",
+    "joints": "state.q(arm)[:] = 0; state.qd(arm)[:] = 0",
+    "places": "[a.fill(0) for a in state.placed(bodies)]",
+    "pose": "[a.fill(0) for a in state.pose(frame)]",
+    "speeds": "[a.fill(0) for a in (*state.body_velocities(bodies), *state.fastest_points(bodies))]",
+    "data": "d = state.data_of('arm'); d.qvel[:] = 0; d.qpos[:] = 0; d.xpos[:] = 0; d.cvel[:] = 0",
+    "distances": "c = state.closest_per_body(gap); c.distance[:] = 9; c.point_a[:] = 0",
+}
+
+
+@pytest.mark.parametrize("physics", [True, False])
+@pytest.mark.parametrize("what", ALTERED)
+def test_what_a_criterion_writes_into_arrays_changes_no_other_and_no_motion(own, what, physics):
+    more = person("op", 2.3, 0.3, 0) + LOG
+    for kind, said in (
+        ("kinetic_energy", 'robot = "arm"\nlimit = 0.5'),
+        ("velocity", 'of = "arm"\nlimit = 0.2'),
+        ("effective_mass", 'at = "arm"\nlimit = 1.0'),
+        ("minimum_distance", 'between = ["arm", "op"]\nlimit = 0.3'),
+    ):
+        more += f'[[safety]]\nkind = "{kind}"\nname = "{kind}"\n{said}\n'
+    found = []
+    for body in ("", ALTERED[what] + "; "):
+        text = BIND.format(f"{body}return self.result(1.0)").replace(
+            "        def eval", "        gap = model.gap(model.select('op'), bodies)\n        def eval"
+        )
+        station = own(text, more, engine=f"engine = {{ gravity = [0, 0, 0], physics = {physics} }}\n".lower())
+        Path(station.model.folder, "m.csv").write_text(GAP)
+        found.append(station.run().results)
+    one, other = found
+    assert np.nanmin(other["own"].values) == 1.0
+    for name in one:
+        np.testing.assert_array_equal(one[name].values, other[name].values, name)
+        np.testing.assert_array_equal(one[name].verdicts, other[name].verdicts, name)

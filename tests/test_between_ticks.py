@@ -653,7 +653,17 @@ def test_a_contact_between_two_ticks_decides_though_nothing_moves_at_any_tick(tm
     assert (slow.verdict, slow.open) == (Verdict.WITHIN, "")
     assert touching(tmp_path / "b", shaking(0.02), contact()).verdict is Verdict.EXCEEDED
     accepted = contact(between_samples='"accepted: nobody is there"')
-    assert touching(tmp_path / "c", shaking(0.02), accepted).verdict is None
+    assert touching(tmp_path / "c", shaking(0.02), accepted).verdict is Verdict.EXCEEDED
+
+
+def test_accepted_is_what_nobody_knows_between_ticks_not_what_is_known_to_exceed(tmp_path):
+    """Of an arm with tolerances nothing bounds contacts: what the file accepts then stands in its place."""
+    said = 'between_samples = "accepted: contacts are measured"\n'
+    unknown = contact(area_tolerance=0.1)
+    slow = lambda t: ((0.05 * t, 0.0), (0.05, 0.0))  # noqa: E731
+    found = [touching(tmp_path / f"{k}", slow, unknown + more) for k, more in enumerate(("", said))]
+    assert [each.verdict for each in found] == [Verdict.UNDECIDED, Verdict.WITHIN]
+    assert found[1].between == "accepted: contacts are measured"
 
 
 @pytest.mark.parametrize(("beyond", "verdict"), [(0.001, Verdict.EXCEEDED), (0.1, None)])

@@ -58,6 +58,11 @@ class Watch:
     people: tuple[str, ...]
     """Whose place it depends on: how well devices know that changes from tick to tick."""
 
+    @property
+    def accepted(self) -> str:
+        """Why the file accepts what is not known between ticks; what is known to exceed there counts."""
+        return "" if self.lowest is None else self.criterion.between_samples or ""
+
 
 def watched(criterion: Criterion, model: Model, points: Points) -> Watch | None:
     """How a criterion is judged between two ticks; None when nothing bounds it."""
@@ -209,7 +214,7 @@ class BetweenTicks:
             idle = now.idle and watch.lowest is not None
             if told.exceeded is not None:
                 result = told.exceeded
-            elif told.open and (now.verdict is _WITHIN or idle or now.muted):
+            elif told.open and not watch.accepted and (now.verdict is _WITHIN or idle or now.muted):
                 result = replace(self._asking.take_back(result, told.open), muted=False)
         self._before[i] = now
         return result

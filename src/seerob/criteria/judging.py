@@ -53,7 +53,7 @@ class Bound:
     def between(self) -> str:
         """Say what is known of the time between instants (`seerob.core.snapshot.CriterionInfo.between`)."""
         if self.watch is not None:
-            return ""
+            return self.watch.accepted
         return self.criterion.between_samples or self.criterion.instants or UNBOUNDED
 
 

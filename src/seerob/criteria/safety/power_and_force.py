@@ -140,8 +140,8 @@ class PowerAndForce(Criterion, frozen=True, kw_only=True):
         return contacts.whoever_is_known(seen_first(bones, contacts.evaluate, contacts.without))
 
     def lowest(self, model: Model, points: Points) -> Lowest | None:
-        """Judge the least margin within a span; None where the file accepts that nobody knows it."""
-        return None if self.between_samples else Contacts(self, model).lowest(points)
+        """Judge the least margin within a span."""
+        return Contacts(self, model).lowest(points)
 
     def table(self, model: Model) -> body_limits.BodyLimits:
         """The limits that apply."""

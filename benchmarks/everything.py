@@ -26,6 +26,7 @@ import numpy as np
 
 import seerob as sr
 from seerob.app.console.terminal import cache_folder
+from seerob.core.markers import plain
 from seerob.session import run as road
 from seerob.twin.engine import Engine
 
@@ -80,7 +81,7 @@ def measure(seconds: float) -> dict[str, float]:
     judge = road.Judge(station.bound)
     feed = road.pump(station.sources, period, endless=True, ahead=road.looks_ahead(station.model))
     peer = Peer(engine)
-    encoder = msgspec.msgpack.Encoder()
+    encoder = msgspec.msgpack.Encoder(enc_hook=plain)
     stages: dict[str, list[float]] = {"engine": [], "criteria": [], "snapshot": []}
     whole, computed, with_page, alone, worst_distance = [], [], [], [], np.inf
     page, size = 0.0, 0

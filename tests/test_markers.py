@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import ast
+import pickle
 from itertools import pairwise
+from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
+from seerob import criteria
+from seerob.core.markers import Marker, changed, drawn, plain
 from seerob.core.shapes.floor_polygon import cut_ears
-from seerob.core.snapshot import Polyline, Prism, Rays
+from seerob.core.snapshot import Highlight, Label, Polyline, Prism, Rays, Result, Verdict
 from seerob.core.transforms import Array
 
 
@@ -25,6 +32,50 @@ def test_beams_start_together_or_each_where_it_says() -> None:
     starts = ((0.0, 0.0, 1.0), (0.0, 0.0, 2.0))
     assert Rays(starts=starts[:1], ends=ends).beams() == [(starts[0], ends[0]), (starts[0], ends[1])]
     assert Rays(starts=starts, ends=ends).beams() == list(zip(starts, ends, strict=True))
+
+
+def test_markers_that_are_made_when_somebody_looks_are_those_of_a_tuple_in_all_respects() -> None:
+    asked = []
+
+    def make() -> list[Marker]:
+        asked.append(1)
+        return [
+            Label(position=(0.0, 0.0, 1.0), text="near", verdict=Verdict.WITHIN),
+            Highlight(body="arm/l1"),
+        ]
+
+    eager = Result(name="d", markers=tuple(make()))
+    lazy = Result(name="d", markers=drawn(make))
+    changes = changed(lazy.markers, lambda m: replace(m, verdict=Verdict.UNDECIDED))
+    assert len(asked) == 1
+    pack = msgspec.msgpack.Encoder(enc_hook=plain).encode
+    assert pack(lazy) == pack(eager)
+    assert (lazy == eager, eager == lazy, hash(lazy) == hash(eager)) == (True, True, True)
+    assert (lazy.markers[1], len(lazy.markers), [*lazy.markers]) == (eager.markers[1], 2, [*eager.markers])
+    assert (repr(lazy), pickle.loads(pickle.dumps(lazy))) == (repr(eager), eager)
+    assert type(pickle.loads(pickle.dumps(lazy)).markers) is tuple
+    assert len(asked) == 2  # made once, however often they are looked at
+    assert [m.verdict for m in changes] == [Verdict.UNDECIDED] * 2
+    with pytest.raises(TypeError, match="unsupported"):
+        msgspec.msgpack.encode(lazy)  # who does not know of them is told, and leaves none out
+
+
+def test_nothing_that_is_drawn_later_reads_the_twin() -> None:
+    """It is elsewhere then."""
+    seen = 0
+    for path in (Path(criteria.__file__).parent).rglob("*.py"):
+        tree = ast.parse(path.read_text())
+        for inner in ast.walk(tree):
+            calls = isinstance(inner, ast.Call) and isinstance(inner.func, ast.Name)
+            if calls and inner.func.id == "drawn":
+                (given,) = inner.args
+                assert isinstance(given, ast.Name), f"{path.name}: give drawn a function by its name"
+                made = [f for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) and f.name == given.id]
+                names = {n.id for f in made for n in ast.walk(f) if isinstance(n, ast.Name)}
+                assert made, path.name
+                assert "state" not in names, f"{path.name}: {given.id} reads the state"
+                seen += 1
+    assert seen > 4
 
 
 def star(rng: np.random.Generator, n: int) -> Array:

@@ -5,7 +5,9 @@ World frame: right-handed, z up, metres. Quaternions: unit, w first.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
+from typing import cast, overload
 
 from msgspec import Struct
 
@@ -141,3 +143,80 @@ class Rays(Struct, frozen=True, kw_only=True, tag="rays"):
 
 
 Marker = Arrow | Segment | Sphere | Ellipsoid | Box | Hull | Polyline | Prism | Rays | Label | Highlight
+
+
+class _Drawn(Sequence[Marker]):
+    """Markers that are made when somebody looks."""
+
+    __slots__ = "_made", "_make"
+
+    def __init__(self, make: Callable[[], Sequence[Marker]]) -> None:
+        self._make: Callable[[], Sequence[Marker]] | None = make
+        self._made: tuple[Marker, ...] = ()
+
+    def _all(self) -> tuple[Marker, ...]:
+        make = self._make
+        if make is not None:  # twice, should two threads look at once, to one result
+            self._made = tuple(make())
+            self._make = None
+        return self._made
+
+    def __len__(self) -> int:
+        return len(self._all())
+
+    @overload
+    def __getitem__(self, index: int) -> Marker: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Marker, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Marker | tuple[Marker, ...]:
+        return self._all()[index]
+
+    def __iter__(self) -> Iterator[Marker]:
+        return iter(self._all())
+
+    def __eq__(self, other: object) -> bool:
+        return self._all() == (other._all() if isinstance(other, _Drawn) else other)
+
+    def __hash__(self) -> int:
+        return hash(self._all())
+
+    def __repr__(self) -> str:
+        return repr(self._all())
+
+    def __reduce__(self) -> tuple[type[tuple[Marker, ...]], tuple[tuple[Marker, ...]]]:
+        return tuple, (self._all(),)
+
+
+def drawn(make: Callable[[], Sequence[Marker]]) -> tuple[Marker, ...]:
+    """Markers that are made only when a page, a recorder or a report looks at them, for `Result.markers`.
+
+    They compare, iterate and pickle as the tuple that they are; encoders are told by `plain`.
+
+    Args:
+        make: Makes them from copies. It may run ticks later and in another thread, when the twin is
+            elsewhere: it must read neither `State` nor an array that is written again.
+    """
+    return cast("tuple[Marker, ...]", _Drawn(make))
+
+
+def changed(markers: Sequence[Marker], change: Callable[[Marker], Marker]) -> tuple[Marker, ...]:
+    """Each marker changed; when somebody looks, where they are made only then."""
+    if isinstance(markers, _Drawn):
+        return drawn(lambda: tuple(map(change, markers)))
+    return tuple(map(change, markers))
+
+
+def plain(value: object) -> object:
+    """What an encoder writes of what no message has: markers, and numpy's scalars as Python's.
+
+    Raises:
+        TypeError: It is neither.
+    """
+    if isinstance(value, _Drawn):
+        return value[:]
+    item: Callable[[], object] | None = getattr(value, "item", None)
+    if item is None or getattr(value, "ndim", 1) != 0:
+        raise TypeError(f"{type(value).__name__} cannot be recorded")
+    return item()

@@ -6,14 +6,15 @@ import logging
 import math
 import traceback
 from collections.abc import Iterable, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 from msgspec.structs import replace
 
 from seerob.core.errors import SeerobError, Undecided, UnknownName, Unweighed
+from seerob.core.markers import Marker, changed
 from seerob.core.plugin import PluginError, kind_of
 from seerob.core.snapshot import Basis, Finding, Result, Row, Verdict
 from seerob.core.verdict import ROUNDING, keeps
@@ -44,7 +45,7 @@ class Bound:
     watch: Watch | None = None
     """How it is judged between two ticks; None where nothing bounds it."""
 
-    @property
+    @cached_property
     def own(self) -> bool:
         """Whether it is one of the user's, which does not ship."""
         return not type(self.criterion).__module__.startswith("seerob.")
@@ -231,11 +232,12 @@ def undecided(result: Result, reason: str) -> Result:
             else row
             for row in result.rows
         ),
-        markers=tuple(
-            replace(marker, verdict=Verdict.UNDECIDED) if marker.verdict is Verdict.WITHIN else marker
-            for marker in result.markers
-        ),
+        markers=changed(result.markers, _open_marker),
     )
+
+
+def _open_marker(marker: Marker) -> Marker:
+    return replace(marker, verdict=_UNDECIDED) if marker.verdict is _WITHIN else marker
 
 
 def _open(part: Result, reason: str) -> Result:
@@ -404,8 +406,9 @@ class Judge:
         muted: Result | None = None
         try:
             with state.asking():
-                muted = None if applies else self._muted(bound.criterion, state)
-                result = muted or self._asked(i, evaluate, state)
+                if not applies and bound.criterion.active is not None:
+                    muted = self._muted(bound.criterion, state)
+                result = self._asked(i, evaluate, state) if muted is None else muted
         except Unweighed as reason:
             result = self._at_least(i, evaluate, state, str(reason))
         except Undecided as reason:
@@ -427,9 +430,13 @@ class Judge:
         state.require(*names)
         if bodies:
             state.require_bodies(bodies)
-        with state.set_apart() if bound.own else nullcontext():
+        if bound.own:
+            with state.set_apart():
+                result = evaluate(state)
+        else:
             result = evaluate(state)
-        self._rely_on_undeclared(i, state)
+        if self._undeclared[i] or not state.asked <= self._declared[i]:
+            self._rely_on_undeclared(i, state)
         if type(result) is not Result:
             what = f"{_where(bound)} returns {type(result).__name__}, not a Result"
             self._warn(bound, what)
@@ -437,8 +444,9 @@ class Judge:
         if result.t is not None or result.muted:
             # When it was asked and whether it applied is for who asks to say: a log counts no instant twice.
             result = replace(result, t=None, muted=False)
-        reason = contradiction(result, bound.criterion)
-        if not reason and (silent := unsaid(result, bound.criterion)):
+        criterion = bound.criterion
+        reason = contradiction(result, criterion)
+        if not reason and result.verdict is None and (silent := unsaid(result, criterion)):
             self._warn(bound, f"{_where(bound)}: {silent}")
             silent = f"{silent}; {result.reason}".removesuffix("; ")
             return replace(undecided(result, silent), verdict=_UNDECIDED, nothing=False, reason=silent)
@@ -449,7 +457,7 @@ class Judge:
                 raise Undecided(reason)
         elif result.value is not None and not math.isfinite(result.value):
             raise Undecided(f"the value is {result.value}, not a finite number")
-        elif not bound.criterion.by_speed and state.speed_errors:
+        elif not criterion.by_speed and state.speed_errors:
             return self._shaken(i, result, state)
         return undecided(result, reason) if reason else result
 

@@ -68,4 +68,4 @@ def partly_seen(model: Model, gap: Gap, bind: Callable[[Gap], Evaluate]) -> Eval
         a, b = (tuple(i for i in side if i not in lost) for side in (gap.a, gap.b))
         return bind(model.gap(a, b)) if a and b else None
 
-    return seen_first((*gap.a, *gap.b), bind(gap), without)
+    return seen_first(gap.bodies, bind(gap), without)

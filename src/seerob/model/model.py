@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -190,6 +191,11 @@ class Gap:
     """How much nearer the real surfaces may be than the shapes used, as far as known [m]."""
     notes: tuple[str, ...]
     """What the shapes are when they are not the real thing."""
+
+    @cached_property
+    def bodies(self) -> tuple[int, ...]:
+        """Those of both sets."""
+        return *self.a, *self.b
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy, deepcopy
+from functools import partial
 from typing import Any, NamedTuple
 
 import mujoco
@@ -68,6 +69,11 @@ class _Point(NamedTuple):
     jacobian: Array
     sigma: list[float]
     wxyz: list[float]
+
+
+def _point_of(xmat: Array, xpos: Array, frame: Frame, offset: Array) -> Array:
+    rotation, position = carried(xmat, xpos, frame.mj, frame.body_from_frame)
+    return np.asarray(position + rotation @ offset)
 
 
 class State(Validity):
@@ -568,11 +574,31 @@ class State(Validity):
         Raises:
             Undecided: Whoever moves it was not heard; of a person, this bone is in doubt.
         """
+        self._require_frame(frame)
+        return self._pose(frame)
+
+    def _require_frame(self, frame: Frame) -> None:
         names, bodies = self._movers.get(frame.mj) or self._movers_of(frame.mj)
         self.require(*names)
         if bodies:
             self.require_bodies(bodies)
-        return self._pose(frame)
+
+    def drawn_point(self, frame: Frame, offset: Array) -> Callable[[], Array]:
+        """Where a point of a frame is now [m], shape (3,): worked out when it is drawn, maybe ticks later.
+
+        Args:
+            frame: The frame.
+            offset: The point in it [m], shape (3,).
+
+        Raises:
+            Undecided: As `pose`.
+        """
+        self._require_frame(frame)
+        if "placed once" not in self._cache:
+            # MuJoCo writes through its own at the next tick.
+            self._cache["placed once"] = self._xmat.copy(), self._xpos.copy()
+        xmat, xpos = self._cache["placed once"]
+        return partial(_point_of, xmat, xpos, frame, offset)
 
     def _movers_of(self, body: int) -> tuple[tuple[str, ...], tuple[int, ...]]:
         """Whom the place of a body of MuJoCo depends on: the innermost robot or machine, or a bone."""
@@ -774,12 +800,12 @@ class State(Validity):
 
     def closest(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closest:
         """Where two sets are nearest; ``allow_estimated`` and ``strayed`` as in `require_bodies`."""
-        self.require_bodies((*gap.a, *gap.b), allow_estimated=allow_estimated, strayed=strayed)
+        self.require_bodies(gap.bodies, allow_estimated=allow_estimated, strayed=strayed)
         return self._distances(gap.query, Per.SETS).at(0)
 
     def closest_per_body(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closests:
         """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``."""
-        self.require_bodies((*gap.a, *gap.b), allow_estimated=allow_estimated, strayed=strayed)
+        self.require_bodies(gap.bodies, allow_estimated=allow_estimated, strayed=strayed)
         return self._distances(gap.query, Per.BODY)
 
     def distances(self, query: Query, per: Per, *, allow_estimated: bool = False) -> Closests:

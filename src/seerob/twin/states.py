@@ -323,7 +323,7 @@ class States:
 
     def _distances(self, gap: Gap, per: Per) -> Closests:
         self.require(*gap.carriers)
-        self._settled((*gap.a, *gap.b))
+        self._settled(gap.bodies)
         question = gap.query, per
         if question not in self._answers:
             self._answers |= self._bench.questions.ask(question, self._rotations, self._positions)

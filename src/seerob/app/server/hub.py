@@ -15,6 +15,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from seerob.app.server.client import Client, Closing
 from seerob.app.server.feed import KNOWN_ACTIONS, Feed
 from seerob.app.wire import schema
+from seerob.core.markers import plain
 from seerob.core.snapshot import (
     PROTOCOL,
     Command,
@@ -34,7 +35,7 @@ MOST_CLIENTS = 64
 PATIENCE = 10.0
 """How long a page may leave a frame waiting [s]."""
 
-_encode = msgspec.msgpack.Encoder().encode
+_encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
 _decode: Callable[[bytes], Command | Tracking] = msgspec.msgpack.Decoder(Command | Tracking).decode
 LARGEST_COMMAND = 512
 """[B]; one has less than 100."""

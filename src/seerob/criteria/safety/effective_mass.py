@@ -9,6 +9,7 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core import figures
+from seerob.core.markers import Marker, drawn
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Arrow, Basis, Ellipsoid, Result, Verdict
 from seerob.core.tolerances import Shifts, Spread, deciding, spread
@@ -148,25 +149,22 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                 open_ = deciding(tolerances.tolerances, ends.widths) if verdict is Verdict.UNDECIDED else ""
             if u is None and gap is not None and self.limit is not None:
                 verdict = Verdict.UNDECIDED
-            rotation, position = state.pose(frame)
-            center = position + rotation @ offset
-            ellipsoid = Ellipsoid(
-                center=tuple(center.tolist()),
-                wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
-                radii=tuple(np.minimum(DRAWN * masses, LARGEST_DRAWN).tolist()),
-                verdict=verdict,
-            )
-            arrows: tuple[Arrow, ...] = ()
-            if u is not None and mass is not None:
-                length = min(DRAWN * mass, LARGEST_DRAWN)
-                arrows = (
-                    Arrow(
-                        origin=tuple(center.tolist()),
-                        vector=tuple((length * u).tolist()),
-                        label=figures.worded(mass, self.limit, self.unit, at_most=True),
-                        verdict=verdict,
-                    ),
+            place = state.drawn_point(frame, offset)
+
+            def draw() -> tuple[Marker, ...]:
+                center = tuple(place().tolist())
+                ellipsoid = Ellipsoid(
+                    center=center,
+                    wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
+                    radii=tuple(np.minimum(DRAWN * masses, LARGEST_DRAWN).tolist()),
+                    verdict=verdict,
                 )
+                if u is None or mass is None:
+                    return (ellipsoid,)
+                vector = tuple((min(DRAWN * mass, LARGEST_DRAWN) * u).tolist())
+                label = figures.worded(mass, self.limit, self.unit, at_most=True)
+                return ellipsoid, Arrow(origin=center, vector=vector, label=label, verdict=verdict)
+
             return Result(
                 name=self.name,
                 value=mass if mass is not None and math.isfinite(mass) else None,
@@ -185,7 +183,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
                     ),
                     simplified,
                 ),
-                markers=(ellipsoid, *arrows),
+                markers=drawn(draw),
             )
 
         return evaluate

@@ -10,6 +10,7 @@ from msgspec import Meta
 from seerob.core import figures
 from seerob.core.domains import at_least
 from seerob.core.errors import Undecided
+from seerob.core.markers import drawn
 from seerob.core.snapshot import Basis, Result, Sphere, Verdict
 from seerob.core.tolerances import deciding, spread
 from seerob.core.transforms import Array
@@ -102,13 +103,13 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
                 verdict = judge_interval(interval, self.limit)
                 if verdict is Verdict.UNDECIDED:
                     reason = reason or NOISE
-            _, position = state.pose(robot.tip)
-            sphere = Sphere(
-                center=tuple(position.tolist()),
-                radius=DRAWN * max(energy, 0.0) ** (1 / 3),
-                label=figures.worded(energy, self.limit, self.unit, at_most=True),
-                verdict=verdict,
-            )
+            tip = state.drawn_point(robot.tip, np.zeros(3))
+
+            def draw() -> tuple[Sphere, ...]:
+                label = figures.worded(energy, self.limit, self.unit, at_most=True)
+                radius = DRAWN * max(energy, 0.0) ** (1 / 3)
+                return (Sphere(center=tuple(tip().tolist()), radius=radius, label=label, verdict=verdict),)
+
             return Result(
                 name=self.name,
                 value=energy,
@@ -117,7 +118,7 @@ class KineticEnergy(Criterion, frozen=True, kw_only=True):
                 verdict=verdict,
                 reason=reason,
                 interval=interval,
-                markers=(sphere,),
+                markers=drawn(draw),
             )
 
         return evaluate

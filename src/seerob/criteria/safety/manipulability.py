@@ -9,6 +9,7 @@ import numpy as np
 from msgspec import Meta
 
 from seerob.core import figures
+from seerob.core.markers import drawn
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Basis, Ellipsoid, Result, Verdict
 from seerob.core.transforms import Array
@@ -117,14 +118,18 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
                 reason = f"near a singularity: {joint} leads out of it the soonest"
                 if after.max() <= smallest + NOTHING:
                     reason = "no joint by itself leads out of the singularity"
-            rotation, position = state.pose(frame)
-            ellipsoid = Ellipsoid(
-                center=tuple((position + rotation @ offset).tolist()),
-                wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
-                radii=(DRAWN * sigma[0], DRAWN * sigma[1], DRAWN * sigma[2]),
-                label=f"σ₃ {figures.worded(smallest, self.limit, self.unit, at_most=False)}",
-                verdict=verdict,
-            )
+            place = state.drawn_point(frame, offset)
+
+            def draw() -> tuple[Ellipsoid, ...]:
+                ellipsoid = Ellipsoid(
+                    center=tuple(place().tolist()),
+                    wxyz=(wxyz[0], wxyz[1], wxyz[2], wxyz[3]),
+                    radii=(DRAWN * sigma[0], DRAWN * sigma[1], DRAWN * sigma[2]),
+                    label=f"σ₃ {figures.worded(smallest, self.limit, self.unit, at_most=False)}",
+                    verdict=verdict,
+                )
+                return (ellipsoid,)
+
             parts = (
                 Result(name="σ₁", value=sigma[0], unit="m/rad"),
                 Result(name="σ₂", value=sigma[1], unit="m/rad"),
@@ -139,7 +144,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
                 verdict=verdict,
                 reason=reason,
                 parts=parts,
-                markers=(ellipsoid,),
+                markers=drawn(draw),
             )
 
         return evaluate

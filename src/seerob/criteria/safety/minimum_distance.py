@@ -9,6 +9,7 @@ from msgspec import Meta
 
 from seerob.core import figures
 from seerob.core.errors import InputError
+from seerob.core.markers import drawn
 from seerob.core.snapshot import Basis, Result, Segment, Verdict
 from seerob.core.tolerances import Tolerance, deciding
 from seerob.criteria.criterion import Criterion, Evaluate, EvaluateMany, judge_interval
@@ -74,12 +75,12 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
             a_named = places.named(state, closest.body_a, closest.point_a)
             b_named = places.named(state, closest.body_b, closest.point_b)
             deeper = " (overlap, at least this deep)" if closest.kind == DistanceKind.DEPTH_AT_LEAST else ""
-            segment = Segment(
-                start=tuple(closest.point_a.tolist()),
-                end=tuple(closest.point_b.tolist()),
-                label=figures.worded(distance, self.limit, self.unit, at_most=False),
-                verdict=verdict,
-            )
+
+            def draw() -> tuple[Segment, ...]:
+                start, end = tuple(closest.point_a.tolist()), tuple(closest.point_b.tolist())
+                label = figures.worded(distance, self.limit, self.unit, at_most=False)
+                return (Segment(start=start, end=end, label=label, verdict=verdict),)
+
             return Result(
                 name=self.name,
                 value=distance,
@@ -89,7 +90,7 @@ class MinimumDistance(Criterion, frozen=True, kw_only=True):
                 verdict=verdict,
                 reason=f"{a_named} ↔ {b_named}{deeper}{open_}",
                 interval=interval if interval[0] < interval[1] else None,
-                markers=(segment,),
+                markers=drawn(draw),
             )
 
         return evaluate

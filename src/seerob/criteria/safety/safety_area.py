@@ -69,8 +69,8 @@ class SafetyArea(Criterion, frozen=True, kw_only=True):
 
     def _bound(self, model: Model, watched: tuple[_Watched, ...], depths: Depths) -> Evaluate:
         several = len(_names(self.area)) > 1
-        offs = [TrackingError(model, (*each.gap.a, *each.gap.b)) for each in watched]
-        concerned = tuple(dict.fromkeys(i for each in watched for i in (*each.gap.a, *each.gap.b)))
+        offs = [TrackingError(model, each.gap.bodies) for each in watched]
+        concerned = tuple(dict.fromkeys(i for each in watched for i in each.gap.bodies))
 
         def evaluate(state: State) -> Result:
             nearest, perhaps = (np.inf, ""), (np.inf, "", 0.0)

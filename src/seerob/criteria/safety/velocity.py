@@ -3,6 +3,7 @@ r"""Speed of a point, or of the fastest point of a set of bodies, [Weistroffer20
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -11,6 +12,7 @@ from msgspec import Meta
 from seerob.core import figures
 from seerob.core.domains import at_least
 from seerob.core.errors import InputError
+from seerob.core.markers import drawn
 from seerob.core.quantities import Metres3
 from seerob.core.snapshot import Arrow, Basis, Input, Result, Verdict
 from seerob.core.transforms import Array
@@ -102,13 +104,13 @@ class Velocity(Criterion, frozen=True, kw_only=True):
 
         def evaluate(state: State) -> Result:
             v = velocity_of(state, frame, mechanism, offset)[:3]
-            rotation, position = state.pose(frame)
+            place = state.drawn_point(frame, offset)
             speed, interval = math.sqrt(float(v @ v)), None
             error = state.speed_error(mechanism)
             if error is not None:
                 off = float(speed_noise(state.jacobian(frame, mechanism, offset)[:3], error))
                 interval = max(speed - off, 0.0), speed + off
-            return self._result(speed, position + rotation @ offset, v, interval=interval)
+            return self._result(speed, place, v, interval=interval)
 
         return evaluate
 
@@ -146,14 +148,15 @@ class Velocity(Criterion, frozen=True, kw_only=True):
                 low, high = np.maximum(speeds - off, 0.0), speeds + off
                 interval = float(low.max()), float(high.max())
             where = model.bodies[bodies[k]].name
-            return self._result(float(speeds[k]), points[k], velocities[k], where, interval=interval)
+            point, v = points[k], velocities[k]
+            return self._result(float(speeds[k]), lambda: point, v, where, interval=interval)
 
         return evaluate
 
     def _result(
         self,
         speed: float,
-        point: Array,
+        place: Callable[[], Array],
         v: Array,
         where: str = "",
         *,
@@ -162,12 +165,12 @@ class Velocity(Criterion, frozen=True, kw_only=True):
         verdict = judge(speed, self.limit) if interval is None else judge_interval(interval, self.limit)
         if interval is not None and verdict is Verdict.UNDECIDED:
             where = f"{where}: {NOISE}".removeprefix(": ")
-        arrow = Arrow(
-            origin=tuple(point.tolist()),
-            vector=tuple((DRAWN * v).tolist()),
-            label=figures.worded(speed, self.limit, self.unit, at_most=True),
-            verdict=verdict,
-        )
+
+        def draw() -> tuple[Arrow, ...]:
+            label = figures.worded(speed, self.limit, self.unit, at_most=True)
+            origin, vector = tuple(place().tolist()), tuple((DRAWN * v).tolist())
+            return (Arrow(origin=origin, vector=vector, label=label, verdict=verdict),)
+
         return Result(
             name=self.name,
             value=speed,
@@ -176,7 +179,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
             verdict=verdict,
             reason=where,
             interval=interval,
-            markers=(arrow,),
+            markers=drawn(draw),
         )
 
     def falls(self, model: Model, points: Points) -> Falls:

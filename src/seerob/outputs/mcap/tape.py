@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,6 +14,7 @@ import msgspec
 from mcap.writer import Writer as McapWriter
 from mcap_protobuf.schema import register_schema
 
+from seerob.core.markers import plain
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Scene, Snapshot
 from seerob.outputs.mcap.foxglove import frame_transforms, marker_update, scene_update
@@ -90,7 +90,7 @@ class McapTape:
         """
         self._scene = scene
         self._people = {m.name: [j.name for j in m.joints] for m in scene.mechanisms if m.role == "human"}
-        self._encode = msgspec.msgpack.Encoder(enc_hook=_plain).encode
+        self._encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
         self._next_view = -math.inf
         self.ticks = 0
         """Ticks that were taken."""
@@ -172,7 +172,7 @@ class McapTape:
             }
             for name, joints in self._people.items()
         }
-        return msgspec.json.encode({"t": snapshot.t, "people": people}, enc_hook=_plain)
+        return msgspec.json.encode({"t": snapshot.t, "people": people}, enc_hook=plain)
 
     def flush(self) -> None:
         """End the chunk and hand it to the disk: what was written so far survives the process."""
@@ -218,13 +218,5 @@ def _results_json(snapshot: Snapshot) -> bytes:
                 for r in snapshot.results
             ],
         },
-        enc_hook=_plain,
+        enc_hook=plain,
     )
-
-
-def _plain(value: Any) -> object:
-    """Numpy's scalars as Python's: a criterion may leave one in a result."""
-    item: Callable[[], object] | None = getattr(value, "item", None)
-    if item is None or getattr(value, "ndim", 1) != 0:
-        raise TypeError(f"{type(value).__name__} cannot be recorded")
-    return item()

@@ -170,7 +170,7 @@ class BetweenSamples:
             Undecided: Somebody whose place nobody gave, or who follows variables; a part without a shape.
         """
         gap = self._model.gap(self._model.select(a), self._model.select(b))
-        self._require((*gap.a, *gap.b), a, b)
+        self._require(gap.bodies, a, b)
         first, second = (chains_of(self._model, side, self._slid) for side in (gap.a, gap.b))
 
         def middle(t: float) -> tuple[Array, Array]:

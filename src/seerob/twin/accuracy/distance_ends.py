@@ -27,8 +27,8 @@ class DistanceEnds:
     """
 
     def __init__(self, model: Model, gap: Gap) -> None:
-        self._off = TrackingError(model, (*gap.a, *gap.b))
-        self._concerned = (*gap.a, *gap.b)
+        self._off = TrackingError(model, gap.bodies)
+        self._concerned = gap.bodies
         self._shape = len(gap.a), len(gap.b)
         self._pairs = Survey(model.shapes, [(Query(model.shapes, gap.a, gap.b), Per.PAIR)])
 

@@ -6,8 +6,7 @@ author of a criterion can forget it. Each reason is worked out once per tick.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Hashable
 from typing import Any, NamedTuple
 
 from seerob.core.errors import NotAsked, Undecided
@@ -34,6 +33,22 @@ class _Owners(NamedTuple):
     bodies: frozenset[int]
 
 
+class _Asking:
+    """A context in which what would not raise `Undecided` is closed, without a generator at each question."""
+
+    def __init__(self, of: Validity) -> None:
+        self._of = of
+
+    def __enter__(self) -> None:
+        of = self._of
+        of.asked.clear()
+        of.speeds_asked.clear()
+        of._closed = True
+
+    def __exit__(self, *_: object) -> None:
+        self._of._closed = False
+
+
 class Validity:
     """What may be relied on at an instant.
 
@@ -56,6 +71,7 @@ class Validity:
         self._hearings = hearings
         self._signals = signals or Signals(model.dictionary, {})
         self._closed = False
+        self._asking = _Asking(self)
         self._cache: dict[Any, Any] = {}
         engine = model.workstation.engine
         self._period = engine.tick
@@ -80,16 +96,9 @@ class Validity:
 
     # -- what says nothing of whether it may be relied on is closed while a criterion is asked ----
 
-    @contextmanager
-    def asking(self) -> Iterator[None]:
+    def asking(self) -> _Asking:
         """While a criterion is asked: what would not raise `Undecided` is closed, and `asked` is noted."""
-        self.asked.clear()
-        self.speeds_asked.clear()
-        self._closed = True
-        try:
-            yield
-        finally:
-            self._closed = False
+        return self._asking
 
     def _open(self, what: str, instead: str) -> None:
         if self._closed:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from seerob.core.errors import Undecided
-from seerob.core.tolerances import Spread, Tolerance
+from seerob.core.tolerances import Tolerance
+from seerob.core.verdict import ROUNDING
 from seerob.criteria.stopping import search, table
 from seerob.criteria.stopping.largest import LargestSeparation
 from seerob.criteria.stopping.search import factor_by_search
@@ -19,7 +20,8 @@ from seerob.criteria.stopping.terms import (
     largest_scale,
     way_of_person,
 )
-from seerob.criteria.stopping.tolerances import SeparationEnds, intervals
+from seerob.criteria.stopping.tolerances import SeparationEnds
+from seerob.kernels.separation import judged
 
 
 def test_full_speed_until_standstill_is_the_bound_and_half_of_it_a_constant_deceleration():
@@ -93,12 +95,17 @@ def test_the_largest_factor_is_searched_up_to_ten_times_the_present_speeds(costl
 
 
 def test_what_S_p_may_be_off_is_put_on_the_side_of_the_distance():
-    distance, S_p = np.array([3.0, 2.0]), np.array([1.0, 1.5])
-    assert intervals(distance, distance, S_p, None) == [(3.0, 3.0), (2.0, 2.0)]
-    assert intervals(distance - 0.25, distance + 0.25, S_p, None) == [(2.75, 3.25), (1.75, 2.25)]
-    span = Spread(S_p - 0.5, S_p + 0.25, np.zeros((0, 2)))
-    assert intervals(distance, distance, S_p, span) == [(2.75, 3.5), (1.75, 2.5)]
-    assert intervals(distance - 1.0, distance + 1.0, S_p, span) == [(1.75, 4.5), (0.75, 3.5)]
+    distance, S_p, none = np.array([3.0, 2.0]), np.array([1.0, 1.5]), np.zeros(2)
+
+    def between(near, far, low, high):
+        ends, verdicts = np.empty((2, 2)), np.empty(2, np.int64)
+        judged(distance, near, far, S_p, none, low, high, ROUNDING, False, ends, verdicts)
+        return list(zip(*ends.tolist(), strict=True))
+
+    assert between(distance, distance, S_p, S_p) == [(3.0, 3.0), (2.0, 2.0)]
+    assert between(distance - 0.25, distance + 0.25, S_p, S_p) == [(2.75, 3.25), (1.75, 2.25)]
+    assert between(distance, distance, S_p - 0.5, S_p + 0.25) == [(2.75, 3.5), (1.75, 2.5)]
+    assert between(distance - 1.0, distance + 1.0, S_p - 0.5, S_p + 0.25) == [(1.75, 4.5), (0.75, 3.5)]
 
 
 @pytest.mark.parametrize("remembers", [False, True])

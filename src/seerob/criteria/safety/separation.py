@@ -2,6 +2,7 @@ r"""Protective separation distance, ISO/TS 15066:2016 5.5.4.2.3; upper bound: [W
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Annotated, ClassVar, Literal, NamedTuple
@@ -11,32 +12,32 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from seerob.core import figures
-from seerob.core.domains import number
+from seerob.core.domains import at_least, number
 from seerob.core.errors import InputError, Undecided
 from seerob.core.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.core.tolerances import Shifts, Tolerance, deciding
 from seerob.core.transforms import Array
+from seerob.core.verdict import ROUNDING
 from seerob.criteria.criterion import (
     Criterion,
     Evaluate,
     EvaluateMany,
     Follows,
     Moment,
-    judge_interval,
-    worst,
 )
 from seerob.criteria.partly_seen import partly_seen
 from seerob.criteria.sensors.detection import Detection, device_of
 from seerob.criteria.stopping.inputs import approach_speed, intrusion
 from seerob.criteria.stopping.largest import LargestSeparation
-from seerob.criteria.stopping.many_instants import separations
+from seerob.criteria.stopping.many_instants import separations as at_instants
 from seerob.criteria.stopping.models import MOVING, Stop, StopModel, bind_stop
 from seerob.criteria.stopping.onset import LARGEST_WINDOW
 from seerob.criteria.stopping.search import TOP, factor_by_search
 from seerob.criteria.stopping.terms import At, Course, separation_distance, way_of_person
-from seerob.criteria.stopping.tolerances import SIMULATED, SeparationEnds, intervals, shifted, tolerances
+from seerob.criteria.stopping.tolerances import SIMULATED, SeparationEnds, shifted, tolerances
 from seerob.description.norms import iso_13855
 from seerob.description.norms.iso_13855 import REACHING, WALKING
+from seerob.kernels.separation import EXCEEDED, UNDECIDED, WITHIN, judged, separations
 from seerob.model import provenance
 from seerob.model.model import Gap, Model
 from seerob.twin.accuracy.distance_ends import DistanceEnds
@@ -51,6 +52,7 @@ __all__ = ["Detection", "Separation", "Stop", "separation_bound"]
 CLOSE = 1e-4
 """A rise of S_p between ticks that is not looked into [m]; our choice, a tenth of the tolerance to which
 `seerob.session.permissible.between_samples` bounds distances."""
+_VERDICTS = {WITHIN: Verdict.WITHIN, UNDECIDED: Verdict.UNDECIDED, EXCEEDED: Verdict.EXCEEDED}
 MORE = "S_p may be larger by"
 """Name of the part of a result that says so; there is none where S_p is known."""
 
@@ -222,15 +224,21 @@ class Separation(Criterion, frozen=True, kw_only=True):
         return "; ".join([*reasons, *stop.doubts])
 
     def _distance(self, course: Course, K: float, seen: Array | float) -> Array:
-        """S_p of each part [m], of a person who is seen to be as fast as ``seen`` [m/s]."""
+        """S_p of each part [m], of a person who is seen to be as fast as ``seen`` [m/s].
 
-        def at_speed(v_h: Array | float) -> Array:
-            return separation_distance(course, v_h, self.stop.reaction, K)
-
-        if self.human_speed is not None:
-            return at_speed(np.maximum(self.human_speed, seen))
-        assumed = iso_13855.least_distance(at_speed)
-        return np.asarray(np.maximum(assumed, at_speed(seen))) if np.any(seen > WALKING) else assumed
+        Args:
+            course: Of the robot, at one instant (n,) or at N of them (N, n).
+            K: C + Z_d + Z_r [m].
+            seen: Of one instant, or of each (N, 1).
+        """
+        fast = np.asarray(seen, float).reshape(-1)
+        S_r, S_s = (np.ascontiguousarray(each).reshape(len(fast), -1) for each in (course.S_r, course.S_s))
+        time = float(at_least("T_r", self.stop.reaction, unit="s") + at_least("T_s", course.T_s, unit="s"))
+        v_h = math.nan if self.human_speed is None else self.human_speed
+        found = np.empty(course.S_r.shape)
+        rows = found.reshape(len(fast), -1)
+        separations(S_r, S_s, time, K, v_h, fast, REACHING, WALKING, iso_13855.ARM_REACH, rows)
+        return found
 
     @staticmethod
     def _seen(state: State, gap: Gap) -> tuple[float, float]:
@@ -242,9 +250,12 @@ class Separation(Criterion, frozen=True, kw_only=True):
         if state.strays(gap.a):
             return 0.0, 0.0
         lost = state.invalid_bodies(gap.a)
-        people = tuple(i for i in gap.a if i not in lost)
+        people = tuple(i for i in gap.a if i not in lost) if lost else gap.a
         speeds = state.fastest_points(people, allow_estimated=True)[0]
-        return float(speeds.max(initial=0.0)), float((speeds + state.speed_noise(people)).max(initial=0.0))
+        seen = float(speeds.max(initial=0.0))
+        if not state.speed_errors:
+            return seen, seen
+        return seen, float((speeds + state.speed_noise(people)).max(initial=0.0))
 
     def looks_ahead(self, model: Model) -> Mapping[str, float]:
         """Look ahead as long as the robot takes to react [s], by its name."""
@@ -309,7 +320,11 @@ class Separation(Criterion, frozen=True, kw_only=True):
             span = ends.at(state) if ends.tolerances else None
             # What acceleration and noise may add to S_p, with all inputs at their worst, is less distance.
             more = most - S_p if span is None else np.maximum(tops[largest_ends] - span.high, 0.0)
-            spans = intervals(near - more, far, S_p, span)
+            low, high = (S_p, S_p) if span is None else (span.low, span.high)
+            verdicts, between = np.empty(len(S_p), np.int64), np.empty((2, len(S_p)))
+            k = judged(
+                found.distance, near, far, S_p, more, low, high, ROUNDING, bool(unknown), between, verdicts
+            )
             open_at_all = span is not None or bool((far > near).any() or (most > S_p).any())
             bodies = found.body_a.tolist()
             parts = tuple(
@@ -319,17 +334,21 @@ class Separation(Criterion, frozen=True, kw_only=True):
                     unit="m",
                     limit=least,
                     at_most=False,
-                    verdict=self._verdict(ends_of_part, least, bool(unknown)),
-                    interval=ends_of_part if open_at_all else None,
+                    verdict=_VERDICTS[code],
+                    interval=(first, last) if open_at_all else None,
                     reason=names[bone],
                 )
-                for body, distance, least, ends_of_part, bone in zip(
-                    gap.b, found.distance.tolist(), S_p.tolist(), spans, bodies, strict=True
+                for body, distance, least, code, first, last, bone in zip(
+                    gap.b,
+                    found.distance.tolist(),
+                    S_p.tolist(),
+                    verdicts.tolist(),
+                    *between.tolist(),
+                    bodies,
+                    strict=True,
                 )
             )
-            verdict = worst([part.verdict for part in parts])
-            margins = (found.distance - S_p).tolist()
-            k = min((i for i, part in enumerate(parts) if part.verdict is verdict), key=margins.__getitem__)
+            verdict = parts[k].verdict
             open_ = unknown
             if verdict is Verdict.UNDECIDED and not unknown:
                 widths = np.zeros(0) if span is None else span.widths[:, k]
@@ -365,7 +384,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
                     *parts,
                     *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r), seen[0]),
                     *self._more(most - S_p, unbounded_reason),
-                    *self._permissible(stop, state, course, now, found.distance, K),
+                    *self._permissible(stop, state, course, now, found.distance, K, seen, stray),
                 ),
                 markers=(segment,),
             )
@@ -399,7 +418,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
         if self.mode == "fixed" or own._tolerances():
             return None
         incomplete = bool(self.unknown(model))
-        return separations(own.stop, gap, own._distance, K, incomplete=incomplete)
+        return at_instants(own.stop, gap, own._distance, K, incomplete=incomplete)
 
     def remembers(self, model: Model) -> bool:
         """Say whether the result depends on earlier instants, so that it is asked in the order of time."""
@@ -588,19 +607,27 @@ class Separation(Criterion, frozen=True, kw_only=True):
         def at(state: State, distance: Array) -> tuple[Array, tuple[Result, ...]]:
             course = stop.courses(state)
             now = course(1.0)
-            required = self._required(now, K, *self._seen(state, gap))
+            seen, stray = self._seen(state, gap), state.strays(gap.a)
+            required = self._required(now, K, *seen)
             if required.unbounded_reason:
                 raise Undecided(required.unbounded_reason)
-            return required.most, self._permissible(stop, state, course, now, distance, K)
+            return required.most, self._permissible(stop, state, course, now, distance, K, seen, stray)
 
         return at
 
     def _permissible(
-        self, stop: StopModel, state: State, course: At, now: Course, distance: Array, K: float
+        self,
+        stop: StopModel,
+        state: State,
+        course: At,
+        now: Course,
+        distance: Array,
+        K: float,
+        seen: tuple[float, float],
+        stray: str,
     ) -> tuple[Result, ...]:
         """Largest speed of the robot's fastest point for which no part is nearer than its S_p."""
         speed, factor, reason = None, None, ""
-        seen = self._seen(state, self._gap(state.model))
 
         def S_p(scale: float) -> Array:
             required = self._required(course(scale), K, *seen)
@@ -610,11 +637,7 @@ class Separation(Criterion, frozen=True, kw_only=True):
 
         least, most = stop.reactions(state)
         onset = least if most is None else most
-        if (
-            state.strays(self._gap(state.model).a)
-            or now.unbounded_reason
-            or (now.most is not None and now.most.unbounded_reason)
-        ):
+        if stray or now.unbounded_reason or (now.most is not None and now.most.unbounded_reason):
             reason = "S_p is at least what is shown: no speed follows"
         elif stop.inverse is not None and onset(1.0).linear:
             given = self.human_speed
@@ -637,12 +660,6 @@ class Separation(Criterion, frozen=True, kw_only=True):
             Result(name="largest permissible speed", value=speed, unit="m/s", at_most=False, reason=reason),
             Result(name="share of the present speed", value=factor, at_most=False, reason=beside),
         )
-
-    @staticmethod
-    def _verdict(interval: tuple[float, float], S_p: float, incomplete: bool) -> Verdict | None:
-        """Below an incomplete S_p is EXCEEDED all the same; above it nothing follows."""
-        verdict = judge_interval(interval, S_p, at_most=False)
-        return Verdict.UNDECIDED if incomplete and verdict is Verdict.WITHIN else verdict
 
     def basis(self, model: Model) -> Basis:
         """State the formula, its source, the inputs with their origin, and what is not modelled."""

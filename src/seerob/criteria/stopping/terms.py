@@ -13,7 +13,6 @@ Speeds count as positive whatever their direction, so that what recedes never sh
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -22,6 +21,7 @@ import numpy as np
 from seerob.core.domains import at_least, number
 from seerob.core.transforms import Array
 from seerob.criteria.stopping.onset import Onset
+from seerob.kernels import separation as kernel
 from seerob.twin.state import State
 
 BOUND, CONSTANT = 1.0, 0.5
@@ -153,23 +153,8 @@ def largest_factor(c: Array, b: Array, a: Array | float = 0.0) -> float:
     Returns:
         0 where no factor is; inf where nothing grows.
     """
-    squares = np.broadcast_to(a, np.shape(c)).tolist() if np.ndim(a) else [float(a)] * len(c)
-    parts = list(zip(np.asarray(c).tolist(), np.asarray(b).tolist(), squares, strict=True))
-    if any(at_rest > 0 for at_rest, _, _ in parts):
-        return 0.0
-    least = math.inf
-    # Of a dozen parts: a loop is faster than arrays.
-    for at_rest, grows, with_square in parts:
-        left = -at_rest
-        # The root that stays exact when the square is small.
-        down = grows + math.sqrt(grows * grows + 4 * with_square * left)
-        if math.isnan(down):
-            return math.nan
-        if down > 0:
-            least = min(least, 2 * left / down)
-        elif with_square != 0:
-            least = 0.0
-    return least
+    squares = np.zeros(len(c)) + a
+    return float(kernel.largest_factor(np.ascontiguousarray(c), np.ascontiguousarray(b), squares))
 
 
 def worst_case(S_p: Array) -> Array:

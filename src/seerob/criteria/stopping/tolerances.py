@@ -74,20 +74,3 @@ class SeparationEnds:
         if self._remembers:
             _ = found.widths
         return found
-
-
-def intervals(near: Array, far: Array, S_p: Array, span: Spread | None) -> list[tuple[float, float]]:
-    """Of each part's distance [m], with what S_p may be off put on the distance's side.
-
-    So the verdict of an interval against the S_p shown is that of the least distance against the largest S_p
-    and of the largest distance against the least.
-
-    Args:
-        near: Least distance of each part [m], people being where devices see them or not, shape (n,).
-        far: Largest distance, likewise.
-        S_p: Of each part, as given [m], shape (n,).
-        span: Ends of S_p; None when nothing of the stop may be off.
-    """
-    low, high = (S_p, S_p) if span is None else (span.low, span.high)
-    ends = near - (high - S_p), far + (S_p - low)
-    return list(zip(*(end.tolist() for end in ends), strict=True))

@@ -1,0 +1,157 @@
+"""Protective separation distances of the parts of a robot, and what they say of distances, compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from seerob.core.transforms import Array
+
+Codes = NDArray[np.int64]
+
+WITHIN, UNDECIDED, EXCEEDED = 0, 1, 2
+"""Verdicts, the worse the larger."""
+
+_ROW, _ROWS = "f8[::1]", "f8[:,::1]"
+
+
+@njit(
+    f"void({_ROWS}, {_ROWS}, f8, f8, f8, {_ROW}, f8, f8, f8, {_ROWS})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def separations(
+    S_r: Array,
+    S_s: Array,
+    time: float,
+    K: float,
+    v_h: float,
+    seen: Array,
+    reaching: float,
+    walking: float,
+    arm: float,
+    found: Array,
+) -> None:
+    r"""Find S_p of each part at many instants; writes into the last argument.
+
+    It is :math:`v_h (T_r + T_s) + S_r + S_s + K`.
+
+    Args:
+        S_r: Ways while the robot reacts [m], shape (N, n).
+        S_s: Ways while it brakes [m], shape (N, n).
+        time: T_r + T_s [s].
+        K: C + Z_d + Z_r [m].
+        v_h: Speed of the person that is given [m/s]; NaN for that of ISO 13855, by the next three.
+        seen: Speed that the person is seen to have, which counts where it is larger [m/s], shape (N,).
+        reaching: Speed up to ``arm`` [m/s].
+        walking: Speed beyond [m/s].
+        arm: Distance up to which the former counts, and below which the latter leads to none [m].
+        found: S_p [m], shape (N, n).
+    """
+    given = not math.isnan(v_h)
+    for k in range(S_r.shape[0]):
+        own = np.maximum(np.maximum(v_h, seen[k]), 0.0) * time
+        near, far = np.maximum(reaching, 0.0) * time, np.maximum(walking, 0.0) * time
+        faster = np.maximum(seen[k], 0.0) * time
+        for i in range(S_r.shape[1]):
+            if given:
+                found[k, i] = own + S_r[k, i] + S_s[k, i] + K
+                continue
+            least = near + S_r[k, i] + S_s[k, i] + K
+            if not least <= arm:
+                least = np.maximum(far + S_r[k, i] + S_s[k, i] + K, arm)
+            # A speed that is not a number is none that may be left out.
+            if not seen[k] <= walking:
+                least = np.maximum(least, faster + S_r[k, i] + S_s[k, i] + K)
+            found[k, i] = least
+
+
+@njit(
+    f"i8({_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, f8, b1, {_ROWS}, i8[::1])",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def judged(
+    distance: Array,
+    near: Array,
+    far: Array,
+    S_p: Array,
+    more: Array,
+    low: Array,
+    high: Array,
+    rounding: float,
+    incomplete: bool,
+    ends: Array,
+    verdicts: Codes,
+) -> int:
+    """Judge distances of parts against S_p as `seerob.core.verdict.keeps`; writes the last two arguments.
+
+    Args:
+        distance: As the twin has them [m], shape (n,).
+        near: Least that they may be [m], shape (n,).
+        far: Largest, likewise.
+        S_p: As given [m], shape (n,).
+        more: What acceleration and noise may add to it [m], shape (n,).
+        low: Least end of S_p by its tolerances [m], shape (n,).
+        high: Largest end, likewise.
+        rounding: Share of S_p, and of 1 m where it is less, by which a distance must keep it.
+        incomplete: Whether S_p may be larger than all that: then nothing is within.
+        ends: Between which each distance lies, with what S_p may be off put on its side [m], shape (2, n).
+        verdicts: Of each, shape (n,).
+
+    Returns:
+        Which part governs: of those with the worst verdict the one that is nearest to its S_p, or deepest in.
+    """
+    worst, governs = -1, 0
+    for i in range(len(S_p)):
+        ends[0, i] = (near[i] - more[i]) - (high[i] - S_p[i])
+        ends[1, i] = far[i] + (S_p[i] - low[i])
+        limit = S_p[i]
+        if not math.isinf(limit):
+            limit = limit + rounding * max(1.0, abs(limit))
+        kept = ends[0, i] >= limit
+        if math.isnan(ends[0, i]) or math.isnan(ends[1, i]) or kept != (ends[1, i] >= limit):
+            verdicts[i] = UNDECIDED
+        elif kept:
+            verdicts[i] = UNDECIDED if incomplete else WITHIN
+        else:
+            verdicts[i] = EXCEEDED
+        if verdicts[i] > worst:
+            worst, governs = verdicts[i], i
+        elif verdicts[i] == worst and distance[i] - S_p[i] < distance[governs] - S_p[governs]:
+            governs = i
+    return governs
+
+
+@njit(f"f8({_ROW}, {_ROW}, {_ROW})", cache=True, nogil=True, error_model="numpy")
+def largest_factor(c: Array, b: Array, a: Array) -> float:
+    r"""Largest factor s of all speeds with :math:`a_i s^2 + b_i s + c_i \le 0` for every part i.
+
+    Args:
+        c: S_p at standstill less the distance [m], shape (n,).
+        b: What grows with the speeds [m], not negative, shape (n,).
+        a: What grows with their squares [m], not negative, shape (n,).
+
+    Returns:
+        0 where no factor is; inf where nothing grows; NaN where something is not a number.
+    """
+    least = math.inf
+    for i in range(len(c)):
+        if c[i] > 0:
+            return 0.0
+    for i in range(len(c)):
+        left = -c[i]
+        # The root that stays exact when the square is small.
+        down = b[i] + math.sqrt(b[i] * b[i] + 4 * a[i] * left)
+        if math.isnan(down):
+            return math.nan
+        if down > 0:
+            least = min(least, 2 * left / down)
+        elif a[i] != 0:
+            least = 0.0
+    return least

@@ -1,7 +1,10 @@
 """What a plug-in of your own is made from: criteria, rules, sources, sinks, and what they give.
 
 Names here stay; where they live inside may change. A plug-in imports nothing else of seerob.
+docs/extending.md has a tutorial per kind.
 """
+
+from typing import Final
 
 from seerob.core.errors import InputError, SeerobError, Undecided, UnknownName
 from seerob.core.markers import (
@@ -28,13 +31,18 @@ from seerob.criteria.scoring.spans import beyond
 from seerob.devices.live.listening import LiveSource
 from seerob.model.model import Model
 from seerob.outputs.sink import Closing, Sink, Writer
+from seerob.outputs.tables.growing_table import no_formula
 from seerob.recording.answers import Answers
 from seerob.twin.spans import Falls, Points, approaching
 from seerob.twin.state import State
 from seerob.twin.states import States
 from seerob.workstation.source import Opened, Source, Target
 
+VERSION: Final = 1
+"""Goes up when a name here is taken away or means something else; a new name leaves it as it is."""
+
 __all__ = [
+    "VERSION",
     "Answers",
     "Arrow",
     "Basis",
@@ -88,5 +96,6 @@ __all__ = [
     "bind_posture",
     "judge",
     "judge_interval",
+    "no_formula",
     "worst",
 ]

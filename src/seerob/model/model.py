@@ -198,7 +198,7 @@ class Gap:
         return *self.a, *self.b
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Model:
     """A compiled workstation; frozen. Made by `seerob.model.mounting.compilation.compile_workstation`."""
 
@@ -218,6 +218,10 @@ class Model:
     dictionary: dict[str, Variable] = field(default_factory=dict)
     """Variables of controllers and machines by their names here."""
     _gaps: dict[tuple[tuple[int, ...], tuple[int, ...]], Gap] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        of = f"{len(self.bodies)} bodies, {', '.join(self.mechanisms) or 'nobody moves'}"
+        return f"<Model {self.workstation.title!r}: {of}>"
 
     @property
     def estimate_uncertainty(self) -> dict[str, float]:

@@ -127,6 +127,10 @@ class ResultLog(Mapping[str, Series]):
     def __len__(self) -> int:
         return len(self._series)
 
+    def __repr__(self) -> str:
+        verdict = "no verdict" if self.verdict is None else self.verdict.value
+        return f"<ResultLog: {len(self)} criteria, {self.ticks} ticks, {verdict}>"
+
     @property
     def verdict(self) -> Verdict | None:
         """Verdict of the whole run; None when no criterion has one."""

@@ -195,6 +195,10 @@ class Series:
         # Appended last at each tick: its length is how many ticks are whole.
         self._verdicts = Column("B", spill)
 
+    def __repr__(self) -> str:
+        verdict = "no verdict" if self.verdict is None else self.verdict.value
+        return f"<Series {self.name!r}: {len(self)} instants, {verdict}>"
+
     @property
     def known(self) -> bool:
         """Whether anything was heard."""

@@ -24,6 +24,7 @@ from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, EvaluateMany
 from seerob.criteria.judging import Judge, held, held_names, needed, unmentioned, worded
 from seerob.model.model import Model
+from seerob.outputs.notebook import batch_html
 from seerob.recording.answers import UNDECIDED, WITHIN, Answers, Flags
 from seerob.recording.series import CODES, ONE_INSTANT
 from seerob.session.run import Bound, Feed, engine_of, settled
@@ -39,7 +40,7 @@ SHARES = 8
 """Parts that a motion has between the two, so that threads end together."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Column:
     """What one criterion says of every instant."""
 
@@ -69,8 +70,12 @@ class Column:
         known = not self.between or self.between.startswith("accepted: ")
         return found if known or found is not Verdict.WITHIN else Verdict.UNDECIDED
 
+    def __repr__(self) -> str:
+        verdict = "no verdict" if self.verdict is None else self.verdict.value
+        return f"<Column {self.name!r}: {len(self.value)} instants, {verdict}>"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Batch(Mapping[str, Column]):
     """What all criteria say of N instants, by the criterion's name."""
 
@@ -89,6 +94,12 @@ class Batch(Mapping[str, Column]):
 
     def __len__(self) -> int:
         return len(self.columns)
+
+    def __repr__(self) -> str:
+        return f"<Batch: {len(self)} criteria, {len(self.t)} instants>"
+
+    def _repr_html_(self) -> str:
+        return batch_html((c.name, c.verdict, c.answers.verdict, c.value, c.unit) for c in self.values())
 
 
 class _Whereabouts(State):

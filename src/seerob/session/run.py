@@ -22,6 +22,7 @@ from seerob.criteria.judging import bound_to
 from seerob.devices.live.listening import LiveSource, delay_of
 from seerob.devices.live.real_time import Clock
 from seerob.model.model import Model
+from seerob.outputs.notebook import results_html
 from seerob.outputs.sink import KeepsResults, Writer
 from seerob.recording.result_log import ResultLog
 from seerob.session.displays import Looks, invalid_reasons
@@ -234,7 +235,7 @@ def settled() -> Iterator[None]:
         gc.unfreeze()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Summary:
     """What a run came to."""
 
@@ -255,6 +256,14 @@ class Summary:
     def verdict(self) -> Verdict | None:
         """Verdict of the whole run."""
         return self.results.verdict
+
+    def __repr__(self) -> str:
+        verdict = "no verdict" if self.verdict is None else self.verdict.value
+        of = f"{len(self.results)} criteria, {self.ticks} ticks, {self.duration:g} s"
+        return f"<Summary {self.scene.title!r}: {verdict}, {of}>"
+
+    def _repr_html_(self) -> str:
+        return results_html(self.results)
 
 
 def run(

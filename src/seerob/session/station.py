@@ -7,8 +7,9 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import replace
 from numpy.typing import ArrayLike
@@ -25,6 +26,8 @@ from seerob.model.model import Model
 from seerob.model.mounting.compilation import Progress, compile_workstation
 from seerob.model.mounting.in_place import implausible
 from seerob.model.mounting.things import MadeArea
+from seerob.outputs.notebook import criteria_html
+from seerob.outputs.sentences import counted
 from seerob.outputs.sink import Sink, Writer
 from seerob.recording.filing import source_files
 from seerob.recording.recording import Recording
@@ -63,8 +66,45 @@ class Station:
             InputError: With every mistake in every file that it names.
         """
         self.workstation = workstation
+        self._cache = cache
         made = self._swept_areas(cache, progress)
         self.model: Model = compile_workstation(workstation, cache=cache, progress=progress, made=made)
+
+    def __repr__(self) -> str:
+        return f"<Station {self.workstation.title!r}: {self._counts()}>"
+
+    def _repr_html_(self) -> str:
+        infos = scene_of(self.model, self.bound, [], files={}).criteria
+        return criteria_html(self.workstation.title, self._counts(), infos)
+
+    def _counts(self) -> str:
+        """``two robots, one person, 18 criteria``."""
+        roles = [mechanism.role for mechanism in self.model.mechanisms.values()]
+        criteria = len(self.workstation.safety) + len(self.workstation.ergonomics)
+        every = (
+            (roles.count("robot"), "robot", "robots"),
+            (roles.count("human"), "person", "people"),
+            (roles.count("machine"), "machine", "machines"),
+            (criteria, "criterion", "criteria"),
+        )
+        return ", ".join(counted(n, one, many) for n, one, many in every if n)
+
+    def __getstate__(self) -> dict[str, object]:
+        """What the file says; who reads it back compiles it again, from the same files or not at all."""
+        return {"workstation": self.workstation, "cache": self._cache, "files": _digests(self.model.files)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Compile again.
+
+        Raises:
+            InputError: A file of the workstation is another than it was.
+        """
+        self.__init__(state["workstation"], cache=state["cache"])  # type: ignore[misc]
+        now, then = _digests(self.model.files), state["files"]
+        changed = [name for name in {**then, **now} if now.get(name) != then.get(name)]
+        if changed:
+            what = "changed since the workstation was pickled"
+            raise InputError.at(changed[0], "", what, "load the workstation again in this process")
 
     def _swept_areas(self, cache: Path | None, progress: Progress) -> dict[str, MadeArea]:
         """Areas that are swept, from a run of the same workstation without them."""
@@ -137,6 +177,7 @@ class Station:
     def with_criteria(self, *criteria: Criterion) -> Station:
         """Return the compiled workstation with more safety criteria; nothing is compiled again."""
         other = object.__new__(Station)
+        other._cache = self._cache
         other.workstation = replace(self.workstation, safety=(*self.workstation.safety, *criteria))
         from dataclasses import replace as replaced
 
@@ -439,6 +480,10 @@ class Station:
             stop=stop,
             progress=progress,
         )
+
+
+def _digests(files: Mapping[str, bytes]) -> dict[str, str]:
+    return {name: sha256(content).hexdigest() for name, content in files.items()}
 
 
 def load(path: Path | str, *, cache: Path | None = None) -> Station:

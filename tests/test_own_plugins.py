@@ -1,0 +1,189 @@
+"""Source, live source and sink of a company, as docs/extending.md shows them, beside its criteria."""
+
+import asyncio
+import csv
+import json
+import math
+import re
+import threading
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+import seerob as sr
+from seerob import api
+from seerob.protocols.links.tcp_server import close_server
+from seerob.recording.series import CODES
+from seerob.testing import sources_never_within
+
+ROOT = Path(__file__).parents[1]
+ROBOT = """
+[[robots]]
+name = "arm"
+model = "library:ur5e"
+q_deg = [0, -90, 0, -90, 0, 0]
+
+[[safety]]
+kind = "velocity"
+name = "speed"
+at = "arm"
+limit = 2.0
+"""
+UP = (0.0, -math.pi / 2, 0.0, -math.pi / 2, 0.0, 0.0)
+
+
+@pytest.fixture(autouse=True)
+def acme(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "examples"))
+
+
+def cell(folder, text):
+    (folder / "workstation.toml").write_text(ROBOT + text)
+    return folder
+
+
+def swing(folder, seconds=1.0, period=0.008):
+    with (folder / "motion.jsonl").open("w") as file:
+        for k in range(round(seconds / period) + 1):
+            q = [0.3 * math.sin(2 * k * period), *UP[1:]]
+            file.write(json.dumps({"t": 100 + k * period, "q": q}) + "\n")
+
+
+FROM_FILE = """
+[[sources]]
+kind = "acme.joint_lines"
+robot = "arm"
+file = "motion.jsonl"
+"""
+
+
+def test_a_source_of_ones_own_moves_the_robot(tmp_path):
+    swing(tmp_path)
+    run = sr.load(cell(tmp_path, FROM_FILE)).run()
+    speed = run.results["speed"]
+    # The tool point of the upright arm is 0.2328 m from the axis of its base (d4 + d6 of its table).
+    assert speed.max() == pytest.approx(0.6 * math.hypot(0.1333 + 0.0996, 0.0), rel=0.02)
+    assert speed.verdict is sr.Verdict.WITHIN
+
+
+def test_it_is_never_within_when_it_lies(tmp_path):
+    swing(tmp_path)
+    sources_never_within(cell(tmp_path, FROM_FILE))
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('{"t": 0}', "line 2"),
+        ("[]", "line 2"),
+        ('{"t": 0, "q": [1, 2]}', "6 finite numbers"),
+        ('{"t": NaN, "q": [0,0,0,0,0,0]}', "line 2"),
+        ("\xff", "line 2"),
+    ],
+)
+def test_a_wrong_line_is_said_with_its_place(tmp_path, line, said):
+    good = json.dumps({"t": 0.0, "q": UP})
+    (tmp_path / "motion.jsonl").write_text(f"{good}\n{line}\n", encoding="latin-1")
+    station = sr.load(cell(tmp_path, FROM_FILE))
+    with pytest.raises(sr.InputError, match=said):
+        station.run()
+
+
+class Controller:
+    """The other end: a real server that sends 125 lines a second until it is told to stop."""
+
+    def __init__(self):
+        self._ready = threading.Event()
+        self.silent = threading.Event()
+        self._thread = threading.Thread(target=asyncio.run, args=(self._serve(),))
+        self._thread.start()
+        self._ready.wait()
+
+    async def _serve(self):
+        self._loop, self._over = asyncio.get_running_loop(), asyncio.Event()
+        server = await asyncio.start_server(self._speak, "127.0.0.1", 0)
+        self.port = server.sockets[0].getsockname()[1]
+        self._ready.set()
+        await self._over.wait()
+        await close_server(server)
+        await asyncio.sleep(0.1)  # those who speak see that it is over
+
+    async def _speak(self, _, writer):
+        begun = time.monotonic()
+        while not self._over.is_set():
+            t = time.monotonic() - begun
+            q, qd = [0.3 * math.sin(2 * t), *UP[1:]], [0.6 * math.cos(2 * t), *[0.0] * 5]
+            if not self.silent.is_set():
+                writer.write((json.dumps({"t": t, "q": q, "qd": qd}) + "\n").encode())
+            await asyncio.sleep(0.008)
+        writer.close()
+
+    def stop(self):
+        self._loop.call_soon_threadsafe(self._over.set)
+        self._thread.join()
+
+
+def test_a_live_source_of_ones_own_is_heard_and_its_silence_is_undecided(tmp_path):
+    controller = Controller()
+    text = f'[[sources]]\nkind = "acme.cell_controller"\nrobot = "arm"\nport = {controller.port}\n'
+    station = sr.load(cell(tmp_path, text + "frequency = 125\n"))
+    begun = time.monotonic()
+
+    def stop():
+        passed = time.monotonic() - begun
+        if passed > 4.0:
+            controller.silent.set()
+        return passed > 5.5
+
+    run = station.run(live=True, stop=stop)
+    controller.stop()
+    speed = run.results["speed"]
+    verdicts = speed.verdicts
+    within, undecided = (CODES[v] for v in (sr.Verdict.WITHIN, sr.Verdict.UNDECIDED))
+    assert (verdicts == within).any()
+    assert speed.max() == pytest.approx(0.6 * 0.2329, rel=0.1)
+    assert verdicts[-1] == undecided
+    assert run.verdict is sr.Verdict.UNDECIDED
+
+
+def test_a_sink_of_ones_own_writes_each_change_once(tmp_path):
+    swing(tmp_path)
+    text = FROM_FILE + '[[sinks]]\nkind = "acme.verdict_changes"\n'
+    station = sr.load(cell(tmp_path, text))
+    station.run(folder=tmp_path / "out", sinks=station.workstation.sinks)
+    with (tmp_path / "out/verdicts.csv").open(newline="") as file:
+        head, *rows = csv.reader(file)
+    assert head[1] == "criterion"
+    assert [row[1] for row in rows].count("speed") >= 1
+    assert all(a[2] != b[2] for a, b in pairwise(rows) if a[1] == b[1])
+
+
+def test_the_page_shows_each_file_as_it_is():
+    page = (ROOT / "docs/extending.md").read_text()
+    shown = re.findall(r"write-docs: file/(\S+)", page)
+    assert {Path(name).stem for name in shown} == {
+        file.stem for file in (ROOT / "examples/acme").glob("*.py") if file.stem != "__init__"
+    }
+
+
+def test_files_of_the_page_import_the_public_names_only():
+    for file in (ROOT / "examples/acme").glob("*.py"):
+        for line in file.read_text().splitlines():
+            assert not re.match(r"(from|import) seerob(?!\.api import)", line), f"{file.name}: {line}"
+
+
+NAMES_OF_VERSION_1 = (
+    "Answers Arrow Basis BodySample Box Closing Criterion Ellipsoid Evaluate EvaluateMany Falls "
+    "Finding Highlight Hull Input InputError JointSample Label LiveSource Marker Model Opened Origin "
+    "Points Polyline PoseSample Prism Quality Rays Result Row Rule Sample Scene SeerobError Segment "
+    "SignalSample Sink Snapshot Source Sphere State States Target Undecided UnknownName Verdict "
+    "Writer approaching beyond bind_posture judge judge_interval worst "
+)
+
+
+def test_no_name_of_a_version_is_taken_away():
+    assert api.VERSION == 1
+    assert set(NAMES_OF_VERSION_1.split()) <= set(api.__all__)
+    assert all(hasattr(api, name) for name in api.__all__)

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -203,7 +203,7 @@ class Model:
     """A compiled workstation; frozen. Made by `seerob.model.mounting.compilation.compile_workstation`."""
 
     workstation: Workstation
-    mj: Any
+    mj: mujoco.MjModel
     """The `mujoco.MjModel` of the whole workstation."""
     bodies: tuple[Body, ...]
     frames: dict[str, Frame]

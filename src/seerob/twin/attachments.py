@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,7 +40,7 @@ class Attachments:
         self.unknown = {b.index: untold(b) for b in model.bodies if b.holder}
         self._moves: dict[tuple[int, ...], NDArray[np.bool_]] = {}
 
-    def put(self, mj: Any, index: int, bearer: int) -> None:
+    def put(self, mj: mujoco.MjModel, index: int, bearer: int) -> None:
         """From now on a body rides on another one of MuJoCo's.
 
         Args:
@@ -52,7 +51,7 @@ class Attachments:
         self.ids[index], self.roots[index] = bearer, mj.body_rootid[bearer]
         self._moves.clear()
 
-    def moves(self, mj: Any, bodies: tuple[int, ...]) -> NDArray[np.bool_]:
+    def moves(self, mj: mujoco.MjModel, bodies: tuple[int, ...]) -> NDArray[np.bool_]:
         """Which degrees of freedom move each of some bodies, shape (b, nv)."""
         if bodies not in self._moves:
             self._moves[bodies] = np.array([moving_dofs(mj, self.ids[i]) for i in bodies])

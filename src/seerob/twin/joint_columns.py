@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -36,7 +35,7 @@ class Columns:
     """What each carries [kg]."""
 
     @classmethod
-    def of(cls, mechanism: Mechanism, mj: Any) -> Columns:
+    def of(cls, mechanism: Mechanism, mj: mujoco.MjModel) -> Columns:
         """Bind to a `mujoco.MjModel`."""
         v, n = mechanism.v_address, len(mechanism.v_address)
         in_turn = n > 0 and np.array_equal(v, v[0] + np.arange(n))
@@ -62,7 +61,7 @@ class Columns:
         return own.copy() if self.coupling is None else self.coupling.T @ own @ self.coupling
 
 
-def moving_dofs(mj: Any, body: int) -> NDArray[np.bool_]:
+def moving_dofs(mj: mujoco.MjModel, body: int) -> NDArray[np.bool_]:
     """Which degrees of freedom move one of MuJoCo's bodies, shape (nv,)."""
     found = np.zeros(mj.nv, bool)
     while body > 0:

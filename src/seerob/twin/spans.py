@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -142,7 +142,7 @@ class Points:
         self._ids = None
         return self.count - 1
 
-    def span(self, path: Path, begin: float, end: float, ids: Indices, mj: Any) -> Span:
+    def span(self, path: Path, begin: float, end: float, ids: Indices, mj: mujoco.MjModel) -> Span:
         """What holds from one instant to another.
 
         Args:
@@ -178,7 +178,7 @@ class Points:
         v: Array,
         begin: float,
         end: float,
-        mj: Any,
+        mj: mujoco.MjModel,
         fast: Array,
         quick: Array,
         bend: Array,
@@ -198,7 +198,7 @@ class Points:
         part = slice(int(self._start[point]), int(self._start[point + 1]))
         return self._joints[part], self._turns[part], self._lengths[part]
 
-    def chains(self, points: Indices, ids: Indices, mj: Any) -> Chains:
+    def chains(self, points: Indices, ids: Indices, mj: mujoco.MjModel) -> Chains:
         """Joints that move some points; ids and model as `span` takes them."""
         if self._ids is None or not np.array_equal(self._ids, ids):
             self._chains(mj, ids)
@@ -235,7 +235,7 @@ class Points:
                 found += rate * np.abs(coupling[dof])
         return found
 
-    def _chains(self, mj: Any, ids: Indices) -> None:
+    def _chains(self, mj: mujoco.MjModel, ids: Indices) -> None:
         """Resolve which joints move each point, from base to tip, and how long the segments between are."""
         data = mujoco.MjData(mj)
         mujoco.mj_kinematics(mj, data)
@@ -257,7 +257,7 @@ class Points:
         self._ids = np.array(ids)
 
 
-def joints_of(mj: Any, body: int) -> list[int]:
+def joints_of(mj: mujoco.MjModel, body: int) -> list[int]:
     """Joints that move a body of MuJoCo's, from base to tip."""
     found: list[int] = []
     while body > 0:
@@ -279,7 +279,7 @@ class Span:
         bend: Array,
         joints: Array,
         path: Path,
-        mj: Any,
+        mj: mujoco.MjModel,
         captured: Array | None = None,
     ) -> None:
         self.begin, self.end = begin, end
@@ -353,7 +353,7 @@ class Relative:
         points: Of the latter, in its frame [m], shape (k, 3) each.
     """
 
-    def __init__(self, mj: Any, pairs: Iterable[tuple[int, int]], points: Iterable[Array]) -> None:
+    def __init__(self, mj: mujoco.MjModel, pairs: Iterable[tuple[int, int]], points: Iterable[Array]) -> None:
         data = mujoco.MjData(mj)
         mujoco.mj_kinematics(mj, data)
         start, joints, turns, lengths = [0], [], [], []

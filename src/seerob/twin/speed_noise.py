@@ -12,7 +12,7 @@ joint that others follow (a mimic, a gripper) moves points by the sum of what ea
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -25,7 +25,7 @@ from seerob.twin.spans import joints_of
 Indices = NDArray[np.int64]
 
 
-def levers(data: Any, joints: Indices, body: Body, R: Array, x: Array) -> Array:
+def levers(data: mujoco.MjData, joints: NDArray[np.signedinteger], body: Body, R: Array, x: Array) -> Array:
     """Largest distance of a body from axes [m], shape (k,).
 
     Args:
@@ -66,7 +66,7 @@ class SpeedNoise:
 
     def of_bodies(
         self,
-        data: Any,
+        data: mujoco.MjData,
         ids: Indices,
         rotations: Array,
         positions: Array,

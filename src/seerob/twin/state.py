@@ -80,7 +80,7 @@ class State(Validity):
     """A view of the engine's `mujoco.MjData`; never keep one beyond its tick."""
 
     def __init__(
-        self, model: Model, data: Any, hearings: dict[str, Hearing], signals: Signals | None = None
+        self, model: Model, data: mujoco.MjData, hearings: dict[str, Hearing], signals: Signals | None = None
     ) -> None:
         super().__init__(model, hearings, signals)
         self._data = data

@@ -7,7 +7,6 @@ joints that turn or slide, one to a body, are followed so; MuJoCo follows the ot
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -46,7 +45,7 @@ class Tree:
     """Which joints move each link, shape (n + 1, n)."""
 
     @classmethod
-    def of(cls, mj: Any, root: int) -> Tree | None:
+    def of(cls, mj: mujoco.MjModel, root: int) -> Tree | None:
         """Bind to a `mujoco.MjModel`; None for a tree that only MuJoCo follows.
 
         Args:

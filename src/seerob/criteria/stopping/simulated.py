@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -90,7 +89,7 @@ class StopSimulation:
         """
         self.robot = robot
         self.masses = MassTolerances(model, robot)
-        self._weighed: dict[tuple[Shifts, bytes], Any] = {}
+        self._weighed: dict[tuple[Shifts, bytes], mujoco.MjModel] = {}
         self.bodies = [model.bodies[i] for i in bodies]
         self.brakes = np.ascontiguousarray(brakes, float)
         self._model = model
@@ -152,7 +151,7 @@ class StopSimulation:
             after = self._braked(v)
             q, v, t = q + STEP / 2 * (v + after), after, t + STEP
 
-    def _at_masses(self, mj: Any, shifts: Shifts) -> Any:
+    def _at_masses(self, mj: mujoco.MjModel, shifts: Shifts) -> mujoco.MjModel:
         if not any(shifts):
             return mj
         key = shifts, mj.body_mass.tobytes()

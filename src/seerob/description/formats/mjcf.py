@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -32,9 +32,12 @@ from seerob.description.shapes.detail import physics_mesh
 from seerob.description.shapes.split_surfaces import with_insides
 from seerob.description.xml_values import MAX_BYTES, Reader, parse_xml
 
+if TYPE_CHECKING:
+    import mujoco
+
 
 def shapes_of_body(
-    reader: Reader, model: Any, body: int, name: str
+    reader: Reader, model: mujoco.MjModel, body: int, name: str
 ) -> tuple[tuple[Mesh, ...], tuple[Solid, ...]]:
     """Display meshes and solids of one body, in its frame.
 
@@ -64,7 +67,7 @@ def shapes_of_body(
     return tuple(drawn) or tuple(mesh for _, mesh in touched), with_insides(solids)
 
 
-def _geom(reader: Reader, model: Any, geom: int, body: str) -> tuple[Solid, Mesh] | None:
+def _geom(reader: Reader, model: mujoco.MjModel, geom: int, body: str) -> tuple[Solid, Mesh] | None:
     import mujoco
 
     kinds = mujoco.mjtGeom
@@ -103,7 +106,7 @@ def _geom(reader: Reader, model: Any, geom: int, body: str) -> tuple[Solid, Mesh
     return replace(placed, name=name), replace(shown.moved(body_from_geom), color=(r, g, b, a))
 
 
-def _mesh(model: Any, mesh: int) -> Mesh:
+def _mesh(model: mujoco.MjModel, mesh: int) -> Mesh:
     v, n = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     f, m = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
     return Mesh(model.mesh_vert[v : v + n].astype(float), model.mesh_face[f : f + m].astype(np.int32))
@@ -260,7 +263,7 @@ def _remedy(said: str) -> str:
     return "give every moving body a mass greater than 0: <inertial>, or mass or density of its geoms"
 
 
-def _remarks(reader: Reader, spec: Any, model: Any) -> None:
+def _remarks(reader: Reader, spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
     left_out = {
         "tendons": model.ntendon,
         "flexes": model.nflex,
@@ -285,7 +288,7 @@ def _remarks(reader: Reader, spec: Any, model: Any) -> None:
         reader.finding("note", "", "springs in joints are left out")
 
 
-def _body_names(reader: Reader, model: Any) -> list[str]:
+def _body_names(reader: Reader, model: mujoco.MjModel) -> list[str]:
     names = []
     for body in range(model.nbody):
         name = model.body(body).name
@@ -296,7 +299,7 @@ def _body_names(reader: Reader, model: Any) -> list[str]:
     return names
 
 
-def _link(reader: Reader, spec: Any, model: Any, body: int, names: list[str]) -> Link:
+def _link(reader: Reader, spec: mujoco.MjSpec, model: mujoco.MjModel, body: int, names: list[str]) -> Link:
     name = names[body]
     parent_from_link = transform(rotation_from_wxyz(model.body_quat[body]), model.body_pos[body])
     adr, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
@@ -316,7 +319,7 @@ def _link(reader: Reader, spec: Any, model: Any, body: int, names: list[str]) ->
     )
 
 
-def _joint(reader: Reader, model: Any, joint: int) -> Joint | None:
+def _joint(reader: Reader, model: mujoco.MjModel, joint: int) -> Joint | None:
     import mujoco
 
     name = model.joint(joint).name or f"joint_{joint}"
@@ -352,7 +355,7 @@ def _joint(reader: Reader, model: Any, joint: int) -> Joint | None:
     )
 
 
-def _force_limits(model: Any, joint: int) -> Iterator[float]:
+def _force_limits(model: mujoco.MjModel, joint: int) -> Iterator[float]:
     """Every bound on the force of a joint: its own, and those of motors that drive it alone."""
     import mujoco
 
@@ -376,7 +379,7 @@ def _force_limits(model: Any, joint: int) -> Iterator[float]:
 
 
 def _at_zero(
-    reader: Reader, model: Any, adr: int, joints: tuple[Joint, ...], parent_from_link: Array
+    reader: Reader, model: mujoco.MjModel, adr: int, joints: tuple[Joint, ...], parent_from_link: Array
 ) -> Array:
     """MuJoCo's bodies are given with every joint at its ``ref``; descriptions are with every joint at 0."""
     references = [float(model.qpos0[model.jnt_qposadr[adr + i]]) for i in range(len(joints))]
@@ -390,7 +393,7 @@ def _at_zero(
 
 
 def _inertial(
-    reader: Reader, spec: Any, model: Any, body: int, name: str, *, shown: bool
+    reader: Reader, spec: mujoco.MjSpec, model: mujoco.MjModel, body: int, name: str, *, shown: bool
 ) -> tuple[Inertial | None, str]:
     """Mass properties that can be used, and why they cannot."""
     mass = float(model.body_mass[body])
@@ -444,7 +447,7 @@ def _without_empty_world(links: list[Link]) -> list[Link]:
     return [replace(root, parent=None), *(link for link in links[1:] if link is not root)]
 
 
-def _sites(model: Any, names: list[str], taken: set[str]) -> list[Link]:
+def _sites(model: mujoco.MjModel, names: list[str], taken: set[str]) -> list[Link]:
     """Sites are frames without mass: a tool may be mounted on one."""
     sites = []
     for site in range(model.nsite):
@@ -461,7 +464,7 @@ def _sites(model: Any, names: list[str], taken: set[str]) -> list[Link]:
     return sites
 
 
-def _mimicking(model: Any, links: list[Link], left_out: list[str]) -> Iterator[Link]:
+def _mimicking(model: mujoco.MjModel, links: list[Link], left_out: list[str]) -> Iterator[Link]:
     """Joint equalities as mimic joints; what other equalities there are is appended to ``left_out``."""
     import mujoco
 

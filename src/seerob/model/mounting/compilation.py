@@ -381,7 +381,7 @@ class _Compiler:
                 biastype=mujoco.mjtBias.mjBIAS_AFFINE,
             )
 
-    def _model(self, mj: Any, bodies: Sequence[Body]) -> Model:
+    def _model(self, mj: mujoco.MjModel, bodies: Sequence[Body]) -> Model:
         numbered = tuple(replace(body, mj=_body_id(mj, body.name)) for body in bodies)
         frames = {
             name: Frame(name, _body_id(mj, name), np.eye(4))
@@ -431,5 +431,5 @@ def _weight(inertial: Inertial) -> Quantity:
     return Quantity(inertial.mass, inertial.origin, inertial.source, inertial.error)
 
 
-def _body_id(mj: Any, name: str) -> int:
+def _body_id(mj: mujoco.MjModel, name: str) -> int:
     return int(mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name))

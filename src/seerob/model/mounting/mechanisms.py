@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -103,7 +102,7 @@ class Riders:
 
 
 def mechanism(
-    mj: Any,
+    mj: mujoco.MjModel,
     name: str,
     chain: MechanismDraft,
     riders: Riders,
@@ -190,7 +189,7 @@ def stands_out(a: float, b: float, variance: float) -> float:
     return math.sqrt(((a - b) / 2) ** 2 + variance) - (a + b) / 2
 
 
-def _unshaped(mj: Any, masses: Iterable[LinkMass], bodies: Sequence[Body]) -> Iterable[str]:
+def _unshaped(mj: mujoco.MjModel, masses: Iterable[LinkMass], bodies: Sequence[Body]) -> Iterable[str]:
     """Bodies with a mass of which some lies, by centre of mass and inertia, where nothing has a shape.
 
     The shapes of all that moves as one with a body count, and all its mass must go into them. A body whose
@@ -229,7 +228,7 @@ def _unshaped(mj: Any, masses: Iterable[LinkMass], bodies: Sequence[Body]) -> It
                 yield name
 
 
-def _spans(mj: Any, data: Any, i: int) -> bool:
+def _spans(mj: mujoco.MjModel, data: mujoco.MjData, i: int) -> bool:
     """Whether what moves as one with a body of MuJoCo joins joints in different places, and moves a mass."""
     weld = int(mj.body_weldid[i])
     onward = [k for k in range(mj.nbody) if mj.body_jntnum[k] and mj.body_weldid[mj.body_parentid[k]] == weld]
@@ -238,7 +237,7 @@ def _spans(mj: Any, data: Any, i: int) -> bool:
     return bool(onward) and max(float(np.linalg.norm(x - places[0])) for x in places) > ONE_PLACE
 
 
-def _out_of(mj: Any, data: Any, i: int, shown: Sequence[Body], *, spread: bool) -> float:
+def _out_of(mj: mujoco.MjModel, data: mujoco.MjData, i: int, shown: Sequence[Body], *, spread: bool) -> float:
     """How far one of MuJoCo's bodies reaches out of shapes at least [m]; ``spread``: by its inertia too."""
     turn, own = data.ximat[i].reshape(3, 3), data.xmat[i].reshape(3, 3)
     about = mj.body_inertia[i] * spread
@@ -252,7 +251,7 @@ def _out_of(mj: Any, data: Any, i: int, shown: Sequence[Body], *, spread: bool) 
     return found
 
 
-def _ends(data: Any, body: Body, axis: Array) -> tuple[float, float]:
+def _ends(data: mujoco.MjData, body: Body, axis: Array) -> tuple[float, float]:
     """From where to where the shape of a body reaches along an axis of the world [m]."""
     along = body.corners @ (data.xmat[body.mj].reshape(3, 3).T @ axis) + data.xpos[body.mj] @ axis
     out = body.radius + body.deviation
@@ -264,5 +263,5 @@ def _room(body: Body) -> float:
     return float((np.ptp(body.corners, axis=0) + 2 * (body.radius + body.deviation)).prod())
 
 
-def _body_id(mj: Any, name: str) -> int:
+def _body_id(mj: mujoco.MjModel, name: str) -> int:
     return int(mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_BODY, name))

@@ -43,7 +43,7 @@ class Mounting:
 
     file: str = "workstation"
     """The workstation file, for messages."""
-    spec: Any = field(default_factory=mujoco.MjSpec)
+    spec: mujoco.MjSpec = field(default_factory=mujoco.MjSpec)
     entries: list[Entry] = field(default_factory=list)
     meshes: dict[str, bytes] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -115,7 +114,7 @@ class Joints:
     """In ``MjData.qvel``, shape (nj,)."""
 
     @classmethod
-    def of(cls, mj: Any) -> Joints:
+    def of(cls, mj: mujoco.MjModel) -> Joints:
         """Read the joints of a compiled model.
 
         Raises:
@@ -231,7 +230,8 @@ def reach_box(model: Model, bodies: Sequence[int]) -> tuple[Array, Array]:
         length += float(np.linalg.norm(corners - anchors[-1], axis=1).max()) + beyond
         for joint in chain:
             if mj.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
-                ends = limits.get(mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_JOINT, joint), (None, None))
+                name = mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_JOINT, joint) or ""
+                ends = limits.get(name, (None, None))
                 length += np.inf if None in ends else max(abs(end) for end in ends if end is not None)
         low, high = np.minimum(low, anchors[0] - length), np.maximum(high, anchors[0] + length)
     return low, high

@@ -361,7 +361,7 @@ def _screws(model: Model, moving: Moving) -> dict[int, _Screw]:
             limits[f"{name}/{joint.name}"] = low, high
     screws = {}
     for j in {j for chain in moving.chains for j in chain}:
-        name = mujoco.mj_id2name(model.mj, mujoco.mjtObj.mjOBJ_JOINT, j)
+        name = mujoco.mj_id2name(model.mj, mujoco.mjtObj.mjOBJ_JOINT, j) or ""
         low, high = limits[name]
         now = float(model.mj.qpos0[moving.joints.q_address[j]])
         slide = bool(moving.joints.slides[j])

@@ -18,8 +18,9 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
+import mujoco
 import numpy as np
 
 from seerob.core.shapes.geometry import Mesh
@@ -75,7 +76,7 @@ class Swept:
 class Holding(Protocol):
     """What grippers hold as a motion goes on, instant by instant: see `seerob.twin.machines.held`."""
 
-    mj: Any
+    mj: mujoco.MjModel
     """The `mujoco.MjModel` that tells where bodies are on those that carry them."""
 
     def follow(self, qpos: Array) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -94,7 +94,7 @@ class Posed(State):
 
     def __init__(self, model: Model, robot: Mechanism, witness: Witness) -> None:
         """At home until `place` is called."""
-        data: Any = mujoco.MjData(model.mj)
+        data: mujoco.MjData = mujoco.MjData(model.mj)
         hearings = {name: Hearing(given=True, driven=False) for name in model.mechanisms}
         super().__init__(model, data, hearings)
         self._robot, self._witness = robot, witness

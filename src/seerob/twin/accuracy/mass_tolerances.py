@@ -27,7 +27,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -104,7 +104,7 @@ class MassTolerances:
         """
         return nominal + float(self._simplified @ np.array(shifts, float)) if shifts else nominal
 
-    def weighed(self, mj: Any, shifts: Shifts) -> Any:
+    def weighed(self, mj: mujoco.MjModel, shifts: Shifts) -> mujoco.MjModel:
         """A `mujoco.MjModel` with shifted masses, and moments of inertia with them.
 
         Centres of mass stay where they are: `moved` names those that may be off.

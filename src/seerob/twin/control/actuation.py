@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -23,7 +22,13 @@ nothing hinders it. The feed-forward contains the share, so that free motion doe
 
 
 def set_gains(
-    mj: Any, data: Any, mechanisms: Sequence[Mechanism], options: Options, dof: Indices, *, controllers: bool
+    mj: mujoco.MjModel,
+    data: mujoco.MjData,
+    mechanisms: Sequence[Mechanism],
+    options: Options,
+    dof: Indices,
+    *,
+    controllers: bool,
 ) -> tuple[Array, Array]:
     """Proportional and derivative gain per degree of freedom; also written into the actuators.
 
@@ -66,7 +71,7 @@ def set_gains(
     return kp, kd
 
 
-def set_torque_limits(mj: Any, mechanisms: Sequence[Mechanism], dof: Indices) -> Array:
+def set_torque_limits(mj: mujoco.MjModel, mechanisms: Sequence[Mechanism], dof: Indices) -> Array:
     """Largest torque per degree of freedom, infinity where unknown; also written into the actuators."""
     limits = np.full(mj.nv, np.inf)
     for m in mechanisms:

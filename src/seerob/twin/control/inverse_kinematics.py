@@ -9,7 +9,7 @@ near the start. Real controllers may choose otherwise, so a pose-driven twin is 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -43,8 +43,8 @@ class Miss(NamedTuple):
 
 
 def solve_pose(
-    mj: Any,
-    data: Any,
+    mj: mujoco.MjModel,
+    data: mujoco.MjData,
     mechanism: Mechanism,
     frame: Frame,
     rotation: Array,

@@ -20,7 +20,7 @@ from seerob.model.model import Mechanism
 class TaskPull:
     """One person, bound once."""
 
-    def __init__(self, mj: Any, mechanism: Mechanism, bandwidth: float) -> None:
+    def __init__(self, mj: mujoco.MjModel, mechanism: Mechanism, bandwidth: float) -> None:
         """Take the joints' own stiffness away from its actuators.
 
         Args:
@@ -45,7 +45,7 @@ class TaskPull:
         mj.actuator_biasprm[self._actuators, 1] = 0.0
         self._torques = np.zeros(mj.nv)
 
-    def command(self, mj: Any, data: Any, wanted: Any, kp: Array) -> None:
+    def command(self, mj: mujoco.MjModel, data: mujoco.MjData, wanted: Any, kp: Array) -> None:
         """Turn the commands of its joints into those of its bones.
 
         Args:

@@ -173,7 +173,7 @@ class _Grip:
         state.attachments.away = (state.attachments.away - set(here)) | set(gone)
         self._holds = held
 
-    def _load(self, mj: Any, held: bool) -> None:
+    def _load(self, mj: mujoco.MjModel, held: bool) -> None:
         """Let it weigh on the hand, or not."""
         body = self._in_hand
         change = (self._mass if held else 0.0) - float(mj.body_mass[body])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import mujoco
 import numpy as np
 
@@ -24,7 +22,7 @@ class Held:
     def __init__(self, model: Model) -> None:
         """At the begin: nothing is held."""
         own = own_masses(model)
-        self.mj: Any = own.mj
+        self.mj: mujoco.MjModel = own.mj
         hearings = {name: Hearing(given=True, driven=False) for name in own.mechanisms}
         self._data = mujoco.MjData(own.mj)
         self._state = State(own, self._data, hearings)

@@ -1,0 +1,49 @@
+"""What typings/mujoco says is what the installed MuJoCo has: fields, enumerations, functions."""
+
+import ast
+import re
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+STUB = Path(__file__).parents[1] / "typings/mujoco/__init__.pyi"
+CLASSES = {c.name: c for c in ast.parse(STUB.read_text()).body if isinstance(c, ast.ClassDef)}
+MODEL = mujoco.MjModel.from_xml_string(
+    "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
+)
+HAVE = {"MjModel": MODEL, "MjData": mujoco.MjData(MODEL), "MjOption": MODEL.opt, "MjStatistic": MODEL.stat}
+FIELDS = [
+    (name, field.target.id, ast.unparse(field.annotation))
+    for name in HAVE
+    for field in CLASSES[name].body
+    if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+]
+
+
+@pytest.mark.parametrize(("owner", "name", "said"), FIELDS, ids=lambda x: x)
+def test_a_field_has_the_type_that_is_said(owner, name, said):
+    value = getattr(HAVE[owner], name)
+    if element := re.fullmatch(r"NDArray\[np\.(\w+)\]", said):
+        assert value.dtype == getattr(np, element[1])
+    elif said != "Any":
+        assert type(value).__name__ == said
+
+
+@pytest.mark.parametrize("name", [name for name in CLASSES if name.startswith("mjt")])
+def test_an_enumeration_has_the_values_that_are_said(name):
+    said = {a.targets[0].id: a.value.value for a in CLASSES[name].body}
+    assert said == {k: int(v) for k, v in getattr(mujoco, name).__members__.items()}
+
+
+@pytest.mark.parametrize(
+    "said",
+    [f for f in ast.parse(STUB.read_text()).body if isinstance(f, ast.FunctionDef)],
+    ids=lambda f: f.name,
+)
+def test_a_function_takes_the_arguments_that_are_said(said):
+    signature = getattr(mujoco, said.name).__doc__.split("\n")[0]
+    while "[" in signature:
+        signature = re.sub(r"\[[^\[\]]*\]", "", signature)
+    assert [a.arg for a in said.args.args] == re.findall(r"[(,] ?(\w+):", signature)

@@ -79,3 +79,13 @@ def test_decoders_of_motion_capture_say_what_their_peers_say(smoke):
 
 def test_rescaled_motions_are_not_far_from_toppra_alone(smoke):
     assert "toppra alone" in smoke("permissible")
+
+
+def test_a_flooded_page_is_measured_in_one_run(smoke):
+    said = smoke("flooded_page")
+    assert {line.split()[0] for line in said.splitlines()} >= {
+        "commands",
+        "acknowledgements",
+        "pings",
+        "requests",
+    }

@@ -77,8 +77,9 @@ class Visitor:
 
     def __init__(self, server, *, acknowledge=True, path="/ws", **options):
         options.setdefault("subprotocols", [wire.PROTOCOL])
+        scheme = "wss" if "ssl" in options else "ws"
         self._open = connect(
-            f"ws://127.0.0.1:{server.port}{path}", compression=None, max_size=2**26, **options
+            f"{scheme}://127.0.0.1:{server.port}{path}", compression=None, max_size=2**26, **options
         )
         self.socket = self._open.__enter__()
         self.acknowledge = acknowledge

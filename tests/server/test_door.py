@@ -6,6 +6,7 @@ import httpx
 import pytest
 from websockets.exceptions import InvalidStatus
 
+from seerob.app.server.access import Tokens
 from seerob.app.server.door import HEADERS
 from seerob.app.server.live import Live
 from seerob.app.server.player import Player
@@ -15,7 +16,8 @@ from seerob.core.host_name import is_loopback
 from seerob.core.snapshot import PROTOCOL, Snapshot
 from server.frames import MESHES, PATIENCE, Remembered, Visitor, raw, scene, snapshot
 
-TOKEN = "0123456789abcdef0123456789abcdef"
+TOKENS = Tokens.made()
+TOKEN = TOKENS.view
 HASH = next(iter(MESHES))
 
 
@@ -195,7 +197,7 @@ def test_the_right_protocol_among_others_is_taken(server):
 
 
 def test_a_token_is_needed_for_everything(page):
-    with serve(page, token=TOKEN) as server:
+    with serve(page, tokens=TOKENS) as server:
         base = f"http://127.0.0.1:{server.port}/"
         assert server.url == f"{base}?token={TOKEN}"
         for path in (
@@ -215,7 +217,7 @@ def test_a_token_is_needed_for_everything(page):
 
 
 def test_the_token_moves_from_the_address_to_a_cookie(page):
-    with serve(page, token=TOKEN) as server, httpx.Client() as browser:
+    with serve(page, tokens=TOKENS) as server, httpx.Client() as browser:
         first = browser.get(server.url)
         assert (first.status_code, first.headers["location"]) == (303, "/")
         cookie = first.headers["set-cookie"].lower()
@@ -229,14 +231,15 @@ def test_the_token_moves_from_the_address_to_a_cookie(page):
             assert visitor.of(Snapshot)
 
 
-def test_others_can_reach_it_only_with_a_token():
+def test_others_can_reach_it_only_with_tokens_and_encrypted_or_told_so_in_words():
     for host in ("0.0.0.0", "192.0.2.7", "::", "cell.example"):
-        with pytest.raises(InputError, match="give a token, or listen on"):
+        with pytest.raises(InputError, match="give tokens, or listen on"):
             Server(scene=scene(), meshes={}, feed=Live(), host=host, port=0).start()
-    for token in ("", "short", "with space and more", "ü" * 20, "a;b=" * 8):
-        with pytest.raises(InputError, match="token"):
-            Server(scene=scene(), meshes={}, feed=Live(), token=token, port=0).start()
-    with Server(scene=scene(), meshes={}, feed=Live(), host="0.0.0.0", port=0, token=TOKEN) as server:
+        with pytest.raises(InputError, match="not encrypted; give --certificate"):
+            Server(scene=scene(), meshes={}, feed=Live(), host=host, port=0, tokens=TOKENS).start()
+    with Server(
+        scene=scene(), meshes={}, feed=Live(), host="0.0.0.0", port=0, tokens=TOKENS, clear_text=True
+    ) as server:
         assert server.url == f"http://localhost:{server.port}/?token={TOKEN}"
         with Visitor(server, path=f"/ws?token={TOKEN}") as visitor:
             visitor.read()
@@ -258,6 +261,8 @@ def test_what_only_this_machine_can_reach(host, alone):
 
 
 def test_an_address_that_is_not_ours_is_one_clear_error():
-    server = Server(scene=scene(), meshes={}, feed=Live(), host="192.0.2.7", token=TOKEN, port=0)
+    server = Server(
+        scene=scene(), meshes={}, feed=Live(), host="198.51.100.7", tokens=TOKENS, clear_text=True, port=0
+    )
     with pytest.raises(InputError, match="cannot listen on"):
         server.start()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from websockets.exceptions import InvalidStatus
 
+from seerob.app.server.access import Tokens
 from seerob.app.server.live import Live
 from seerob.app.server.serving import Server
 from seerob.core.snapshot import Tracked, Tracking
@@ -19,7 +20,7 @@ from server.frames import MESHES, PATIENCE, Visitor, scene
 
 POINTS = ("viewer", "left-grip", "right-grip")
 PLACES = np.array([[0.0, 1.7, 0.0], [-0.3, 1.0, -0.4], [0.3, 1.0, -0.4]])
-TOKEN = "a1b2c3d4e5f60718"
+TOKENS = Tokens.made()
 
 
 class Page(Visitor):
@@ -146,14 +147,30 @@ def test_an_offer_that_contradicts_itself_is_turned_away(server, wrong):
 
 
 def test_without_the_token_nobody_offers():
-    with Server(scene=scene(), meshes=MESHES, feed=Live(), port=0, token=TOKEN) as server:
+    with Server(scene=scene(), meshes=MESHES, feed=Live(), port=0, tokens=TOKENS) as server:
         with pytest.raises(InvalidStatus, match="401"):
             Page(server)
         with pytest.raises(InvalidStatus, match="403"):
-            Page(server, path=f"/ws?token={TOKEN}", origin="https://elsewhere.example")
-        with Page(server, path=f"/ws?token={TOKEN}") as page:
+            Page(server, path=f"/ws?token={TOKENS.track}", origin="https://elsewhere.example")
+        with Page(server, path=f"/ws?token={TOKENS.track}") as page:
             page.see(human="nobody")
             assert not page.answer().accepted
+
+
+@pytest.mark.parametrize("role", ["view", "control"])
+def test_who_may_only_look_is_nobodys_headset(samples, role):
+    with Server(scene=scene(), meshes=MESHES, feed=Live(), port=0, tokens=TOKENS) as server:
+        with Page(server, path=f"/ws?token={getattr(TOKENS, role)}") as looker:
+            for k in range(50):
+                looker.see(k)
+            answer = looker.answer()
+            assert not answer.accepted
+            assert "for tracking" in answer.reason
+        assert samples == []
+        with Page(server, path=f"/ws?token={TOKENS.track}") as tracker:
+            seen(tracker, samples)
+    refused = [v.refused for v in server.visits.take() if v.role == role and v.event == "left"]
+    assert 1 <= next(iter(refused[0].values())) <= 50
 
 
 def test_of_limbs_that_nobody_sees_nothing_is_scored():

@@ -8,7 +8,7 @@ import httpx
 import pytest
 from websockets.exceptions import WebSocketException
 
-from seerob.app.server.connection import PromptRequests
+from seerob.app.server.connection import Doorstep, PromptRequests
 from seerob.app.server.player import Player
 from seerob.app.server.serving import Server
 from seerob.core.snapshot import Snapshot
@@ -64,7 +64,7 @@ def test_who_does_not_ask_is_cut_and_who_looks_on_is_not(server, monkeypatch, sa
 
 
 def test_there_are_only_so_many_connections(server, monkeypatch):
-    monkeypatch.setattr(PromptRequests, "most", 5)
+    monkeypatch.setattr(Doorstep, "most", 5)
     with contextlib.ExitStack() as held:
         for _ in range(5):
             silent = socket.create_connection(("127.0.0.1", server.port), timeout=DEADLINE)
@@ -74,3 +74,31 @@ def test_there_are_only_so_many_connections(server, monkeypatch):
                 assert ended(more)
     # The server learns in its own time that they are gone.
     assert persistent(lambda: httpx.get(server.url)).status_code in (200, 503)  # 503: not built
+
+
+def test_one_address_of_another_machine_does_not_take_all_connections(monkeypatch):
+    monkeypatch.setattr(Doorstep, "most_of_one", 3)
+    monkeypatch.setattr("seerob.app.server.connection.is_loopback", lambda host: host == "127.0.0.2")
+    with contextlib.ExitStack() as held, socket.create_server(("127.0.0.1", 0)) as listening:
+        doorstep = held.enter_context(Doorstep(listening))
+        doorstep.setblocking(False)
+        clients = []
+        taken = 0
+
+        def come(address):
+            client = held.enter_context(
+                socket.create_connection(doorstep.getsockname(), source_address=(address, 0))
+            )
+            try:
+                clients.append((client, held.enter_context(doorstep.accept()[0])))
+            except BlockingIOError:
+                return False
+            return True
+
+        for _ in range(10):
+            taken += come("127.0.0.3")
+        assert taken == 3
+        assert come("127.0.0.4")  # another address
+        assert all(come("127.0.0.2") for _ in range(10))  # this machine itself
+        clients[0][1].close()
+        assert come("127.0.0.3")

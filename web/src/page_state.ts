@@ -64,6 +64,11 @@ export const mutedCriteria = signal<ReadonlySet<string>>(new Set());
 export const traces = new Map<string, Trace>();
 export const tracesRevision = signal(0);
 
+/** Whether this page may play, pause and seek; a live run can be held back in any page. */
+export const mayControl = computed(() => isLive.value || (hello.value?.may.includes("control") ?? false));
+/** Whether this page may offer what a headset sees. */
+export const mayTrack = computed(() => hello.value?.may.includes("track") ?? false);
+
 export const isLive = computed(() => hello.value?.mode === "live");
 
 export const rows = computed<Row[]>(() => {

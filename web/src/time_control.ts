@@ -2,7 +2,7 @@
 // the worker keeps the last minutes.
 
 import type { Action, ToWorker } from "./messages";
-import { isLive, lookingAt, now, reach, scene, traces, transport } from "./page_state";
+import { isLive, lookingAt, mayControl, now, reach, scene, traces, transport } from "./page_state";
 import { neighbourViolation } from "./traces";
 
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const;
@@ -90,6 +90,6 @@ export class TimeControl {
   }
 
   private command(action: Action, value: number | null = null): void {
-    this.send({ kind: "command", action, value });
+    if (mayControl.value) this.send({ kind: "command", action, value });
   }
 }

@@ -10,7 +10,7 @@
 export const PROTOCOL = "seerob.v1.msgpack";
 
 /** Hash of the types below; a stale page finds another in `Hello.schema`. */
-export const SCHEMA = "dc2d4d47fbce7bbb";
+export const SCHEMA = "9d7633cdb8c53690";
 
 /** A vector at a point. */
 export interface Arrow {
@@ -436,6 +436,11 @@ export interface Hello {
   duration: number | null;
   /** Hash of the message types; a page built for another one must be built anew. */
   schema: string;
+  /**
+   * What this page may do, as its token says: `view`, `track` (offer what a headset sees), `control`
+   * (play, pause, seek).
+   */
+  may: string[];
 }
 
 /** One criterion over a stretch of time, for plots and the timeline's lanes. */

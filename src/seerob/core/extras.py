@@ -21,6 +21,7 @@ EXTRAS = {
     "ompl": "plan",
     "openvr": "vive",
     "xr": "openxr",
+    "cryptography": "tls",
 }
 """Package as it is imported → the extra that brings it."""
 

@@ -17,6 +17,9 @@ class Hello(Struct, frozen=True, kw_only=True, tag="hello"):
     """Length of the recording [s]; None when live."""
     schema: str = ""
     """Hash of the message types; a page built for another one must be built anew."""
+    may: tuple[str, ...] = ()
+    """What this page may do, as its token says: ``view``, ``track`` (offer what a headset sees), ``control``
+    (play, pause, seek)."""
 
 
 class Trace(Struct, frozen=True, kw_only=True):

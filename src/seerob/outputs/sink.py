@@ -11,6 +11,7 @@ from msgspec import Struct
 
 from seerob.core.samples import Sample
 from seerob.core.snapshot import CriterionInfo, Scene, Snapshot
+from seerob.recording.format import Visitor
 from seerob.recording.result_log import ResultLog
 
 
@@ -51,6 +52,21 @@ class KeepsResults(Protocol):
 
     def share(self, log: ResultLog) -> None:
         """Use the log of the run; adding a snapshot that is in it changes nothing."""
+
+
+class Visited(Protocol):
+    """Where it is known who looks on."""
+
+    def take(self, *, end: bool = False) -> tuple[Visitor, ...]:
+        """What happened since the last call; at the ``end`` also who is there still."""
+
+
+@runtime_checkable
+class RecordsVisitors(Protocol):
+    """A writer that records who looked on."""
+
+    def watch(self, visited: Visited) -> None:
+        """Record them, too, from now on."""
 
 
 class Sink(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

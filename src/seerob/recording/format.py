@@ -28,6 +28,8 @@ VIEW_SCENE, VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS = "/scene", "/markers", "/tf
 VIEW_PEOPLE = "/people"
 VIEWS = (VIEW_MARKERS, VIEW_FRAMES, VIEW_RESULTS, VIEW_PEOPLE)
 """For foreign viewers; `VIEW_SCENE` is sent once, these from time to time."""
+VISITORS = "/visitors"
+"""Who looked on; only where somebody did."""
 
 MESH_PREFIX = "mesh/"
 """Attachments ``mesh/<hash>.glb``."""
@@ -42,6 +44,21 @@ class Tick(Struct, frozen=True, kw_only=True):
     t: float
     """Run time [s]."""
     samples: tuple[JointSample | PoseSample | BodySample | SignalSample, ...] = ()
+
+
+class Visitor(Struct, frozen=True, kw_only=True):
+    """A page that was connected to the run, or an address that was not let in."""
+
+    event: str
+    """``came``, ``left``, ``there`` (at the end of the recording) or ``refused``."""
+    role: str
+    """``view``, ``track``, ``control``; ``any`` where no token is asked for, ``none`` of strangers."""
+    address: str
+    since: str
+    """Wall-clock time, ISO 8601 in UTC."""
+    until: str | None = None
+    refused: dict[str, int] = {}
+    """What was asked for in vain, and how often by now."""
 
 
 def nanoseconds(t: float) -> int:

@@ -1,7 +1,7 @@
 // Lets whoever wears a headset be the person of the workstation: shown where there is one, in a live run.
 
 import { useEffect, useState } from "preact/hooks";
-import { isLive, scene, tracked } from "../page_state";
+import { isLive, mayTrack, scene, tracked } from "../page_state";
 import { Offering, sessionMode } from "../xr/offering";
 import { useActions } from "./app_context";
 
@@ -13,7 +13,7 @@ export function HeadsetOffer() {
   useEffect(() => {
     sessionMode().then((mode) => setThere(mode !== null));
   }, []);
-  if (!there || !isLive.value) return null;
+  if (!there || !isLive.value || !mayTrack.value) return null;
   const people = new Set(scene.value?.nodes.filter((n) => n.role === "human").map((n) => n.owner));
   const begin = async (human: string): Promise<void> => {
     setFailure("");

@@ -1,7 +1,7 @@
 // Play, pause, step, speed; or, while live, hold and follow.
 
 import { formatTime } from "../format";
-import { isLive, lookingAt, now, reach, scene, stale, transport } from "../page_state";
+import { isLive, lookingAt, mayControl, now, reach, scene, stale, transport } from "../page_state";
 import { SPEEDS } from "../time_control";
 import { useActions } from "./app_context";
 import { Icon, type IconName } from "./Icon";
@@ -40,6 +40,7 @@ export function TransportBar() {
         <>
           <select
             aria-label="Speed"
+            disabled={!mayControl.value}
             value={String(speed)}
             onChange={(event) => time.speed(Number(event.currentTarget.value))}
           >
@@ -54,6 +55,7 @@ export function TransportBar() {
             class={loop ? "on" : ""}
             aria-pressed={loop}
             aria-label="Loop"
+            disabled={!mayControl.value}
             title="Start again at the end"
             onClick={() => time.loop(!loop)}
           >
@@ -61,6 +63,7 @@ export function TransportBar() {
           </button>
         </>
       )}
+      {!mayControl.value && <span class="only-look">looks on: whoever may control it plays</span>}
       {lookingAt.value !== null && (
         <span class="behind">{formatTime(reach.value.end - lookingAt.value)} behind live</span>
       )}
@@ -76,6 +79,7 @@ function TransportButton(props: { icon: IconName; title: string; act: () => void
       class={props.strong ? "strong" : ""}
       title={props.title}
       aria-label={props.title}
+      disabled={!mayControl.value}
       onClick={props.act}
     >
       <Icon name={props.icon} />

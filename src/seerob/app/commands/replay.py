@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from seerob.app.console.interruption import Stopped
-from seerob.app.console.terminal import WORDS, Exit, add_page, exit_code, line, seconds
+from seerob.app.console.terminal import WORDS, Exit, exit_code, line, seconds
+from seerob.app.console.visiting import add_page, tell_pages, visiting
 from seerob.core.snapshot import Verdict
 
 if TYPE_CHECKING:
@@ -51,13 +52,13 @@ def show(path: Path, options: argparse.Namespace) -> int:
         feed=player,
         host=options.host,
         port=options.port,
-        token=options.token,
+        **visiting(options),
     )
     stopped = Stopped()
     with server:
         if server.notice:
             line("note", server.notice)
-        line("page", f"{server.url}  (Ctrl-C ends)", "bold")
+        tell_pages(server, "Ctrl-C ends")
         end = time.monotonic() + (options.seconds if options.seconds is not None else float("inf"))
         while not stopped() and (time.monotonic() < end or player.reading):
             time.sleep(0.1)

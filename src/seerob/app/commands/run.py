@@ -11,7 +11,6 @@ from seerob.app.console.loading import compiled
 from seerob.app.console.progress import announced, spinner
 from seerob.app.console.sinks import file_of, opened_sinks, refuse_existing, sinks_of, tell_files
 from seerob.app.console.terminal import (
-    add_page,
     describe,
     exit_code,
     line,
@@ -20,6 +19,7 @@ from seerob.app.console.terminal import (
     tell,
     tell_results,
 )
+from seerob.app.console.visiting import add_page, tell_pages, visiting
 from seerob.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -87,13 +87,18 @@ def reach(station: Station) -> None:
 def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
     """Show, judge and record until Ctrl-C or the time is over."""
     from seerob.app.server.live import LiveView
+    from seerob.outputs.sink import RecordsVisitors
 
     folder = run_folder(station.model.folder, options.output)
     sinks = [] if options.no_record else sinks_of(station.workstation, lossless=False)
     refuse_existing(sinks, folder)
     stopped = Stopped()
     with LiveView(
-        scene=scene, meshes=station.model.meshes, host=options.host, port=options.port, token=options.token
+        scene=scene,
+        meshes=station.model.meshes,
+        host=options.host,
+        port=options.port,
+        **visiting(options),
     ) as view:
         if view.server.notice:
             line("note", view.server.notice)
@@ -108,7 +113,10 @@ def live(station: Station, scene: Scene, options: argparse.Namespace) -> int:
 
         with spinner() as say, opened_sinks(station, sinks, folder, scene) as opened:
             writers = announced(opened, list(map(file_of, sinks)), say)
-            line("page", f"{view.url}  (Ctrl-C ends the run)", "bold")
+            for writer in opened:
+                if isinstance(writer, RecordsVisitors):
+                    writer.watch(view.server.visits)
+            tell_pages(view.server, "Ctrl-C ends the run")
             _tell_ends(station)
             writers += _triggers(station, allow=options.allow_writing)
             writers += _targets(station, allow=options.allow_writing)

@@ -138,13 +138,6 @@ def add_output(sub: argparse.ArgumentParser, *, beside: str = "workstation") -> 
     sub.add_argument("--json", action="store_true", help="results as JSON on standard output")
 
 
-def add_page(sub: argparse.ArgumentParser) -> None:
-    """Arguments of commands that serve the page."""
-    sub.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine only)")
-    sub.add_argument("--port", type=port, default=8080, help="port of the page; 0 is any free one")
-    sub.add_argument("--token", help="what visitors must know; needed when not only this machine may visit")
-
-
 def run_folder(near: Path, wanted: Path | None) -> Path:
     """A new folder for the files of one run."""
     if wanted is not None:

@@ -2,13 +2,15 @@
 
 uvicorn waits for the first request without end and takes every connection. Whoever can reach the port, with
 the token or without, could so take every file descriptor of the process, and no source that was lost could
-connect again.
+connect again. Where TLS is spoken, they are counted before it begins.
 """
 
 from __future__ import annotations
 
 import asyncio
-from typing import cast
+import socket
+from typing import Any, cast
+from weakref import WeakSet
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -16,16 +18,84 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.frames import Frame
 from websockets.protocol import State
 
+from seerob.app.server.access import neighbourhood
+from seerob.app.server.allowance import Allowance, Allowances
+from seerob.core.host_name import is_loopback
+
 MOST_CONNECTIONS = 400
 """Of pages and their WebSockets together; processes commonly have 1024 files."""
 PROMPTNESS = 10.0
 """How long a connection may be open, or open again after an answer, without a whole request [s]."""
+MOST_OF_ONE = 100
+"""Connections of one address of another machine."""
+CONNECTIONS = 200.0, 600.0
+"""That one address may begin per second, and at once."""
+AT_ONCE = 64
+"""Connections that are closed before others in the loop have their turn."""
+PIECE = 1024
+"""Of what one page sent that is read at once [B]."""
+HANDSHAKE = 5.0
+"""How long the beginning of TLS may take [s]."""
+PINGS = 5.0, 20.0
+"""That one page may send per second, and at once."""
+
+
+class Doorstep(socket.socket):
+    """A listening socket that closes at once who is one too many."""
+
+    most = MOST_CONNECTIONS
+    most_of_one = MOST_OF_ONE
+
+    def __init__(self, listening: socket.socket) -> None:
+        """Take over a socket that listens."""
+        self._open: WeakSet[socket.socket] = WeakSet()
+        self._allowances = Allowances(*CONNECTIONS)
+        super().__init__(listening.family, listening.type, listening.proto, listening.detach())
+
+    def accept(self) -> tuple[socket.socket, Any]:
+        """Accept somebody.
+
+        Raises:
+            BlockingIOError: Nobody waits, or who did was one too many.
+        """
+        for _ in range(AT_ONCE):
+            connection, address = super().accept()
+            who = neighbourhood(str(address[0]))
+            allowance = self._allowances.of(who)
+            if not allowance.wait() and self._has_room(who):
+                allowance.take()
+                self._open.add(connection)
+                return connection, address
+            connection.close()
+        raise BlockingIOError
+
+    def _has_room(self, who: str) -> bool:
+        held = [other for other in self._open if other.fileno() >= 0]
+        of_one = 0 if is_loopback(who) else sum(_whose(other) == who for other in held)
+        self._open = WeakSet(held)
+        return len(held) < self.most and of_one < self.most_of_one
+
+
+def _whose(connection: socket.socket) -> str:
+    try:
+        return neighbourhood(str(connection.getpeername()[0]))
+    except OSError:  # gone already
+        return ""
+
+
+class PromptLoop(asyncio.SelectorEventLoop):
+    """A loop whose servers do not wait long for the beginning of TLS."""
+
+    async def create_server(self, *arguments: Any, **options: Any) -> asyncio.Server:
+        """Create one."""
+        if options.get("ssl") is not None:
+            options.setdefault("ssl_handshake_timeout", HANDSHAKE)
+        return await super().create_server(*arguments, **options)
 
 
 class PromptRequests(H11Protocol):
-    """Cuts who is one too many, and who takes too long to say what they want."""
+    """Cuts who takes too long to say what they want."""
 
-    most = MOST_CONNECTIONS
     promptness = PROMPTNESS
     _deadline: asyncio.TimerHandle | None = None
 
@@ -34,10 +104,7 @@ class PromptRequests(H11Protocol):
     ) -> None:
         """Begin to wait for a request."""
         super().connection_made(transport)
-        if len(self.connections) > self.most:
-            transport.abort()
-        else:
-            self._wait()
+        self._wait()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Wait no longer."""
@@ -80,6 +147,42 @@ class WholeBinaryFrames(WebSocketsSansIOProtocol):
         super().connection_made(transport)
         self._abort = cast(asyncio.Transport, transport).abort
         self.app_state = {**self.app_state, "abort": self._abort}
+        self._pings = Allowance(*PINGS)
+        self._held = False
+        self._unread = bytearray()
+
+    def data_received(self, data: bytes) -> None:
+        """Read a little at a time: a quarter of a megabyte of small frames would hold everybody up."""
+        self._unread += data
+        self._read_on()
+
+    def _read_on(self) -> None:
+        while self._unread and not (self._held or self.read_paused or self.transport.is_closing()):
+            piece = bytes(self._unread[:PIECE])
+            del self._unread[:PIECE]
+            super().data_received(piece)
+        if self._held or self.read_paused:
+            self.transport.pause_reading()
+        else:
+            self.transport.resume_reading()
+
+    def handle_ping(self) -> None:
+        """Answer, and read no faster than pings may come: nothing else bounds that."""
+        super().handle_ping()
+        if (wait := self._pings.take()) and not self._held:
+            self._held = True
+            self.loop.call_later(wait, self._let_go)
+
+    def _let_go(self) -> None:
+        self._held = False
+        self._read_on()
+
+    async def receive(self) -> Any:
+        """Give what came to the application, which makes it read on."""
+        message = await super().receive()
+        if self._unread or self._held:
+            self._read_on()
+        return message
 
     def handle_text(self, event: Frame) -> None:
         """Refuse text."""

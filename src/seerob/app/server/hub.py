@@ -10,10 +10,14 @@ from math import isfinite
 from typing import Any
 
 import msgspec
+from msgspec.structs import replace
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from seerob.app.server.access import Role
+from seerob.app.server.allowance import Allowance
 from seerob.app.server.client import Client, Closing
 from seerob.app.server.feed import KNOWN_ACTIONS, Feed
+from seerob.app.server.visits import Visit, Visits
 from seerob.app.wire import schema
 from seerob.core.markers import plain
 from seerob.core.snapshot import (
@@ -39,6 +43,14 @@ _encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
 _decode: Callable[[bytes], Command | Tracking] = msgspec.msgpack.Decoder(Command | Tracking).decode
 LARGEST_COMMAND = 512
 """[B]; one has less than 100."""
+RATES: dict[str, tuple[float, float]] = {
+    "ack": (120.0, 240.0),
+    "tracking": (160.0, 320.0),
+    "command": (40.0, 80.0),
+}
+"""What one page may send: per second, and at once. Beyond that it is read no faster."""
+SHARED: dict[str, tuple[float, float]] = {"tracking": (640.0, 1280.0), "command": (100.0, 200.0)}
+"""What all pages together may send."""
 
 
 def read_message(data: bytes) -> Command | Tracking:
@@ -68,10 +80,14 @@ class Hub:
     Everything here runs in the server's loop.
     """
 
-    def __init__(self, *, scene: Scene, feed: Feed, patience: float = PATIENCE) -> None:
+    def __init__(
+        self, *, scene: Scene, feed: Feed, visits: Visits | None = None, patience: float = PATIENCE
+    ) -> None:
         self._feed, self._patience = feed, patience
-        hello = Hello(server=_name(), mode=feed.mode, duration=feed.duration, schema=schema())
-        self._hello, self._scene = _encode(hello), _encode(scene)
+        self._visits = Visits() if visits is None else visits
+        self._hello = Hello(server=_name(), mode=feed.mode, duration=feed.duration, schema=schema())
+        self._scene = _encode(scene)
+        self._shared = {kind: Allowance(*rate) for kind, rate in SHARED.items()}
         self._newest: Snapshot | None = None
         self._ended: Closing | None = None
         self.clients: set[Client] = set()
@@ -113,11 +129,15 @@ class Hub:
         if self._ended is not None:
             await _close(socket, self._ended)
             return
+        state = socket.scope["state"]
+        address = socket.client.host if socket.client else ""
         if len(self.clients) >= MOST_CLIENTS:
+            self._visits.turn_away(address, f"{MOST_CLIENTS} pages are connected already")
             await _close(socket, Closing(1013, f"{MOST_CLIENTS} pages are connected already"))
             return
         client = Client(socket, patience=self._patience)
-        client.offer("Hello", self._hello)
+        hello = replace(self._hello, may=tuple(sorted(state["roles"])))
+        client.offer("Hello", _encode(hello))
         client.offer("Scene", self._scene)
         client.offer("History", _encode(self._feed.history()))
         if (so_far := self._feed.so_far()) is not None:
@@ -126,7 +146,9 @@ class Hub:
         if self._newest is not None:
             client.offer_frame(self._newest.seq, _encode(self._newest))
         self.clients.add(client)
-        tasks = [asyncio.create_task(client.send()), asyncio.create_task(self._listen(client, socket))]
+        visit = self._visits.come(state["role"], address)
+        listening = self._listen(client, socket, visit, state["roles"])
+        tasks = [asyncio.create_task(client.send()), asyncio.create_task(listening)]
         try:
             closing = await client.over
         finally:
@@ -135,36 +157,56 @@ class Hub:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+            visit.leave()
         await _close(socket, closing)
 
-    async def _listen(self, client: Client, socket: WebSocket) -> None:
+    async def _listen(self, client: Client, socket: WebSocket, visit: Visit, roles: frozenset[Role]) -> None:
         told: Tracked | None = None
+        own = {kind: Allowance(*rate) for kind, rate in RATES.items()}
         try:
             while True:
-                command = read_message(await socket.receive_bytes())
-                if isinstance(command, Tracking):
-                    told = _offer(client, command, told)
-                    continue
-                if command.action == "ack":
-                    client.acknowledge(int(command.value or 0))
-                    continue
-                self._feed.command(command)
-                client.offer("Transport", _encode(self._feed.transport()))
+                message = read_message(await socket.receive_bytes())
+                if isinstance(message, Tracking):
+                    kind = "tracking"
+                else:
+                    kind = "ack" if message.action == "ack" else "command"
+                shared = self._shared.get(kind)
+                wait = max(own[kind].take(), 0.0 if shared is None else shared.take())
+                if wait:
+                    # Meanwhile nothing is read, and whoever sends has to wait, too.
+                    visit.refuse(f"more than {RATES[kind][0]:g} per second: {kind}")
+                    await asyncio.sleep(wait)
+                if isinstance(message, Tracking):
+                    told = _offer(client, message, told, visit, may=Role.TRACK in roles)
+                elif kind == "ack":
+                    client.acknowledge(int(message.value or 0))
+                else:
+                    if Role.CONTROL in roles:
+                        self._feed.command(message)
+                    else:
+                        visit.refuse(message.action)
+                    client.offer("Transport", _encode(self._feed.transport()))
         except ValueError as error:
+            visit.refuse(str(error)[:200])
             client.end(Closing(1007, str(error)))
         except (WebSocketDisconnect, RuntimeError):
             client.end(Closing(1006, "gone"))
 
 
-def _offer(client: Client, tracking: Tracking, told: Tracked | None) -> Tracked:
+def _offer(client: Client, tracking: Tracking, told: Tracked | None, visit: Visit, *, may: bool) -> Tracked:
     """Pass on what a headset sees; the page is told what became of it when that changes.
 
     Raises:
         ValueError: It contradicts itself.
     """
     offer = headset_offers.read(tracking, headset_offers.now())
-    refusal = OFFERS.offer(tracking.human, client, offer)
+    if may:
+        refusal = OFFERS.offer(tracking.human, client, offer)
+    else:
+        refusal = "this page may not: open the address for tracking that seerob printed"
     answer = Tracked(human=tracking.human, accepted=not refusal, reason=refusal)
+    if refusal:
+        visit.refuse(f"tracking: {refusal}")
     if answer != told:
         client.offer("Tracked", _encode(answer))
     return answer

@@ -14,6 +14,8 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
+from seerob.app.server.access import Tokens
+from seerob.app.server.certificates import Tls
 from seerob.app.server.feed import Audience
 from seerob.app.server.serving import Server
 from seerob.core.samples import Sample
@@ -220,9 +222,11 @@ class LiveView(Closing):
     Args:
         scene: What does not change during the run.
         meshes: Binary glTF per mesh hash of the scene's nodes.
-        host: Address to listen on; anything but this machine's own needs a token.
+        host: Address to listen on; anything but this machine's own needs tokens, and TLS or ``clear_text``.
         port: Port; 0 is any free one, a taken one moves to the next free.
-        token: What a visitor must know.
+        tokens: What visitors must know, by role.
+        tls: Encrypts.
+        clear_text: Whether others may be served unencrypted.
 
     Raises:
         InputError: As `Server.start`.
@@ -235,10 +239,21 @@ class LiveView(Closing):
         meshes: dict[str, bytes],
         host: str = "127.0.0.1",
         port: int = 8080,
-        token: str | None = None,
+        tokens: Tokens | None = None,
+        tls: Tls | None = None,
+        clear_text: bool = False,
     ) -> None:
         self._live = Live()
-        self.server = Server(scene=scene, meshes=meshes, host=host, port=port, token=token, feed=self._live)
+        self.server = Server(
+            scene=scene,
+            meshes=meshes,
+            feed=self._live,
+            host=host,
+            port=port,
+            tokens=tokens,
+            tls=tls,
+            clear_text=clear_text,
+        )
         self.url = self.server.start()
         """What to open in a browser."""
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
+from time import monotonic
 
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 
@@ -40,9 +42,19 @@ def files(folder: Path) -> dict[str, Path]:
     }
 
 
+LISTED = 1.0
+"""How long the list of a folder's files counts [s]: long enough that requests without end do not read it
+each time, short enough for a page that is built anew."""
+
+
+@lru_cache(8)
+def _files(folder: Path, _: int) -> dict[str, Path]:
+    return files(folder)
+
+
 def answer(folder: Path, path: str) -> Response:
     """The file at ``path`` (the page itself when empty); 503 when the page was not built."""
-    listed = files(folder)
+    listed = _files(folder, int(monotonic() / LISTED))
     if "index.html" not in listed:
         return HTMLResponse(_NOT_BUILT, 503)
     file = listed.get(path or "index.html")

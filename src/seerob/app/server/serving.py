@@ -26,12 +26,15 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 
 from seerob.app.server import page
+from seerob.app.server.access import Role, Tokens
+from seerob.app.server.certificates import Tls
 from seerob.app.server.client import Closing
-from seerob.app.server.connection import PromptRequests, WholeBinaryFrames
+from seerob.app.server.connection import Doorstep, PromptLoop, PromptRequests, WholeBinaryFrames
 from seerob.app.server.door import Door
 from seerob.app.server.feed import Feed
 from seerob.app.server.hub import PATIENCE, Hub
 from seerob.app.server.page import FOLDER
+from seerob.app.server.visits import Visits
 from seerob.core.errors import InputError
 from seerob.core.host_name import is_address, is_loopback
 from seerob.core.snapshot import Scene
@@ -73,7 +76,6 @@ _log = logging.getLogger(__name__)
 LARGEST_MESSAGE = 16384
 """From a page [B]; what a headset sees of a body with both hands has 10 000, a command less than 100."""
 PORTS_TRIED = 20
-SHORTEST_TOKEN = 16
 
 
 class Server:
@@ -83,9 +85,11 @@ class Server:
         scene: What does not change.
         meshes: Binary glTF per mesh hash of the scene's nodes.
         feed: `live.Live` or `player.Player`.
-        host: Address to listen on; anything but this machine's own needs a token.
+        host: Address to listen on; anything but this machine's own needs tokens, and TLS or ``clear_text``.
         port: Port; 0 is any free one, a taken one moves to the next free (see `notice`).
-        token: What a visitor must know; it is part of the address that `start` returns.
+        tokens: What visitors must know, by role; a token is part of each address of `urls`.
+        tls: Encrypts; see `seerob.app.server.certificates`.
+        clear_text: Whether others may be served unencrypted, so that anyone on the way reads and changes it.
         hosts: Names, besides addresses and ``localhost``, under which the server may be asked for.
         origins: Origins, such as ``https://line3.example``, whose pages may connect as well.
         page: Folder of the built page.
@@ -100,18 +104,31 @@ class Server:
         feed: Feed,
         host: str = "127.0.0.1",
         port: int = 8080,
-        token: str | None = None,
+        tokens: Tokens | None = None,
+        tls: Tls | None = None,
+        clear_text: bool = False,
         hosts: Iterable[str] = (),
         origins: Iterable[str] = (),
         page: Path = FOLDER,
         patience: float = PATIENCE,
     ) -> None:
-        self._host, self._wanted, self._token = host, port, token
+        self._host, self._wanted, self._tokens = host, port, tokens
+        self.tls, self.clear_text = tls, clear_text
         self._feed = feed
-        self.hub = Hub(scene=scene, feed=feed, patience=patience)
+        self.visits = Visits()
+        """Who is, and was, connected."""
+        self.hub = Hub(scene=scene, feed=feed, visits=self.visits, patience=patience)
         app = build(hub=self.hub, meshes=meshes, folder=page, lifespan=self._lifespan)
-        names = {name.lower() for name in hosts} | ({host.lower()} if not is_address(host) else set())
-        self._app = Door(app, hosts=frozenset(names), origins=frozenset(origins), token=token)
+        known = (*hosts, *(() if tls is None else tls.names))
+        names = {name.lower() for name in known} | ({host.lower()} if not is_address(host) else set())
+        self._app = Door(
+            app,
+            hosts=frozenset(names),
+            origins=frozenset(origins),
+            tokens=tokens,
+            visits=self.visits,
+            encrypted=tls is not None,
+        )
         self._thread: Thread | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._uvicorn: uvicorn.Server | None = None
@@ -124,21 +141,28 @@ class Server:
 
     @property
     def url(self) -> str:
-        """What to open in a browser."""
+        """What to open in a browser; of a server that asks for tokens, to look only."""
+        return self.urls[Role.VIEW]
+
+    @property
+    def urls(self) -> dict[Role, str]:
+        """What to open in a browser, by role; one address for all where no token is asked for."""
         # "Every address" is not one that a browser can open; this machine's own is among them.
         everywhere = is_address(self._host) and ip_address(self._host).is_unspecified
         name = "localhost" if everywhere else f"[{self._host}]" if ":" in self._host else self._host
-        return f"http://{name}:{self.port}/" + (f"?token={self._token}" if self._token else "")
+        base = f"{'http' if self.tls is None else 'https'}://{name}:{self.port}/"
+        tokens = self._tokens or ("",) * len(Role)
+        return {role: base + (token and f"?token={token}") for role, token in zip(Role, tokens, strict=True)}
 
     def start(self) -> str:
         """Listen, and return `url`; connections are answered as soon as this returns.
 
         Raises:
-            InputError: No token where one is needed, or nothing to listen on.
+            InputError: No tokens or no TLS where they are needed, or nothing to listen on.
         """
         if self._thread is not None:
             raise RuntimeError("a server starts once")
-        self._check_token()
+        self._check_others()
         listening = self._listen()
         self._thread = Thread(target=self._run, args=(listening,), name="seerob-server", daemon=True)
         self._thread.start()
@@ -166,23 +190,27 @@ class Server:
     ) -> None:
         self.stop()
 
-    def _check_token(self) -> None:
-        if self._token is None and not is_loopback(self._host):
-            what = f"{self._host!r} can be reached from other machines and no token was given"
-            raise InputError.at("server", "host", what, "give a token, or listen on 127.0.0.1")
-        if self._token is not None and not (
-            len(self._token) >= SHORTEST_TOKEN and self._token.isascii() and self._token.isalnum()
-        ):
-            what = f"is not {SHORTEST_TOKEN} or more letters and digits"
-            raise InputError.at("server", "token", what, "use secrets.token_hex(16)")
+    def _check_others(self) -> None:
+        if is_loopback(self._host):
+            return
+        reached = f"{self._host!r} can be reached from other machines"
+        if self._tokens is None:
+            remedy = "give tokens, or listen on 127.0.0.1"
+            raise InputError.at("server", "host", f"{reached} and no token was given", remedy)
+        if self.tls is None and not self.clear_text:
+            remedy = "give --certificate and --key, or install the extra tls; --clear-text does without"
+            what = f"{reached}, and whoever is on the way could read and change what is not encrypted"
+            raise InputError.at("server", "host", what, remedy)
 
     def _listen(self) -> socket.socket:
         tried = range(self._wanted, min(self._wanted + PORTS_TRIED, 65536)) if self._wanted else (0,)
         failure: OSError | None = None
         for port in tried:
             try:
-                listening = socket.create_server(
-                    (self._host, port), family=socket.AF_INET6 if ":" in self._host else socket.AF_INET
+                listening = Doorstep(
+                    socket.create_server(
+                        (self._host, port), family=socket.AF_INET6 if ":" in self._host else socket.AF_INET
+                    )
                 )
             except OSError as error:
                 failure = error
@@ -201,7 +229,7 @@ class Server:
             self._app,
             loop="asyncio",
             http=PromptRequests,
-            backlog=64,  # so many are accepted before one that is too many can be cut
+            backlog=64,
             ws=WholeBinaryFrames,
             ws_max_size=LARGEST_MESSAGE,
             ws_ping_interval=5.0,
@@ -216,9 +244,12 @@ class Server:
             server_header=False,
             timeout_graceful_shutdown=2,
         )
+        config.load()
+        config.ssl = None if self.tls is None else self.tls.context
         self._uvicorn = uvicorn.Server(config)
         try:
-            asyncio.run(self._uvicorn.serve(sockets=[listening]))
+            with asyncio.Runner(loop_factory=PromptLoop) as runner:
+                runner.run(self._uvicorn.serve(sockets=[listening]))
         except (Exception, SystemExit) as error:
             if self._ready.is_set():
                 _log.exception("the server ended")

@@ -33,7 +33,9 @@ from seerob.recording.format import (
     VIEW_PEOPLE,
     VIEW_RESULTS,
     VIEW_SCENE,
+    VISITORS,
     Tick,
+    Visitor,
     nanoseconds,
 )
 
@@ -75,6 +77,19 @@ _PEOPLE_SCHEMA = {
                 },
             },
         },
+    },
+}
+
+_VISITOR_SCHEMA = {
+    "type": "object",
+    "properties": {
+        "t": {"type": "number"},
+        "event": {"type": "string"},
+        "role": {"type": "string"},
+        "address": {"type": "string"},
+        "since": {"type": "string"},
+        "until": {"type": ["string", "null"]},
+        "refused": {"type": "object", "additionalProperties": {"type": "integer"}},
     },
 }
 
@@ -173,6 +188,16 @@ class McapTape:
             for name, joints in self._people.items()
         }
         return msgspec.json.encode({"t": snapshot.t, "people": people}, enc_hook=plain)
+
+    def visitors(self, t: float, visitors: tuple[Visitor, ...]) -> None:
+        """Append who came, left or was refused."""
+        if visitors and VISITORS not in self._channels:
+            schema = self._mcap.register_schema(
+                "seerob.Visitor", "jsonschema", json.dumps(_VISITOR_SCHEMA).encode()
+            )
+            self._channels[VISITORS] = self._mcap.register_channel(VISITORS, "json", schema)
+        for visitor in visitors:
+            self._put(VISITORS, 0, t, msgspec.json.encode({"t": t, **msgspec.to_builtins(visitor)}))
 
     def flush(self) -> None:
         """End the chunk and hand it to the disk: what was written so far survives the process."""

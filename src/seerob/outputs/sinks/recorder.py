@@ -14,7 +14,8 @@ from msgspec import Meta
 from seerob.core.errors import InputError, SeerobError
 from seerob.core.samples import Sample
 from seerob.core.snapshot import Finding, Scene, Snapshot
-from seerob.outputs.sink import Closing, Sink
+from seerob.outputs.sink import Closing, Sink, Visited
+from seerob.recording.format import Visitor
 
 if TYPE_CHECKING:
     from seerob.outputs.mcap.tape import McapTape
@@ -70,6 +71,7 @@ class _Waiting(NamedTuple):
     t: float
     samples: tuple[Sample, ...]
     snapshot: Snapshot | None
+    visitors: tuple[Visitor, ...] = ()
 
 
 class RecorderWriter(Closing):
@@ -95,12 +97,17 @@ class RecorderWriter(Closing):
         self._error: Exception | None = None
         self._last = (-1, -math.inf)
         self._taken = 0
+        self._visited: Visited | None = None
         self._thread = Thread(target=self._run, name="seerob recorder", daemon=True)
         try:
             self._thread.start()
         except KeyboardInterrupt:  # while its beginning was waited for: nobody will close this
             self._end()
             raise
+
+    def watch(self, visited: Visited) -> None:
+        """Record who looks on, too."""
+        self._visited = visited
 
     def write(self, snapshot: Snapshot, samples: tuple[Sample, ...]) -> None:
         """Take one tick; returns at once unless ``lossless`` and the queue is full.
@@ -129,7 +136,8 @@ class RecorderWriter(Closing):
             kept = snapshot if backlog < self._queue else None
             if kept is None:
                 self.dropped += 1
-            self._waiting.append(_Waiting(seq, t, samples, kept))
+            visitors = () if self._visited is None else self._visited.take()
+            self._waiting.append(_Waiting(seq, t, samples, kept, visitors))
             self._condition.notify_all()
 
     def close(self) -> None:
@@ -190,12 +198,15 @@ class RecorderWriter(Closing):
                 done = self._closing and not taken
                 self._condition.notify_all()
             if done:
+                if self._visited is not None:
+                    self._tape.visitors(max(self._last[1], 0.0), self._visited.take(end=True))
                 self._tape.finish(self._counts())
                 return
             if taken and oldest is None:
                 oldest = time.monotonic()
             for tick in taken:
                 self._tape.tick(tick.seq, tick.t, tick.samples, tick.snapshot)
+                self._tape.visitors(tick.t, tick.visitors)
             if oldest is not None and time.monotonic() - oldest >= FLUSH_PERIOD:
                 self._tape.flush()
                 oldest = None

@@ -1,0 +1,102 @@
+"""Options of commands that serve the page: who may visit, with what token, and how it is encrypted."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from getpass import getpass
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn, TypedDict
+
+from seerob.app.console.terminal import line, port
+from seerob.core.errors import InputError
+from seerob.core.host_name import is_loopback
+
+if TYPE_CHECKING:
+    from seerob.app.server.access import Tokens
+    from seerob.app.server.certificates import Tls
+    from seerob.app.server.serving import Server
+
+
+class Visiting(TypedDict):
+    """Arguments of a server."""
+
+    tokens: Tokens | None
+    tls: Tls | None
+    clear_text: bool
+
+
+def add_page(sub: argparse.ArgumentParser) -> None:
+    """Arguments of commands that serve the page."""
+    sub.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine only)")
+    sub.add_argument("--port", type=port, default=8080, help="port of the page; 0 is any free one")
+    text = "tokens of visitors, by role; made when it does not exist; - asks (default: new ones for each run)"
+    sub.add_argument("--token-file", type=Path, metavar="FILE", help=text)
+    text = "the server's own, PEM (default: one that is made here, for other machines than this one)"
+    sub.add_argument("--certificate", type=Path, metavar="FILE", help=text)
+    sub.add_argument("--key", type=Path, metavar="FILE", help="its private key, PEM, without a password")
+    text = "serve other machines unencrypted: whoever is on the way can read and change what they see"
+    sub.add_argument("--clear-text", action="store_true", help=text)
+    sub.add_argument("--token", type=_refused, help=argparse.SUPPRESS)
+
+
+def _refused(text: str) -> NoReturn:
+    what = "others on this machine see the command line, and the shell keeps it"
+    raise argparse.ArgumentTypeError(f"{what}; use --token-file FILE, or - to be asked")
+
+
+def visiting(options: argparse.Namespace) -> Visiting:
+    """What the options of `add_page` ask for.
+
+    Raises:
+        InputError: A token is weak, a certificate cannot be used, or options contradict one another.
+        MissingPackage: A certificate has to be made, and the extra ``tls`` is not installed.
+    """
+    from seerob.app.server import certificates
+    from seerob.app.server.access import Tokens, read_tokens
+
+    alone = is_loopback(options.host)
+    tokens = None
+    if options.token_file == Path("-"):
+        tokens = _asked()
+    elif options.token_file is not None:
+        tokens = read_tokens(options.token_file)
+    elif not alone:
+        tokens = Tokens.made()
+    if options.key is not None and options.certificate is None:
+        raise InputError.at("", "--key", "is of no use alone", "give --certificate, too")
+    if options.clear_text and options.certificate is not None:
+        raise InputError.at("", "--clear-text", "contradicts --certificate", "leave out one of them")
+    tls = None
+    if options.certificate is not None:
+        tls = certificates.given(options.certificate, options.key)
+    elif not (alone or options.clear_text):
+        from platformdirs import user_config_path
+
+        tls = certificates.own(user_config_path("seerob", appauthor=False) / "tls", options.host)
+    return Visiting(tokens=tokens, tls=tls, clear_text=options.clear_text)
+
+
+def _asked() -> Tokens:
+    from seerob.app.server.access import Role, Tokens
+
+    if not sys.stdin.isatty():
+        raise InputError.at("", "--token-file", "- asks, and there is no terminal", "name a file")
+    given = {str(role): getpass(f"token to {role} (nothing: a new one): ") for role in Role}
+    return Tokens.checked({role: token for role, token in given.items() if token}, "prompt")
+
+
+def tell_pages(server: Server, end: str) -> None:
+    """Say which address to open for what, and what visitors have to trust."""
+    from seerob.app.server.access import Role
+
+    addresses = server.urls
+    line("page", f"{server.url}  ({end})", "bold")
+    if len(set(addresses.values())) > 1:
+        line("  track", f"{addresses[Role.TRACK]}  (and may offer what a headset sees)")
+        line("  control", f"{addresses[Role.CONTROL]}  (and may play, pause and seek)")
+    tls = server.tls
+    if tls is not None and tls.authority is not None:
+        line("trust", f"{tls.authority} on each visitor's device; SHA-256 {tls.fingerprint}")
+    elif tls is None and server.clear_text:
+        line("warning", "unencrypted: whoever is on the way can read and change what visitors see", "yellow")

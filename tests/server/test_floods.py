@@ -1,0 +1,163 @@
+"""Pages and strangers who ask as fast as they can: the others, and the run, have their share."""
+
+import asyncio
+import multiprocessing
+import socket
+import threading
+import time
+
+import httpx
+import msgspec
+import pytest
+
+from seerob.app.server.access import Role, Tokens
+from seerob.app.server.allowance import Allowance, Allowances
+from seerob.app.server.door import STRANGERS
+from seerob.app.server.hub import RATES, SHARED
+from seerob.app.server.live import Live
+from seerob.app.server.serving import Server
+from seerob.core.snapshot import PROTOCOL, Command, Snapshot
+from server.frames import MESHES, PATIENCE, Visitor, scene, snapshot
+from server.test_hostile_visitors import frame
+
+SECONDS = 2.0
+
+
+class Counting(Live):
+    """A live feed that counts what it is asked."""
+
+    asked = 0
+
+    def command(self, command):
+        self.asked += 1
+
+
+@pytest.fixture
+def feed():
+    return Counting()
+
+
+@pytest.fixture
+def server(feed):
+    over = threading.Event()
+
+    def publish():
+        k = 0
+        while not over.wait(0.01):
+            feed.publish(snapshot(k))
+            k += 1
+
+    with Server(scene=scene(), meshes=MESHES, feed=feed, port=0) as server:
+        publisher = threading.Thread(target=publish)
+        publisher.start()
+        yield server
+        over.set()
+        publisher.join()
+
+
+def flood(port, seconds, messages):
+    """Send as fast as the other end reads; how many were sent."""
+    upgrade = (
+        f"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\n"
+        f"Sec-WebSocket-Protocol: {PROTOCOL}\r\n\r\n"
+    ).encode()
+    end, sent = time.monotonic() + seconds, 0
+    with socket.create_connection(("127.0.0.1", port)) as s:
+        s.sendall(upgrade)
+        s.recv(4096)
+        s.settimeout(0.1)
+        while time.monotonic() < end:
+            try:
+                sent += s.send(messages)
+            except TimeoutError:
+                continue
+            except OSError:
+                break
+    return sent
+
+
+COMMANDS = frame(2, msgspec.msgpack.encode(Command(action="seek", value=1.0))) * 200
+ACKS = frame(2, msgspec.msgpack.encode(Command(action="ack", value=1.0))) * 200
+
+
+@pytest.mark.parametrize(("messages", "pages"), [(COMMANDS, 1), (COMMANDS, 6), (ACKS, 1)])
+def test_a_page_that_floods_is_read_no_faster_than_allowed_and_others_go_on(server, feed, messages, pages):
+    with Visitor(server) as witness:
+        witness.of(Snapshot)
+        begun = time.monotonic()
+        flooders = [
+            multiprocessing.get_context("spawn").Process(target=flood, args=(server.port, SECONDS, messages))
+            for _ in range(pages)
+        ]
+        for flooder in flooders:
+            flooder.start()
+        seen, gap, last = 0, 0.0, time.monotonic()
+        while any(flooder.is_alive() for flooder in flooders):
+            witness.of(Snapshot)
+            now = time.monotonic()
+            seen, gap, last = seen + 1, max(gap, now - last), now
+        passed = time.monotonic() - begun
+    rate, burst = RATES["command"]
+    shared, at_once = SHARED["command"]
+    assert feed.asked <= min(pages * (burst + rate * passed), at_once + shared * passed) + pages
+    if messages is COMMANDS:
+        assert feed.asked > burst  # it is slowed down, not cut
+        assert any("per second: command" in v for e in server.visits.take(end=True) for v in e.refused)
+    assert seen / passed > 10
+
+
+def test_pings_without_end_are_not_read_on(server):
+    pings = frame(9, b"") * 500
+    with Visitor(server) as witness:
+        witness.of(Snapshot)
+        sent = flood(server.port, SECONDS, pings)
+        alone = flood(server.port, SECONDS, COMMANDS[:40])
+        assert witness.of(Snapshot)
+    assert sent < 2**24  # what kernels keep, not what one sends in that time
+    assert alone
+
+
+def test_strangers_who_ask_without_end_are_slowed_down_and_visitors_are_not():
+    tokens = Tokens.made()
+    with Server(scene=scene(), meshes=MESHES, feed=Live(), port=0, tokens=tokens) as server:
+        address = f"http://127.0.0.1:{server.port}/none"
+
+        async def ask(count, **options):
+            async with httpx.AsyncClient(limits=httpx.Limits(max_connections=20), timeout=PATIENCE) as client:
+                answers = await asyncio.gather(*(client.get(address, **options) for _ in range(count)))
+            return [answer.status_code for answer in answers]
+
+        begun = time.monotonic()
+        rate, burst = STRANGERS
+        codes = asyncio.run(ask(120))
+        took = time.monotonic() - begun
+        answered = codes.count(401)
+        assert set(codes) <= {401, 429}
+        assert answered <= burst + rate * (took + 5.0) + 1
+        cookie = {"Cookie": f"seerob-{server.port}={tokens.cookie(Role.VIEW)}"}
+        begun = time.monotonic()
+        assert set(asyncio.run(ask(120, headers=cookie))) <= {404, 503}
+        assert time.monotonic() - begun < took
+
+
+def test_an_allowance_gives_its_rate_and_never_more():
+    now = 0.0
+    allowance = Allowance(10.0, 5.0, now=lambda: now)
+    given = 0
+    while now < 100.0:
+        now += allowance.take()
+        given += 1
+    assert given == pytest.approx(5 + 10 * 100, abs=1)
+    now += 1000.0
+    assert [allowance.take() for _ in range(5)] == [0.0] * 5
+    assert allowance.take() > 0
+
+
+def test_allowances_are_of_those_who_asked_last():
+    allowances = Allowances(1.0, 1.0)
+    first = allowances.of("a")
+    for k in range(5000):
+        allowances.of(str(k))
+    assert allowances.of("a") is not first
+    assert len(allowances._of) <= 1025

@@ -1,0 +1,217 @@
+"""The page over TLS, as foreign clients see it: Python's ssl, websockets, curl and openssl."""
+
+import contextlib
+import shutil
+import socket
+import ssl
+import subprocess
+import time
+from datetime import timedelta
+
+import httpx
+import pytest
+from websockets.sync.client import connect
+
+from seerob.app.server import certificates, connection
+from seerob.app.server.access import Tokens
+from seerob.app.server.player import Player
+from seerob.app.server.serving import Server
+from seerob.core.errors import InputError
+from seerob.core.snapshot import PROTOCOL, Snapshot
+from server.frames import MESHES, PATIENCE, Remembered, Visitor, scene, snapshot
+
+TOKENS = Tokens.made()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("tls") / "made"
+
+
+@pytest.fixture(scope="module")
+def tls(folder):
+    return certificates.own(folder, "0.0.0.0")
+
+
+@pytest.fixture(scope="module")
+def server(tls):
+    feed = Player(Remembered([snapshot(0), snapshot(1)]))
+    with Server(
+        scene=scene(), meshes=MESHES, feed=feed, host="0.0.0.0", port=0, tokens=TOKENS, tls=tls
+    ) as server:
+        yield server
+
+
+@pytest.fixture(scope="module")
+def trusting(tls):
+    return ssl.create_default_context(cafile=tls.authority)
+
+
+def test_a_client_that_trusts_the_authority_is_served_under_every_name(server, tls, trusting):
+    assert server.url.startswith("https://localhost:")
+    for name in {"localhost", "127.0.0.1", *(n for n in tls.names if n.count(".") == 3)}:
+        with httpx.Client(verify=trusting) as browser:
+            first = browser.get(f"https://{name}:{server.port}/?token={TOKENS.view}")
+            assert (first.status_code, first.headers["location"]) == (303, "/")
+            assert "secure" in first.headers["set-cookie"].lower()
+            assert browser.get(f"https://{name}:{server.port}/").status_code in (200, 503)
+    with Visitor(server, path=f"/ws?token={TOKENS.view}", ssl=trusting) as page:
+        assert page.of(Snapshot) == snapshot(0)
+
+
+def test_a_client_that_does_not_know_the_authority_refuses(server):
+    with pytest.raises(httpx.ConnectError, match="CERTIFICATE_VERIFY_FAILED"):
+        httpx.get(server.url)
+    with pytest.raises(ssl.SSLCertVerificationError):
+        connect(f"wss://localhost:{server.port}/ws", subprotocols=[PROTOCOL])
+
+
+def test_a_name_that_is_not_this_machines_is_not_believed(server, trusting):
+    link = socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE)
+    with link, pytest.raises(ssl.SSLCertVerificationError, match="match"):
+        trusting.wrap_socket(link, server_hostname="cell.example")
+
+
+@pytest.mark.filterwarnings("ignore:ssl.TLSVersion:DeprecationWarning")
+def test_old_tls_and_clear_text_are_refused(server, tls):
+    old = ssl.create_default_context(cafile=tls.authority)
+    old.set_ciphers("ALL:@SECLEVEL=0")
+    old.minimum_version, old.maximum_version = ssl.TLSVersion.TLSv1, ssl.TLSVersion.TLSv1_1
+    link = socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE)
+    with link, pytest.raises(ssl.SSLError, match=r"PROTOCOL_VERSION|EOF"):
+        old.wrap_socket(link, server_hostname="localhost")
+    with pytest.raises(httpx.RemoteProtocolError):
+        httpx.get(f"http://127.0.0.1:{server.port}/?token={TOKENS.view}")
+
+
+def test_a_page_that_is_not_encrypted_opens_no_socket_of_one_that_is(server, trusting):
+    for origin, known in (
+        (f"http://127.0.0.1:{server.port}", 403),
+        (f"https://127.0.0.1:{server.port}", 101),
+    ):
+        with contextlib.ExitStack() as stack:
+            path = f"/ws?token={TOKENS.view}"
+            try:
+                stack.enter_context(Visitor(server, path=path, ssl=trusting, origin=origin))
+                code = 101
+            except Exception as refused:
+                code = refused.response.status_code
+            assert code == known
+
+
+@pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
+def test_curl_is_served(server, tls):
+    command = ["curl", "--silent", "--show-error", "--output", "/dev/null", "--write-out", "%{http_code}"]
+    url = f"https://localhost:{server.port}/?token={TOKENS.view}"
+    said = subprocess.run([*command, "--cacert", tls.authority, url], capture_output=True, text=True)
+    assert (said.returncode, said.stdout) == (0, "303"), said.stderr
+    assert subprocess.run([*command, url], capture_output=True).returncode == 60  # nobody it knows
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed")
+def test_openssl_finds_the_chain_whole_and_the_authority_bound_to_this_machine(folder):
+    said = subprocess.run(
+        ["openssl", "verify", "-x509_strict", "-CAfile", folder / "authority.pem", folder / "server.pem"],
+        capture_output=True,
+        text=True,
+    )
+    assert said.returncode == 0, said.stderr
+    text = subprocess.run(
+        ["openssl", "x509", "-in", folder / "authority.pem", "-noout", "-text"],
+        capture_output=True,
+        text=True,
+    ).stdout
+    for part in (
+        "CA:TRUE, pathlen:0",
+        "Name Constraints: critical",
+        "IP:192.168.0.0/255.255.0.0",
+        "DNS:localhost",
+    ):
+        assert part in text
+
+
+def shake_hands(*ends):
+    """Two ends of TLS that talk to each other: who they are, and what they read and write."""
+    for _ in range(5):
+        for end, said, heard in ends:
+            with contextlib.suppress(ssl.SSLWantReadError):
+                end.do_handshake()
+            heard.write(said.read())
+
+
+@pytest.mark.parametrize(
+    ("name", "believed"), [("bank.example", False), ("8.8.8.8", False), ("10.0.0.5", True)]
+)
+def test_the_authority_cannot_speak_for_others(folder, name, believed):
+    forged = folder.parent / "forged.pem"
+    forged.write_bytes(certificates._issue((name,), *certificates._authority(folder)))
+    context = certificates._context()
+    context.load_cert_chain(forged)
+    client = ssl.create_default_context(cafile=folder / "authority.pem")
+    to_client, from_client, to_server, from_server = (ssl.MemoryBIO() for _ in range(4))
+    ours = client.wrap_bio(to_client, from_client, server_hostname=name), from_client, to_server
+    theirs = context.wrap_bio(to_server, from_server, server_side=True), from_server, to_client
+    if believed:
+        shake_hands(ours, theirs)
+        assert ours[0].version() == "TLSv1.3"
+    else:
+        with pytest.raises(ssl.SSLCertVerificationError, match="permitted subtree violation"):
+            shake_hands(ours, theirs)
+
+
+def test_it_is_made_once_kept_to_its_owner_and_renewed(folder, tls, monkeypatch):
+    assert {file.stat().st_mode & 0o777 for file in folder.iterdir()} == {0o600}
+    assert folder.stat().st_mode & 0o777 == 0o700
+    before = {file.name: file.read_bytes() for file in folder.iterdir()}
+    again = certificates.own(folder, "0.0.0.0")
+    assert again.fingerprint == tls.fingerprint
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
+    moved = certificates.own(folder, "192.168.77.7")  # an address that it does not name yet
+    assert "192.168.77.7" in moved.names
+    assert (folder / "server.pem").read_bytes() != before["server.pem"]
+    assert (folder / "authority.pem").read_bytes() == before["authority.pem"]
+    monkeypatch.setattr(certificates, "RENEWED", timedelta(days=400))
+    renewed = (folder / "server.pem").read_bytes()
+    certificates.own(folder, "192.168.77.7")
+    assert (folder / "server.pem").read_bytes() != renewed
+
+
+def test_what_is_no_certificate_is_one_clear_error(tmp_path, folder):
+    wrong = tmp_path / "wrong.pem"
+    for text in (b"", b"no", (folder / "authority.pem").read_bytes()):
+        wrong.write_bytes(text)
+        with pytest.raises(InputError, match="--certificate and --key"):
+            certificates.given(wrong, None)
+    with pytest.raises(InputError, match="--certificate and --key"):
+        certificates.given(tmp_path / "none.pem", None)
+    with pytest.raises(InputError, match="--certificate and --key"):
+        certificates.given(folder / "server.pem", folder / "authority.key")
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "authority.pem").write_text("no")
+    (tmp_path / "broken" / "authority.key").write_text("no")
+    with pytest.raises(InputError, match="remove its files"):
+        certificates.own(tmp_path / "broken", "0.0.0.0")
+
+
+def test_a_certificate_of_ones_own_serves(folder, trusting):
+    feed = Player(Remembered([snapshot(0)]))
+    given = certificates.given(folder / "server.pem", None)
+    with Server(scene=scene(), meshes={}, feed=feed, port=0, tls=given) as server:
+        assert httpx.get(server.url, verify=trusting).status_code in (200, 503)
+
+
+def test_who_begins_tls_and_does_not_go_on_is_counted_and_cut(tls, monkeypatch):
+    monkeypatch.setattr(connection, "HANDSHAKE", 0.3)
+    monkeypatch.setattr(connection.Doorstep, "most", 5)
+    feed = Player(Remembered([snapshot(0)]))
+    with (
+        contextlib.ExitStack() as held,
+        Server(scene=scene(), meshes={}, feed=feed, port=0, tls=tls) as server,
+    ):
+        begun = time.monotonic()
+        silent = [socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) for _ in range(8)]
+        for one in silent:
+            held.enter_context(one)
+            with contextlib.suppress(ConnectionError):
+                assert one.recv(1) == b""
+        assert time.monotonic() - begun < PATIENCE / 2

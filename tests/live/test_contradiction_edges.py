@@ -162,9 +162,9 @@ def test_joints_that_become_more_begin_anew():
 
 
 def standing(speed, period, until=3.0):
-    """Samples at which positions that stand while velocities run are found."""
+    """Samples at which positions that stand, but for their last bits, while velocities run are found."""
     looking = Contradictions(None)
-    motion = [said(k * period, (0.0,), (speed,)) for k in range(round(until / period))]
+    motion = [said(k * period, (1e-12 * (k % 2),), (speed,)) for k in range(round(until / period))]
     return [k for k, sample in enumerate(motion) if looking.find(sample)]
 
 
@@ -305,3 +305,73 @@ def test_a_joint_that_is_stopped_may_brake_harder_than_it_accelerates():
     target = Target(name="arm", joints=("a",), units=("rad",), velocity=(3.2,), acceleration=(1.0,))
     motion = [said(t, (2 * t - 6 * t * t / 2,), (2 - 6 * t,)) for t in np.arange(0, 0.3, 0.008).tolist()]
     assert not last(motion, target)
+
+
+RAMP = 0.7
+"""In which it gets as fast as it is [s]."""
+
+
+def ramp(t):
+    """Share of its speed, and the way to it as a share of that in a second."""
+    x = min(t, RAMP)
+    return math.sin(math.pi * x / RAMP / 2) ** 2, x / 2 - RAMP / (2 * math.pi) * math.sin(math.pi * x / RAMP)
+
+
+def brought_to_rest(hertz, speed, braking, at, digits=16, seconds=2.0):
+    """A joint that gets faster, goes at a speed, brakes from an instant on, and stands to the last bit."""
+    for k in range(round(seconds * hertz)):
+        t = k / hertz
+        left = min(max(t - at, 0.0), speed / braking)
+        q = speed * (ramp(t)[1] + max(0.0, min(t, at) - RAMP) + left) - braking * left**2 / 2
+        yield t, round(q, digits), speed * ramp(t)[0] - braking * left
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("rates", [True, False])
+@pytest.mark.parametrize(
+    ("hertz", "speed"), [(20, 0.5), (20, 3.0), (125, 0.1), (125, 1.0), (500, 0.1), (500, 3.0)]
+)
+def test_a_device_that_hangs_on_its_last_sample_is_found(hertz, speed, rates, way):
+    """Whether its velocities go on as they were, are zero from then on, or were never said."""
+    for after in (1.0, 0.0) if rates else (None,):
+        looking, found, last = Contradictions(None), [], 0.0
+        for t, q, rate in brought_to_rest(hertz, speed, 1e9, 9.0):
+            hangs = t > 1.0
+            last = last if hangs else q
+            rate = None if after is None else speed * after if hangs else rate
+            found.append((t, looking.find(said(t, (way * last,), None if rate is None else (way * rate,)))))
+        first = next(t for t, why in found if why)
+        assert 1.0 < first <= 1.0 + 4 / hertz
+        assert all(why for t, why in found if t >= first)
+
+
+@pytest.mark.parametrize("digits", [16, 6, 4, 3])
+@pytest.mark.parametrize("rates", [True, False])
+@pytest.mark.parametrize("hertz", [20, 125, 500])
+def test_a_joint_that_brakes_as_arms_do_may_stand_to_the_last_bit(hertz, rates, digits):
+    """At whatever instant between two samples it begins to, in digits down to a milliradian."""
+    chance = np.random.default_rng(3)
+    for _ in range(40):
+        speed, braking, at = (
+            chance.uniform(0.02, 3.0),
+            chance.uniform(2.0, 60.0),
+            1.0 + chance.uniform(0, 0.1),
+        )
+        looking = Contradictions(None)
+        for t, q, rate in brought_to_rest(hertz, speed, braking, at, digits):
+            assert not looking.find(said(t, (q,), (rate,) if rates else None)), (t, speed, braking)
+
+
+def test_a_robot_that_stands_may_do_so_to_the_last_bit():
+    looking = Contradictions(None)
+    for k in range(2000):
+        # With the noise of velocities of an arm that stands.
+        assert not looking.find(said(0.008 * k, (0.3, -1.2), (0.003 * (-1) ** k, 0.002)))
+
+
+@pytest.mark.parametrize(("rate", "told"), [(0.0038, False), (0.0048, True), (-0.0048, True)])
+def test_velocities_over_positions_that_stand_to_the_last_bit(rate, told):
+    """2 mrad in half a second, and 30 ms."""
+    looking = Contradictions(None)
+    found = [looking.find(said(0.008 * k, (0.3,), (rate,))) for k in range(200)]
+    assert any(found) is told

@@ -40,9 +40,9 @@ def target(name, address, unit="mm/s", **more):
 
 
 def person():
-    from seerob.app.emulation.mvn_person import animated
+    from seerob.app.emulation.mvn_person import animated, measured
 
-    return animated("library:reach")
+    return measured(animated("library:reach"), 2e-4)
 
 
 # -- controllers --------------------------------------------------------------------------------
@@ -239,25 +239,36 @@ def vive(patch):
 
 
 def kinect(_):
-    from seerob.app.emulators.kinect import KinectSender, animated
+    from seerob.app.emulators.kinect import KinectSender, animated, measured
     from seerob.devices.sources.kinect import Kinect, Link
 
-    server = KinectSender(animated("library:reach"), to=None, port=0, rate=60.0).start()
+    server = KinectSender(measured(animated("library:reach"), 2e-4), to=None, port=0, rate=60.0).start()
     return Made(server, Kinect(human="anna", link=Link.WEBSOCKET, host=HERE, port=server.port, timeout=1.0))
 
 
 class Page(Emulator):
-    """The page that a headset shows: offers what it sees, seventy times a second, until it is closed."""
+    """The page that a headset shows: offers what it sees, seventy times a second, until it is closed.
+
+    Args:
+        worn: Of whoever wears it.
+    """
+
+    def __init__(self, worn):
+        super().__init__()
+        self._worn = worn
 
     def begin(self):
         """Offer."""
         return self._offer
 
     def _offer(self):
-        poses = np.tile(np.array([0, 1.7, 0, 1, 0, 0, 0], "<f4"), (3, 1)).tobytes()
-        said = Tracking(human="anna", t=0.0, names=("viewer", "left-grip", "right-grip"), poses=poses)
+        begun = time.monotonic()
+        names = ("viewer", "left-grip", "right-grip")
         while not self._over.wait(1 / 72):
             now = time.monotonic()
+            places = self._worn(now - begun).positions[:3]
+            poses = np.hstack([places, np.tile([1, 0, 0, 0], (3, 1))]).astype("<f4").tobytes()
+            said = Tracking(human="anna", t=0.0, names=names, poses=poses)
             OFFERS.offer("anna", self, read(msgspec.structs.replace(said, t=now), now))
         OFFERS.gone(self)
 
@@ -267,7 +278,7 @@ def headset(patch):
 
     patch.setattr("seerob.devices.sources.headset.SILENCE", SILENCE)
     patch.setattr("seerob.devices.sources.headset.GATHER", 0.02)
-    return Made(Page().start(), Headset(human="anna", timeout=1.0))
+    return Made(Page(person()).start(), Headset(human="anna", timeout=1.0))
 
 
 FOREIGN = (opcua, opcua_robot, mqtt, foxglove)

@@ -152,6 +152,24 @@ def captured(recording: Captured) -> Person:
     return _repeated(t, positions, turns)
 
 
+def measured(person: Person, noise: float) -> Person:
+    """Who moves, as a device measures it: what has no noise is taken for frozen.
+
+    Args:
+        person: Who moves.
+        noise: Standard deviation of each coordinate [m], and of each direction [rad].
+    """
+    chance = np.random.default_rng(0)
+
+    def pose(t: float) -> Pose:
+        at = person(t)
+        turns = at.wxyz + 0.5 * noise * chance.normal(size=at.wxyz.shape)
+        turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
+        return Pose(at.positions + noise * chance.normal(size=at.positions.shape), turns)
+
+    return pose if noise else person
+
+
 def _of_postures(person: Description, times: Array, q: Array) -> Person:
     positions, rotations = segments(person, q)
     turns = np.array([[wxyz_from_rotation(R) for R in row] for row in rotations])

@@ -99,6 +99,9 @@ class EmulatorOptions(Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 LIBRARY = "library:reach"
 """What is played when nothing is given."""
+NOISE = 2e-4
+"""Of what a device measures [m]: that of optical trackers; a person without noise is taken for frozen."""
+Noise = Annotated[float, option("noise of what is measured, standard deviation", "m", ge=0, le=0.1)]
 
 
 class PersonOptions(EmulatorOptions, frozen=True, kw_only=True):
@@ -107,6 +110,7 @@ class PersonOptions(EmulatorOptions, frozen=True, kw_only=True):
     file: Annotated[
         str, option("motion to play: an .mvnx or .bvh recording, or keyframes (.toml, library:…)")
     ] = LIBRARY
+    noise: Noise = NOISE
 
     def person(self) -> Person:
         """Who moves.
@@ -114,16 +118,17 @@ class PersonOptions(EmulatorOptions, frozen=True, kw_only=True):
         Raises:
             InputError: The motion is missing or wrong.
         """
-        from seerob.app.emulation.mvn_person import animated, followed, recorded
+        from seerob.app.emulation.mvn_person import animated, followed, measured, recorded
 
         given = Path(self.file)
         match given.suffix.lower():
             case ".mvnx":
-                return recorded(given)
+                person = recorded(given)
             case ".bvh":
-                return followed(given)
+                person = followed(given)
             case _:
-                return animated(self.file)
+                person = animated(self.file)
+        return measured(person, self.noise)
 
 
 # -- robots -------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 
 from seerob.app.emulation.message_sender import MessageSender, Way
-from seerob.app.emulation.options import LIBRARY, EmulatorOptions, Ready, option, port
+from seerob.app.emulation.options import LIBRARY, NOISE, EmulatorOptions, Noise, Ready, option, port
 from seerob.core.transforms import Array, inverse, rotation_from_rpy, transform
 from seerob.description.capture.mapping import conventions, plain
 from seerob.description.description import Description
@@ -103,6 +103,26 @@ def repeated(pictures: list[Picture], up: Array | None = None) -> Scene:
     return scene
 
 
+def measured(scene: Scene, noise: float) -> Scene:
+    """What a camera measures of it: what has no noise is taken for frozen.
+
+    Args:
+        scene: What is before the camera.
+        noise: Standard deviation of each coordinate [m].
+    """
+    chance = np.random.default_rng(0)
+
+    def picture(t: float) -> Picture:
+        seen = scene(t)
+        bodies = [
+            replace(body, positions=body.positions + noise * chance.normal(size=body.positions.shape))
+            for body in seen.bodies
+        ]
+        return replace(seen, bodies=tuple(bodies))
+
+    return picture if noise else scene
+
+
 FIRST = 1.0
 """The camera's clock at the first picture [s]; it counts from when it was switched on."""
 
@@ -153,12 +173,14 @@ class Kinect(EmulatorOptions, frozen=True, kw_only=True):
     to: Annotated[str, option("address to send datagrams to")] = "127.0.0.1"
     port: Annotated[int, port("port to send to, or to listen at with --websocket")] = PORT
     rate: Annotated[float, option("pictures per second", "Hz", ge=1, le=60)] = 30.0
+    noise: Noise = NOISE
     websocket: Annotated[bool, option("let listeners connect; else UDP")] = False
 
     def ready(self) -> Ready:
         """The sender."""
         keyframes = self.file.startswith("library:") or self.file.endswith(".toml")
         scene = animated(self.file) if keyframes else recorded(Path(self.file), self.subject)
+        scene = measured(scene, self.noise)
         to = None if self.websocket else (self.to, self.port)
         server = KinectSender(scene, to=to, host=self.host, port=self.port, rate=self.rate)
         where = self.host if self.websocket else self.to

@@ -2,7 +2,9 @@
 
 Whatever is measured has noise: its last digits change from sample to sample, to and fro. A point that had
 noise so far and now says exactly the same is no longer measured, whatever stamp its samples carry. What
-never had noise (made motions, values rounded to millimetres) may stand still.
+never had noise (made motions, values rounded to millimetres) may stand still in a file. A live device makes
+no motions, and what it filters has little noise that goes to and fro: there a point that never repeated
+itself is frozen once it does, and so is one that never moved while others do.
 """
 
 from __future__ import annotations
@@ -29,11 +31,15 @@ NOTHING = (np.nan,) * 4
 class Frozen:
     """Of the points of one device.
 
+    Args:
+        live: Whether it measures while it speaks.
+
     Attributes:
         bones: Those of which something was frozen in the newest sample.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, live: bool = False) -> None:
+        self._live = live
         self.bones: set[str] = set()
         self._names: tuple[str, ...] = ()
 
@@ -84,5 +90,9 @@ class Frozen:
         new = known & ~same
         self._value[new] = value[new]
         self._same[new] = 0
+        never = self._repeats <= REPEATED * self._steps
+        if self._live:
+            often = self._steps >= STEPS
+            return np.asarray(same & never & (often | ((self._steps == 0) & often.any())))
         noisy = (self._steps >= STEPS) & (self._back >= TO_AND_FRO * self._steps)
-        return np.asarray(same & noisy & (self._repeats <= REPEATED * self._steps))
+        return np.asarray(same & noisy & never)

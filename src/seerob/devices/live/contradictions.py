@@ -6,12 +6,19 @@ be the derivative of the positions that it measures: over the last `SPAN`, no jo
 integral of its velocity by more than noise, rounding and the lag of a filter explain. Nor may a joint get
 faster more quickly than the accelerations that the file states, on which stopping distances rest: by its
 velocities, or by its positions where a device gives no velocities.
+
+A robot may stand, and say so to the last bit. It cannot stop dead: a joint that went :math:`x` in the last
+interval :math:`T`, after a speed :math:`v`, and then stands to the last bit has braked within
+:math:`s = v T - x`, with :math:`v^2 / 2s` at least. What no arm can is a device that hangs on its last
+sample, and so is one whose velocities go on over positions that stand.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
+from itertools import zip_longest
 from typing import NamedTuple
 
 from seerob.core.samples import BodySample, JointSample, PoseSample, Sample, SignalSample
@@ -45,6 +52,15 @@ BODY_SPEED, BODY_SLACK = 10.0, 0.2
 """Of a point of a person: faster than any hand at work [m/s], and noise of depth cameras [m]."""
 MANY = 0.5
 """Share of the points of a person that do not jump together unless all of it is elsewhere."""
+HARDEST = {"rad": 300.0, "m": 100.0}
+"""No joint brakes harder [rad/s² or m/s²]: ten times what published stopping tables of arms come to."""
+FINEST = {"rad": 1e-5, "m": 1e-6}
+"""What a joint may move without being seen, where it is said more finely [rad or m]."""
+STEPS = 4
+"""Times the step of its digits that a joint must go within an interval, for its speed to be told by it."""
+HELD = 2e-3, 2.5
+"""Way that velocities tell of a joint which stands to the last bit, from which on they contradict it [rad or
+m]: twice the coarsest digit that controllers have; and after how many intervals what stands does not move."""
 SILENCE = 0.5
 """After it what was before says nothing of now [s]."""
 
@@ -59,14 +75,89 @@ class _Told(NamedTuple):
     """Integral of its magnitude."""
 
 
+class _Standing:
+    """One joint of which it is told whether it stands to the last bit.
+
+    Args:
+        unit: ``rad`` or ``m``.
+    """
+
+    def __init__(self, unit: str) -> None:
+        self._unit = unit
+        self._q, self._since, self._seen = math.nan, -math.inf, -math.inf
+        """Position, when it was said first and last."""
+        self._step, self._interval, self._speed = 0.0, math.inf, 0.0
+        """Way and time to it [rad or m, s]; the speed before that."""
+        self._longest = math.inf
+        self._finest = math.inf
+        """Least step of its digits that was seen [rad or m]."""
+        self._rate = self._way = self._fastest = 0.0
+        """Velocity said last; what they come to while it stands, and the largest of them."""
+        self._window = -math.inf
+        self._looked, self._dead = False, ""
+
+    def add(self, t: float, q: float, qd: float | None, jitter: float) -> str:
+        """Why it cannot stand as it is said to; empty when it may.
+
+        Args:
+            t: [s]
+            q: Position [rad or m].
+            qd: Velocity [rad/s or m/s]; None where the device measures none.
+            jitter: By which the time between two samples may be off [s].
+        """
+        rate, self._rate = self._rate, qd or 0.0
+        before, self._seen = self._seen, t
+        if q != self._q:
+            self._move(t, q)
+            return ""
+        if t - self._window > SPAN:
+            self._window, self._way, self._fastest = t, 0.0, 0.0
+        self._way += 0.5 * (t - before) * (rate + self._rate)
+        self._fastest = max(self._fastest, abs(rate), abs(self._rate))
+        if abs(self._way) > HELD[0] + LAG * self._fastest:
+            said = f"{self._rate:.3g} {self._unit}/s"
+            return f"the velocity of {{}} is not zero while the joint stands still to the last bit: {said}"
+        if not self._looked and t - self._since > HELD[1] * self._longest:
+            self._looked, self._dead = True, self._stopped_dead(jitter)
+        return self._dead
+
+    def _move(self, t: float, q: float) -> None:
+        step, interval = q - self._q, t - self._since
+        if not math.isnan(step):
+            for size in (abs(step), abs(abs(step) - abs(self._step))):
+                if size > 1e-9:
+                    self._finest = min(self._finest, size)
+        self._speed = self._step / self._interval
+        self._longest = max(interval, self._interval)
+        self._step, self._interval = (0.0, math.inf) if math.isnan(step) else (step, interval)
+        self._q, self._since, self._window = q, t, t
+        self._way = self._fastest = 0.0
+        self._looked, self._dead = False, ""
+
+    def _stopped_dead(self, jitter: float) -> str:
+        """Whether it would have had to brake harder than any joint can."""
+        speed, way = abs(self._speed), abs(self._step)
+        if self._step * self._speed <= 0 or way < STEPS * self._finest:
+            return ""
+        least = max(speed * self._interval - way, 2 * self._finest, FINEST[self._unit]) + speed * jitter
+        if speed**2 <= 2 * HARDEST[self._unit] * least:
+            return ""
+        return (
+            f"{{}} stands to the last bit right after {speed:.3g} {self._unit}/s, which nothing brakes so: "
+            "its last sample again and again?"
+        )
+
+
 class Contradictions:
     """What one source says of one target, sample by sample.
 
     Args:
         target: With joint units, and limits of speed and acceleration; None where nobody knows them.
+        live: Whether it measures a robot while it speaks: a motion that was planned may stop dead.
     """
 
-    def __init__(self, target: Target | None) -> None:
+    def __init__(self, target: Target | None, *, live: bool = True) -> None:
+        self._live = live
         units = () if target is None else target.units
         limits = () if target is None else target.velocity
         self._units = units
@@ -82,6 +173,7 @@ class Contradictions:
         self._newest: _Told | None = None
         self._places: deque[tuple[float, tuple[float, ...]]] = deque(maxlen=ANCHORS + 1)
         """Instants [s] and positions of a device that gives no velocities."""
+        self._standing: list[_Standing] = []
 
     def find(self, sample: Sample) -> str:
         """Why this sample and those before it are no one motion; empty when they may be."""
@@ -96,10 +188,11 @@ class Contradictions:
             self._told.clear()
             self._places.clear()
             self._newest = None
+            self._standing = []
             before = None
         if isinstance(sample, JointSample):
             jump = self._leap(before, sample, step) if isinstance(before, JointSample) else ""
-            return jump or self._compare(sample, t)
+            return jump or self._compare(sample, t) or self._hangs(sample, t)
         if isinstance(sample, PoseSample):
             return _moved(before, sample, step) if isinstance(before, PoseSample) else ""
         return _flew(before, sample, step) if isinstance(before, BodySample) else ""
@@ -137,6 +230,21 @@ class Contradictions:
                 break
         if t - self._told[-1].t >= SPAN / ANCHORS:
             self._told.append(now)
+        return found
+
+    def _hangs(self, sample: JointSample, t: float) -> str:
+        """Whether a joint that moved stands to the last bit, as nothing that brakes does."""
+        if len(self._standing) != len(sample.q):
+            units = [*self._units, *["rad"] * len(sample.q)]
+            self._standing = [_Standing(unit) for unit in units[: len(sample.q)]]
+        if sample.qd is not None and len(sample.qd) != len(sample.q):
+            return ""
+        rates: Sequence[float | None] = sample.qd or ()
+        jitter = LOOSE if sample.t_device is None else 0.0
+        found = ""
+        for k, (joint, q, qd) in enumerate(zip_longest(self._standing, sample.q, rates)):
+            if (why := joint.add(t, q, qd, jitter if self._live else math.inf)) and not found:
+                found = why.format(f"joint {k + 1}")
         return found
 
     def _hurries(self, then: _Told, now: _Told) -> str:

@@ -33,6 +33,7 @@ from seerob.core.extras import need
 from seerob.core.host_name import check_host, check_url
 from seerob.core.samples import BodySample, JointSample, Quality, Sample, SignalSample, key
 from seerob.core.snapshot import Finding
+from seerob.description.capture.frozen import Frozen
 from seerob.devices.live.arrivals import Arrivals, Statistics
 from seerob.devices.live.contact import Contact, contact_of
 from seerob.devices.live.contradictions import Contradictions
@@ -50,6 +51,8 @@ STOP_WITHIN = 1.0
 """A listener that does not end by then is left behind [s]; its thread keeps no process alive."""
 ASK_WITHIN = 1.5
 """At start [s]."""
+STILL = "it says the same of the person to the last bit, again and again: is it still measured?"
+"""What is measured has noise, and nobody stands so still."""
 UNTIMED = "it sends no time, so that nobody knows how late it is: give a bound as delay of the source"
 
 
@@ -231,6 +234,7 @@ class Listener:
         self._found: dict[tuple[str, ...], tuple[str, float]] = {}
         """What contradicted itself, and until when that counts [s]."""
         self._posted: dict[tuple[str, ...], Sample] = {}
+        self._people: dict[tuple[str, ...], _Person] = {}
         self._lock = Lock()
         self._thread = Thread(target=self._run, name=f"seerob-{self.name}", daemon=True)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -306,8 +310,9 @@ class Listener:
         if not math.isfinite(sample.t):
             raise SeerobError(f"it yields a sample without the time of its arrival (t is {sample.t})")
         if isinstance(sample, SignalSample):
-            self._news(sample, sample.t, self.drives)
+            self._news(replace(sample, source=self.name), sample.t, self.drives)
             return
+        sample = replace(sample, source=self.name)
         host, what = sample.t, key(sample)
         heard = Instant(host)
         if sample.t_device is not None:
@@ -318,6 +323,15 @@ class Listener:
                 # No news, and a doubt about what was said before.
                 self._doubt(what, heard.invalid_reason)
             return
+        if isinstance(sample, BodySample):
+            person = self._people.setdefault(what, _Person())
+            stood = person.stood(sample, host)
+            if stood is not None:
+                self._arrivals.repeat()
+                if stood > self._source.timeout and what in self._posted:
+                    self._doubt(what, STILL)
+                return
+            sample = replace(sample, points=person.frozen(sample.points))
         late = (self._source.delay or 0.0) * (not self._source.asked)
         if sample.t_device is not None:
             late = self._clock.latency
@@ -346,7 +360,7 @@ class Listener:
             if self._up is False:
                 _log.warning("%s: heard again", self.name)
             self._up = True
-        sample = self._posted[key(sample)] = replace(sample, source=self.name, seq=self._seq)
+        sample = self._posted[key(sample)] = replace(sample, seq=self._seq)
         self._seq += 1
         self._post(sample)
 
@@ -376,6 +390,29 @@ class Listener:
             _log.warning("%s: not heard: %s", self.name, reason)
             self._arrivals.lose()
             self._up = False
+
+
+class _Person:
+    """What one device said of a person."""
+
+    def __init__(self) -> None:
+        self.frozen = Frozen(live=True)
+        self._content: int | None = None
+        self._since = 0.0
+
+    def stood(self, sample: BodySample, host: float) -> float | None:
+        """For how long it has said nothing but this [s]: that is silence; None where it is news.
+
+        Args:
+            sample: What it says.
+            host: When [s].
+        """
+        content = _content(sample)
+        seen = any(p.position is not None or p.wxyz is not None for p in sample.points)
+        if seen and content == self._content:
+            return host - self._since
+        self._content, self._since = content, host
+        return None
 
 
 def _content(sample: Sample) -> int:

@@ -77,7 +77,7 @@ class LookedAt:
                 if pending is not None and key(pending) == about:
                     pending = _doubted(pending, self._name, told[about][0])
                 continue
-            look = looks.setdefault(about, Contradictions(self._target))
+            look = looks.setdefault(about, Contradictions(self._target, live=False))
             stamped = sample if sample.t_device is not None else replace(sample, t_device=sample.t)
             reason, holds = told.get(about, ("", -math.inf))
             if (found := look.find(stamped)) and holds < math.inf:

@@ -173,14 +173,3 @@ def test_the_simulated_stop_is_that_of_masses_at_the_ends_of_their_tolerance(tmp
     moved = separation(tmp_path / "com", SIMULATED, arm=ROTOR + "com_tolerance = 0.01\n")
     assert moved.verdict is Verdict.UNDECIDED
     assert "com_tolerance of arm ± 10 mm not followed" in moved.reason
-
-
-def test_what_torques_allow_a_lighter_arm_is_not_taken_for_known(tmp_path):
-    by_torque = SIMULATED.replace("acceleration = 0, ", "").replace("simulated", "bound").replace(
-        "brakes = [40.0, 20.0]", "stopping = 0.2"
-    )  # fmt: skip
-    plain = separation(tmp_path / "plain", by_torque, x=9.0, urdf=two_r(effort=5.0))
-    assert plain.verdict is Verdict.WITHIN
-    S = separation(tmp_path / "off", by_torque, arm=MASSES_OFF, x=9.0, urdf=two_r(effort=5.0))
-    assert S.verdict is Verdict.UNDECIDED
-    assert "mass_tolerance of arm" in S.reason

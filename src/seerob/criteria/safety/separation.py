@@ -355,8 +355,8 @@ class Separation(Criterion, frozen=True, kw_only=True):
                 wide = float(far[k] - near[k])
                 open_ = deciding((*ends.tolerances, tracking(wide / 2)), np.append(widths, wide))
                 if most[k] > S_p[k] and bool((most - S_p)[k] >= max(wide, *widths.tolist(), 0.0)):
-                    faster = "if the robot gets faster during the reaction time as its torques allow: give "
-                    why = stop.more or f"{faster}stop.acceleration"
+                    faster = "if the robot is as fast as it can be during the reaction time: give "
+                    why = stop.more or f"{faster}stop.acceleration, or acceleration_limits"
                     if not state.speed_errors.keys().isdisjoint(movers):
                         why = "by the noise of positions that speeds are derived from"
                     open_ = f"S_p is up to {most[k]:.3f} m {why}"

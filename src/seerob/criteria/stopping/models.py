@@ -92,8 +92,8 @@ class Stop(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     acceleration: Annotated[float, Meta(ge=0, extra={"unit": "m/s²"})] | None = None
     """How fast any point of the robot may get faster during the reaction time [m/s²]; 0 where your safety
     controller sees to it. When not given: what a motion from a file is known to do; of a live robot the
-    ``acceleration_limits`` of its table; else what its torque limits and masses allow, and between that and
-    none the verdict is undecided."""
+    ``acceleration_limits`` of its table; else all of its ``velocity_limits`` at once, and between that and no
+    acceleration the verdict is undecided."""
     tolerance: StopTolerance | None = None
     """How far ``reaction``, ``stopping`` and ``deceleration`` may be off, either way."""
 

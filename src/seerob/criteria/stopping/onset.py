@@ -30,8 +30,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from seerob.core.domains import at_least, number
-from seerob.core.errors import Undecided
+from seerob.core.domains import number
 from seerob.core.transforms import Array
 from seerob.kernels.ahead import joint_speeds, kept, part_speeds, until_braking
 from seerob.kernels.speed import fastest_of, stacked
@@ -482,7 +481,7 @@ def by_joints(
     v: Array,
     T_r: float,
     qd: Array,
-    qdd: Array,
+    qdd: Array | None,
     largest: Array,
     coupling: Array,
     chains: Sequence[KinematicChain],
@@ -494,7 +493,7 @@ def by_joints(
         v: Speeds of the parts [m/s], shape (n,).
         T_r: Reaction time [s].
         qd: Speeds of the joints [rad/s or m/s], shape (j,).
-        qdd: Largest accelerations, shape (j,).
+        qdd: Largest accelerations, shape (j,); None where a joint may be at its largest speed at once.
         largest: Largest speeds, inf where there is no limit, shape (j,).
         coupling: All joints from these, shape (m, j).
         chains: Of each part.
@@ -504,9 +503,12 @@ def by_joints(
     T, gained = T_r + lead, T_r**2 / 2 + lead * T_r
     # A limit that the joint is beyond is none.
     most = np.where(now > (1 + BEYOND) * largest, np.inf, np.maximum(largest, now))
-    u = np.minimum(now + qdd * T, most)
-    ways = np.minimum(now * T_r + qdd * gained, u * T_r)
-    every_u, every_way, every_a = (np.abs(coupling) @ each for each in (u, ways, qdd))
+    at_once = np.maximum(largest, now)
+    u = at_once if qdd is None else np.minimum(now + qdd * T, most)
+    ways = u * T_r if qdd is None else np.minimum(now * T_r + qdd * gained, u * T_r)
+    every_u, every_way, every_a = (
+        np.abs(coupling) @ each for each in (u, ways, 0 * u if qdd is None else qdd)
+    )
     S_r, v_s = np.empty_like(v), np.empty_like(v)
     for i, (turns, rows, levers) in enumerate(chains):
         uj, wj, aj = every_u[rows], every_way[rows], every_a[rows]
@@ -521,21 +523,7 @@ def by_joints(
         before = np.cumsum(spin) - spin
         onward = np.cumsum((uj * weight)[::-1])[::-1]
         A = float((aj * weight + uj * np.where(turns, 2 * before * weight + onward, 2 * before)).sum())
+        A = math.inf if qdd is None else A
         v_s[i] = max(min(v[i] + A * T, float((uj * weight).sum())), v[i])
         S_r[i] = max(min(v[i] * T_r + A * gained, way), v[i] * T_r)
     return Onset(v, S_r, v_s, ways, u, linear=False)
-
-
-def from_torques(M: Array, bias: Array, torques: Array) -> Array:
-    r"""Largest accelerations of joints with limited torques, :math:`|M^{-1}| (\tau + |c + g|)`.
-
-    Args:
-        M: Mass matrix, shape (j, j).
-        bias: Torques of gravity and of the motion, shape (j,) [N·m or N].
-        torques: Limits, shape (j,).
-    """
-    torques = at_least("torques", torques, unit="N·m or N")
-    try:
-        return np.asarray(np.abs(np.linalg.inv(M)) @ (torques + np.abs(bias)))
-    except np.linalg.LinAlgError as error:
-        raise Undecided("the mass matrix is singular") from error

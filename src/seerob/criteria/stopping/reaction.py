@@ -3,32 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
-import mujoco
 import numpy as np
 
-from seerob.core.errors import Undecided
 from seerob.core.snapshot import Input, Origin
 from seerob.core.transforms import Array
 from seerob.criteria.stopping.onset import (
+    BEYOND,
     At,
     Foreseen,
     Levers,
     Onset,
     by_joints,
     constant,
-    from_torques,
     held,
     shaken,
 )
 from seerob.model.model import Gap, Mechanism, Model
-from seerob.twin.accuracy.mass_tolerances import MassTolerances
 from seerob.twin.state import State
 
 Reactions = Callable[[State], tuple[At, At | None]]
-"""What follows from the speeds as they are known, and a bound from above where that is another one: of what
-torques allow, and of speeds that may be off by the noise of positions that they were derived from."""
+"""What follows from the speeds as they are known, and a bound from above where that is another one: with all
+joints at their largest speeds at once, and of speeds that may be off by the noise of positions that they were
+derived from."""
 
 NAME = "acceleration during T_r"
 GIVE = "give stop.acceleration"
@@ -74,12 +71,11 @@ def bind_reaction(
         return lambda state: with_noise(state, (given(state), None)), what, ()
     foreseen = Foreseen(model, robot, gap, T_r)
     limits = _acceleration_limits(model, robot)
-    torques = np.array([np.nan if limit is None else limit.value for limit in robot.effort_limits])
     levers = Levers(model, robot, gap)
     largest = np.array([np.inf if limit is None else limit.value for limit in robot.velocity_limits])
+    endless = ", ".join(j.name for j, x in zip(robot.joints, largest, strict=True) if np.isinf(x))
     carriers, now = model.carriers_of(robot.name), np.zeros(0)
-    uncertain = ", ".join(map(str, MassTolerances(model, robot).tolerances))
-    bias, lead = _Bias(model, robot), model.workstation.engine.tick
+    lead = model.workstation.engine.tick
 
     def reactions(state: State) -> tuple[At, At | None]:
         known = foreseen.at(state)
@@ -92,25 +88,18 @@ def bind_reaction(
             why = f"{robot.name} is carried by {robot.on}, and nobody says how fast both get faster: {GIVE}"
         elif not points:
             why = f"what {robot.name} does during the reaction time is not known: {GIVE} = 0 where it may not"
-        elif limits is None and uncertain:
-            why = f"what torques allow where {uncertain} is not known: {GIVE}, or acceleration_limits"
-        elif limits is None and np.isnan(torques).any():
-            names = ", ".join(j.name for j, x in zip(robot.joints, torques, strict=True) if np.isnan(x))
-            why = f"{robot.name}: neither acceleration_limits nor the torque limit of {names}: {GIVE}"
+        elif limits is None and endless:
+            why = f"{robot.name}: neither acceleration_limits nor the speed limit of {endless}: {GIVE}"
+        elif limits is None and (np.abs(qd) > (1 + BEYOND) * largest).any():
+            why = f"{robot.name} is faster than its speed limits, and has no acceleration_limits: {GIVE}"
         else:
             why = ""
-        qdd = limits
-        if not why and qdd is None:
-            try:
-                qdd = from_torques(state.mass_matrix(robot), bias(state), torques)
-            except Undecided as reason:
-                why = f"{reason}: {GIVE}"
-        if why or qdd is None:
+        if why:
             return with_noise(state, (lambda scale: held(scale * v, T_r, scale * qd, why), None))
-        accelerations, chains = qdd, levers.at(state)
+        chains = levers.at(state)
 
         def joints(v: Array, qd: Array) -> Onset:
-            return by_joints(v, T_r, qd, accelerations, largest, robot.coupling, chains, lead)
+            return by_joints(v, T_r, qd, limits, largest, robot.coupling, chains, lead)
 
         def most(scale: float) -> Onset:
             return joints(scale * v, scale * qd)
@@ -124,9 +113,9 @@ def bind_reaction(
             return most, None if off is None else top
         return (lambda scale: held(scale * v, T_r, scale * qd)), top
 
-    named = {limit.source for limit in robot.effort_limits if limit is not None}
+    named = {limit.source for limit in robot.velocity_limits if limit is not None}
     value, origin, source, unit = (
-        "by torque limits and masses",
+        "at once to its speed limits",
         Origin.ESTIMATED,
         "; ".join(sorted(named)),
         "",
@@ -138,7 +127,7 @@ def bind_reaction(
     elif limits is not None and not carriers:
         value, origin, unit = ", ".join(f"{x:g}" for x in limits), Origin.GIVEN, "rad/s² or m/s²"
         source = f"workstation file (acceleration_limits of {robot.name})"
-    elif np.isnan(torques).any() or robot.role != "robot" or carriers:
+    elif endless or robot.role != "robot" or carriers:
         value, origin, source = "not known", Origin.MISSING, ""
     what = Input(name=NAME, value=value, unit=unit, origin=origin, source=source)
     left_out = tuple(f"an acceleration of {name}, which {robot.name} carries" for name in robot.riders)
@@ -160,21 +149,3 @@ def joint_limits(model: Model, robot: Mechanism) -> tuple[Array, Array] | None:
     if limits is None:
         return None
     return limits, np.array([np.inf if limit is None else limit.value for limit in robot.velocity_limits])
-
-
-class _Bias:
-    """Torques of gravity and motion on a robot's joints."""
-
-    def __init__(self, model: Model, robot: Mechanism) -> None:
-        self._data: Any = mujoco.MjData(model.mj)
-        self._robot, self._b = robot, np.zeros(model.mj.nv)
-
-    def __call__(self, state: State) -> Array:
-        mj, data, robot = state.model.mj, self._data, self._robot
-        now = state.data_of(robot.name)
-        data.qpos[:], data.qvel[:] = now.qpos, now.qvel
-        mujoco.mj_kinematics(mj, data)
-        mujoco.mj_comPos(mj, data)
-        mujoco.mj_comVel(mj, data)
-        mujoco.mj_rne(mj, data, 0, self._b)
-        return np.asarray(robot.coupling.T @ self._b[robot.v_address])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seerob.devices.live.differentiation import SAMPLES, Differentiator, end_weights
+from seerob.devices.live.differentiation import FEW, SAMPLES, Differentiator, PositionNoise, end_weights
 
 steps = st.lists(st.floats(1e-3, 0.1), min_size=2, max_size=SAMPLES - 1)
 
@@ -56,3 +56,56 @@ def test_a_gap_begins_anew():
         assert speeds == pytest.approx((2.0, -1.0))
     assert slope.add(1.0, (5.0, 5.0)) is None
     assert slope.add(0.5, (5.0, 5.0)) is None
+
+
+def told(noise, t, q):
+    for instant, value in zip(t.tolist(), q.tolist(), strict=True):
+        noise.add(instant, (value,))
+
+
+@pytest.mark.parametrize("hertz", [20, 125, 500])
+@pytest.mark.parametrize("uneven", [0.0, 0.4])
+def test_how_far_derived_speeds_may_be_off_is_what_the_noise_makes(hertz, uneven):
+    """Of a swing, at even and at uneven instants: hardly ever more than that, and mostly not much less."""
+    rng, sigma, count = np.random.default_rng(2), 3e-4, 400
+    t = (np.arange(count) + uneven * rng.uniform(-0.5, 0.5, count)) / hertz
+    q, v = 0.3 * np.sin(1.5 * t), 0.45 * np.cos(1.5 * t)
+    q += sigma * rng.standard_normal(count)
+    for n in (3, SAMPLES) if hertz > 100 else (3,):
+        noise, off = PositionNoise(), []
+        for k in range(count):
+            noise.add(t[k], (q[k],))
+            if k >= n + FEW:
+                times = t[k - n + 1 : k + 1].tolist()
+                (error,) = noise.speed_error(times)
+                wrong = abs(end_slope(times, q[k - n + 1 : k + 1, None])[0] - v[k])
+                off.append(wrong / error)
+        assert np.mean(np.array(off) > 1) < 0.02
+        assert 0.2 < np.sqrt(np.mean(np.square(off))) < 0.5  # a third, of three standard deviations
+
+
+def test_what_has_no_noise_is_not_off():
+    noise = PositionNoise()
+    t = np.arange(200) / 125
+    told(noise, t, 0.3 * np.sin(1.5 * t))
+    assert noise.speed_error(t[-3:].tolist())[0] < 5e-3
+
+
+def test_before_much_is_told_the_largest_counts():
+    noise = PositionNoise()
+    told(noise, np.arange(3.0), np.zeros(3))
+    assert noise.speed_error([0.0, 1.0, 2.0]) is None
+    noise.add(3.0, (1.0,))
+    noise.add(3.0, (9.0,))  # not later: left out
+    (first,) = noise.speed_error([1.0, 2.0, 3.0])
+    assert first == pytest.approx(3 * np.sqrt(6.5) / np.sqrt(20))
+    told(noise, np.arange(4.0, 12.0), np.ones(8))
+    assert noise.speed_error([9.0, 10.0, 11.0])[0] == pytest.approx(2 * first)
+
+
+def test_a_jump_is_no_noise():
+    noise = PositionNoise()
+    told(noise, np.arange(60.0), np.where(np.arange(60) < 30, 0.0, 1.0))
+    assert noise.speed_error([57.0, 58.0, 59.0])[0] < 1e-12
+    noise.add(60.0, (1.0, 1.0))
+    assert noise.speed_error([57.0, 58.0, 59.0]) is None

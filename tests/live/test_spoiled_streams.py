@@ -72,6 +72,8 @@ class Tick(NamedTuple):
     speed_off: float
     """Of the tip's speed from what it is [m/s]."""
     reason: str
+    noise: float = 0.0
+    """How far the speed may be off, as it is said [m/s]."""
 
 
 TIMES = np.linspace(0, 2 * math.pi / OMEGA, 2000)
@@ -141,7 +143,8 @@ class Spoiled:
             there = self.clock.start - self.delay + state.t + OFFSET
             off = np.abs(state.joint_positions(arm) - motion(there)[0]).max()
             value = math.nan if result.value is None else result.value - tip_speed(there)
-            told.append(Tick(state.t, result.verdict == "within", off, abs(value), result.reason))
+            noise = max(result.interval) - result.value if result.interval else 0.0
+            told.append(Tick(state.t, result.verdict == "within", off, abs(value), result.reason, noise))
             self.now += 0.003
             self.clock.wait(state.t + TICK)
         return told
@@ -340,3 +343,24 @@ def test_who_sends_no_time_is_as_old_as_the_file_allows(station, monkeypatch):
     silent = next(tick.t for tick in told if "not heard for" in tick.reason)
     last = 1000.0 + packets[-1][0] - bounded.clock.start + bounded.delay
     assert silent == pytest.approx(last + 0.2 - bounded.delay - 0.05, abs=0.011)
+
+
+@pytest.mark.parametrize("rates", [True, False])
+@pytest.mark.parametrize("sigma", [0.0, 2e-4])
+def test_speeds_that_come_from_noisy_positions_are_as_far_off_as_is_said(station, monkeypatch, sigma, rates):
+    chance = np.random.default_rng(CHANCE)
+
+    def said(t):
+        q, qd = motion(t)
+        return q + sigma * chance.normal(size=2), qd if rates else None
+
+    told = Spoiled(station, monkeypatch, stream(6.0, said=said), ticks=500).live()[50:]
+    sure = [tick for tick in told if tick.decided]
+    assert len(sure) >= 0.99 * len(told)
+    wide = [tick.noise for tick in sure]
+    if rates or not sigma:
+        assert max(wide) < 0.02
+    else:
+        assert min(wide) > 0.1
+        # The controllers of the twin smooth what they are pulled to.
+        assert all(tick.speed_off < tick.noise + 0.02 for tick in sure)

@@ -15,6 +15,7 @@ gains as applied forces diverge at a floating root. Torque limits clamp the whol
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 
@@ -25,6 +26,8 @@ from seerob.core.errors import InputError, SimulationDiverged
 from seerob.core.samples import BodySample, JointSample, PoseSample, Sample, SignalSample
 from seerob.core.transforms import Array, rotation_from_wxyz
 from seerob.description.capture.following import Following
+from seerob.devices.live.differentiation import PositionNoise
+from seerob.files.trajectories.trajectory import QUIET
 from seerob.kernels import pull as kernel
 from seerob.model.model import Mechanism, Model
 from seerob.model.mounting.compilation import pose_matrix
@@ -177,6 +180,8 @@ class Engine:
         """Who was put elsewhere during a tick."""
         self._force = np.zeros(self._mj.nv)
         self._almost = 0.999 * self._limits
+        self._noises: dict[str, tuple[PositionNoise, deque[float]]] = {}
+        """By robot whose live source says no speeds: noise of its positions, and its newest instants [s]."""
         self._said: dict[str, own_words.LiveWords] = {}
         """By robot, what its live source says of itself."""
         self._followings: dict[str, Following] = {}
@@ -301,11 +306,26 @@ class Engine:
                     self._leapt[name] = t + HOLD, jump
                 until, said = self._leapt[name]
                 jump = said if t <= until else ""
-            error = sample.qd_error if isinstance(sample, JointSample) else None
             torques = None if sample is None else torques_of(sample)
-            off = None if error is None else np.array(error)
+            off = None if sample is None else self._speed_error(name, sample)
             hearing.heard.append(Heard(t, reason or jump, torques, off))
             hearing.leaves_at = self._references[name].leaves_at if name in self._stands else 0.0
+
+    def _speed_error(self, name: str, sample: JointSample | PoseSample) -> Array | None:
+        """How far speeds may be off that were derived from noisy positions; None where they are not.
+
+        Of a live source that says none, they are slopes of the parabola through its newest three samples.
+        """
+        error = sample.qd_error if isinstance(sample, JointSample) else None
+        if name in self._unread:
+            if not isinstance(sample, JointSample) or sample.qd is None:
+                noise, times = self._noises.setdefault(name, (PositionNoise(), deque(maxlen=3)))
+                noise.add(sample.t, tuple(self._references[name].newest.tolist()))
+                times.append(sample.t)
+                error = noise.speed_error(times) if len(times) == 3 else None
+            if error is not None and not max(error, default=0.0) > QUIET:
+                return None
+        return None if error is None else np.array(error)
 
     def _following(self, name: str) -> Following:
         """What captured motion of a person goes through.

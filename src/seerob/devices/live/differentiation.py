@@ -8,12 +8,18 @@ the velocity is :math:`\sigma_v = \frac{\sigma}{T}\sqrt{\frac{12 (2n-1)(8n-11)}{
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from operator import mul
+from statistics import median
 
 SAMPLES = 7
 """That the parabola is fitted to."""
+DEVIATIONS = 3.0
+"""That are told of noise: of normal errors 99.7 % lie within."""
+REMEMBERED, FEW = 64, 16
+"""Third differences that noise is told by; of fewer the largest counts, not the median."""
 FLAT = 1e-9
 """Sum of the squares that a parabola has beside the best line, in units of the span, below which its
 curvature is not told by the instants: all but two of them fall together."""
@@ -60,6 +66,11 @@ class Differentiator:
         self._gap = gap
         self._times: deque[float] = deque(maxlen=SAMPLES)
         self._values: deque[tuple[float, ...]] = deque(maxlen=SAMPLES)
+        self._noise = PositionNoise()
+
+    def error(self) -> tuple[float, ...] | None:
+        """How far the newest velocities may be off by the noise of positions [rad/s or m/s], shape (n,)."""
+        return self._noise.speed_error(self._times) if len(self._times) > 2 else None
 
     def add(self, t: float, values: tuple[float, ...]) -> tuple[float, ...] | None:
         """Velocities at the newest sample; None until there are three, and again after a gap.
@@ -76,7 +87,56 @@ class Differentiator:
             self._values.clear()
         self._times.append(t)
         self._values.append(values)
+        self._noise.add(t, values)
         if len(self._times) < 3:
             return None
         weights = end_weights(self._times)
         return tuple([sum(map(mul, weights, column)) for column in zip(*self._values, strict=True)])
+
+
+class PositionNoise:
+    """Standard deviation of the noise of positions that come one by one."""
+
+    def __init__(self) -> None:
+        self._times: deque[float] = deque(maxlen=4)
+        self._values: deque[tuple[float, ...]] = deque(maxlen=4)
+        self._found: deque[list[float]] = deque(maxlen=REMEMBERED)
+
+    def add(self, t: float, values: tuple[float, ...]) -> None:
+        """Take what came.
+
+        Args:
+            t: [s]; what is not later than the sample before it is left out.
+            values: [rad or m], shape (n,).
+        """
+        if self._times and not t > self._times[-1]:
+            return
+        if self._values and len(self._values[-1]) != len(values):
+            self._values.clear()
+            self._times.clear()
+            self._found.clear()
+        self._times.append(t)
+        self._values.append(values)
+        if len(self._times) < 4:
+            return
+        # Divided differences, so that unevenly spaced instants are no noise.
+        weights = [1 / math.prod(a - b for b in self._times if b != a) for a in self._times]
+        size = math.sqrt(sum(map(mul, weights, weights)))
+        columns = zip(*self._values, strict=True)
+        self._found.append([abs(sum(map(mul, weights, column))) / size for column in columns])
+
+    def speed_error(self, times: Sequence[float]) -> tuple[float, ...] | None:
+        """How far a slope of the parabola through values at instants may be off at the last of them.
+
+        Args:
+            times: Ascending [s], shape (m,), m >= 3.
+
+        Returns:
+            [rad/s or m/s], shape (n,); None as long as nothing is told of the noise.
+        """
+        if not self._found:
+            return None
+        weights = end_weights(times)
+        by = DEVIATIONS * math.sqrt(sum(map(mul, weights, weights)))
+        few = len(self._found) < FEW
+        return tuple([by * (max(c) if few else 1.4826 * median(c)) for c in zip(*self._found, strict=True)])

@@ -40,7 +40,13 @@ GAP = 5.0
 
 
 def joint_sample(
-    m: Monitoring, *, target: str, arrived: float, device: float | None, qd: tuple[float, ...] | None
+    m: Monitoring,
+    *,
+    target: str,
+    arrived: float,
+    device: float | None,
+    qd: tuple[float, ...] | None,
+    qd_error: tuple[float, ...] | None = None,
 ) -> JointSample:
     """What a message says of the joints.
 
@@ -52,6 +58,7 @@ def joint_sample(
         arrived: Host's monotonic time [s].
         device: The controller's time [s].
         qd: Speeds [rad/s].
+        qd_error: How far they may be off [rad/s].
     """
     n = len(m.q)
     return JointSample(
@@ -62,6 +69,7 @@ def joint_sample(
         target=target,
         q=m.q,
         qd=qd,
+        qd_error=qd_error,
         tau=m.tau if len(m.tau) == n else None,
         tcp=(1e-3 * m.tcp[0], 1e-3 * m.tcp[1], 1e-3 * m.tcp[2]) if m.tcp else None,
     )
@@ -233,11 +241,14 @@ class Fri(LiveSource, frozen=True, kw_only=True):
                     raise ProtocolError(f"sends {len(m.q)} joints where an LBR has {JOINTS}")
                 t = device(m)
                 instant = datagram.arrived if t is None else t
-                qd = None
+                qd = error = None
                 if not newest - REORDERED < instant <= newest:  # neither doubled nor overtaken
                     newest = instant
                     qd = slope.add(instant, m.q)
-                yield joint_sample(m, target=self.robot, arrived=datagram.arrived, device=t, qd=qd)
+                    error = None if qd is None else slope.error()
+                yield joint_sample(
+                    m, target=self.robot, arrived=datagram.arrived, device=t, qd=qd, qd_error=error
+                )
                 now = m.session, m.quality, m.safety, m.operation, m.control, m.drives
                 if now != said or datagram.arrived >= due:
                     said, due = now, datagram.arrived + SIGNAL_PERIOD

@@ -75,6 +75,27 @@ def test_what_its_drive_does_after_the_blow_is_known_or_it_is_not_within(tmp_pat
         assert Verdict.WITHIN not in {row.verdict for row in rows}
 
 
+@pytest.mark.parametrize("v", [0.02, 9e-4, 1e-5, -1e-5])
+@pytest.mark.parametrize(
+    ("drive", "verdict"), [("", Verdict.UNDECIDED), ("drive_force = 5000\n", Verdict.EXCEEDED)]
+)
+def test_a_drive_presses_as_hard_however_slowly_it_moves(tmp_path, v, drive, verdict):
+    """A cart that closes a gap of 30 mm at a wall."""
+    wall = '[[parts]]\nname = "wall"\nshape = { box = [0.2, 4, 4] }\n'
+    wall += "at = { position = [0.63, 0, 5] }\n"
+    found = results(tmp_path, CART + wall + CONTACT + drive, cart=([0.0], [v]))["F"]
+    assert found.verdict is verdict
+    assert results(tmp_path / "0", CART + wall + CONTACT + drive, cart=([0.0], [0.0]))["F"].verdict is None
+
+
+@pytest.mark.parametrize("v", [0.1, 5e-4])
+def test_a_carrier_presses_with_the_arm_that_it_carries_however_slowly_it_moves(tmp_path, v):
+    text = CART + ARM + ARM_TOO
+    found = results(tmp_path, text, cart=([0.0], [v]), arm=([0.3, 0.5], [0.0, 0.0]))["A"]
+    assert found.verdict is Verdict.UNDECIDED
+    assert "(cart moves and carries arm)" in found.reason
+
+
 def test_a_mass_that_nobody_gave_is_undecided(tmp_path):
     text = CART.replace("mass = 100\n", "") + CONTACT + "drive_force = 0\n"
     found = results(tmp_path, text, cart=([0.0], [0.1]))["F"]
@@ -127,7 +148,8 @@ def test_a_robot_that_nothing_carries_takes_no_drive_force(tmp_path):
         ("drive_force = 400\n", Verdict.EXCEEDED),
     ],
 )
-def test_fingers_that_close_press_as_hard_as_their_gripper(tmp_path, drive, verdict):
+@pytest.mark.parametrize("v", [0.02, 4e-4])
+def test_fingers_that_close_press_as_hard_as_their_gripper(tmp_path, drive, verdict, v):
     """140 N is what a hand may be pressed with; the fingers alone, 0.15 kg at 20 mm/s, press with 2 N."""
     excluded = '["Skull and forehead", "Face", "Larynx, eyes and ears", "Feet"]'
     text = (
@@ -141,7 +163,7 @@ def test_fingers_that_close_press_as_hard_as_their_gripper(tmp_path, drive, verd
     )
     station = made(tmp_path, text)
     arm = (np.radians([0, -90, 90, -90, -90, 0]), np.zeros(6))
-    for speed in (-0.02, 0.0):
+    for speed in (-v, 0.0):
         found = results_at(station, arm=arm, hand=([0.05], [speed]))["pfl"]
         assert found.verdict is (verdict if speed else None), found.reason
         assert not speed or "hand" in found.reason

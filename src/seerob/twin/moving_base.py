@@ -20,14 +20,19 @@ RESTS = 1e-3
 """Largest speed of a joint of a machine that counts as standing still [m/s or rad/s]."""
 
 
-def first_moving(state: State, mechanisms: Iterable[Mechanism]) -> str | None:
+def first_moving(state: State, mechanisms: Iterable[Mechanism], *, rests: float = RESTS) -> str | None:
     """Name of the first that does not stand still; None where all do.
+
+    Args:
+        state: The twin.
+        mechanisms: Who is asked.
+        rests: Largest speed of a joint that counts as standing still [m/s or rad/s].
 
     Raises:
         Undecided: One of them was not heard.
     """
     for mechanism in mechanisms:
-        if np.abs(state.data_of(mechanism.name).qvel[mechanism.v_address]).max(initial=0.0) > RESTS:
+        if np.abs(state.data_of(mechanism.name).qvel[mechanism.v_address]).max(initial=0.0) > rests:
             return mechanism.name
     return None
 

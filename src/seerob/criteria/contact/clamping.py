@@ -38,8 +38,9 @@ Flags = NDArray[np.bool_]
 Coordinate = tuple[str, int]
 """A commanded joint: mechanism and column."""
 
-STILL = 1e-3
-"""Parts of a robot that move more slowly against each other stay as they are [m/s]."""
+STILL = 1e-6
+"""Parts that move more slowly against each other stay as they are [m/s]: rounding, and nothing else. What
+moves slowly clamps as what is fast does; noise of speeds is for `seerob.criteria.noisy_speeds`."""
 AHEAD = 0.09
 """Largest way that is looked ahead to the next instant [m]."""
 SAMPLED = 64

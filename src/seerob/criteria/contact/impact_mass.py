@@ -8,6 +8,7 @@ import numpy as np
 
 from seerob.core.transforms import Array
 from seerob.criteria.contact import collision
+from seerob.criteria.contact.clamping import STILL
 from seerob.kernels.speed import directions
 from seerob.model.model import Mechanism, Model
 from seerob.twin.moving_base import first_moving
@@ -90,14 +91,14 @@ class Behind:
         Raises:
             Undecided: A carrier was not heard.
         """
-        moving = first_moving(state, self._carriers)
+        moving = first_moving(state, self._carriers, rests=STILL)
         if moving is None:
             return self._robot if self._robot.role == "machine" else None
         return next(carrier for carrier in self._carriers if carrier.name == moving)
 
-    def riding(self, state: State, *, standstill: float) -> tuple[Mechanism, ...]:
-        """Grippers and other machines on it that move by drives of their own."""
-        return tuple(m for m in self._riders if float(np.abs(state.qd(m)).max(initial=0.0)) > standstill)
+    def riding(self, state: State) -> tuple[Mechanism, ...]:
+        """Grippers and other machines on it that move by drives of their own, however slowly."""
+        return tuple(m for m in self._riders if float(np.abs(state.qd(m)).max(initial=0.0)) > STILL)
 
     def simplified(self, mover: Mechanism | None) -> float:
         """M/2 + m_L, or the whole mass of what moves as one [kg]."""

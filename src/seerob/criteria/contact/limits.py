@@ -134,6 +134,8 @@ class Judged:
 
     v_r: Array
     """Bounds on the speeds of the surfaces [m/s], shape (b,)."""
+    moves: NDArray[np.bool_]
+    """Which of them move, shape (b,)."""
     v_h: Array
     """Bounds on the speeds of the person [m/s], shape (k,)."""
     near: NDArray[np.bool_]

@@ -222,3 +222,47 @@ def test_addresses_that_cannot_be_are_named(tmp_path, wrong):
     with pytest.raises(InputError, match=r"bad\.address"):
         Mqtt(name="plc", host="127.0.0.1", password_env="SEEROB_NO_SUCH").open(tmp_path, target)
     assert address(SPEED) == Plain("belt", "/speed")
+
+
+STAMPED = Variable(
+    name="crate",
+    source="plc",
+    address={"topic": "crate", "pointer": "/x", "time": "/t"},
+    unit="mm",
+    timeout=60,
+)
+
+
+def test_messages_that_are_played_again_are_a_restart_once_and_a_loop_then(port):
+    """Over a real broker: by the time in the payload, and by that of a metric of Sparkplug."""
+    begun, seq = time.time(), iter(range(10**6))
+
+    def send(back):
+        at = time.time() - back
+        said(port, "crate", json.dumps({"x": 5.0, "t": at}))
+        metric = Metric(name="count", alias=5, type=4, value=7.0, time=at)
+        k = next(seq)
+        kind, payload = ("DDATA", metric) if k else ("DBIRTH", metric)
+        if not k:
+            said(port, "spBv1.0/plant/NBIRTH/edge", encode(Payload(seq=0)))
+        said(port, f"spBv1.0/plant/{kind}/edge/belt", encode(Payload(seq=(k + 1) % 256, metrics=(payload,))))
+
+    both = "crate", "count"
+    with broker(port), listening_to(port, STAMPED, COUNT, DOOR) as heard:
+        until(heard, lambda: heard, lambda: said(port, "cell/door", "true"))
+        until(heard, lambda: all(known(heard, name) is not None for name in both), lambda: send(0.0))
+        for back, word in ((1.0, "it seems to have started again"), (2.0, "a loop?")):
+            send(back)
+            wait_for(lambda: all(word in newest(heard).doubts.get(name, "") for name in both))  # noqa: B023
+        assert known(heard, "door") is True
+    assert time.time() - begun < 60
+
+
+def test_of_what_no_time_is_said_that_is_told(port, monkeypatch, tmp_path):
+    monkeypatch.setattr("seerob.devices.live.listening.ASK_WITHIN", 30.0)
+    monkeypatch.setattr("seerob.devices.variables.live_source.COVER_WITHIN", 0.2)
+    with broker(port):
+        target = Target(variables=(SPEED, STAMPED, COUNT))
+        findings = reached(Mqtt(name="plc", host="127.0.0.1", port=port), tmp_path, target)
+    (told,) = [f.text for f in findings if "played again" in f.text]
+    assert told.startswith("no time is said of belt/speed: ")

@@ -24,6 +24,7 @@ from seerob.core.samples import JointSample, SignalSample
 from seerob.devices.live.listening import Listener
 from seerob.devices.sources.opcua import Opcua
 from seerob.devices.sources.opcua_robot import OpcuaRobot
+from seerob.devices.variables.live_source import Change, Picture
 from seerob.protocols.plc.opcua_address import Address, address, browse_name, node_name, written
 from seerob.protocols.plc.opcua_client import Security
 from seerob.protocols.plc.opcua_robotics import natural
@@ -344,3 +345,41 @@ def test_axes_in_natural_order():
     names = [f"Axis_{k}" for k in (10, 2, 1, 9)]
     assert sorted(names, key=natural) == ["Axis_1", "Axis_2", "Axis_9", "Axis_10"]
     assert math.isclose(UNITS["deg"].factor * 180, math.pi)
+
+
+def test_values_that_are_played_again_are_a_restart_once_and_a_loop_then(monkeypatch):
+    """Over a real server whose SourceTimestamp goes back; the hold of a restart ends by itself."""
+    monkeypatch.setattr("seerob.devices.variables.live_source.RESTART_HOLD", 0.6)
+    played = {
+        "Belt/speed": Emulated(lambda t: 100.0 + t % 7.0, "mm/s"),
+        "Belt/running": Emulated(lambda t: True),
+    }
+    server = OpcuaServer(played).start()
+    try:
+        with listening(Opcua(name="plc", url=server.url), target(SPEED, RUNS)) as heard:
+            doubt = lambda: heard[-1].doubts.get("belt/speed", "") if heard else "?"  # noqa: E731
+            wait_for(lambda: good(heard))
+            server.clock = lambda: time.time() - 2.0
+            wait_for(lambda: "it seems to have started again" in doubt())
+            wait_for(lambda: good(heard))  # its clock goes on
+            count = len(heard)
+            wait_for(lambda: len(heard) > count + 20)
+            assert good(heard)
+            server.clock = lambda: time.time() - 4.0
+            wait_for(lambda: "not for the first time within 60 s: a loop?" in doubt())
+            time.sleep(1.0)
+            assert "a loop?" in doubt()
+            assert "a loop?" not in heard[-1].doubts.get("belt/runs", "")  # which never changed
+    finally:
+        server.stop()
+
+
+def test_a_value_that_was_overtaken_is_no_news():
+    picture = Picture((SPEED,), by_exception=True)
+    for stamp, raw in ((10.0, 250.0), (9.8, 300.0)):
+        picture.take((Change("belt/speed", raw, stamp=stamp),), 100.0)
+    sample = picture.sample(100.0)
+    assert (sample.values, sample.doubts) == ({"belt/speed": 0.25}, {})
+    # What is called bad counts whenever it was so.
+    picture.take((Change("belt/speed", 1.0, invalid_reason="the server says Bad", stamp=9.8),), 100.0)
+    assert "Bad" in picture.sample(100.0).doubts["belt/speed"]

@@ -12,6 +12,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
@@ -76,6 +77,8 @@ class OpcuaServer(LoopEmulator):
         self.written: dict[str, list[bool]] = {path: [] for path in outputs}
         self.bad: set[str] = set()
         """Paths of variables that are called bad; may be changed while it runs."""
+        self.clock: Callable[[], float] = time.time
+        """What its variables are stamped with [s since 1970]; may be changed while it runs."""
         self._made = time.monotonic()
         self._built: tuple[Any, _Cell] | None = None
 
@@ -268,10 +271,12 @@ class _Cell:
         from asyncua import ua
         from asyncua.ua.status_codes import StatusCodes
 
+        stamp: Any = datetime.fromtimestamp(self._emulator.clock(), UTC).replace(tzinfo=None)
         for path, node in self._variables.items():
-            value = ua.DataValue(ua.Variant(self._emulator.paths[path].value(t)))
-            if path in self._emulator.bad:
-                value = ua.DataValue(value.Value, ua.StatusCode(ua.UInt32(StatusCodes.BadSensorFailure)))
+            bad = path in self._emulator.bad
+            code = ua.StatusCode(ua.UInt32(StatusCodes.BadSensorFailure if bad else StatusCodes.Good))
+            said = ua.Variant(self._emulator.paths[path].value(t))
+            value = ua.DataValue(said, code, SourceTimestamp=stamp)
             await self._server.write_attribute_value(node.nodeid, value)
         for path, node in self._outputs.items():
             written, now = self._emulator.written[path], bool(await node.read_value())
@@ -286,8 +291,6 @@ class _Cell:
             await self._write(node, self._emulator.safety[key])
 
     async def _write(self, node: Node, value: Any) -> None:
-        from datetime import UTC, datetime
-
         from asyncua import ua
 
         now: Any = datetime.now(UTC).replace(tzinfo=None)

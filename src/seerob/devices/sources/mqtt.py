@@ -108,9 +108,9 @@ def plain_change(name: str, where: Plain, payload: bytes, *, retained: bool, now
             if where.pointer or where.time:
                 raise
             value = payload.decode("utf-8", "replace")
-        raw, age = value_and_time(value, where.pointer, where.time, now=now)
+        raw, age, stamp = value_and_time(value, where.pointer, where.time, now=now)
         if where.time is not None:
-            return Change(name, raw, age=age)
+            return Change(name, raw, age=age, stamp=stamp)
     except (ProtocolError, ValueError) as error:
         return Change(name, None, invalid_reason=f"{where.topic}: {error}")
     except KeyError as error:
@@ -167,6 +167,11 @@ class Mqtt(VariablesSource, frozen=True, kw_only=True):
         """Its payload says when it was so; the broker only knows when it came."""
         where = address(variable)
         return isinstance(where, Plain) and where.time is not None
+
+    def stamps(self, variable: Variable) -> bool:
+        """A metric of Sparkplug has a time, and a payload whose ``time`` is given."""
+        where = address(variable)
+        return isinstance(where, Metric) or where.time is not None
 
     async def ask(self) -> tuple[Finding, ...]:
         """Connect once."""
@@ -310,7 +315,7 @@ def _metric(name: str, where: Metric, node: sparkplug.Node) -> Change:
         return Change(name, None, invalid_reason=f"{where.speaker}: has no metric {where.metric!r}")
     if said[0] is None:
         return Change(name, None, invalid_reason=f"{where.speaker}: says that {where.metric!r} has no value")
-    return Change(name, said[0])
+    return Change(name, said[0], stamp=said[1])
 
 
 def _nodes(topic: str, payload: bytes) -> Iterator[Node]:

@@ -89,6 +89,10 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
         """The server is asked whether it has said everything."""
         return True
 
+    def stamps(self, variable: Variable) -> bool:
+        """SourceTimestamp, which servers give with nearly every value."""
+        return True
+
     async def ask(self) -> tuple[Finding, ...]:
         """Connect once."""
         async with connect(self.way(), Path()) as client:
@@ -122,7 +126,7 @@ class Opcua(VariablesSource, frozen=True, kw_only=True):
                     Shown(shown),
                     # A value that stands is as new as the newest answer, however long ago it changed.
                     *(
-                        Change(name, found.value, invalid_reason=found.invalid_reason)
+                        Change(name, found.value, invalid_reason=found.invalid_reason, stamp=found.stamp)
                         for name, found in changed.items()
                     ),
                 )

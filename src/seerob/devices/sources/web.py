@@ -159,6 +159,10 @@ class Web(VariablesSource, frozen=True, kw_only=True):
         """It is asked, or the document says when it was so."""
         return not self._pushed or spot(variable.address).time is not None
 
+    def stamps(self, variable: Variable) -> bool:
+        """Where the document says when it was so."""
+        return spot(variable.address).time is not None
+
     async def ask(self) -> tuple[Finding, ...]:
         """Hear one document."""
         async with aclosing(self._documents(("",), Path())) as documents:
@@ -184,8 +188,8 @@ class Web(VariablesSource, frozen=True, kw_only=True):
                 yield Change(name, None, invalid_reason=str(said))
                 continue
             try:
-                value, age = value_and_time(said, where.pointer, where.time, now=now)
-                yield Change(name, value, age=max(age, took))
+                value, age, stamp = value_and_time(said, where.pointer, where.time, now=now)
+                yield Change(name, value, age=max(age, took), stamp=stamp)
             except KeyError as error:
                 # Of what is pushed, a document may tell a part; what stays out grows old.
                 if not self._pushed:

@@ -15,8 +15,10 @@ AHEAD = 1.0
 """Of clocks that differ by more nobody knows how old a value is [s]."""
 
 
-def value_and_time(document: Any, pointer: str, time: str | None, *, now: float) -> tuple[Any, float]:
-    """A value, and how old it is [s]; 0 when nothing says it.
+def value_and_time(
+    document: Any, pointer: str, time: str | None, *, now: float
+) -> tuple[Any, float, float | None]:
+    """A value, how old it is [s], and when it was so [s since 1970]; 0 and None when nothing says it.
 
     Args:
         document: As it was sent.
@@ -30,12 +32,13 @@ def value_and_time(document: Any, pointer: str, time: str | None, *, now: float)
     """
     value = at(document, parts(pointer))
     if time is None:
-        return value, 0.0
-    age = now - instant(at(document, parts(time)))
+        return value, 0.0, None
+    stamp = instant(at(document, parts(time)))
+    age = now - stamp
     if age < -AHEAD:
         what = f"its time is {-age:.3g} s ahead of this computer's clock, so nobody knows how old it is"
         raise ValueError(f"{what}: set both clocks, or state the zone of a local time")
-    return value, max(0.0, age)
+    return value, max(0.0, age), stamp
 
 
 def instant(value: Any) -> float:

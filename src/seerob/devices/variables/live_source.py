@@ -8,6 +8,7 @@ and what cannot be is a doubt with its reason.
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections.abc import AsyncGenerator, AsyncIterator, Mapping
 from contextlib import aclosing
@@ -20,6 +21,7 @@ from seerob.core.errors import SeerobError
 from seerob.core.quantities import Seconds
 from seerob.core.samples import Sample, SignalSample
 from seerob.core.snapshot import Finding
+from seerob.devices.live.device_clock import AGAIN, REORDERED, RESTART_HOLD
 from seerob.devices.live.listening import ASK_WITHIN, LiveSource, because
 from seerob.workstation.source import Target
 from seerob.workstation.variables.dictionary import BadValue, Value, Variable
@@ -50,6 +52,8 @@ class Change(NamedTuple):
     """Why the device itself does not stand by it."""
     age: float = 0.0
     """How old it may have been when it arrived [s]: since it was asked for, or by the device's own stamps."""
+    stamp: float | None = None
+    """When it was so, by the device's own clock [s]; None where it does not say."""
 
 
 class Shown(NamedTuple):
@@ -121,8 +125,12 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
         unheard = f"not heard within {COVER_WITHIN:g} s" + (f": {ended}" if ended else "")
         texts = {name: unheard if name in waiting else doubts[name] for name in doubts}
         heard = f"{len(variables) - len(texts)} of {len(variables)} variables are heard at start"
+        unstamped = [v.name for v in variables if not self.stamps(v)]
+        shown = ", ".join(unstamped[:6]) + (f" and {len(unstamped) - 6} more" if len(unstamped) > 6 else "")
+        blind = f"no time is said of {shown}: values that are played again cannot be told from new ones"
         return (
             Finding(level="note", subject=self.name, text=heard),
+            *((Finding(level="note", subject=self.name, text=blind),) if unstamped else ()),
             *(
                 Finding(level="warning", subject=name, text=text.removeprefix(f"{name}: "))
                 for name, text in texts.items()
@@ -131,6 +139,10 @@ class VariablesSource(LiveSource, frozen=True, kw_only=True):
 
     def times(self, variable: Variable) -> bool:
         """Whether it shows how late a variable is heard: it is asked for it, or told when it was so."""
+        return False
+
+    def stamps(self, variable: Variable) -> bool:
+        """Whether the device says when a variable was so: else values that are played again look like new."""
         return False
 
     def changes(
@@ -208,6 +220,10 @@ class Picture:
         self._said: dict[str, float] = {}
         self._values: dict[str, Value] = {}
         self._bad: dict[str, str] = {}
+        self._stamps: dict[str, float] = {}
+        self._back: dict[str, tuple[float, str]] = {}
+        """Variables whose time went back: until when nothing rests on them [s], and why."""
+        self._restarted: dict[str, float] = {}
         self.begun = False
         """Whether the device has said anything yet."""
 
@@ -226,6 +242,9 @@ class Picture:
             if variable is None:
                 continue
             self.begun = True
+            stamp = None if change.invalid_reason else change.stamp
+            if stamp is not None and self._is_old(change.name, stamp, now):
+                continue
             self._said[change.name] = now - change.age
             self._bad.pop(change.name, None)
             if change.invalid_reason:
@@ -245,6 +264,9 @@ class Picture:
         """
         t = now if heard is None else heard
         doubts = dict(self._bad)
+        for name, (until, why) in self._back.items():
+            if now <= until:
+                doubts.setdefault(name, f"{name}: {why}")
         for name, variable in self._variables.items():
             if variable.write or name in doubts:
                 continue
@@ -255,6 +277,24 @@ class Picture:
                 doubts[name] = f"{name}: not heard for {now - said:.2f} s (time-out {variable.timeout:g} s)"
         ages = {name: age for name in self._values if (age := self._age(name, t)) > 0}
         return SignalSample(source="", seq=0, t=t, values=dict(self._values), doubts=doubts, ages=ages)
+
+    def _is_old(self, name: str, stamp: float, now: float) -> bool:
+        """Whether a value was overtaken on the way; time that goes back by more is a restart, then a loop.
+
+        As `seerob.devices.live.device_clock.DeviceClock` has it of samples.
+        """
+        back = self._stamps.get(name, -math.inf) - stamp
+        if 0 < back <= REORDERED:
+            return True
+        self._stamps[name] = stamp
+        if back > 0:
+            what = f"its time went back by {back:.3g} s"
+            if now - self._restarted.get(name, -math.inf) < AGAIN:
+                hold, why = AGAIN, f"{what}, not for the first time within {AGAIN:g} s: a loop?"
+            else:
+                hold, why = RESTART_HOLD, f"{what}: it seems to have started again"
+            self._back[name], self._restarted[name] = (now + hold, why), now
+        return False
 
     def _age(self, name: str, t: float) -> float:
         """How much older than ``t`` what is known of a variable may be [s]."""

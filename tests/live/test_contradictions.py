@@ -125,7 +125,8 @@ def test_a_controller_whose_positions_stand_while_its_velocities_run_or_the_othe
         joints = lambda: [s for s in list(heard) if isinstance(s, JointSample)]  # noqa: E731
         wait_for(lambda: len(joints()) > 150)
         samples = joints()
-    first = next(k for k, s in enumerate(samples) if s.reason)
+    # Of a busy machine the clock may be found first.
+    first = next(k for k, s in enumerate(samples) if "velocity" in s.reason)
     assert samples[first].quality is Quality.DEGRADED
     word = "is not zero while the joint stands still" if frozen == "q" else "is zero while the joint moves"
     assert word in samples[first].reason

@@ -308,11 +308,17 @@ def test_the_command_sends_what_it_is_told(tmp_path):
         "--cm",
         "--rate",
         "60",
+        "--noise",
+        "0",
     ]
     server, what, where, *_ = options_of("mvn", words).ready()
     assert (what, where) == (f"a person, {tmp_path / 'x.mvnx'}", f"127.0.0.1:{port}")
     (data, *_) = server.instant(3)
     (frame,) = fed(Frames(unit=Unit.CM), [data])
     np.testing.assert_allclose(frame.positions, POSES[3].positions, atol=1e-5)
+    (data, *_) = options_of("mvn", words[:-2]).ready().server.instant(3)
+    (frame,) = fed(Frames(unit=Unit.CM), [data])
+    off = frame.positions - POSES[3].positions
+    assert 1e-4 < off.std() < 3e-4  # as it is measured
     with pytest.raises(InputError, match=r"<= 240 \[Hz\]"):
         options_of("mvn", ["--rate", "1000"])

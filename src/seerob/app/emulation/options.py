@@ -100,7 +100,8 @@ class EmulatorOptions(Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 LIBRARY = "library:reach"
 """What is played when nothing is given."""
 NOISE = 2e-4
-"""Of what a device measures [m]: that of optical trackers; a person without noise is taken for frozen."""
+"""Standard deviation of what a device measures [m]: that of optical trackers; without it a person is taken
+for frozen."""
 Noise = Annotated[float, option("noise of what is measured, standard deviation", "m", ge=0, le=0.1)]
 
 

@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 
 from oracles.pinocchio_oracle import pinocchio_model
 from seerob.app import cli
+from seerob.app.commands.explain import sentence
 from seerob.core.errors import InputError
 from seerob.description.robots import library
 from seerob.session.explanation import NORMAL_95, SLOW, Dynamics, explain, fit, friction, slopes
@@ -92,6 +93,38 @@ def test_the_model_explains_the_log_of_its_own_robot() -> None:
     found = explain(cell()[0], "arm", said(1, 500, mass=0.0))
     assert found.explains is True
     assert abs(found.payload.value) <= found.slack
+
+
+def _moved(t: np.ndarray, by: np.ndarray, qd: np.ndarray) -> dict[str, np.ndarray]:
+    """Torques that a model of the right mass and any friction does not explain."""
+    return {
+        "another centre of mass": t + by @ np.array([0, 0.5, 0, 0, 0, 0, 0, 0, 0, 0]),
+        "another centre of mass along the axis": t + by @ np.array([0, 0, 0, 1.0, 0, 0, 0, 0, 0, 0]),
+        "another inertia": t + by @ np.array([0, 0, 0, 0, 5.0, 0, 0, 5.0, 0, 5.0]),
+        "friction that drives": t - 2 * (COULOMB * np.sign(qd) + VISCOUS * qd),
+        "an offset": t + np.array([0, 60.0, 0, 0, 0, 0]),
+    }
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        "another centre of mass",
+        "another centre of mass along the axis",
+        "another inertia",
+        "friction that drives",
+        "an offset",
+    ],
+)
+def test_the_mass_alone_explains_no_log(what) -> None:
+    words = said(1, 500, mass=0.0)
+    _, q, qd, qdd = motion(1, 500)
+    _, columns = cell()[1](q, qd, qdd)
+    found = explain(cell()[0], "arm", words._replace(tau=_moved(words.tau, columns, qd)[what]))
+    assert found.explains is False
+    assert found.unexplained == ()
+    assert abs(found.payload.value) <= found.slack
+    assert ("centres of mass" in sentence(found)) is not bool(found.driven)
 
 
 def test_the_truth_lies_in_95_of_100_intervals() -> None:

@@ -174,6 +174,34 @@ MISTAKES: dict[str, tuple[dict[str, str], str, set[str]]] = {
         set(),
     ),
     "limit in mm/s": ({"limit": "limit = 250"}, "safety[0].limit", {"distance", "separation"}),
+    "a person placed in mm": (
+        {"at": "at = { position_mm = [1.75, 0, 0], rpy_deg = [0, 0, 180] }"},
+        "humans[0].at.position",
+        set(),
+    ),
+    "an area placed in mm": (
+        {
+            "more": '[[areas]]\nname = "side"\nshape = { box = [1, 1, 2] }\n'
+            "at = { position_mm = [1.75, 0.5, 1] }\n"
+        },
+        "areas[0].at.position",
+        {"speed", "distance", "separation"},
+    ),
+    "limit in mJ": (
+        {"more": '[[safety]]\nkind = "kinetic_energy"\nrobot = "ur5"\nlimit = 300\n'},
+        "safety[3].limit",
+        {"speed", "distance", "separation"},
+    ),
+    "limit in g": (
+        {"more": '[[safety]]\nkind = "effective_mass"\nat = "ur5"\nlimit = 300\n'},
+        "safety[3].limit",
+        {"speed", "distance", "separation"},
+    ),
+    "limit of 1.2 mm": (
+        {"more": '[[safety]]\nkind = "minimum_distance"\nbetween = ["ur5", "operator"]\nlimit_mm = 1.2\n'},
+        "safety[3].limit",
+        {"speed", "distance", "separation"},
+    ),
     "a time-out of 10 s": (
         {"more": '[[sources]]\nkind = "csv"\nrobot = "ur5"\nfile = "m.csv"\ntimeout = 10\n'},
         "sources[0].timeout",

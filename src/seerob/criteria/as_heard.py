@@ -8,6 +8,7 @@ It is confirmed for all that is no farther beyond than the value in the file: no
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from seerob.core.snapshot import Finding
@@ -82,11 +83,16 @@ class AsHeard:
 
     def _confirmed(self, quantity: Quantity) -> bool:
         return any(
-            isinstance(one.value, float | int) and abs(scaled(one.value, factor)) >= abs(quantity.values[0])
+            isinstance(one.value, float | int) and _no_farther(quantity.values[0], scaled(one.value, factor))
             for one in self._model.workstation.confirmed
             for key, factor in canonical(one.key)
             if key == quantity.key
         )
+
+
+def _no_farther(value: float, confirmed: float) -> bool:
+    """Whether a value is no farther beyond than the one that was confirmed, to the same side."""
+    return math.copysign(1.0, value) == math.copysign(1.0, confirmed) and abs(value) <= abs(confirmed)
 
 
 def _placed(state: State, name: str) -> bool:

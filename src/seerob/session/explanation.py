@@ -261,6 +261,23 @@ class JointExplained:
     """Root mean square that the fit leaves [N·m or N]; of a joint that does not move, the payload alone."""
     asked: float
     """What may be left for it to be explained."""
+    payload: float
+    """Root mean square of what the fitted payload adds, by mass, centre and inertia [N·m or N]."""
+    speed: float
+    """Largest in the log [rad/s or m/s]."""
+
+    @property
+    def driven(self) -> str:
+        """Why what was fitted beside a payload is no friction; empty when it may be."""
+        if not self.moves:
+            return ""
+        if self.coulomb.value + self.coulomb.half < 0 and -self.coulomb.value > self.asked / 2:
+            return f"Coulomb friction of {self.coulomb} {self.unit} drives it"
+        if self.viscous.value + self.viscous.half < 0 and -self.viscous.value * self.speed > self.asked / 2:
+            return "its viscous friction is negative: it drives it"
+        if abs(self.offset.value) - self.offset.half > self.asked:
+            return f"an offset of {self.offset} {self.unit} is no friction"
+        return ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,6 +311,16 @@ class Explanation:
         return tuple(j.name for j in self.joints if not j.moves and j.left > j.asked)
 
     @property
+    def misplaced(self) -> tuple[str, ...]:
+        """Joints at which what is on the flange weighs as the file has it, and pulls elsewhere than there."""
+        return tuple(j.name for j in self.joints if j.payload > j.asked)
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """Joints whose fit needs what is no friction, each with what."""
+        return tuple(f"{j.name}: {j.driven}" for j in self.joints if j.driven)
+
+    @property
     def slack(self) -> float:
         """Up to this a mass that is missing does not count [kg]."""
         return max(PAYLOAD[0] * self.mass, PAYLOAD[1])
@@ -302,7 +329,7 @@ class Explanation:
     def explains(self) -> bool | None:
         """Whether the model of the file explains the log, friction apart; None when the motion tells not."""
         low, high = self.payload.value - self.payload.half, self.payload.value + self.payload.half
-        if self.unexplained or low > self.slack or high < -self.slack:
+        if self.unexplained or self.misplaced or self.driven or low > self.slack or high < -self.slack:
             return False
         determined = self.payload.determined and max(abs(low), abs(high)) <= self.slack
         return True if determined and not self.held else None
@@ -342,16 +369,12 @@ def explain(model: Model, name: str, said: Said) -> Explanation:
         Figure(float(x), float(NORMAL_95 * np.sqrt(max(v, 0.0))) if determined else float("inf"))
         for x, v, determined in zip(found.values, np.diag(found.covariance), found.determined, strict=True)
     ]
-    joints = []
+    joints, added = [], payload @ found.values[: len(POINTS)]
     for j, joint in enumerate(robot.joints):
         limit = robot.effort_limits[j]
         asked = ASKED * (float(np.abs(tau[:, j]).max()) if limit is None else limit.value)
         moves = bool(used[:, j].any())
-        r = (
-            found.residuals[used[:, j], j]
-            if moves
-            else gap[:, j] - payload[:, j] @ found.values[: len(POINTS)]
-        )
+        r = found.residuals[used[:, j], j] if moves else gap[:, j] - added[:, j]
         joints.append(
             JointExplained(
                 joint.name,
@@ -365,6 +388,8 @@ def explain(model: Model, name: str, said: Said) -> Explanation:
                 moves=moves,
                 left=float(np.sqrt((r**2).mean())),
                 asked=asked,
+                payload=float(np.sqrt((added[:, j] ** 2).mean())),
+                speed=float(np.abs(qd[:, j]).max()),
             )
         )
     carried = {model.bodies[i].owner: model.bodies[i].mass for i in robot.carried}

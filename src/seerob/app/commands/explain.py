@@ -86,6 +86,14 @@ def sentence(found: Explanation) -> str:
     slack = f"{found.slack:.2g} kg"
     if found.unexplained:
         return f"with friction and a payload fitted, too much is left at {', '.join(found.unexplained)}"
+    if found.driven:
+        return f"what friction would have to be is none, at {'; '.join(found.driven)}: check signs and zeros"
+    low = abs(found.payload.value) - found.payload.half
+    if found.misplaced and not low > found.slack:
+        return (
+            f"what is on the flange pulls at {', '.join(found.misplaced)} as the file does not have it: give "
+            "the tools and workpieces their centres of mass"
+        )
     if found.explains is False:
         return (
             f"the payload differs by {found.payload} kg, more than {slack}: give the tools and workpieces "

@@ -1,0 +1,133 @@
+"""Each threshold of what a source says of itself, on both sides."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made_cell import FLOATING, TWO_R, made, two_r
+from seerob.core.transforms import transform
+from seerob.twin.own_words import SaidTool, bound, fixed_offset, other_speed, sign_or_unit
+
+
+def test_the_largest_distance_that_is_left_decides() -> None:
+    """One place of four that is 40 mm off: what fits best leaves 30 mm there, and 10 mm at the others."""
+    turned, places = np.eye(3)[None].repeat(4, 0), np.zeros((4, 3))
+    said = np.array([[0, 0, 0.1]] * 3 + [[0, 0, 0.14]])
+    fit = fixed_offset(turned, places, said)
+    np.testing.assert_allclose(fit.offset, [0, 0, 0.11], atol=1e-12)
+    assert fit.error == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize(
+    ("said", "twin", "samples", "told"),
+    [
+        (1.0, 1.269, 9, False),  # 0.02 m/s and a fifth of the larger: 0.2738
+        (1.0, 1.280, 9, True),  # 0.276
+        (1.280, 1.0, 9, True),
+        (0.0, 0.0249, 9, False),  # both stand
+        (0.0, 0.049, 9, False),
+        (0.0, 0.0505, 9, True),
+        (0.0, 1.0, 4, False),
+        (0.0, 1.0, 5, True),
+    ],
+)
+def test_speeds_of_one_motion(said: float, twin: float, samples: int, told: bool) -> None:
+    why = other_speed(np.full(samples, said), np.full(samples, twin))
+    assert bool(why) is told
+    if told:
+        assert f"moves at {said:.3g} m/s, the twin's at {twin:.3g} m/s (means over {samples}" in why
+
+
+def test_speeds_that_are_seen_for_a_while_only() -> None:
+    """Five samples of many in which it moves tell; what stands is in no mean."""
+    said, twin = np.zeros(50), np.zeros(50)
+    twin[:5] = 0.2
+    assert "means over 5 samples" in other_speed(said, twin)
+    twin[4] = 0.0
+    assert other_speed(said, twin) == ""
+
+
+def test_torques_too_small_beside_friction_tell_no_sign() -> None:
+    """Up to 2 N·m, root mean square over samples of the length over joints."""
+    for size, told in ((1.99, False), (2.0, True), (2.05, True)):
+        model = np.array([[size, 0.0], [0.0, size], [size, 0.0]])
+        assert bool(sign_or_unit(-model, model)) is told
+    assert sign_or_unit(np.zeros((3, 2)), np.full((3, 2), 9.0)) == ""
+
+
+@pytest.mark.parametrize(
+    ("factor", "told"), [(-1.0, True), (-0.35, True), (-0.32, False), (-2.9, True), (0.0, False)]
+)
+def test_torques_of_the_opposite_sign_are_told_from_half(factor: float, told: bool) -> None:
+    """|1 + f| < |f − 1| / 2 between −3 and −1/3."""
+    model = np.array([[10.0, -4.0], [8.0, 3.0], [-9.0, 1.0]])
+    why = sign_or_unit(factor * model, model)
+    assert bool(why) is told
+    if factor == -1.0:
+        apart = 2 * np.linalg.norm(model) / np.sqrt(3)
+        assert f"they add up to 0 N·m, and differ from them by {apart:.3g} N·m" in why
+
+
+@pytest.mark.parametrize(
+    ("factor", "name"),
+    [
+        (1000.0, "N·mm"), (1390.0, "N·mm"), (1410.0, ""), (610.0, "N·mm"), (590.0, ""),
+        (1e-3, "kN·m"), (1.39e-3, "kN·m"), (1.41e-3, ""), (0.61e-3, "kN·m"), (0.59e-3, ""),
+        (100.0, "N·cm"), (139.0, "N·cm"), (141.0, ""), (61.0, "N·cm"), (59.0, ""), (1.0, ""), (1.3, ""),
+    ],
+)  # fmt: skip
+def test_units_of_torques(factor: float, name: str) -> None:
+    model = np.array([[10.0, -4.0], [8.0, 3.0], [-9.0, 1.0]])
+    why = sign_or_unit(factor * model, model)
+    assert (f"{factor:.3g} × what the model needs: {name} read as N·m" in why) if name else why == ""
+
+
+@pytest.mark.parametrize(("angle", "told"), [(24.0, True), (27.0, False)])
+def test_a_unit_is_told_of_torques_that_are_alike(angle: float, told: bool) -> None:
+    """From a correlation of 0.9 on: cos 25.84°."""
+    model = np.array([[10.0, 0.0]])
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    assert bool(sign_or_unit(1e4 * np.array([[c, s]]), model)) is told
+
+
+# -- where a planar arm has its tool centre point, and how fast it is there -------------------------
+
+
+@pytest.fixture
+def tool(tmp_path) -> SaidTool:
+    station = made(tmp_path, FLOATING + TWO_R, {"arm.urdf": two_r()})
+    found = bound(station.model, "arm")
+    assert found is not None
+    tip = {"tool": np.array([0.0, 0.2, 0.0])}
+    return SaidTool(found.arm, tip, found.bases, found.tolerance)
+
+
+def test_a_place_in_another_frame_is_turned_and_shifted(tool: SaidTool) -> None:
+    """0.2 m beside the tip, said in a frame at (3, 1, 0) of the root that is a quarter turn about z off."""
+    base = transform(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([3.0, 1.0, 0.0]))
+    tool = SaidTool(tool.arm, tool.tips, np.array([np.eye(4), base]), tool.tolerance)
+    q = np.array([[0.3, 0.4], [-0.5, 1.0], [1.0, -0.2]])
+    a, b = q[:, 0], q.sum(axis=1)
+    tip = np.stack(
+        [np.cos(a) + np.cos(b) - 0.2 * np.sin(b), np.sin(a) + np.sin(b) + 0.2 * np.cos(b), 0 * a], 1
+    )
+    said = (tip - base[:3, 3]) @ base[:3, :3]
+    off, name, frame = tool.off(tool.arm.posture(q), said)
+    assert (name, frame) == ("tool", 1)
+    np.testing.assert_allclose(off, 0.0, atol=1e-12)
+    # Of several frames the one whose farthest place is nearest: not the one that is right once.
+    near = np.vstack([said[:2], tip[2:]])
+    off, _, frame = tool.off(tool.arm.posture(q), near)
+    each = [np.linalg.norm(near @ m[:3, :3].T + m[:3, 3] - tip, axis=1).max() for m in tool.bases]
+    assert off.max() == pytest.approx(min(each))
+    assert frame == int(np.argmin(each))
+
+
+def test_the_speed_beside_the_tip_is_that_of_the_closed_form(tool: SaidTool) -> None:
+    q, qd = np.array([[0.3, 0.4], [-0.5, 1.0]]), np.array([[0.7, -1.1], [0.2, 0.9]])
+    a, b = q[:, 0], q.sum(axis=1)
+    wa, wb = qd[:, 0], qd.sum(axis=1)
+    x = -wa * np.sin(a) - wb * (np.sin(b) + 0.2 * np.cos(b))
+    y = wa * np.cos(a) + wb * (np.cos(b) - 0.2 * np.sin(b))
+    np.testing.assert_allclose(tool.speeds(tool.arm.posture(q), qd), [np.hypot(x, y)], atol=1e-12)

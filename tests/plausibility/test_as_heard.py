@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from made_cell import FLOATING, TWO_R, heard, made, person, two_r
+from seerob.core.samples import Quality
 from seerob.core.verdict import Verdict
 from seerob.criteria.judging import Judge
 from seerob.twin.engine import Engine
@@ -30,6 +31,8 @@ between = ["arm", "op"]
 limit = 0.1
 """
 )
+
+LIVE = 'kind = "ros_tcp"\nrobot = "arm"\nhost = "127.0.0.1"'
 
 
 def results(folder, shifts, *, more=""):
@@ -76,3 +79,49 @@ def test_what_is_plausible_once_is_not_held_any_more(tmp_path):
 def test_it_is_confirmed_up_to_a_value(tmp_path, value, verdict):
     own = f'[[confirmed]]\nkey = "robots[0].nobody_within"\nvalue = {value}\nwhy = "a long hall"\n'
     assert {v for v, _ in results(tmp_path, [[15, 0, 0]], more=own)} == {verdict}
+
+
+@pytest.mark.parametrize(("confirmed", "verdict"), [(-0.4, Verdict.WITHIN), (0.4, Verdict.UNDECIDED)])
+def test_it_is_confirmed_to_one_side_only(tmp_path, confirmed, verdict):
+    """Who may stand 0.4 m above the floor does not sink 0.3 m into it, nor the other way round."""
+    own = f'[[confirmed]]\nkey = "humans[0].feet"\nvalue = {confirmed}\nwhy = "a pit, or a platform"\n'
+    assert {v for v, _ in results(tmp_path, [[0, 0, -0.3]], more=own)} == {verdict}
+
+
+def test_what_is_in_doubt_is_no_place_that_is_plausible(tmp_path):
+    """Samples that their source calls degraded, before those that put the person 15 m away."""
+    station = made(tmp_path, CELL, {"arm.urdf": two_r()})
+    human = station.model.mechanisms["op"]
+    engine = Engine(station.model, driven={"op": 1.0}, live={"op"})
+    judge, found, state = Judge(station.bound, station.model.findings), [], None
+    for k in range(300):
+        q = human.home + np.concatenate([[0.0 if k < 50 else 15.0], np.zeros(len(human.home) - 1)])
+        quality = Quality.DEGRADED if k < 50 else Quality.GOOD
+        engine.take([heard("op", 0.01 * k, q, np.zeros(len(q)), quality=quality)])
+        state = engine.start() if state is None else engine.tick()
+        (result,) = judge(state)
+        found.append(result)
+    assert {result.verdict for result in found} == {Verdict.UNDECIDED}
+    assert "robots[0].nobody_within" in found[-1].reason
+
+
+SLIDE = """<robot name="slide"><link name="base"/><link name="cart"><inertial><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+<joint name="j" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
+<limit lower="-50" upper="50" effort="1000" velocity="10"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(("away", "verdict"), [(0.0, Verdict.WITHIN), (-20.0, Verdict.UNDECIDED)])
+def test_where_a_device_puts_a_robot_is_looked_at_too(tmp_path, away, verdict):
+    """A carriage that is said to be 20 m off, as one whose unit was mistaken is."""
+    text = CELL.replace("q = [0, 0]\n", "").replace('kind = "mvn"\nhuman = "op"', LIVE)
+    station = made(tmp_path, text, {"arm.urdf": SLIDE})
+    engine = Engine(station.model, driven={"arm": 1.0}, live={"arm"})
+    judge, found, state = Judge(station.bound, station.model.findings), [], None
+    for k in range(20):
+        engine.take([heard("arm", 0.01 * k, [away], [0.0])])
+        state = engine.start() if state is None else engine.tick()
+        found.append(judge(state)[0])
+    assert {result.verdict for result in found} == {verdict}
+    assert all(("robots[0].nobody_within" in r.reason) is (verdict is Verdict.UNDECIDED) for r in found)

@@ -35,12 +35,12 @@ class AsHeard:
         self._model = model
         people = {human.name for human in model.workstation.humans}
         self._waiting = {
-            source.target(): source.target() in people
+            source.target()
             for source in model.workstation.sources
             if (isinstance(source, LiveSource) or source.captured)
             and source.target() in {*people, *(robot.name for robot in model.workstation.robots)}
         }
-        """Whom such a source moves, and whether that is a person; once they were heard, nobody."""
+        """Whom such a source moves; once they were heard, nobody."""
         self._where: dict[str, Array] = {}
         self._plausible: set[str] = set()
         self._found: tuple[Finding, ...] = ()
@@ -50,11 +50,11 @@ class AsHeard:
         """What is implausible now; None where nothing is new."""
         if not self._waiting and not self._found:
             return None
-        new = [name for name in self._waiting if _placed(state, name)]
+        new = [name for name in sorted(self._waiting) if _placed(state, name)]
         if not new and not (self._found and state.t >= self._due):
             return None
         for name in new:
-            del self._waiting[name]
+            self._waiting.discard(name)
             self._where[name] = state.joint_positions(self._model.mechanisms[name])
         before, self._due = self._found, state.t + AGAIN
         self._found = tuple(self._implausible(self._now(state)))

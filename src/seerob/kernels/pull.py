@@ -82,12 +82,63 @@ def along(
 
 
 @njit(
-    f"void({', '.join([_ROW] * 9)}, f8, i8[::1], {_ROW})",
+    f"void({_ROW}, {_ROWS}, {_ROWS}, b1[::1], f8, {_ROW}, f8, i8[::1], i8[::1], {', '.join([_ROWS] * 6)})",
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def command(
+def aim(
+    instants: Array,
+    points: Array,
+    speeds: Array,
+    jumps: Flags,
+    coast: float,
+    t: Array,
+    dt: float,
+    q_places: Indices,
+    v_places: Indices,
+    q: Array,
+    v: Array,
+    a: Array,
+    q_all: Array,
+    v_all: Array,
+    a_all: Array,
+) -> None:
+    """Motion of one robot or human at the steps of a tick, and among all; writes into the last six.
+
+    Args:
+        instants: As of `along`, likewise the next five.
+        points: Shape (k, n).
+        speeds: Shape (k, n).
+        jumps: Shape (k,).
+        coast: [s]
+        t: Shape (m,).
+        dt: Timestep [s]; velocities among all are half of it earlier, as `mujoco.mj_step` counts.
+        q_places: Where its positions are among all, shape (n,).
+        v_places: Where its velocities are, shape (n,).
+        q: Positions, shape (m, n).
+        v: Velocities, shape (m, n).
+        a: Accelerations, shape (m, n).
+        q_all: Of everybody, shape (m, nq).
+        v_all: Shape (m, nv).
+        a_all: Shape (m, nv).
+    """
+    along(instants, points, speeds, jumps, coast, t, q, v, a)
+    half = 0.5 * dt
+    for row in range(len(t)):
+        for i in range(len(v_places)):
+            q_all[row, q_places[i]] = q[row, i]
+            v_all[row, v_places[i]] = v[row, i] - half * a[row, i]
+            a_all[row, v_places[i]] = a[row, i]
+
+
+@njit(
+    f"void({', '.join([_ROWS] * 5)}, {', '.join([_ROW] * 4)}, f8, i8[::1], {_ROWS})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def commands(
     q: Array,
     v: Array,
     a: Array,
@@ -101,29 +152,80 @@ def command(
     dof: Indices,
     ctrl: Array,
 ) -> None:
-    """Commands of the actuators; writes into ``ctrl``.
+    """Commands of the actuators at steps of a tick; writes into ``ctrl``.
 
     Args:
-        q: Where every joint is to be [rad or m], shape (n,).
-        v: Its velocity half a step earlier, shape (n,).
-        a: Its acceleration, shape (n,).
-        inertial: Torques of the recursive Newton–Euler algorithm, shape (n,) [N·m or N].
-        passive: Passive torques, shape (n,).
+        q: Where every joint is to be [rad or m], shape (s, n).
+        v: Its velocity half a step earlier, shape (s, n).
+        a: Its acceleration, shape (s, n).
+        inertial: Torques of the recursive Newton–Euler algorithm, shape (s, n) [N·m or N].
+        passive: Passive torques, shape (s, n).
         armature: Rotor inertia, shape (n,) [kg·m² or kg].
         damping: Joint damping, shape (n,).
         kp: Proportional gains, shape (n,).
         kd: Derivative gains, shape (n,).
         dt: Timestep [s].
         dof: Joint of each actuator, shape (m,).
-        ctrl: Shape (m,).
+        ctrl: Shape (s, m).
     """
-    for k in range(len(ctrl)):
-        i = dof[k]
-        # Newton–Euler knows neither rotor inertia nor passive forces. All damping is implicit: it acts
-        # on the velocity at the end of the step.
-        after = v[i] + dt * a[i]
-        torque = inertial[i] + armature[i] * a[i] - passive[i] + damping[i] * (after - v[i])
-        ctrl[k] = q[i] + (kd[i] * after + torque) / kp[i]
+    for s in range(len(ctrl)):
+        for k in range(len(dof)):
+            i = dof[k]
+            # Newton–Euler knows neither rotor inertia nor passive forces. All damping is implicit: it acts
+            # on the velocity at the end of the step.
+            after = v[s, i] + dt * a[s, i]
+            torque = inertial[s, i] + armature[i] * a[s, i] - passive[s, i] + damping[i] * (after - v[s, i])
+            ctrl[s, k] = q[s, i] + (kd[i] * after + torque) / kp[i]
+
+
+@njit(
+    f"void({_ROW}, {_ROW}, {_ROW}, {_ROW}, i8[::1], i8[::1], i8[::1], i8[::1], i8[::1], {_ROW}, b1[::1])",
+    cache=True,
+    nogil=True,
+)
+def errors(
+    q: Array,
+    wanted: Array,
+    force: Array,
+    almost: Array,
+    dof: Indices,
+    q_places: Indices,
+    q_start: Indices,
+    v_places: Indices,
+    v_start: Indices,
+    off: Array,
+    saturated: Flags,
+) -> None:
+    """How far robots and humans are from where they are to be, and whose limits hold them back.
+
+    Writes into the last two.
+
+    Args:
+        q: Where every joint is [rad or m], shape (nq,).
+        wanted: Where it is to be, shape (nq,).
+        force: Of each actuator [N·m or N], shape (m,).
+        almost: From which on a joint's limit is reached, shape (nv,).
+        dof: Joint of each actuator, shape (m,).
+        q_places: Where positions of each robot and human in turn are among all.
+        q_start: Where those of each begin in that, shape (r + 1,).
+        v_places: Where their velocities are.
+        v_start: Shape (r + 1,).
+        off: Largest error of a joint of each, shape (r,).
+        saturated: Whether a limit of each is reached, shape (r,).
+    """
+    effort = np.zeros(len(almost))
+    for k in range(len(dof)):
+        effort[dof[k]] = abs(force[k])
+    for r in range(len(off)):
+        most = 0.0
+        for k in range(q_start[r], q_start[r + 1]):
+            here = abs(q[q_places[k]] - wanted[q_places[k]])
+            if not here <= most and not np.isnan(most):  # what is not a number stays
+                most = here
+        off[r], saturated[r] = most, False
+        for k in range(v_start[r], v_start[r + 1]):
+            if effort[v_places[k]] >= almost[v_places[k]]:
+                saturated[r] = True
 
 
 @njit(f"b1({_ROW}, f8)", cache=True, nogil=True)

@@ -126,6 +126,12 @@ class Engine:
         self._limit = engine.tracking_limit
         self._data = mujoco.MjData(self._mj)
         self._wanted = mujoco.MjData(self._mj)
+        # Views that MuJoCo writes through; to ask the data for them takes longer than to use them.
+        data, wanted = self._data, self._wanted
+        self._qpos, self._qvel, self._ctrl = data.qpos, data.qvel, data.ctrl
+        self._actuator_force = data.actuator_force
+        self._pull_to = wanted.qpos, wanted.qvel, wanted.qacc, wanted.qfrc_passive
+        self._joint_inertia = self._mj.dof_armature, self._mj.dof_damping
         self._shown = mujoco.MjData(self._mj)
         self._mechanisms = list(model.mechanisms.values())
         # Without mimics every joint is commanded itself, and a person's 53 by 53 products can be spared.
@@ -172,13 +178,19 @@ class Engine:
             for human in model.workstation.humans
             if human.follow == "task" and controllers
         ]
-        self._feedforward = np.zeros(self._mj.nv)
         self._before = np.zeros(self._mj.nv)
         self._courses: dict[str, tuple[Array, Array, Array]] = {}
         self._divide(self._steps)
         self._broken: set[str] = set()
         """Who was put elsewhere during a tick."""
-        self._force = np.zeros(self._mj.nv)
+        q, v = ([m.q_address for m in self._mechanisms], [m.v_address for m in self._mechanisms])
+        self._places = (
+            *(np.concatenate([np.zeros(0, np.int64), *each]).astype(np.int64) for each in (q, v)),
+            *(np.cumsum([0, *map(len, each)]).astype(np.int64) for each in (q, v)),
+        )
+        """Of positions and velocities of everybody in turn, and where each begins in those."""
+        self._errors = np.zeros(len(self._mechanisms)), np.zeros(len(self._mechanisms), bool)
+        self._people = [human.name for human in model.workstation.humans]
         self._almost = 0.999 * self._limits
         self._noises: dict[str, tuple[PositionNoise, deque[float]]] = {}
         """By robot whose live source says no speeds: noise of its positions, and its newest instants [s]."""
@@ -205,6 +217,15 @@ class Engine:
         )
         self._way = np.empty((rows, self._mj.nq)), np.empty((rows, self._mj.nv))
         """Positions and velocities at each step of a tick."""
+        inertial, passive = np.zeros((2, steps, self._mj.nv))
+        self._efforts = inertial, passive
+        """Torques of the motion itself, and passive ones, at each step."""
+        self._steering = np.zeros((steps, self._mj.nu))
+        """What actuators are told at each step."""
+        course, dofs = self._course, [len(m.home) for m in self._mechanisms]
+        self._step_rows = [(*(each[k] for each in course), inertial[k], passive[k]) for k in range(steps)]
+        for mechanism, n in zip(self._mechanisms, dofs, strict=True):
+            self._courses[mechanism.name] = np.zeros((rows, n)), np.zeros((rows, n)), np.zeros((rows, n))
 
     # -- what comes in ----------------------------------------------------------------------
 
@@ -432,9 +453,13 @@ class Engine:
         self.signals.forget(start)
         self._aim(start, t)
         self._broken.clear()
-        qpos, qvel = self._data.qpos, self._data.qvel
+        qpos, qvel = self._qpos, self._qvel
         q_way, v_way = self._way
         q_way[0], v_way[0] = self._shown.qpos, self._shown.qvel
+        if self.controllers and self.physics and not self._task_pulls:
+            for step in range(self._steps):
+                self._want(step)
+            self._steer(0, self._steps)
         for step in range(self._steps if self.physics else 0):
             if self.controllers:
                 self._pull(step, start + step * self._dt)
@@ -467,11 +492,8 @@ class Engine:
     def _strays(self) -> bool:
         """Whether the physics holds a person elsewhere than captured."""
         limit = self.model.workstation.engine.human_tracking_limit
-        people = (h.name for h in self.model.workstation.humans)
-        return any(
-            self._hearings[name].captured is not None and self._hearings[name].error > limit
-            for name in people
-        )
+        hearings = (self._hearings[name] for name in self._people)
+        return any(hearing.captured is not None and hearing.error > limit for hearing in hearings)
 
     def _captured(self) -> tuple[Array, Array]:
         """As `_way`, with people where they were captured."""
@@ -523,39 +545,58 @@ class Engine:
         t = np.array([start + step * self._dt for step in range(self._steps + 1)])
         t[-1] = end
         q_all, v_all, a_all = self._course
+        # mj_step moves positions with the velocity at the end of the step, so its velocities
+        # belong half a step earlier than its positions.
         for mechanism in self._mechanisms:
-            q, v, a = self._courses[mechanism.name] = self._references[mechanism.name].course(t)
-            # mj_step moves positions with the velocity at the end of the step, so its velocities
-            # belong half a step earlier than its positions.
+            reference = self._references[mechanism.name]
+            if mechanism.name not in self._coupled:
+                places = mechanism.q_address, mechanism.v_address
+                reference.aim(t, self._dt, places, self._courses[mechanism.name], self._course)
+                continue
+            q, v, a = self._courses[mechanism.name] = reference.course(t)
             before = v - 0.5 * self._dt * a
-            if mechanism.name in self._coupled:
-                q = q @ mechanism.coupling.T + mechanism.offset
-                before, a = before @ mechanism.coupling.T, a @ mechanism.coupling.T
+            q = q @ mechanism.coupling.T + mechanism.offset
+            before, a = before @ mechanism.coupling.T, a @ mechanism.coupling.T
             q_all[:, mechanism.q_address] = q
             v_all[:, mechanism.v_address] = before
             a_all[:, mechanism.v_address] = a
 
     def _pull(self, step: int, t: float) -> None:
-        wanted, mj = self._wanted, self._mj
         self._land(step, t)
-        q, v, a = (part[step] for part in self._course)
-        wanted.qpos[:], wanted.qvel[:], wanted.qacc[:] = q, v, a
+        if self._task_pulls:
+            self._want(step)
+            self._steer(step, step + 1)
+        self._ctrl[:] = self._steering[step]
+        for pull in self._task_pulls:
+            pull.command(self._mj, self._data, self._wanted, self._kp)
+
+    def _want(self, step: int) -> None:
+        """Work out what the motion itself needs at a step."""
+        wanted, mj = self._wanted, self._mj
+        qpos, qvel, qacc, qfrc_passive = self._pull_to
+        q, v, a, inertial, passive = self._step_rows[step]
+        qpos[:], qvel[:], qacc[:] = q, v, a
         mujoco.mj_kinematics(mj, wanted)
         mujoco.mj_comPos(mj, wanted)
         mujoco.mj_comVel(mj, wanted)
         mujoco.mj_passive(mj, wanted)
-        mujoco.mj_rne(mj, wanted, 1, self._feedforward)
-        kernel.command(
-            q, v, a, self._feedforward, wanted.qfrc_passive, mj.dof_armature, mj.dof_damping,
-            self._kp, self._kd, self._dt, self._dof, self._data.ctrl,
+        mujoco.mj_rne(mj, wanted, 1, inertial)
+        passive[:] = qfrc_passive
+
+    def _steer(self, begin: int, end: int) -> None:
+        """Work out what actuators are told from one step to before another."""
+        q, v, a, inertial, passive = (part[begin:end] for part in (*self._course, *self._efforts))
+        armature, damping = self._joint_inertia
+        kernel.commands(
+            q, v, a, inertial, passive, armature, damping,
+            self._kp, self._kd, self._dt, self._dof, self._steering[begin:end],
         )  # fmt: skip
-        for pull in self._task_pulls:
-            pull.command(mj, self._data, wanted, self._kp)
 
     def _land(self, step: int, t: float) -> None:
         """Put there who jumped there by ``t`` [s], also where that is the instant of the tick itself."""
         for mechanism in self._mechanisms if self.controllers else ():
-            if self._references[mechanism.name].lands(t):
+            reference = self._references[mechanism.name]
+            if reference.landing and reference.lands(t):
                 self._broken.add(mechanism.name)
                 self._put(mechanism, *(part[step] for part in self._courses[mechanism.name]))
 
@@ -598,13 +639,15 @@ class Engine:
             return
         if self.model.workstation.contacts and self.model.workstation.humans:
             self.state.touches = self._touches()
-        off = np.abs(self._data.qpos - self._course.q[-1])
-        self._force[self._dof] = np.abs(self._data.actuator_force)
-        reached = self._force >= self._almost
-        for mechanism in self._mechanisms:
+        q_places, v_places, q_start, v_start = self._places
+        kernel.errors(
+            self._qpos, self._course.q[-1], self._actuator_force, self._almost, self._dof,
+            q_places, q_start, v_places, v_start, *self._errors,
+        )  # fmt: skip
+        off, saturated = self._errors
+        for k, mechanism in enumerate(self._mechanisms):
             hearing = self._hearings[mechanism.name]
-            hearing.error = float(off[mechanism.q_address].max(initial=0.0))
-            hearing.saturated = bool(reached[mechanism.v_address].any())
+            hearing.error, hearing.saturated = float(off[k]), bool(saturated[k])
             if mechanism.role == "human" and self.controllers:
                 self._note_captured(mechanism, hearing)
 
@@ -627,7 +670,7 @@ class Engine:
             hearing.residual = following.errors(self.state.t, hearing.captured) if following else {}
 
     def _check_finite(self) -> None:
-        if np.isfinite(self._data.qpos).all() and np.isfinite(self._data.qvel).all():
+        if kernel.tame(self._qpos, math.inf) and kernel.tame(self._qvel, math.inf):
             return
         for mechanism in self._mechanisms:
             bad = ~np.isfinite(self._data.qpos[mechanism.q_address])

@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.kernels.pull import SLACK, along
+from seerob.kernels.pull import SLACK, aim, along
 
+Indices = NDArray[np.int64]
 Knots = tuple[Array, Array, Array, NDArray[np.bool_]]
 
 MAX_KEPT = 4096
@@ -149,6 +150,11 @@ class Reference:
         """Let the twin be put there at ``t`` [s]: it is elsewhere, for it was not known before."""
         self._landings.append(t)
 
+    @property
+    def landing(self) -> bool:
+        """Whether a jump is still to end."""
+        return bool(self._landings)
+
     def lands(self, t: float) -> bool:
         """Whether a jump ended by ``t`` [s]; told once."""
         due = [jump for jump in self._landings if jump <= t + SLACK]
@@ -174,14 +180,35 @@ class Reference:
 
     def course(self, t: Array) -> tuple[Array, Array, Array]:
         """Position [rad or m], velocity and acceleration at many instants [s] (m,), each of shape (m, n)."""
-        if self._knots is None:
-            self._knots = (
-                # Before the first sample it waits at home.
-                np.array(self._times or [np.inf], float),
-                np.array(self._points),
-                np.array(self._velocities),
-                np.array([instant in self._jumps for instant in self._times or [np.inf]]),
-            )
         found = np.empty((3, len(t), self._zero.shape[0]))
-        along(*self._knots, self._coast, t, found[0], found[1], found[2])
+        along(*self._known(), self._coast, t, found[0], found[1], found[2])
         return found[0], found[1], found[2]
+
+    def aim(
+        self,
+        t: Array,
+        dt: float,
+        places: tuple[Indices, Indices],
+        own: tuple[Array, Array, Array],
+        of: Course,
+    ) -> None:
+        """Write `course` at the steps of a tick into arrays; arguments as of `seerob.kernels.pull.aim`.
+
+        Args:
+            t: When they are, and when the tick ends [s], shape (m,).
+            dt: Timestep [s].
+            places: Of its positions and of its velocities among all, shape (n,) each.
+            own: Where its positions, velocities and accelerations are written, shape (m, n) each.
+            of: Where those of everybody are.
+        """
+        aim(*self._known(), self._coast, t, dt, *places, *own, *of)
+
+    def _known(self) -> Knots:
+        if self._knots is None:
+            jumps = np.zeros(max(len(self._times), 1), bool)
+            if self._jumps:
+                jumps[:] = [instant in self._jumps for instant in self._times or [np.inf]]
+            # Before the first sample it waits at home.
+            instants = np.array(self._times or [np.inf], float)
+            self._knots = instants, np.array(self._points), np.array(self._velocities), jumps
+        return self._knots

@@ -41,6 +41,10 @@ class DistanceKind(IntEnum):
     """Nearer than the query's cap, which is the value: more was not asked; no points."""
 
 
+_KINDS = {int(kind): kind for kind in DistanceKind}
+"""To ask an enumeration for a member takes longer than to make all the rest of an answer."""
+
+
 class Per(StrEnum):
     """What a least distance is taken over: the two sets, each body, or each pair of bodies."""
 
@@ -116,7 +120,7 @@ class Closests:
             self.point_b[index],
             int(self.body_a[index]),
             int(self.body_b[index]),
-            DistanceKind(int(self.kind[index])),
+            _KINDS[int(self.kind[index])],
         )
 
 

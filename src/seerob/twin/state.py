@@ -114,6 +114,7 @@ class State(Validity):
         self._xmat, self._xpos, self._xquat = data.xmat, data.xpos, data.xquat
         self._surveyor = Surveyor(model.shapes)
         self._cdof, self._com, self._qvel = data.cdof, data.subtree_com, data.qvel
+        self._cvel, self._qpos = data.cvel, data.qpos
         self._rows: dict[tuple[int, ...], Indices] = {}
         self._corners = stacked([body.corners for body in model.bodies])
         self._reach = np.array([body.radius + body.deviation for body in model.bodies])
@@ -368,13 +369,13 @@ class State(Validity):
         return self._q(mechanism)
 
     def _q(self, mechanism: Mechanism) -> Array:
-        return np.asarray(self._data.qpos[self.columns[mechanism.name].own_q])
+        return np.asarray(self._qpos[self.columns[mechanism.name].own_q])
 
     def qd(self, mechanism: Mechanism) -> Array:
         """Joint velocities of the twin [rad/s or m/s], shape (n,)."""
         self.require(mechanism.name)
         self.speeds_asked.add(mechanism.name)
-        return np.asarray(self._data.qvel[self.columns[mechanism.name].own_v])
+        return np.asarray(self._qvel[self.columns[mechanism.name].own_v])
 
     def speed_error(self, mechanism: Mechanism) -> Array | None:
         """How far its joint velocities may be off, where they were derived from noisy positions.
@@ -383,15 +384,22 @@ class State(Validity):
             Three standard deviations [rad/s or m/s], shape (n,); None where nobody says that they were.
         """
         self.require(mechanism.name)
-        return self._hearings[mechanism.name].speed_error(self.t)
+        return self._every_speed_error().get(mechanism.name)
 
     @property
     def speed_errors(self) -> Mapping[str, Array]:
         """By name of whose speeds were derived from noisy positions: `speed_error`, where there is any."""
         if "speed errors" not in self._cache:
-            every = {name: hearing.speed_error(self.t) for name, hearing in self._hearings.items()}
-            self._cache["speed errors"] = {n: e for n, e in every.items() if e is not None and e.any()}
+            every = self._every_speed_error().items()
+            self._cache["speed errors"] = {name: error for name, error in every if error.any()}
         found: dict[str, Array] = self._cache["speed errors"]
+        return found
+
+    def _every_speed_error(self) -> dict[str, Array]:
+        if "every speed error" not in self._cache:
+            every = ((name, hearing.speed_error(self.t)) for name, hearing in self._hearings.items())
+            self._cache["every speed error"] = {name: error for name, error in every if error is not None}
+        found: dict[str, Array] = self._cache["every speed error"]
         return found
 
     def speed_noise(self, bodies: tuple[int, ...]) -> Array:
@@ -740,10 +748,9 @@ class State(Validity):
 
     def _velocities(self) -> tuple[Array, Array]:
         if "v" not in self._cache:
-            data = self._data
             linear, angular = np.empty((2, *self._positions.shape))
             velocities(
-                data.cvel, data.subtree_com, self._positions, self.attachments.ids, self.attachments.roots,
+                self._cvel, self._com, self._positions, self.attachments.ids, self.attachments.roots,
                 linear, angular,
             )  # fmt: skip
             self._cache["v"] = linear, angular

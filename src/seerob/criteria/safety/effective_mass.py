@@ -71,6 +71,12 @@ def projected_mass(inverse: Array, u: Array) -> Array:
     return reciprocals(along.reshape(-1)).reshape(along.shape)
 
 
+def _mass_along(inverse: Array, u: Array) -> float:
+    """`projected_mass` of one direction."""
+    along = float(u @ inverse @ u)
+    return math.inf if along <= 0.0 else 1.0 / along
+
+
 def principal_masses(inverse: Array) -> tuple[Array, Array]:
     """Effective masses along the principal axes, smallest first [kg], and the axes as columns.
 
@@ -138,7 +144,7 @@ class EffectiveMass(Criterion, frozen=True, kw_only=True):
         def evaluate(state: State) -> Result:
             inverse, axes, masses, wxyz = state.mass_ellipsoid(frame, robot, offset)
             u, reason = direction(state, axes)
-            mass = None if u is None else float(projected_mass(inverse, u))
+            mass = None if u is None else _mass_along(inverse, u)
             verdict, interval, open_ = self._verdict(mass), None, ""
             if len(tolerances) and u is not None and mass is not None and math.isfinite(mass):
                 ends = self._ends(

@@ -26,6 +26,7 @@ from seerob.twin.spans import Falls, Points, speeding
 from seerob.twin.state import State
 from seerob.twin.states import States
 
+NO_NOISE = np.zeros(0)
 DRAWN = 0.5
 """Length of the arrow of a speed of 1 m/s [m]."""
 
@@ -122,17 +123,21 @@ class Velocity(Criterion, frozen=True, kw_only=True):
 
     def _bind_set(self, model: Model) -> Evaluate:
         bodies = self._bodies(model)
-        movers = {i: model.bodies[i].carrier for i in bodies}
+        movers = [model.bodies[i].carrier for i in bodies]
+        rows_of = {
+            name: [k for k, mover in enumerate(movers) if mover == name] for name in dict.fromkeys(movers)
+        }
+        moving = [(model.mechanisms[name], rows) for name, rows in rows_of.items()]
 
         def noise(state: State, points: Array) -> Array:
-            """Of the fastest point of each body [m/s], shape (b,)."""
+            """Of the fastest point of each body [m/s], shape (b,); of none where nobody says how far."""
+            errors = [state.speed_error(mechanism) for mechanism, _ in moving]
+            if not any(error is not None for error in errors):
+                return NO_NOISE
             found = np.zeros(len(bodies))
-            for name in dict.fromkeys(movers.values()):
-                mechanism = model.mechanisms[name]
-                error = state.speed_error(mechanism)
+            for (mechanism, rows), error in zip(moving, errors, strict=True):
                 if error is None:
                     continue
-                rows = [k for k, i in enumerate(bodies) if movers[i] == name]
                 own = tuple(bodies[k] for k in rows)
                 axes = (np.tile(axis, (len(rows), 1)) for axis in np.eye(3))
                 J = np.stack([state.along(own, mechanism, points[rows], u) for u in axes], axis=-2)
@@ -144,7 +149,7 @@ class Velocity(Criterion, frozen=True, kw_only=True):
             k = int(speeds.argmax())
             interval = None
             off = noise(state, points)
-            if off.any():
+            if off is not NO_NOISE and off.any():
                 low, high = np.maximum(speeds - off, 0.0), speeds + off
                 interval = float(low.max()), float(high.max())
             where = model.bodies[bodies[k]].name

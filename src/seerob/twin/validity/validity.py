@@ -151,6 +151,8 @@ class Validity:
         if name.startswith(VARIABLE):
             return ""
         hearing = self._hearings[name]
+        if not hearing.bones_heard:
+            return ""
         if reason := unobserved_reason(name, hearing.unobserved(self.t)):
             return reason
         reason = nobody_says(hearing.unplaced(self.t))
@@ -166,6 +168,8 @@ class Validity:
         if reason := self.invalid_place_reason(name):
             return reason
         hearing = self._hearings[name]
+        if not hearing.bones_heard:
+            return ""
         parts = hearing.invalid_parts(self.t)
         reason = parts[0][0] if parts else hearing.displaced(self.t)
         return f"{name}: {reason}" if reason else ""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from typing import cast, overload
+from typing import overload
 
 from msgspec import Struct
 
@@ -198,7 +198,7 @@ def drawn(make: Callable[[], Sequence[Marker]]) -> tuple[Marker, ...]:
         make: Makes them from copies. It may run ticks later and in another thread, when the twin is
             elsewhere: it must read neither `State` nor an array that is written again.
     """
-    return cast("tuple[Marker, ...]", _Drawn(make))
+    return _Drawn(make)  # type: ignore[return-value]
 
 
 def changed(markers: Sequence[Marker], change: Callable[[Marker], Marker]) -> tuple[Marker, ...]:

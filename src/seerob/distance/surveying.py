@@ -8,7 +8,7 @@ alone, so this saves time and changes nothing.
 from __future__ import annotations
 
 from seerob.core.transforms import Array
-from seerob.distance.least import Closests, Per, Query, Survey
+from seerob.distance.least import Closest, Closests, Per, Query, Survey
 from seerob.kernels.shapes import Shapes
 
 Question = tuple[Query, Per]
@@ -53,6 +53,16 @@ class Surveyor:
             questions = list(self._together)
             self._survey = Survey(self._shapes, questions) if len(questions) > 1 else None
         self._before, self._asked = self._asked, {}
+
+    def closest(self, query: Query, rotations: Array, positions: Array) -> Closest:
+        """Where two sets are nearest at this tick; see `Query`."""
+        question = query, Per.SETS
+        if self._survey is None or question not in self._together:
+            return self.ask(query, Per.SETS, rotations, positions).at(0)
+        self._together[question] = self._tick
+        if self._found is None:
+            self._found = self._survey.together(rotations, positions)
+        return self._found.at(self._survey.columns[question].start)
 
     def ask(self, query: Query, per: Per, rotations: Array, positions: Array) -> Closests:
         """The answer to a question at this tick; see `Query`."""

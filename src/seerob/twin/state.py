@@ -518,8 +518,9 @@ class State(Validity):
     def weigh(self, mechanism: Mechanism) -> None:
         """Raise `Undecided` unless it is known what a robot weighs, with all that it holds now."""
         self.require(mechanism.name, *mechanism.holders)
-        if lost := self.attachments.unknown.keys() & set(mechanism.carried):
-            raise Undecided(self.attachments.unknown[min(lost)])
+        unknown = self.attachments.unknown
+        if unknown and (lost := unknown.keys() & set(mechanism.carried)):
+            raise Undecided(unknown[min(lost)])
         if mechanism.unknown_masses and not self._at_least:
             raise Unweighed("; ".join(mechanism.unknown_masses))
 
@@ -558,7 +559,7 @@ class State(Validity):
             self.weigh(mechanism)
             if why := self._hearings[mechanism.name].coarse:
                 raise Undecided(f"{mechanism.name}: {why}")
-        key = ("M", *(mechanism.name for mechanism in mechanisms))
+        key = "M", *[mechanism.name for mechanism in mechanisms]
         if key not in self._cache:
             if "M" not in self._cache:
                 mujoco.mj_makeM(self.model.mj, self._data)
@@ -808,7 +809,9 @@ class State(Validity):
     def closest(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closest:
         """Where two sets are nearest; ``allow_estimated`` and ``strayed`` as in `require_bodies`."""
         self.require_bodies(gap.bodies, allow_estimated=allow_estimated, strayed=strayed)
-        return self._distances(gap.query, Per.SETS).at(0)
+        if self._apart:
+            return self._distances(gap.query, Per.SETS).at(0)
+        return self._surveyor.closest(gap.query, self._rotations, self._positions)
 
     def closest_per_body(self, gap: Gap, *, allow_estimated: bool = False, strayed: bool = False) -> Closests:
         """Where each body of ``gap.b`` is nearest to ``gap.a``, in the order of ``gap.b``."""

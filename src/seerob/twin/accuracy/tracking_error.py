@@ -138,9 +138,10 @@ class TrackingError:
 
     def none(self, state: State) -> bool:
         """Whether no device says where any of these people are, and the twin follows: nothing is off then."""
-        return not any(
-            state.hearing(person, strayed=True).bones or state.stray(person) for person in self._bones
-        )
+        for person in self._bones:
+            if state.hearing(person, strayed=True).bones or state.stray(person):
+                return False
+        return True
 
     def at(self, state: State) -> Array:
         """Tracking error of each body [m], shape (b,)."""

@@ -86,6 +86,8 @@ class Validity:
         """By question and person, bones that may not be relied on at this tick."""
         self._lost: dict[int, tuple[frozenset[str], tuple[int, ...]]] = {}
         self._relied_on: set[Hashable] = set()
+        self._sound: dict[int, bool] = {}
+        """By whom bodies belong to, whether nothing of any of them is in doubt at this tick."""
 
     def heard(self) -> None:
         """Work every reason out again: what is known of robots, people and machines has changed."""
@@ -93,6 +95,7 @@ class Validity:
         self._bones.clear()
         self._lost.clear()
         self._relied_on.clear()
+        self._sound.clear()
 
     # -- what says nothing of whether it may be relied on is closed while a criterion is asked ----
 
@@ -300,6 +303,8 @@ class Validity:
         """
         owners = self._owners(bodies)
         self.asked |= owners.everyone
+        if self._all_sound(owners) and not self.attachments.unknown:
+            return
         key = owners.key, allow_estimated, strayed
         if key in self._relied_on:
             return
@@ -322,6 +327,9 @@ class Validity:
     def invalid_bodies(self, bodies: tuple[int, ...]) -> tuple[int, ...]:
         """Bodies that are bones in doubt, of people whose other bones may be relied on."""
         owners = self._owners(bodies)
+        if self._all_sound(owners):
+            self.asked |= owners.people.keys()
+            return ()
         if owners.key not in self._lost:
             known = frozenset(name for name in owners.people if not self.invalid_place_reason(name))
             lost = {f"{name}/{bone}" for name in known for bone in self.bones_in_doubt(name)}
@@ -330,6 +338,18 @@ class Validity:
         known, which = self._lost[owners.key]
         self.asked |= known
         return which
+
+    def _all_sound(self, owners: _Owners) -> bool:
+        """Whether nothing of any of them is in doubt: what is mostly so, and found out once a tick."""
+        found = self._sound.get(owners.key)
+        if found is None:
+            found = self._sound[owners.key] = all(map(self._is_sound, owners.everyone))
+        return found
+
+    def _is_sound(self, name: str) -> bool:
+        if self.invalid_reason(name) or self.invalid_place_reason(name) or self.heard_doubt(name):
+            return False
+        return not self._hearings[name].bones_heard or not self._bones_in_doubt(name)
 
     def _owners(self, bodies: tuple[int, ...]) -> _Owners:
         found = self._owners_of.get(bodies)

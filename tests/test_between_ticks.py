@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from seerob.criteria.safety.power_and_force import Contacts
 from seerob.description.humans.skeleton import BONES
 from seerob.session.run import Judge, engine_of, pump, ticks
 from seerob.twin.engine import Engine
+from seerob.twin.spans import ROUNDING, AllFalls, Fall, Span, approaching, speeding
 from worst_between import worst_found
 
 STICK = (
@@ -724,3 +726,26 @@ def test_a_ur10_that_nears_its_limits_by_a_thousandth_is_within_throughout(tmp_p
     assert near["speed"] > 0.9
     summary = reaching(tmp_path / "near", distance=far["distance"].min() - 0.001, **near).run()
     assert {series.verdict for series in summary.results.values()} == {Verdict.WITHIN}
+
+
+def test_the_falls_of_all_in_one_call_are_those_of_each_by_itself():
+    rng = np.random.default_rng(5)
+    rows = [tuple(rng.choice(9, n, replace=False).tolist()) for n in (1, 3, 0, 9, 2, 4)]
+    every = [
+        approaching(rows[0], rows[1]),
+        speeding(rows[3]),
+        approaching(rows[2], rows[5]),
+        speeding(rows[4]),
+    ]
+    for _ in range(20):
+        bounds, joints, mj = rng.uniform(0, 3, (3, 9)), np.zeros((4, 2)), SimpleNamespace(nv=2)
+        span = Span(0.2, 0.2 + rng.random(), *bounds, joints, None, mj)
+        found = AllFalls([every[0], None, *every[1:]]).of(span)
+        assert found == {each: each(span, 0.0) for each in every}
+        for each, (first, second) in ((every[0], (rows[0], rows[1])), (every[2], (rows[2], rows[5]))):
+            way = [span.fast[list(r)].max(initial=0.0) * span.T + ROUNDING for r in (first, second)]
+            assert found[each] == Fall(sum(way))
+        fast = span.quick[list(rows[3])].max() * span.T + ROUNDING, span.bend[list(rows[3])].max() + ROUNDING
+        assert found[every[1]] == Fall(*fast)
+    span.fast[rows[0][0]] = np.nan
+    assert np.isnan(AllFalls(every).of(span)[every[0]].fall)

@@ -24,7 +24,18 @@ from seerob.core.snapshot import Result, Verdict
 from seerob.core.transforms import Array
 from seerob.criteria.criterion import Criterion, Evaluate, Follows, Lowest, Moment
 from seerob.model.model import Model
-from seerob.twin.spans import Fall, Falls, Indices, Margin, Path, Points, Span
+from seerob.twin.spans import (
+    AllFalls,
+    Approaching,
+    Fall,
+    Falls,
+    Indices,
+    Margin,
+    Path,
+    Points,
+    Span,
+    Speeding,
+)
 from seerob.twin.state import State
 
 MOST = 32
@@ -150,6 +161,9 @@ class BetweenTicks:
         self._shadow: State | None = None
         self._whole: Span | None = None
         """Of the way from tick to tick, which all criteria ask for."""
+        self._simple = AllFalls(watch.falls for watch in watches if watch is not None)
+        self._falls: dict[Falls, Fall] | None = None
+        """What these can lose on that way."""
         self._again: dict[int, Evaluate] = {}
         self._followed: dict[Watch, Followed] = {}
         self._failed: dict[int, str] = {}
@@ -176,7 +190,7 @@ class BetweenTicks:
         speeds, ids, path = state.largest_speeds(), state.attachments.ids, state.path
         if path is None or self._ids is None or self._speeds is None:
             path, self._before, self._followed = None, [None] * len(found), {}
-        self._way, self._asking, self._whole = path, asking, None
+        self._way, self._asking, self._whole, self._falls = path, asking, None, None
         for i, watch in enumerate(self._watches):
             if watch is None:
                 continue
@@ -395,10 +409,14 @@ class BetweenTicks:
     def _fall(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> Fall:
         assert watch.falls is not None
         span = self._span(watch, path, ends, state)
-        least = [end.margin[0] - end.margin[1] for end in ends if end.margin is not None]
-        if len(least) == 1:
-            return watch.falls(span, least[0])
-        m, other = least
+        if span is self._whole and isinstance(watch.falls, Approaching | Speeding):
+            if self._falls is None:
+                self._falls = self._simple.of(span)
+            return self._falls[watch.falls]
+        (m, off), *rest = [end.margin for end in ends if end.margin is not None]
+        if not rest:
+            return watch.falls(span, m - off)
+        m, other = m - off, rest[0][0] - rest[0][1]
         return watch.falls(span, min(m, other) if type(m) is float is type(other) else np.minimum(m, other))
 
     def _low(self, watch: Watch, path: Path, ends: tuple[End, End], state: State) -> float:
@@ -417,15 +435,9 @@ class BetweenTicks:
                 return float(watch.lowest(state, self._span(watch, path, ends, state)))
             except Undecided:
                 return -np.inf
-        fall, bend = self._fall(watch, path, ends, state)
-        (m, off), *rest = [m for m in (self._left(watch, end) for end in ends) if m is not None]
-        if not rest:
-            return float(np.min(m - fall - off))
-        ((other, also),) = rest
-        if all(type(x) is float for x in (m, other, fall, bend)):
-            return float(max((m + other - fall) / 2, min(m, other) - bend) - max(off, also))
-        low = np.maximum((m + other - fall) / 2, np.minimum(m, other) - bend)
-        return float(np.min(low - np.maximum(off, also)))
+        fall = self._fall(watch, path, ends, state)
+        one, *rest = [m for m in (self._left(watch, end) for end in ends) if m is not None]
+        return _least(one, rest[0] if rest else None, fall)
 
     def _search(self, i: int, watch: Watch, ends: tuple[End, End], low: float, state: State) -> Told:
         path = self._way
@@ -487,6 +499,18 @@ class BetweenTicks:
         shadow.captured_qpos = path.captured_at(t)
         shadow.refresh(t)
         return shadow
+
+
+def _least(one: Margin, other: Margin | None, lost: Fall) -> float:
+    """Bound on the margin between two ends, of which one is known at least, tolerances taken off."""
+    (m, off), (fall, bend) = one, lost
+    if other is None:
+        return float(np.min(m - fall - off))
+    m_other, also = other
+    if type(m) is type(m_other) is type(fall) is type(bend) is float:
+        return float(max((m + m_other - fall) / 2, min(m, m_other) - bend) - max(off, also))
+    low = np.maximum((m + m_other - fall) / 2, np.minimum(m, m_other) - bend)
+    return float(np.min(low - np.maximum(off, also)))
 
 
 def _end(criterion: Criterion, result: Result, t: float, speeds: Array) -> End:

@@ -175,3 +175,103 @@ def joints_at(t: Array, q: Array, v: Array, when: float, position: Array, veloci
         c2, c3 = 3 * chord - 2 * c1 - last, c1 + last - 2 * chord
         position[i] = q[k, i] + x * (c1 + x * (c2 + x * c3))
         velocity[i] = (c1 + x * (2 * c2 + x * 3 * c3)) / T
+
+
+@njit(f"f8({_ROW}, i8[::1])", cache=True, nogil=True, error_model="numpy")
+def greatest(values: Array, rows: Indices) -> float:
+    """Largest of some values that are not negative; 0 of none, NaN where one is not a number."""
+    found = 0.0
+    for row in rows:
+        found = np.maximum(found, values[row])
+    return found
+
+
+@njit(
+    f"void({_ROW}, {_ROW}, {_ROW}, f8, f8, i8[::1], i8[::1], b1[::1], {_ROW}, {_ROW})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def all_falls(
+    fast: Array,
+    quick: Array,
+    bend: Array,
+    T: float,
+    rounding: float,
+    start: Indices,
+    rows: Indices,
+    nears: Flags,
+    fall: Array,
+    below: Array,
+) -> None:
+    """How far distances and speeds of sets of points can fall within a span; writes the last two arguments.
+
+    Args:
+        fast: Of points, from `point_bounds`, as the next two, shape (p,).
+        quick: Likewise.
+        bend: Likewise.
+        T: Length of the span [s].
+        rounding: Added to each bound.
+        start: Where the points of each set begin, shape (2 n + 1,): two sets for each figure, of which the
+            second is that of whom a distance is to.
+        rows: The points of all sets.
+        nears: Whether each is a distance; otherwise a speed, shape (n,).
+        fall: From any instant to any other [m or m/s], shape (n,).
+        below: Below the lesser of both ends, shape (n,); infinite where no more is known.
+    """
+    for i in range(len(fall)):
+        first, second = rows[start[2 * i] : start[2 * i + 1]], rows[start[2 * i + 1] : start[2 * i + 2]]
+        if nears[i]:
+            one, other = greatest(fast, first) * T + rounding, greatest(fast, second) * T + rounding
+            fall[i], below[i] = one + other, np.inf
+        else:
+            fall[i], below[i] = greatest(quick, first) * T + rounding, greatest(bend, first) + rounding
+
+
+@njit(
+    f"void(i8[::1], b1[::1], {_ROW}, {_ROW}, {_ROW}, b1[::1], {_ROWS}, {_ROW})",
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def column_changes(
+    joints: Indices,
+    turns: Flags,
+    lengths: Array,
+    qd: Array,
+    away: Array,
+    moves: Flags,
+    shares: Array,
+    found: Array,
+) -> None:
+    r"""How quickly columns of a point's linear Jacobian change at most; writes into the last argument.
+
+    A column, :math:`z_j \times r_j` of a joint that turns and :math:`z_j` of one that slides, turns with
+    all joints before it, and :math:`r_j` changes with joint j and all after it.
+
+    Args:
+        joints: That move the point, from base to tip, shape (k,).
+        turns: Whether each turns; otherwise it slides.
+        lengths: Of the segment behind each [m].
+        qd: Largest speeds of all joints [rad/s or m/s], shape (nv,).
+        away: Their largest ways from the model's pose, shape (nv,).
+        moves: Which of them count, shape (nv,).
+        shares: Of each, the shares of the columns' joints, not negative, shape (nv, n).
+        found: Per second, shape (n,).
+    """
+    found[:] = 0.0
+    k = len(joints)
+    reaches, onwards = np.empty(k), np.empty(k)
+    reach, onward, spun = 0.0, 0.0, 0.0
+    for i in range(k - 1, -1, -1):
+        reach += lengths[i] + (0.0 if turns[i] else away[joints[i]])
+        onward += qd[joints[i]] * (reach if turns[i] else 1.0)
+        reaches[i], onwards[i] = reach, onward
+    for i in range(k):
+        spin = qd[joints[i]] if turns[i] else 0.0
+        spun += spin
+        before = spun - spin
+        change = before * reaches[i] + onwards[i] if turns[i] else before
+        if moves[joints[i]]:
+            for c in range(len(found)):
+                found[c] += change * shares[joints[i], c]

@@ -13,7 +13,7 @@ falls at most ``bend`` below the lesser of both ends, is there nowhere below
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,8 +22,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seerob.core.transforms import Array
-from seerob.kernels.spans import joint_bounds, joints_at, point_bounds
-from seerob.model.model import Model
+from seerob.kernels.spans import (
+    all_falls,
+    column_changes,
+    greatest,
+    joint_bounds,
+    joints_at,
+    point_bounds,
+)
+from seerob.model.model import Mechanism, Model
 
 Indices = NDArray[np.int64]
 Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]
@@ -33,7 +40,22 @@ Foresee = Callable[[str, Array], tuple[Array, Array, str] | None]
 Knots = Callable[[str, float, float], Iterable[float]]
 """Asks of a robot, and from when to when [s], between which instants what it is known to do is one cubic."""
 
-Coupling = Mapping[int, Array]
+
+class Coupling(NamedTuple):
+    """What the commanded joints of a robot do to all joints."""
+
+    moves: NDArray[np.bool_]
+    """Which of them they move, in the order of ``MjData.qvel``, shape (nv,)."""
+    shares: Array
+    """Absolute share of each commanded one in it, shape (nv, n)."""
+
+
+def coupling_of(model: Model, mechanism: Mechanism) -> Coupling:
+    """Of a robot's own joints."""
+    moves, shares = np.zeros(model.mj.nv, bool), np.zeros((model.mj.nv, mechanism.coupling.shape[1]))
+    moves[mechanism.v_address], shares[mechanism.v_address] = True, np.abs(mechanism.coupling)
+    return Coupling(moves, shares)
+
 
 ROUNDING = 1e-9
 """Added to every bound on a way or a speed [m, m/s]: the error of rounding is far below."""
@@ -214,25 +236,13 @@ class Points:
     def column_changes(self, point: int, span: Span, coupling: Coupling) -> Array:
         r"""How quickly columns of a point's linear Jacobian change at most, per second, shape (n,).
 
-        A column, :math:`z_j \times r_j` of a joint that turns and :math:`z_j` of one that slides, turns with
-        all joints before it, and :math:`r_j` changes with joint j and all after it.
-
         Args:
             point: See `add`.
             span: Within which.
-            coupling: By joint that moves, in ``MjData.qvel``, the share of each commanded one, shape (n,).
+            coupling: Whose columns.
         """
-        dofs, turns, lengths = self.chain(point)
-        speeds = span.qd[dofs]
-        reach = np.cumsum((lengths + np.where(turns, 0.0, span.away[dofs]))[::-1])[::-1]
-        onward = np.cumsum((speeds * np.where(turns, reach, 1.0))[::-1])[::-1]
-        spin = np.where(turns, speeds, 0.0)
-        before = np.cumsum(spin) - spin
-        change = np.where(turns, before * reach + onward, before)
-        found = np.zeros(len(next(iter(coupling.values()), ())))
-        for dof, rate in zip(dofs.tolist(), change.tolist(), strict=True):
-            if dof in coupling:
-                found += rate * np.abs(coupling[dof])
+        found = np.empty(coupling.shares.shape[1])
+        column_changes(*self.chain(point), span.qd, span.away, *coupling, found)
         return found
 
     def _chains(self, mj: mujoco.MjModel, ids: Indices) -> None:
@@ -334,7 +344,7 @@ class Span:
 
     def way(self, rows: Indices) -> float:
         """Longest way of any of some points within the span [m]."""
-        return float(self.fast[rows].max(initial=0.0)) * self.T + ROUNDING
+        return greatest(self.fast, rows) * self.T + ROUNDING
 
 
 Margin = tuple[Array | float, Array | float]
@@ -434,22 +444,65 @@ def down_to(least: Array | float, lowest: Array | float) -> Fall:
     return Fall(np.inf, np.maximum(np.asarray(least) - lowest, 0.0))
 
 
-def approaching(a: Iterable[int], b: Iterable[int]) -> Falls:
+@dataclass(frozen=True, eq=False)
+class Approaching:
+    """Bounds the change of a distance between two sets of points by the ways of both."""
+
+    first: Indices
+    second: Indices
+
+    def __call__(self, span: Span, _: Array | float) -> Fall:
+        """How far it can fall within a span [m]."""
+        return Fall(span.way(self.first) + span.way(self.second))
+
+
+@dataclass(frozen=True, eq=False)
+class Speeding:
+    """Bounds the change of the speed of the fastest of some points."""
+
+    rows: Indices
+
+    def __call__(self, span: Span, _: Array | float) -> Fall:
+        """How far it can rise within a span [m/s]."""
+        faster = greatest(span.quick, self.rows) * span.T
+        return Fall(faster + ROUNDING, greatest(span.bend, self.rows) + ROUNDING)
+
+
+def approaching(a: Iterable[int], b: Iterable[int]) -> Approaching:
     """Bound the change of a distance between two sets of points by the ways of both."""
-    first, second = rows_of(a), rows_of(b)
-
-    def falls(span: Span, _: Array | float) -> Fall:
-        return Fall(span.way(first) + span.way(second))
-
-    return falls
+    return Approaching(rows_of(a), rows_of(b))
 
 
-def speeding(points: Iterable[int]) -> Falls:
+def speeding(points: Iterable[int]) -> Speeding:
     """Bound the change of the speed of the fastest of some points."""
-    rows = rows_of(points)
+    return Speeding(rows_of(points))
 
-    def falls(span: Span, _: Array | float) -> Fall:
-        faster = float(span.quick[rows].max(initial=0.0)) * span.T
-        return Fall(faster + ROUNDING, float(span.bend[rows].max(initial=0.0)) + ROUNDING)
 
-    return falls
+class AllFalls:
+    """Bounds what `approaching` and `speeding` do, of many figures in one compiled call.
+
+    Args:
+        falls: Of every figure; others than those are left out.
+    """
+
+    def __init__(self, falls: Iterable[Falls | None]) -> None:
+        self._own = [each for each in falls if isinstance(each, Approaching | Speeding)]
+        sets = [
+            rows
+            for each in self._own
+            for rows in (
+                (each.first, each.second) if isinstance(each, Approaching) else (each.rows, each.rows[:0])
+            )
+        ]
+        self._nears = np.array([isinstance(each, Approaching) for each in self._own], bool)
+        self._start = np.cumsum([0, *map(len, sets)])
+        self._rows = np.concatenate([np.zeros(0, np.int64), *sets])
+
+    def of(self, span: Span) -> dict[Falls, Fall]:
+        """What each says of a span."""
+        falls, below = np.empty((2, len(self._own)))
+        all_falls(
+            span.fast, span.quick, span.bend, span.T, ROUNDING,
+            self._start, self._rows, self._nears, falls, below,
+        )  # fmt: skip
+        return dict(zip(self._own, map(Fall, falls.tolist(), below.tolist()), strict=True))

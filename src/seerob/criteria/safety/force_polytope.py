@@ -29,7 +29,7 @@ from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.recording.answers import Answers
 from seerob.twin import joint_torques
-from seerob.twin.spans import ROUNDING, UNBOUNDED, Fall, Falls, Points, Span, down_to
+from seerob.twin.spans import ROUNDING, UNBOUNDED, Fall, Falls, Points, Span, coupling_of, down_to
 from seerob.twin.state import State
 from seerob.twin.states import States
 
@@ -160,7 +160,7 @@ class ForcePolytope(Criterion, frozen=True, kw_only=True):
         lower, upper, _ = self._torques(model, robot)
         local = frame.body_from_frame[:3, :3] @ np.array(self.offset) + frame.body_from_frame[:3, 3]
         point = points.add(frame.mj, local)
-        coupling = dict(zip(robot.v_address.tolist(), robot.coupling, strict=True))
+        coupling = coupling_of(model, robot)
         heavy = [int(b) for b in robot.mj_bodies if model.mj.body_mass[b] > 0 and self.load == "gravity"]
         weights = np.linalg.norm(model.mj.opt.gravity) * model.mj.body_mass[heavy]
         centres = [points.add(b, model.mj.body_ipos[b]) for b in heavy]

@@ -18,7 +18,7 @@ from seerob.kernels.axes import principal_axes
 from seerob.model import provenance
 from seerob.model.model import Model
 from seerob.recording.answers import Answers
-from seerob.twin.spans import Fall, Falls, Points, Span
+from seerob.twin.spans import Fall, Falls, Points, Span, coupling_of
 from seerob.twin.state import State
 from seerob.twin.states import States
 
@@ -166,7 +166,7 @@ class Manipulability(Criterion, frozen=True, kw_only=True):
         mechanism = model.carrier(frame)
         local = frame.body_from_frame[:3, :3] @ np.array(self.offset) + frame.body_from_frame[:3, 3]
         point = points.add(frame.mj, local)
-        coupling = dict(zip(mechanism.v_address.tolist(), mechanism.coupling, strict=True))
+        coupling = coupling_of(model, mechanism)
 
         def falls(span: Span, _: Array | float) -> Fall:
             moved = points.column_changes(point, span, coupling)

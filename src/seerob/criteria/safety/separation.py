@@ -14,6 +14,7 @@ from msgspec.structs import replace
 from seerob.core import figures
 from seerob.core.domains import at_least, number
 from seerob.core.errors import InputError, Undecided
+from seerob.core.markers import drawn
 from seerob.core.snapshot import Basis, Input, Origin, Result, Segment, Verdict
 from seerob.core.tolerances import Shifts, Tolerance, deciding
 from seerob.core.transforms import Array
@@ -364,29 +365,30 @@ class Separation(Criterion, frozen=True, kw_only=True):
             where = f"{parts[k].name} ↔ {nearest}"
             if seen[0] > (self.human_speed or WALKING):
                 where += f", and {human} is seen at {seen[0]:.2f} m/s, faster than v_h"
-            shown = figures.against(float(found.distance[k]), float(S_p[k]), self.unit, at_most=self.at_most)
-            segment = Segment(
-                start=tuple(found.point_b[k].tolist()),
-                end=tuple(found.point_a[k].tolist()),
-                label=f"{shown.value} m, S_p {shown.limit} m",
-                verdict=verdict,
-            )
+            value, limit = float(found.distance[k]), float(S_p[k])
+
+            def draw() -> tuple[Segment, ...]:
+                shown = figures.against(value, limit, self.unit, at_most=self.at_most)
+                label = f"{shown.value} m, S_p {shown.limit} m"
+                start, end = tuple(found.point_b[k].tolist()), tuple(found.point_a[k].tolist())
+                return (Segment(start=start, end=end, label=label, verdict=verdict),)
+
             return Result(
                 name=self.name,
-                value=float(found.distance[k]),
+                value=value,
                 unit=self.unit,
-                limit=float(S_p[k]),
+                limit=limit,
                 at_most=False,
                 verdict=verdict,
                 reason=f"{where}: {open_}" if verdict is Verdict.UNDECIDED else where,
                 interval=parts[k].interval,
                 parts=(
                     *parts,
-                    *self._shown(now, k, float(S_p[k]), (C + gap.deviation, Z_d, Z_r), seen[0]),
+                    *self._shown(now, k, limit, (C + gap.deviation, Z_d, Z_r), seen[0]),
                     *self._more(most - S_p, unbounded_reason),
                     *self._permissible(stop, state, course, now, found.distance, K, seen, stray),
                 ),
-                markers=(segment,),
+                markers=drawn(draw),
             )
 
         return evaluate

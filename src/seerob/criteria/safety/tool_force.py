@@ -23,7 +23,7 @@ from seerob.criteria.criterion import Criterion, Evaluate, Lowest, judge, judge_
 from seerob.model import provenance
 from seerob.model.model import Mechanism, Model
 from seerob.twin import joint_torques
-from seerob.twin.spans import Points, Span
+from seerob.twin.spans import Points, Span, coupling_of
 from seerob.twin.state import State
 
 DRAWN = 0.002
@@ -177,7 +177,7 @@ class ToolForce(Criterion, frozen=True, kw_only=True):
         given = self._uncertainty(model, robot)
         uncertainty = np.zeros(len(robot.joints)) if given is None else given
         point = points.add(frame.mj, frame.body_from_frame[:3, :3] @ offset + frame.body_from_frame[:3, 3])
-        coupling = dict(zip(robot.v_address.tolist(), robot.coupling, strict=True))
+        coupling = coupling_of(model, robot)
 
         def lowest(state: State, span: Span) -> float:
             J = state.jacobian(frame, robot, offset)[:3]

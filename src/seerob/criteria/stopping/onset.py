@@ -168,7 +168,8 @@ class Foreseen:
         k, end = math.floor(state.t / period + 1e-6), state.t + T_r + period
         last = math.ceil(end / period - 1e-6)
         # The same instants whenever they are asked for.
-        ticks = np.concatenate([[state.t], period * np.arange(k + 1, last + 1)])
+        ticks = np.asarray(period * np.arange(k, last + 1), float)
+        ticks[0] = state.t
         instants = with_knots(state.knots, self._robot.name, ticks)
         foreseen = state.foresee(self._robot.name, instants)
         if foreseen is None:
@@ -333,6 +334,12 @@ class _Joints:
             own = {dof: column for column, dof in enumerate(robot.v_address.tolist())}
             others = (m for m in state.model.mechanisms.values() if m is not robot)
             going = {dof for other in others for dof in other.v_address.tolist()}
+            self._alone = (
+                dofs == robot.v_address.tolist()
+                and np.array_equal(robot.coupling, np.eye(len(dofs)))
+                and not np.any(robot.offset)
+            )
+            """Whether they are the joints of the robot, each commanded itself."""
             self._own = np.array([i for i, dof in enumerate(dofs) if dof in own], np.int64)
             self._columns = np.array([own[dof] for dof in dofs if dof in own], np.int64)
             self._going = np.array([i for i, dof in enumerate(dofs) if dof in going - own.keys()], np.int64)
@@ -350,6 +357,8 @@ class _Joints:
             q: Positions of the robot's there [rad or m], shape (m, j).
             qd: Velocities there, shape (m, j).
         """
+        if self._alone:
+            return q, qd
         dofs = self._chains.dofs
         every_q, every_v = (np.tile(each[dofs], (len(t), 1)) for each in (now.qpos, now.qvel))
         if len(self._going):

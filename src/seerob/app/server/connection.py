@@ -33,7 +33,7 @@ CONNECTIONS = 200.0, 600.0
 AT_ONCE = 64
 """Connections that are closed before others in the loop have their turn."""
 PIECE = 1024
-"""Of what one page sent that is read at once [B]."""
+"""Bytes of one page that are read at once."""
 HANDSHAKE = 5.0
 """How long the beginning of TLS may take [s]."""
 PINGS = 5.0, 20.0

@@ -38,6 +38,7 @@ from seerob.devices.live.arrivals import Arrivals, Statistics
 from seerob.devices.live.contact import Contact, contact_of
 from seerob.devices.live.contradictions import Contradictions
 from seerob.devices.live.device_clock import AFTER, HOLD, DeviceClock, Instant, Known
+from seerob.protocols.links.datagrams import DISTRUST
 from seerob.workstation.source import Opened, Source, Target
 
 _log = logging.getLogger(__name__)
@@ -233,6 +234,8 @@ class Listener:
         self._contradictions: dict[tuple[str, ...], Contradictions] = {}
         self._found: dict[tuple[str, ...], tuple[str, float]] = {}
         """What contradicted itself, and until when that counts [s]."""
+        self._distrusted = "", -math.inf
+        """Why it may be somebody else who is heard, and until when that counts [s]."""
         self._posted: dict[tuple[str, ...], Sample] = {}
         self._people: dict[tuple[str, ...], _Person] = {}
         self._lock = Lock()
@@ -274,6 +277,7 @@ class Listener:
             if self._stopping:
                 return
         _said.set(set())
+        DISTRUST.set(self._distrust)
         pause = FIRST_PAUSE
         while True:
             self._clock.reconnect()
@@ -335,7 +339,10 @@ class Listener:
         late = (self._source.delay or 0.0) * (not self._source.asked)
         if sample.t_device is not None:
             late = self._clock.latency
+        distrusted, until = self._distrusted
         reason = heard.invalid_reason or self._contradiction(sample, what, host)
+        if host <= until:
+            reason = distrusted
         if sample.t_device is None and not self._source.asked and self._source.delay is None:
             reason = reason or UNTIMED
         quality = sample.quality
@@ -374,6 +381,14 @@ class Listener:
         self._posted[what] = replace(last, t=last.t + AFTER, quality=quality, reason=reason, seq=self._seq)
         self._seq += 1
         self._post(self._posted[what])
+
+    def _distrust(self, reason: str) -> None:
+        """Doubt what was said last, and what comes for a while: it may be of somebody else."""
+        self._distrusted = reason, time.monotonic() + HOLD
+        say_once(_log, logging.WARNING, f"{self.name}: {reason}")
+        for what in tuple(self._posted):
+            if not isinstance(self._posted[what], SignalSample):
+                self._doubt(what, reason)
 
     def _contradiction(self, sample: Sample, what: tuple[str, ...], host: float) -> str:
         """What in it contradicts what was said before, now or a moment ago."""

@@ -60,7 +60,9 @@ class Kinect(CaptureStream, frozen=True, kw_only=True):
     link: Link = Link.UDP
     """``udp``: the sender sends to this machine; ``websocket``: this machine connects to the sender."""
     host: str = ""
-    """Address of the camera's PC; with ``udp`` only its datagrams count, anyone's when not given."""
+    """Address of the camera's PC; with ``udp`` only its datagrams count, and those of whoever sends
+    first when not given. It is no proof: addresses of datagrams can be forged. When anybody else sends, the
+    person is undecided."""
     port: Annotated[int, Meta(ge=1, le=65535)] = PORT
     bind: str = "0.0.0.0"  # noqa: S104  # whoever sends is on another machine
     """Own address on which datagrams are listened for."""

@@ -259,7 +259,8 @@ class Mvn(CaptureStream, frozen=True, kw_only=True):
     port: Annotated[int, Meta(ge=1, le=65535)] = mvn.PORT
     """Own port that MVN sends to."""
     sender: str = ""
-    """Address of the computer with MVN; what others send is not listened to. Anyone's when not given."""
+    """Address of the computer with MVN; whoever sends first when not given. It is no proof: addresses of
+    datagrams can be forged. When anybody else sends, the person is undecided."""
     transport: Transport = Transport.UDP
     """``udp`` or ``tcp``, as MVN's settings say."""
     frequency: Annotated[float, Meta(ge=1, le=240, extra={"unit": "Hz"})] = 60.0

@@ -38,7 +38,8 @@ class Rokoko(CaptureStream, frozen=True, kw_only=True):
     port: Annotated[int, Meta(ge=1, le=65535)] = PORT
     """Own port that Studio sends to."""
     sender: str = ""
-    """Address of the computer with Studio; what others send is not listened to. Anyone's when not given."""
+    """Address of the computer with Studio; whoever sends first when not given. It is no proof: addresses of
+    datagrams can be forged. When anybody else sends, the person is undecided."""
     frequency: Annotated[float, Meta(ge=1, le=200, extra={"unit": "Hz"})] = 100.0
     """Rate of the stream in Studio's settings [Hz]."""
 

@@ -61,8 +61,9 @@ class Vive(CaptureStream, frozen=True, kw_only=True):
     """``udp``: the sender sends to this machine; ``websocket``: this machine connects to it; ``openvr``:
     SteamVR runs here."""
     host: str = ""
-    """Name or address of the computer with SteamVR; with ``udp`` only its datagrams count, anyone's when not
-    given."""
+    """Name or address of the computer with SteamVR; with ``udp`` only its datagrams count, and those of
+    whoever sends first when not given. It is no proof: addresses of datagrams can be forged. When anybody
+    else sends, the person is undecided."""
     port: Annotated[int, Meta(ge=1, le=65535)] = PORT
     bind: str = "127.0.0.1"
     """Own address on which datagrams are listened for; when not given, only this machine is heard."""

@@ -9,6 +9,7 @@ import time
 from collections import deque
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
+from contextvars import ContextVar
 from typing import Any, NamedTuple
 
 from seerob.protocols.links.reception import Reception
@@ -34,17 +35,30 @@ Answer = Callable[[bytes], bytes | None]
 """What is sent back to whoever sent a datagram; None for nothing."""
 
 
+DISTRUST: ContextVar[Callable[[str], None]] = ContextVar("distrust")
+"""Is told, by whoever listens, why what is heard may not be from whom it seems to be."""
+
+
+def distrust(reason: str) -> None:
+    """Say why what is heard may not be from whom it seems to be."""
+    if (told := DISTRUST.get(None)) is not None:
+        told(reason)
+
+
 class Datagrams(asyncio.DatagramProtocol):
-    """What arrives at one port.
+    """What arrives at one port from the first who sends there, address and port; who else sends is told.
 
     Attributes:
         port: Of this machine.
         dropped: Datagrams that nobody read in time.
-        strangers: Datagrams from other addresses than the one that is listened to.
+        strangers: Datagrams from others than the one who is listened to.
     """
 
-    def __init__(self, senders: frozenset[str] | None, answer: Answer | None) -> None:
-        self._senders, self._answer = senders, answer
+    def __init__(
+        self, senders: frozenset[str] | None, answer: Answer | None, *, one_port: bool = True
+    ) -> None:
+        self._senders, self._answer, self._one_port = senders, answer, one_port
+        self._first: tuple[str, int] | None = None
         self._loop = asyncio.get_running_loop()
         self._waiting: deque[Datagram] = deque(maxlen=WAITING)
         self._wakeup = Wakeup()
@@ -87,8 +101,13 @@ class Datagrams(asyncio.DatagramProtocol):
         self._take(time.monotonic(), data, addr)
 
     def _take(self, arrived: float, data: bytes, sender: tuple[str | Any, int]) -> None:
-        if self._senders is not None and plain(sender[0]) not in self._senders:
+        who = plain(sender[0]), int(sender[1]) if self._one_port else 0
+        if self._first is None and (self._senders is None or who[0] in self._senders):
+            self._first = who
+        if who != self._first:
             self.strangers += 1
+            heard = "nobody yet" if self._first is None else _shown(self._first)
+            distrust(f"{_shown(who)} sends to port {self.port}, too; heard is {heard}")
             return
         self.dropped += len(self._waiting) == WAITING
         self._waiting.append(Datagram(arrived, data))
@@ -137,6 +156,10 @@ class Datagrams(asyncio.DatagramProtocol):
                     raise TimeoutError(f"nothing sent to port {self.port} for {silence:g} s") from error
 
 
+def _shown(who: tuple[str, int]) -> str:
+    return f"{who[0]} port {who[1]}" if who[1] else who[0]
+
+
 def plain(address: Any) -> str:
     """An address as its sender calls it: IPv4 looks otherwise through a socket of IPv6."""
     return str(address).lower().removeprefix("::ffff:")
@@ -150,15 +173,17 @@ async def listening(
     sender: str | None = None,
     answer: Answer | None = None,
     group: str | None = None,
+    one_port: bool = True,
 ) -> AsyncGenerator[Datagrams, None]:
     """Listen on a port of this machine.
 
     Args:
         bind: Own address to listen on.
         port: 0 is any free one.
-        sender: Name or address of whose datagrams count; anyone's when None.
+        sender: Name or address of whose datagrams count; of whoever sends first when None.
         answer: Asked at once for each datagram that counts; must not raise.
         group: Multicast group to join, on the interface that has the address ``bind``.
+        one_port: Whether all of a sender's datagrams come from one port of it.
 
     Raises:
         OSError: The port is taken, the address is not of this machine, or nobody knows the sender's name.
@@ -170,7 +195,7 @@ async def listening(
         senders = frozenset(plain(address[0]) for *_, address in known)
     (found, *_) = await loop.getaddrinfo(bind, port, type=socket.SOCK_DGRAM)
     link = _bound(found[0], found[4]) if group is None else _member(bind, port, group)
-    heard = Datagrams(senders, answer)
+    heard = Datagrams(senders, answer, one_port=one_port)
     try:
         loop.add_reader(link, heard.attach(link))
     except NotImplementedError:  # a loop of Windows

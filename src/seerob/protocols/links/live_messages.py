@@ -10,7 +10,7 @@ from contextlib import aclosing
 from typing import Generic, Protocol, TypeVar
 
 from seerob.protocols import ProtocolError
-from seerob.protocols.links.datagrams import listening
+from seerob.protocols.links.datagrams import distrust, listening
 
 MAX_MESSAGE = 1 << 20
 SILENCE = 2.0
@@ -19,6 +19,8 @@ NONSENSE = 50
 """Messages in a row that cannot be read before the connection is given up."""
 RESTART = 1.0
 """A device whose time goes back by more has started again [s]."""
+REORDERED = 0.25
+"""What is older than the newest by more was not overtaken on the way [s]: it is played again, or of two."""
 CONNECT_WITHIN = 2.0
 """[s]"""
 
@@ -63,6 +65,9 @@ class Sieve(Generic[T]):
         self._nonsense = 0
         if said.t < self._last - RESTART:
             raise ProtocolError(f"{self._what} has started again")
+        if said.t < self._last - REORDERED:
+            old = f"says again what is {self._last - said.t:.2f} s old"
+            distrust(f"{self._what} {old}: played again, or of two senders")
         if said.t <= self._last:
             return None
         self._last = said.t
@@ -78,7 +83,7 @@ async def from_datagrams(
         sieve: Reads the messages.
         bind: Own address to listen on.
         port: 0 is any free one.
-        sender: Address whose messages count; anyone's when None.
+        sender: Address whose messages count; of whoever sends first when None.
         silence: Longest pause [s].
 
     Yields:

@@ -559,10 +559,10 @@ async def frames(
     address = found[0][4][0]
     queue: asyncio.Queue[Datagram | BaseException] = asyncio.Queue(512)
     async with AsyncExitStack() as stack:
-        port = await stack.enter_async_context(listening(bind, 0, sender=str(address)))
+        port = await stack.enter_async_context(listening(bind, 0, sender=str(address), one_port=False))
         ports = [port]
         if group is not None:
-            joined = listening(bind, data_port, sender=str(address), group=group)
+            joined = listening(bind, data_port, sender=str(address), group=group, one_port=False)
             ports.append(await stack.enter_async_context(joined))
         tasks = [asyncio.create_task(_forward(each, queue)) for each in ports]
         for task in tasks:
